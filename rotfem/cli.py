@@ -1,0 +1,217 @@
+"""The command line: parses, calls, prints. Exit status 0 done, 2 bad input, 3 the computation failed, 130 interrupted."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+from rotfem.errors import ComputationError, OutputError, SceneError
+from rotfem.scene import load_scene
+
+app = typer.Typer(
+    name="rotfem",
+    help="Rotating beams and plates with FEniCSx. A scene is a TOML file; see the README for its keys.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="scene file (TOML)", show_default=False)]
+Output = Annotated[Path | None, typer.Option("-o", "--output", help="result folder [results/<scene name>]")]
+Overrides = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="change a scene key, repeatable")]
+Json = Annotated[bool, typer.Option("--json", help="print the summary as JSON, and nothing else, on stdout")]
+NoPlots = Annotated[bool, typer.Option("--no-plots", help="write no figures")]
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")]
+Debug = Annotated[bool, typer.Option("--debug", help="show the traceback of an error")]
+
+
+@app.callback()
+def _root() -> None:
+    """Rotating beams and plates with FEniCSx."""
+
+
+@app.command()
+def run(
+    scene: ScenePath,
+    output: Output = None,
+    overrides: Overrides = [],  # noqa: B006 (typer reads the default)
+    as_json: Json = False,
+    no_plots: NoPlots = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Compute the steady state or the time history of SCENE."""
+    with Session(as_json, quiet, debug) as session:
+        loaded = load_scene(scene, overrides)
+        folder = session.folder(output or Path("results") / loaded.name)
+        from rotfem.simulation import run as simulate
+
+        try:
+            with session.progress(f"{loaded.name}: {loaded.model.theory}") as progress:
+                result = simulate(loaded, progress=progress)
+        except (ComputationError, KeyboardInterrupt) as error:
+            partial = getattr(error, "result", None)
+            if partial is not None:
+                session.write(partial, folder, plots=not no_plots)
+            raise
+        session.write(result, folder, plots=not no_plots)
+        session.say(result.summary, folder)
+
+
+class Session:
+    """One command under one set of flags: speaks on rank 0 only, and turns errors into messages and exit status.
+
+    Args:
+        as_json: print the summary on stdout as JSON and nothing else there.
+        quiet: print errors only.
+        debug: let tracebacks through.
+    """
+
+    def __init__(self, as_json: bool, quiet: bool, debug: bool):
+        from mpi4py import MPI
+
+        self.comm = MPI.COMM_WORLD
+        self.as_json, self.quiet, self.debug = as_json, quiet, debug
+        self.first = self.comm.rank == 0
+
+    def __enter__(self) -> Session:
+        signal.signal(signal.SIGTERM, _interrupt)
+        return self
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        if error is None or (self.debug and not isinstance(error, SystemExit)):
+            return
+        if isinstance(error, SceneError | OutputError):
+            self._end(str(error), 2)
+        if isinstance(error, ComputationError):
+            self._end(f"the computation failed: {error}", 3)
+        if isinstance(error, KeyboardInterrupt):
+            self._end("interrupted", 130)
+        if self.comm.size > 1 and not isinstance(error, SystemExit):
+            # A rank that fails alone would leave the others waiting for it.
+            import traceback
+
+            traceback.print_exception(kind, error, trace)
+            self.comm.Abort(1)
+
+    def _end(self, message: str, status: int) -> NoReturn:
+        if self.first:
+            print(f"rotfem: {message}", file=sys.stderr)
+        raise SystemExit(status) from None
+
+    def folder(self, path: Path) -> Path:
+        """Return the result folder, made by rank 0.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        from rotfem.results import prepare_folder
+
+        problem = None
+        if self.first:
+            try:
+                prepare_folder(path)
+            except OutputError as error:
+                problem = error
+        problem = self.comm.bcast(problem)
+        if problem is not None:
+            raise problem
+        return path
+
+    def progress(self, title: str) -> ProgressBar:
+        """Return the progress bar: on a terminal only, and only where the command may speak."""
+        return ProgressBar(title, self.first and not self.quiet and not self.as_json and sys.stderr.isatty())
+
+    def write(self, result: Any, folder: Path, plots: bool) -> None:
+        """Write a result and its figures from rank 0, and print its summary where --json asks for it."""
+        if not self.first:
+            return
+        result.write(folder)
+        if plots:
+            from rotfem.plots import plot_run
+
+            plot_run(result, folder)
+        if self.as_json:
+            from rotfem.results import json_text
+
+            sys.stdout.write(json_text(result.summary))
+        for warning in result.summary["warnings"]:
+            if not self.quiet:
+                print(f"warning: {warning}", file=sys.stderr)
+
+    def say(self, summary: dict[str, Any], folder: Path) -> None:
+        """Print what was done, in a few lines."""
+        if self.first and not (self.quiet or self.as_json):
+            print("\n".join(report(summary, folder)))
+
+
+class ProgressBar:
+    """Progress on stderr; calls are free where it is off.
+
+    Args:
+        title: text before the bar.
+        on: whether to draw it.
+    """
+
+    def __init__(self, title: str, on: bool):
+        self._bar: Any = None
+        self._title = title
+        self._on = on
+
+    def __enter__(self) -> Callable[[float], None]:
+        if not self._on:
+            return lambda share: None
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+        columns = (TextColumn(self._title), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+        self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
+        self._bar.start()
+        task = self._bar.add_task("", total=1.0)
+        return lambda share: self._bar.update(task, completed=share)
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+
+def report(summary: dict[str, Any], folder: Path) -> list[str]:
+    """Return the lines a run prints."""
+    f, time = summary["figures"], summary["timings"]
+    lines = [
+        f"{summary['name']}: {summary['theory']}, {summary['frame']} frame, {summary['elements']} elements, "
+        f"{summary['dofs']} dofs",
+        f"effects: {', '.join(summary['effects']) or 'none'} "
+        f"({summary['integrals']['F']} integrals in F, {summary['integrals']['J']} in J)",
+    ]
+    if summary["kind"] == "history":
+        lines.append(
+            f"{summary['steps']} steps, {summary['newton_iterations']} iterations in {time['total']:.2f} s "
+            f"(compile {time['compile']:.2f}, assemble {time['assemble']:.2f}, solve {time['solve']:.2f})"
+        )
+        for name in ("tip_u1", "tip_u2", "tip_u3"):
+            if f"{name}_min" in f:
+                lines.append(
+                    f"{name.replace('_', ' ')}: {f[f'{name}_min']:.6g} m at t = {f[f'{name}_min_time']:.4f} s … "
+                    f"{f[f'{name}_max']:.6g} m at t = {f[f'{name}_max_time']:.4f} s, at the end {f[f'{name}_final']:.6g} m"
+                )
+    else:
+        values = (f"{k.removesuffix('_final').replace('_', ' ')} = {v:.6g}" for k, v in f.items() if k.endswith("_final"))
+        lines.append(f"steady state in {time['total']:.2f} s: {', '.join(values)}")
+    return [*lines, f"results in {folder}"]
+
+
+def _interrupt(signum: int, frame: object) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def main() -> None:
+    """Run the command line."""
+    app()
+

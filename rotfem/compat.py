@@ -1,0 +1,26 @@
+"""The few places where dolfinx 0.9, 0.10 and 0.11 spell the same thing differently."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from dolfinx import fem, la
+from petsc4py import PETSc
+
+
+def create_vector(V: fem.FunctionSpace) -> Any:
+    """Return a ghosted PETSc vector for the dofs of V (0.9 wants a form, 0.11 a space)."""
+    index_map, bs = V.dofmap.index_map, V.dofmap.index_map_bs
+    ghosts = index_map.ghosts.astype(PETSc.IntType)
+    return PETSc.Vec().createGhost(
+        ghosts, size=(index_map.size_local * bs, index_map.size_global * bs), bsize=bs, comm=V.mesh.comm
+    )
+
+
+def wrap(x: la.Vector) -> Any:
+    """Return a PETSc vector that shares the memory of a dolfinx vector."""
+    if hasattr(la, "create_petsc_vector_wrap"):
+        return la.create_petsc_vector_wrap(x)
+    import dolfinx.la.petsc
+
+    return dolfinx.la.petsc.create_vector_wrap(x)

@@ -1,0 +1,127 @@
+"""The two errors a user can meet: a scene that is not valid, and a computation that failed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+_LONGEST_VALUE = 72
+
+
+class Problem(NamedTuple):
+    """One thing wrong with a scene.
+
+    Attributes:
+        key: Dotted path of the key, e.g. ``structure.length``; empty if the whole file is meant.
+        value: What the scene holds there; ``None`` if the key is absent or has no value worth showing.
+        allowed: What is wrong and what would be right.
+    """
+
+    key: str
+    value: Any
+    allowed: str
+
+    def __str__(self) -> str:
+        if not self.key:
+            return self.allowed
+        if self.value is None:
+            return f"{self.key}: {self.allowed}"
+        return f"{self.key} = {show(self.value)}: {self.allowed}"
+
+
+class SceneError(ValueError):
+    """A scene, or an override of it, is not valid.
+
+    Attributes:
+        file: File name of the scene (or the name given to it in Python).
+        key: Dotted path of the first offending key; empty if the whole file is meant.
+        value: What the scene holds there; ``None`` if there is nothing to show.
+        allowed: What is wrong with it and what is allowed.
+        others: Further problems found in the same pass.
+    """
+
+    def __init__(
+        self, file: str, key: str = "", value: Any = None, allowed: str = "", others: Sequence[Problem] = ()
+    ) -> None:
+        # All arguments go to the base class so that the error survives pickling (between MPI ranks).
+        super().__init__(file, key, value, allowed, tuple(others))
+        self.file = file
+        self.key = key
+        self.value = value
+        self.allowed = allowed
+        self.others = tuple(others)
+
+    @property
+    def problems(self) -> tuple[Problem, ...]:
+        """All problems, the first one first."""
+        return (Problem(self.key, self.value, self.allowed), *self.others)
+
+    def __str__(self) -> str:
+        first, *others = self.problems
+        if not others:
+            return f"{self.file}: {first}"
+        return "\n".join([f"{self.file}: {first} (and {len(others)} more)", *(f"  {problem}" for problem in others)])
+
+
+class ComputationError(RuntimeError):
+    """A computation on a valid scene failed.
+
+    Attributes:
+        what: What failed, e.g. ``Newton's method did not converge in 25 iterations``.
+        time: Time at which it failed (s), or ``None`` outside a time history.
+        advice: What to try; may be empty.
+    """
+
+    def __init__(self, what: str, time: float | None = None, advice: str = "") -> None:
+        super().__init__(what, time, advice)
+        self.what = what
+        self.time = time
+        self.advice = advice
+
+    def __str__(self) -> str:
+        message = self.what if self.time is None else f"{self.what} at t = {self.time:.6g} s"
+        return f"{message}; {self.advice}" if self.advice else message
+
+
+class OutputError(OSError):
+    """A result cannot be written.
+
+    Attributes:
+        path: File or folder that was to be written.
+        reason: Why it could not be.
+    """
+
+    def __init__(self, path: object, reason: str) -> None:
+        super().__init__(path, reason)
+        self.path = path
+        self.reason = reason
+
+    def __str__(self) -> str:
+        return f"output {self.path}: cannot be written: {self.reason}; choose a writable folder with -o DIR"
+
+
+def show(value: Any) -> str:
+    """Text of a value as it would stand in a TOML file.
+
+    Args:
+        value: Any value read from a scene.
+
+    Returns:
+        One line, shortened to a readable length.
+    """
+    text = _full_text(value)
+    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 1] + "…"
+
+
+def _full_text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_full_text, value))}]"
+    try:
+        return " ".join(repr(value).split())
+    except ValueError:  # Python refuses to print integers of several thousand digits
+        return f"<{type(value).__name__}>"

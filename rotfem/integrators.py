@@ -1,0 +1,218 @@
+"""Time stepping: generalised-α and Newmark as data, one step as update maps, and step control.
+
+One step from t_n to t_{n+1} = t_n + h satisfies F(q, v, q̈) = 0 at t_{n+1}, with (Arnold & Brüls 2007, eqs. 2–3)
+
+    q_{n+1} = q_n + h v_n + h² (½ − β) a_n + h² β a_{n+1}
+    v_{n+1} = v_n + h (1 − γ) a_n + h γ a_{n+1}
+    (1 − α_m) a_{n+1} + α_m a_n = (1 − α_f) q̈_{n+1} + α_f q̈_n
+
+where a is an auxiliary acceleration; Newmark is α_m = α_f = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.errors import ComputationError
+from rotfem.scene import Scene
+from rotfem.solvers import DirectSolver, Increment, Newton
+from rotfem.system import System
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """Parameters of one member of the family; second-order accurate when γ = ½ + α_f − α_m."""
+
+    alpha_m: float
+    alpha_f: float
+    beta: float
+    gamma: float
+
+    @classmethod
+    def generalised_alpha(cls, rho_inf: float) -> Scheme:
+        """Return the scheme of spectral radius rho_inf at infinite frequency (Chung & Hulbert 1993, eqs. 17, 25)."""
+        alpha_m = (2 * rho_inf - 1) / (rho_inf + 1)
+        alpha_f = rho_inf / (rho_inf + 1)
+        return cls(alpha_m, alpha_f, (1 - alpha_m + alpha_f) ** 2 / 4, 0.5 - alpha_m + alpha_f)
+
+    @classmethod
+    def newmark(cls, beta: float = 0.25, gamma: float = 0.5) -> Scheme:
+        """Return Newmark's scheme; (1/4, 1/2) is the trapezoidal rule."""
+        return cls(0.0, 0.0, beta, gamma)
+
+    @classmethod
+    def of(cls, scene: Scene) -> Scheme:
+        """Return the scheme a scene's [time] table asks for."""
+        assert scene.time is not None
+        t = scene.time
+        if t.scheme == "newmark":
+            return cls.newmark(t.beta, t.gamma)
+        return cls.generalised_alpha(t.spectral_radius)
+
+    def shifts(self, h: float) -> tuple[float, float, float]:
+        """Return (∂q/∂q, ∂v/∂q, ∂q̈/∂q) at t_{n+1}: the factors of K, C, M in the tangent of a step h."""
+        c_a = 1 / (self.beta * h * h)
+        return 1.0, self.gamma * h * c_a, (1 - self.alpha_m) / (1 - self.alpha_f) * c_a
+
+
+@dataclass
+class State:
+    """q, v = q̇, a = q̈ and the auxiliary acceleration, local dof arrays, at time t (s)."""
+
+    t: float
+    q: Array
+    v: Array
+    a: Array
+    auxiliary: Array
+
+    def copy(self) -> State:
+        """Return an independent copy."""
+        return State(self.t, self.q.copy(), self.v.copy(), self.a.copy(), self.auxiliary.copy())
+
+
+class Stepper:
+    """Advances a system in time.
+
+    Args:
+        system: equations of motion; its functions q, v, a are overwritten.
+        scheme: parameters.
+        newton: iteration control, shared by all steps so that it learns the quadratic constant.
+    """
+
+    def __init__(self, system: System, scheme: Scheme, newton: Newton):
+        self.system, self.scheme, self.newton = system, scheme, newton
+        self._solver: DirectSolver | None = None
+        self._dx = Increment(system.V)
+        self.seconds = {"assemble": 0.0, "solve": 0.0}
+        self.substeps = 0
+        self.clamp = system.clamp
+
+    @property
+    def factorisations(self) -> int:
+        """Number of matrix factorisations so far."""
+        return self._solver.factorisations if self._solver else 0
+
+    def start(self, t: float, q: Array, v: Array) -> State:
+        """Return the state at t with the acceleration that the equations of motion give: M q̈ = −F(q, v, 0)."""
+        s = self.system
+        s.set_time(t)
+        state = State(t, q.copy(), v.copy(), np.zeros_like(q), np.zeros_like(q))
+        self._prescribe(state)
+        self._write(state)
+        state.a += self._dx.solve(DirectSolver(s.matrix(0.0, 0.0, 1.0, 1.0)), s.residual())
+        state.auxiliary[:] = state.a
+        return state
+
+    def step(self, state: State, h: float) -> State:
+        """Return the state at state.t + h.
+
+        Raises:
+            ComputationError: Newton failed; the given state is untouched.
+        """
+        s, p = self.system, self.scheme
+        c_q, c_v, c_m = p.shifts(h)
+        new = self._predict(state, h)
+        s.set_time(new.t)
+        self._prescribe(new)
+
+        def increment() -> float:
+            started = perf_counter()
+            self._write(new)
+            b = s.residual()
+            A, changed = s.tangent(c_q, c_v, c_m)
+            assembled = perf_counter()
+            if self._solver is None:
+                self._solver = DirectSolver(A)
+            elif changed:
+                self._solver.refresh()
+            dq = self._dx.solve(self._solver, b)
+            self.seconds["assemble"] += assembled - started
+            self.seconds["solve"] += perf_counter() - assembled
+            new.q += dq
+            new.v += c_v * dq
+            new.a += c_m * dq
+            new.auxiliary += dq / (p.beta * h * h)
+            return s.size(dq)
+
+        try:
+            if s.linear:
+                self.newton.iterations += 1
+                if not np.isfinite(increment()):
+                    raise ComputationError("the solution is not finite")
+            else:
+                self.newton.solve(increment, lambda: s.size(new.q))
+        except ComputationError as error:
+            raise ComputationError(error.what, time=new.t, advice=error.advice) from None
+        return new
+
+    def advance(self, state: State, h: float, halvings: int = 5) -> State:
+        """Return the state at state.t + h, in halved steps where Newton does not manage the whole one.
+
+        Raises:
+            ComputationError: Newton failed at the smallest step too; says how small it was.
+        """
+        try:
+            return self.step(state, h)
+        except ComputationError as error:
+            if self.system.linear:
+                raise
+            if halvings == 0:
+                raise ComputationError(
+                    f"{error.what} (the step was cut down to {h:.3g} s)",
+                    time=error.time,
+                    advice="a smaller time.step, or a look at the load and speed at this time",
+                ) from None
+            self.substeps += 1
+            middle = self.advance(state, h / 2, halvings - 1)
+            return self.advance(middle, h / 2, halvings - 1)
+
+    def resize(self, state: State, last: State, h: float) -> None:
+        """Prepare a state for a step h other than the last one.
+
+        The auxiliary acceleration stands for q̈ at t + h (α_m − α_f), so it moves when h does; without this a change of
+        step would cost an order.
+        """
+        h_last = state.t - last.t
+        lag = (self.scheme.alpha_m - self.scheme.alpha_f) * (h - h_last)
+        state.auxiliary += lag / h_last * (state.auxiliary - last.auxiliary)
+
+    def local_error(self, state: State, last: State) -> float:
+        """Return the scaled local error of the step from last to state: |β − 1/6| h² |a_{n+1} − a_n|.
+
+        Zienkiewicz & Xie 1991, eq. (14): the term of the Taylor series that Newmark's β does not match.
+        """
+        h = state.t - last.t
+        return self.system.size(abs(self.scheme.beta - 1 / 6) * h * h * (state.auxiliary - last.auxiliary))
+
+    def _predict(self, state: State, h: float) -> State:
+        """Return the step that keeps q̈, which is free of residual when the acceleration is constant."""
+        p = self.scheme
+        auxiliary = (state.a - p.alpha_m * state.auxiliary) / (1 - p.alpha_m)
+        q = state.q + h * state.v + h * h * ((0.5 - p.beta) * state.auxiliary + p.beta * auxiliary)
+        v = state.v + h * ((1 - p.gamma) * state.auxiliary + p.gamma * auxiliary)
+        new = State(state.t + h, q, v, state.a.copy(), auxiliary)
+        if self.clamp is not None:
+            self._shift(new, state, h, self.clamp.turned(state.q, state.v, state.t, new.t))
+        return new
+
+    def _shift(self, new: State, state: State, h: float, q: Array) -> None:
+        """Move the prediction to another q, keeping the update maps."""
+        _, c_v, c_m = self.scheme.shifts(h)
+        d = q - new.q
+        new.q, new.v, new.a = q, new.v + c_v * d, new.a + c_m * d
+        new.auxiliary = new.auxiliary + d / (self.scheme.beta * h * h)
+
+    def _prescribe(self, state: State) -> None:
+        """Write the motion of the clamp, exact in q, v and q̈, where the frame does not turn with it."""
+        if self.clamp is not None:
+            dofs = self.clamp.dofs
+            state.q[dofs], state.v[dofs], state.a[dofs] = self.clamp.at(state.t)
+
+    def _write(self, state: State) -> None:
+        self.system.set_state(state.q, state.v, state.a)

@@ -1,0 +1,100 @@
+"""The words every form is written in: bodies, strains, applied loads, and the unknown with its rates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import ufl
+
+
+@dataclass(frozen=True)
+class Body:
+    """Mass that a material vector carries.
+
+    Attributes:
+        x: the vector as an expression of q, three frame components (m for a position, 1 for a director).
+        density: mass per measure (kg/m, kg) for a position, second moment of mass (kg·m, kg·m^2) for a director.
+        measure: UFL measure the body lives on.
+        is_position: whether x moves with the origin of the frame (positions do, directors do not).
+    """
+
+    x: Any
+    density: Any
+    measure: Any
+    is_position: bool = True
+
+
+@dataclass(frozen=True)
+class Strain:
+    """One strain measure with the stiffness that makes energy of it: W = ∫ ½ Γ·C Γ.
+
+    Attributes:
+        name: "axial", "shear", "bending", …
+        value: Γ as an expression of q, scalar or vector.
+        stiffness: C, scalar (N, N·m^2) or matrix.
+        measure: UFL measure.
+    """
+
+    name: str
+    value: Any
+    stiffness: Any
+    measure: Any
+
+    def force(self, strain: Any) -> Any:
+        """Return C Γ, the conjugate force (N) or moment (N·m)."""
+        return ufl.dot(self.stiffness, strain) if ufl.as_ufl(self.stiffness).ufl_shape else self.stiffness * strain
+
+    @property
+    def energy(self) -> Any:
+        """∫ ½ Γ·C Γ, J."""
+        return ufl.inner(self.force(self.value), self.value) / 2 * self.measure
+
+
+@dataclass(frozen=True)
+class AppliedLoad:
+    """A force (or moment) on a position (or angle) x(q).
+
+    Attributes:
+        name: name of its amplitude constant.
+        force: vector (or scalar), N, N/m or N·m.
+        x: what it works on, an expression of q.
+        measure: UFL measure.
+        dead: whether its direction does not depend on q.
+    """
+
+    name: str
+    force: Any
+    x: Any
+    measure: Any
+    dead: bool = True
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Viscosity η (s) of the strains and mass-proportional rate a0 (1/s), constants or None."""
+
+    stiffness: Any = None
+    mass: Any = None
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """The unknown and its rates: coefficients q, v = q̇, a = q̈ and the test function dq of one space."""
+
+    q: Any
+    v: Any
+    a: Any
+    dq: Any
+
+    def rate(self, x: Any) -> Any:
+        """Return ẋ of an expression x(q)."""
+        return ufl.derivative(x, self.q, self.v)
+
+    def second_rate(self, x: Any) -> Any:
+        """Return ẍ of an expression x(q)."""
+        return ufl.derivative(x, self.q, self.a) + ufl.derivative(self.rate(x), self.q, self.v)
+
+    def variation(self, x: Any) -> Any:
+        """Return δx of an expression x(q)."""
+        return ufl.derivative(x, self.q, self.dq)

@@ -1,0 +1,258 @@
+"""Numbers, vectors, tapers and tables as a scene may hold them: what is accepted and how it is stored.
+
+Booleans and strings are not numbers here, and nothing infinite or undefined gets past this module. Sequences
+become tuples, so that a validated scene cannot be changed by accident.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, ConfigDict, PlainValidator, model_validator
+from pydantic_core import PydanticCustomError
+
+Array: TypeAlias = npt.NDArray[np.float64]
+Vector3: TypeAlias = tuple[float, float, float]
+Matrix: TypeAlias = tuple[tuple[float, ...], ...]
+Taper: TypeAlias = tuple[tuple[float, float], ...]
+Profile: TypeAlias = float | Taper
+
+
+def problem(key: str, value: Any, allowed: str) -> PydanticCustomError:
+    """Returns a validation error that names a key.
+
+    Args:
+        key: Dotted path relative to the table being validated; empty for the validated value itself.
+        value: The offending value, ``None`` if the key is absent.
+        allowed: What is wrong and what is allowed.
+    """
+    return PydanticCustomError("scene", "{reason}", {"reason": allowed, "key": key, "value": value})
+
+
+def did_you_mean(name: object, names: Iterable[str]) -> str:
+    """Returns ``'did you mean "x"? '`` for the name closest to `name`, or an empty string if none is close."""
+    matches = difflib.get_close_matches(str(name), list(names), n=1)
+    return f'did you mean "{matches[0]}"? ' if matches else ""
+
+
+class SceneModel(BaseModel):
+    """A table of the scene: immutable, and unknown or missing keys are errors that say what is allowed."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _check_keys(cls, data: Any) -> Any:
+        if isinstance(data, cls):
+            return data
+        if not isinstance(data, Mapping):
+            raise problem("", data, "must be a table of key = value pairs")
+        names = list(cls.model_fields)
+        for key in data:
+            if key not in names:
+                hint = did_you_mean(key, names)
+                raise problem(str(key), None, f"unknown key; {hint}allowed: {', '.join(names)}")
+        for name, field in cls.model_fields.items():
+            if field.is_required() and name not in data:
+                raise problem(name, None, f"required key is missing; must be {field.description or 'given'}")
+        return data
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """An interval of numbers; ``None`` means unbounded. The methods read values and raise if they lie outside."""
+
+    gt: float | None = None
+    ge: float | None = None
+    lt: float | None = None
+    le: float | None = None
+
+    def contains(self, number: float) -> bool:
+        """Returns whether the number lies in the interval."""
+        return (
+            (self.gt is None or number > self.gt)
+            and (self.ge is None or number >= self.ge)
+            and (self.lt is None or number < self.lt)
+            and (self.le is None or number <= self.le)
+        )
+
+    def __str__(self) -> str:
+        words = {"greater than": self.gt, "at least": self.ge, "less than": self.lt, "at most": self.le}
+        return " and ".join(f"{word} {bound:g}" for word, bound in words.items() if bound is not None)
+
+    def number(self, value: Any) -> float:
+        """Returns the value as a float. Raises if it is not a finite number in the interval."""
+        number = as_number(value)
+        if not self.contains(number):
+            raise problem("", value, f"must be {self}")
+        return number
+
+    def integer(self, value: Any) -> int:
+        """Returns the value. Raises if it is not an integer in the interval."""
+        if not isinstance(value, int) or isinstance(value, bool):
+            raise problem("", value, f"must be an integer {self}")
+        # Before the bound check: an integer too long to print, or to become a float, is not a count of anything.
+        if abs(value) > 2**31 or not self.contains(value):
+            raise problem("", value, f"must be an integer {self}")
+        return value
+
+    def profile(self, value: Any) -> Profile:
+        """Returns a number or a taper ((x, value), …) with x from 0 upwards. Raises on anything else."""
+        if not isinstance(value, list | tuple):
+            if not isinstance(value, int | float) or isinstance(value, bool):
+                raise problem("", value, f"must be {f'a number {self}'.rstrip()}, or a taper [[x, value], …]")
+            return self.number(value)
+        taper = as_taper(value)
+        if taper[0][0] != 0.0:
+            raise problem("", value, f"the taper must start at x = 0, not at {taper[0][0]:g}")
+        for x, number in taper:
+            if not self.contains(number):
+                raise problem("", value, f"the value {number:g} at x = {x:g} must be {self}")
+        return taper
+
+
+def as_number(value: Any) -> float:
+    """Returns the value as a float. Raises if it is not a finite number (booleans and strings are not)."""
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        raise problem("", value, "must be a number")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise problem("", value, "must be a finite number")
+    return number
+
+
+def as_rows(value: Any, columns: Sequence[int], shape: str) -> tuple[tuple[float, ...], ...]:
+    """Returns a rectangular table of numbers as a tuple of rows.
+
+    Args:
+        value: A sequence of rows.
+        columns: Allowed numbers of columns; all rows must have the same.
+        shape: The expected form in words, for the error message.
+
+    Raises:
+        PydanticCustomError: If it is not such a table.
+    """
+    if not isinstance(value, list | tuple) or not value or not all(isinstance(row, list | tuple) for row in value):
+        raise problem("", value, f"must be {shape}")
+    if len(value[0]) not in columns:
+        raise problem("", value, f"must be {shape}; row 1 has {len(value[0])} entries")
+    for i, row in enumerate(value, start=1):
+        if len(row) != len(value[0]):
+            raise problem("", value, f"must be {shape}; row {i} has {len(row)} entries, row 1 has {len(value[0])}")
+        for entry in row:
+            try:
+                as_number(entry)
+            except PydanticCustomError as error:
+                raise problem("", value, f"must be {shape}; an entry of row {i} {error.message()}") from None
+    return tuple(tuple(float(entry) for entry in row) for row in value)
+
+
+def as_increasing_rows(value: Any, columns: Sequence[int], shape: str) -> tuple[tuple[float, ...], ...]:
+    """Returns `as_rows`, at least two rows of them with a strictly increasing first column, or raises."""
+    rows = as_rows(value, columns, shape)
+    if len(rows) < 2:
+        raise problem("", value, f"must be {shape} with at least two rows")
+    for i, (before, after) in enumerate(zip(rows, rows[1:], strict=False), start=2):
+        if after[0] <= before[0]:
+            raise problem("", value, f"the first column must increase strictly; row {i}: {after[0]:g} ≤ {before[0]:g}")
+    return rows
+
+
+def as_taper(value: Any) -> Taper:
+    """Returns a taper ((x, value), …) with x (m) strictly increasing. Raises on anything else."""
+    rows = as_increasing_rows(value, (2,), "a taper [[x, value], …]")
+    return tuple((x, number) for x, number in rows)
+
+
+def as_vector(value: Any, sizes: Sequence[int]) -> tuple[float, ...]:
+    """Returns a vector as a tuple of floats. Raises if it has not one of the allowed sizes."""
+    wanted = " or ".join(str(size) for size in sizes)
+    if not isinstance(value, list | tuple) or len(value) not in sizes:
+        raise problem("", value, f"must be a list of {wanted} numbers")
+    for entry in value:
+        try:
+            as_number(entry)
+        except PydanticCustomError as error:
+            raise problem("", value, f"must be a list of {wanted} numbers; an entry {error.message()}") from None
+    return tuple(float(entry) for entry in value)
+
+
+def as_vector3(value: Any) -> Vector3:
+    """Returns a vector of three components. Raises on any other size."""
+    a, b, c = as_vector(value, (3,))
+    return a, b, c
+
+
+def as_padded_vector3(value: Any) -> Vector3:
+    """Returns a vector of three components, the third zero if only two are given. Raises on any other size."""
+    a, b, c = (*as_vector(value, (2, 3)), 0.0)[:3]
+    return a, b, c
+
+
+def as_symmetric_matrix(value: Any, size: int, *, definite: bool) -> Matrix:
+    """Returns a symmetric matrix as a tuple of rows.
+
+    Args:
+        value: A sequence of rows.
+        size: Number of rows and columns.
+        definite: Whether it must be positive definite; positive semidefinite otherwise.
+
+    Raises:
+        PydanticCustomError: If the size, the symmetry (to 1e-9 of the largest entry) or the definiteness is wrong.
+    """
+    shape = f"a symmetric {size}×{size} matrix"
+    rows = as_rows(value, (size,), shape)
+    if len(rows) != size:
+        raise problem("", value, f"must be {shape}; it has {len(rows)} rows")
+    matrix = np.array(rows)
+    scale = float(np.max(np.abs(matrix))) or 1.0
+    if not np.allclose(matrix, matrix.T, rtol=0.0, atol=1e-9 * scale):
+        raise problem("", value, f"must be {shape}; it is not symmetric")
+    # Entries of one matrix differ in units and by many orders of magnitude, so definiteness is judged after
+    # scaling to a unit diagonal; otherwise a soft direction would pass for a rounding error, or the reverse.
+    diagonal = np.diag(matrix)
+    if np.any(diagonal < 0.0) or (definite and np.any(diagonal == 0.0)):
+        raise problem("", value, f"must be {shape}, positive {'definite' if definite else 'semidefinite'}")
+    weights = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, scale))
+    lowest = float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T) * np.outer(weights, weights))[0])
+    if lowest < -1e-9 or (definite and lowest <= 1e-12):
+        raise problem("", value, f"must be {shape}, positive {'definite' if definite else 'semidefinite'}")
+    return rows
+
+
+def evaluate(profile: Profile, x: npt.ArrayLike) -> Array:
+    """Returns the profile at positions x (m), shape of x; linear between the knots of a taper."""
+    positions = np.asarray(x, dtype=np.float64)
+    if isinstance(profile, float | int):
+        return np.full(positions.shape, float(profile))
+    knots, values = np.array(profile).T
+    return np.asarray(np.interp(positions, knots, values), dtype=np.float64)
+
+
+def check_profile_length(key: str, profile: Profile, length: float) -> None:
+    """Raises a problem at `key` if a taper does not end at the length (m), to a relative 1e-9."""
+    if isinstance(profile, tuple) and not math.isclose(profile[-1][0], length, rel_tol=1e-9):
+        reason = f"the taper must run from x = 0 to the length {length:g}; it ends at {profile[-1][0]:g}"
+        raise problem(key, [list(row) for row in profile], reason)
+
+
+Number = Annotated[float, PlainValidator(as_number)]
+Positive = Annotated[float, PlainValidator(Bounds(gt=0.0).number)]
+NonNegative = Annotated[float, PlainValidator(Bounds(ge=0.0).number)]
+PoissonRatio = Annotated[float, PlainValidator(Bounds(gt=-1.0, lt=0.5).number)]
+ShearCorrection = Annotated[float, PlainValidator(Bounds(gt=0.0, le=1.0).number)]
+Count = Annotated[int, PlainValidator(Bounds(ge=1).integer)]
+PositiveProfile = Annotated[Profile, PlainValidator(Bounds(gt=0.0).profile)]
+NonNegativeProfile = Annotated[Profile, PlainValidator(Bounds(ge=0.0).profile)]
+AnyProfile = Annotated[Profile, PlainValidator(Bounds().profile)]
+Vector = Annotated[Vector3, PlainValidator(as_vector3)]
+PaddedVector = Annotated[Vector3, PlainValidator(as_padded_vector3)]

@@ -1,0 +1,153 @@
+"""What a computation returns: plain arrays, and how they are written and read. No dolfinx in it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import tempfile
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.errors import OutputError
+
+Array = npt.NDArray[np.float64]
+
+
+class Table:
+    """Columns of equal length that grow by rows.
+
+    Args:
+        columns: names, in the order they are written.
+    """
+
+    def __init__(self, columns: Iterable[str]):
+        self.columns = tuple(columns)
+        self._rows: list[tuple[float, ...]] = []
+
+    def append(self, row: Iterable[float]) -> None:
+        """Add one row in the order of the columns."""
+        self._rows.append(tuple(float(value) for value in row))
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def arrays(self) -> dict[str, Array]:
+        """Return name ↦ array of all values so far."""
+        values = np.array(self._rows, dtype=np.float64).reshape(len(self._rows), len(self.columns))
+        return {name: values[:, i].copy() for i, name in enumerate(self.columns)}
+
+
+@dataclass
+class RunResult:
+    """Outcome of `rotfem run`.
+
+    Attributes:
+        summary: scene, versions, effects, timings, sizes, figures of merit; JSON-able.
+        history: column ↦ values over time (`t` s, `psi` rad, `psi_dot` rad/s, `tip_u1` m, `tip_u2` m, `tip_alpha` rad,
+            `kinetic`, `strain`, `jacobi` J, …), frame components; one row for a steady state.
+        shape: column ↦ values along the structure at the end (`x` m, `u1` m, …, `N` N, `V` N, `M` N·m).
+    """
+
+    summary: dict[str, Any]
+    history: dict[str, Array] = field(default_factory=dict)
+    shape: dict[str, Array] = field(default_factory=dict)
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write summary.json, history.csv and shape.csv, each whole or not at all; return their paths.
+
+        Raises:
+            OutputError: the folder cannot be written.
+        """
+        folder = Path(folder)
+        written = []
+        for name, columns in (("history.csv", self.history), ("shape.csv", self.shape)):
+            if columns:
+                written.append(write_text(folder / name, csv_text(columns)))
+        written.append(write_text(folder / "summary.json", json_text(self.summary)))
+        return written
+
+
+def prepare_folder(folder: str | Path) -> Path:
+    """Make the result folder and see that it can be written, before anything is computed.
+
+    Raises:
+        OutputError: it cannot be made or written.
+    """
+    path = Path(folder)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path):
+            pass
+    except OSError as error:
+        raise OutputError(path, error.strerror or str(error)) from None
+    return path
+
+
+def csv_text(columns: dict[str, Array]) -> str:
+    """Return columns as CSV with a header; numbers keep all their digits."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*([repr(float(v)) for v in column] for column in columns.values()), strict=True))
+    return buffer.getvalue()
+
+
+def read_csv(path: str | Path) -> dict[str, Array]:
+    """Return the columns of a CSV file that `csv_text` made."""
+    with open(path, encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    values = np.array(rows[1:], dtype=np.float64).reshape(len(rows) - 1, len(rows[0]))
+    return {name: values[:, i].copy() for i, name in enumerate(rows[0])}
+
+
+def json_text(data: Any) -> str:
+    """Return data as JSON; numbers that JSON cannot hold (NaN, infinity) become null."""
+    return json.dumps(_jsonable(data), indent=2, allow_nan=False) + "\n"
+
+
+def _jsonable(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {str(key): _jsonable(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_jsonable(value) for value in data]
+    if isinstance(data, np.ndarray):
+        return _jsonable(data.tolist())
+    if isinstance(data, np.generic):
+        data = data.item()
+    if isinstance(data, float) and not np.isfinite(data):
+        return None
+    return data
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a file whole or not at all (temporary file in the same folder, then renamed).
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    try:
+        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
+        try:
+            with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+                file.write(text)
+            os.chmod(name, 0o666 & ~_umask())
+            os.replace(name, path)
+        except BaseException:
+            os.unlink(name)
+            raise
+    except OSError as error:
+        raise OutputError(path, error.strerror or str(error)) from None
+    return path
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,317 @@
+"""`rotfem run`: the steady state or the time history of a scene."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable, Mapping
+from importlib import metadata
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from rotfem.affine import AffineSystem
+from rotfem.equilibrium import check_steady, critical_speed, newton_for, static_tip_shape, steady_state
+from rotfem.errors import ComputationError, SceneError
+from rotfem.integrators import Scheme, State, Stepper
+from rotfem.results import RunResult, Table
+from rotfem.scene import Scene, load_scene
+from rotfem.solvers import Newton
+from rotfem.system import Model, System, compile_system
+
+Array = npt.NDArray[np.float64]
+Progress = Callable[[float], None]
+
+#: A linear theory has lost its meaning when a displacement exceeds the structure's own length.
+LARGEST_LINEAR_DEFLECTION = 1.0
+
+#: Adaptive steps: safety factor, bounds of a change, changes not worth a new factorisation, smallest relative scale.
+SAFETY, SHRINK, GROW, KEEP, FLOOR = 0.9, 0.2, 2.0, (0.95, 1.3), 1e-6
+
+
+def as_scene(scene: Scene | str | Path | Mapping[str, Any]) -> Scene:
+    """Return a validated scene from a scene, the path of a file or nested tables."""
+    if isinstance(scene, Scene):
+        return scene
+    return Scene.from_dict(scene) if isinstance(scene, Mapping) else load_scene(scene)
+
+
+def run(
+    scene: Scene | str | Path | Mapping[str, Any],
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    progress: Progress | None = None,
+) -> RunResult:
+    """Return the time history of a scene, or its steady state where the spin is constant and [time] absent.
+
+    Args:
+        scene: scene, path of a scene file, or nested tables.
+        comm: communicator the structure is distributed over; every rank gets the whole result.
+        progress: called with the share of the work done, between 0 and 1.
+
+    Raises:
+        SceneError: the scene is not valid or cannot be run.
+        ComputationError: it failed; its attribute `result` holds what was computed until then.
+    """
+    scene = as_scene(scene)
+    scene.check_run()
+    if scene.motion.type == "torque":
+        raise SceneError(scene.file, "motion.type", "torque", "a free hub cannot be computed yet; use a prescribed motion")
+    if scene.time is None or scene.initial.state == "steady":
+        check_steady(scene)
+    return Simulation(scene, comm).run(progress)
+
+
+class Simulation:
+    """One run: the compiled system, the record of what happened, and the summary made of it.
+
+    Args:
+        scene: validated scene.
+        comm: MPI communicator.
+    """
+
+    def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD):
+        self.started = perf_counter()
+        self.scene, self.comm = scene, comm
+        self.model = Model(scene, comm)
+        self.system: System = compile_system(self.model)
+        self.compiled = perf_counter() - self.started
+        names = tuple(f"tip_{c}" for c in self.model.structure.components)
+        self.history = Table(("t", "psi", "psi_dot", *names, "kinetic", "strain", "jacobi"))
+        self.newton = newton_for(scene)
+        self.stepper: Stepper | None = None
+        self.warnings: list[str] = []
+        self.steps = self.rejected = 0
+        self.critical = critical_speed(self.system) if isinstance(self.system, AffineSystem) else None
+        self._critical_since: float | None = None
+
+    def run(self, progress: Progress | None = None) -> RunResult:
+        """Return the result of the scene (see `run`)."""
+        try:
+            self._steady() if self.scene.time is None else self._march(progress or (lambda share: None))
+        except (ComputationError, KeyboardInterrupt) as error:
+            failure = error if isinstance(error, ComputationError) else None
+            error.result = self.result("interrupted" if failure is None else "failed", failure)  # type: ignore[union-attr]
+            raise
+        return self.result("done")
+
+    # --- the two kinds of run -------------------------------------------------------------------------------------
+
+    def _steady(self) -> None:
+        omega = self.model.motion.speed(0.0)
+        q = steady_state(self.system, omega, self.newton)
+        self._record(State(0.0, q, np.zeros_like(q), np.zeros_like(q), np.zeros_like(q)))
+        if self.critical is not None and abs(omega) > self.critical:
+            self.warnings.append(
+                f"the equilibrium is unstable: {abs(omega):g} rad/s is above the speed {self.critical:.6g} rad/s at which "
+                f"the {self.scene.model.theory} stiffness is singular"
+            )
+
+    def _march(self, progress: Progress) -> None:
+        time = self.scene.time
+        assert time is not None
+        self.stepper = Stepper(self.system, Scheme.of(self.scene), newton_for(self.scene))
+        state = self.stepper.start(0.0, *self._initial())
+        self._record(state)
+        grid = self._fixed_steps if time.tolerance is None else self._adaptive_steps
+        for state in grid(state):
+            self.steps += 1
+            self._check(state)
+            last = state.t >= time.end
+            if last or self.steps % time.output_every == 0:
+                self._record(state)
+                progress(state.t / time.end)
+
+    def _initial(self) -> tuple[Array, Array]:
+        """Return (q, v) at t = 0 in the frame of the system."""
+        initial = self.scene.initial
+        q = np.zeros_like(self.system.q.x.array)
+        if initial.tip_displacement is not None:
+            q = static_tip_shape(self.scene, initial.tip_displacement, newton_for(self.scene))
+        elif initial.state == "steady":
+            rotating = self.scene.replace({"model.frame": "rotating"}) if self.model.fixed else self.scene
+            system = compile_system(Model(rotating, self.comm)) if self.model.fixed else self.system
+            q = steady_state(system, rotating.motion.speed, newton_for(self.scene))
+        if self.system.clamp is not None:
+            return self.system.clamp.rigid(q, 0.0)
+        return q, np.zeros_like(q)
+
+    def _fixed_steps(self, state: State) -> Any:
+        time, stepper = self.scene.time, self.stepper
+        assert time is not None and time.step is not None and stepper is not None
+        n = int(np.ceil(time.end / time.step - 1e-9))
+        for i in range(1, n + 1):
+            t = time.end if i == n else i * time.step
+            state = stepper.advance(state, t - state.t)
+            state.t = t
+            yield state
+
+    def _adaptive_steps(self, state: State) -> Any:
+        """Yield states whose local error stays below the tolerance, relative to the largest displacement so far."""
+        time, stepper = self.scene.time, self.stepper
+        assert time is not None and time.tolerance is not None and stepper is not None
+        longest = time.max_step or time.end / 20
+        shortest = time.min_step or 1e-9 * time.end
+        h, largest = min(longest, 1e-4 * time.end), FLOOR
+        while state.t < time.end:
+            h = min(h, longest)
+            left = time.end - state.t
+            h = left if h >= left * (1 - 1e-9) else (left / 2 if h > 0.6 * left else h)
+            new = stepper.advance(state, h)
+            largest = max(largest, self.system.size(new.q))
+            error = stepper.local_error(new, state) / (time.tolerance * largest)
+            factor = float(np.clip(SAFETY * max(error, 1e-12) ** (-1 / 3), SHRINK, GROW))
+            if error > 1.0:
+                self.rejected += 1
+                h *= min(factor, 0.9)
+                if h < shortest:
+                    raise ComputationError(
+                        f"the step fell below {shortest:.3g} s without meeting the tolerance",
+                        time=state.t,
+                        advice="a looser time.tolerance, a smaller time.min_step, or some damping",
+                    )
+                continue
+            if not KEEP[0] <= factor <= KEEP[1]:
+                stepper.resize(new, state, h * factor)
+                h *= factor
+            if h >= time.end - new.t or abs(new.t - time.end) < 1e-12 * time.end:
+                new.t = min(new.t, time.end) if time.end - new.t > 1e-12 * time.end else time.end
+            state = new
+            yield state
+
+    # --- record -----------------------------------------------------------------------------------------------------
+
+    def _check(self, state: State) -> None:
+        """Stop a history that has left the range of its theory.
+
+        Raises:
+            ComputationError: displacements of a linear theory beyond the structure's length, or not finite.
+        """
+        if not self.system.linear:
+            return
+        speed = abs(self.model.motion.speed(state.t))
+        if self._critical_since is None and self.critical is not None and speed > self.critical:
+            self._critical_since = state.t
+        size = self.system.size(state.q)
+        if np.isfinite(size) and size <= LARGEST_LINEAR_DEFLECTION:
+            return
+        theory, why = self.scene.model.theory, "the motion is unstable or its load too large for a linear theory"
+        if self._critical_since is not None:
+            why = (
+                f"its stiffness is not definite above {self.critical:.6g} rad/s, passed at t = {self._critical_since:.4g} s: "
+                "first-order strains keep the softening by the centrifugal force but not the stiffening"
+            )
+        raise ComputationError(
+            f"the {theory} solution diverged (a displacement exceeds the length of the structure; {why})",
+            time=state.t,
+            advice='use model.theory = "consistent_linear" for small or "reissner" for any deflection',
+        )
+
+    def _record(self, state: State) -> None:
+        system, t = self.system, state.t
+        system.set_time(t)
+        system.set_state(state.q, state.v, state.a)
+        tip = self.model.structure.probe(state.q)
+        if system.clamp is not None:
+            tip = system.clamp.relative(tip[None, :], self.model.structure.length, t)[0]
+        energy = system.energies()
+        motion = self.model.motion
+        self.history.append((t, motion.angle(t), motion.speed(t), *tip, *(energy[k] for k in ("kinetic", "strain", "jacobi"))))
+
+    # --- summary ------------------------------------------------------------------------------------------------------
+
+    def result(self, status: str, failure: ComputationError | None = None) -> RunResult:
+        """Return everything computed so far with a summary of how it went."""
+        history = self.history.arrays()
+        shape = self.system.shape() if len(self.history) else {}
+        if self.stepper is not None:
+            newton: Newton = self.stepper.newton
+            if self.stepper.substeps:
+                self.warnings.append(f"{self.stepper.substeps} steps were halved because Newton did not converge")
+        else:
+            newton = self.newton
+        if newton.roundoff > 0:
+            self.warnings.append(f"Newton stopped at round-off, increments {newton.roundoff:.1e} (relative)")
+        if status == "done" and self._critical_since is not None:
+            self.warnings.append(
+                f"the speed is above {self.critical:.6g} rad/s, where the {self.scene.model.theory} stiffness is no longer "
+                f"definite, since t = {self._critical_since:.4g} s"
+            )
+        summary: dict[str, Any] = {
+            "command": "run",
+            "status": status,
+            "name": self.scene.name,
+            "kind": "steady" if self.scene.time is None else "history",
+            "theory": self.scene.model.theory,
+            "frame": self.scene.model.frame,
+            "effects": list(self.model.effects),
+            "integrals": self.system.integrals,
+            "dofs": self.system.V.dofmap.index_map.size_global * self.system.V.dofmap.index_map_bs,
+            "elements": self.model.structure.mesh.topology.index_map(self.model.structure.mesh.topology.dim).size_global,
+            "steps": self.steps,
+            "newton_iterations": newton.iterations,
+            "factorisations": self.stepper.factorisations if self.stepper else newton.iterations,
+            "timings": self._timings(),
+            "figures": figures(history),
+            "warnings": self.warnings,
+            "versions": versions(),
+            "ranks": self.comm.size,
+            "scene": self.scene.to_dict(),
+        }
+        if self.rejected:
+            summary["rejected_steps"] = self.rejected
+        if self.critical is not None:
+            summary["figures"]["critical_speed"] = self.critical
+        if failure is not None:
+            summary["failure"] = {"what": failure.what, "time": failure.time, "advice": failure.advice}
+        return RunResult(summary, history, shape)
+
+    def _timings(self) -> dict[str, float]:
+        total = perf_counter() - self.started
+        parts = {"compile": self.compiled, **(self.stepper.seconds if self.stepper else {})}
+        return {**parts, "other": total - sum(parts.values()), "total": total}
+
+
+def figures(history: dict[str, Array]) -> dict[str, float]:
+    """Return the figures of merit of a history: extremes of the tip with their times, final values, Jacobi drift.
+
+    Extremes inside the history are those of the parabola through three neighbouring samples.
+    """
+    out: dict[str, float] = {}
+    t = history["t"]
+    if len(t) == 0:
+        return out
+    for name in [n for n in history if n.startswith("tip_")]:
+        out[f"{name}_final"] = history[name][-1]
+        if len(t) > 1:
+            out[f"{name}_min_time"], out[f"{name}_min"] = extreme(t, history[name], -1)
+            out[f"{name}_max_time"], out[f"{name}_max"] = extreme(t, history[name], 1)
+    if len(t) > 1:
+        scale = max(float(np.max(np.abs(history["kinetic"]))), float(np.max(np.abs(history["strain"]))), 1e-300)
+        out["jacobi_change"] = (history["jacobi"][-1] - history["jacobi"][0]) / scale
+    return {key: float(value) for key, value in out.items()}
+
+
+def extreme(t: Array, y: Array, sign: int) -> tuple[float, float]:
+    """Return (time, value) of the largest sign·y, by a parabola through the largest sample and its neighbours."""
+    i = int(np.argmax(sign * y))
+    if i in (0, len(y) - 1):
+        return float(t[i]), float(y[i])
+    c = np.polyfit(t[i - 1 : i + 2] - t[i], y[i - 1 : i + 2], 2)
+    if c[0] * sign >= 0:
+        return float(t[i]), float(y[i])
+    s = -c[1] / (2 * c[0])
+    return float(t[i] + s), float(np.polyval(c, s))
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of the program and of what it computes with."""
+    out = {"python": platform.python_version()}
+    for name in ("rotfem", "fenics-dolfinx", "fenics-ufl", "petsc4py", "slepc4py", "numpy", "scipy"):
+        try:
+            out[name.removeprefix("fenics-")] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return out

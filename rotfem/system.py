@@ -1,0 +1,241 @@
+"""The equations of motion F(q, v, a; δq) = 0 of a scene, and their tangents.
+
+F = Σ virtual work of inertia, effects, stress, damping and loads; M = ∂F/∂a, C = ∂F/∂v, K = ∂F/∂q by `ufl.derivative`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem, la
+from dolfinx.fem import petsc as fem_petsc
+from mpi4py import MPI
+from ufl.algorithms import expand_derivatives
+
+from rotfem import compat
+from rotfem.effects import ACCELERATIONS, damping, load_work, virtual_work
+from rotfem.motion import IDENTITY, Frame, Motion, motion_of
+from rotfem.scene import Scene
+from rotfem.structures import build
+from rotfem.structures.clamp import TurningClamp
+from rotfem.theories import THEORIES
+
+Array = npt.NDArray[np.float64]
+
+
+def integral_count(form: Any) -> int:
+    """Return the number of integrals of a UFL form after differentiation."""
+    expanded = expand_derivatives(form)
+    return 0 if expanded.empty() else len(expanded.integrals())
+
+
+class Model:
+    """The residual of a scene as named terms, before anything is compiled.
+
+    Args:
+        scene: validated scene.
+        comm: MPI communicator.
+        effects: names of the effects to include; the scene's own choice if None.
+
+    Attributes:
+        structure: mesh, space, bodies.
+        frame: constants w, dw, a_o, gravity in use.
+        motion: prescribed motion.
+        strains: strain measures that make the stored energy.
+        terms: name ↦ virtual work, a UFL form.
+    """
+
+    def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD, effects: tuple[str, ...] | None = None):
+        self.scene, self.comm = scene, comm
+        self.effects = scene.effective_effects() if effects is None else effects
+        self.theory = THEORIES[scene.model.theory]
+        self.motion: Motion = motion_of(scene)
+        self.structure = s = build(scene, comm)
+        self.fixed = scene.model.frame == "inertial"
+        self.frame = Frame(s.mesh, s.planar, self.fixed, scene.loads.gravity)
+        self.strains = s.strains(self.theory.measures(s.type))
+        self.bodies = s.bodies(self.effects)
+        self.applied = s.loads()
+        self.terms = self._terms()
+
+    def _terms(self) -> dict[str, Any]:
+        k = self.structure.k
+        terms = {"internal": sum(ufl.derivative(s.energy, k.q, k.dq) for s in self.strains)}
+        for name in ("inertia", *self.effects):
+            if name in ACCELERATIONS:
+                terms[name] = virtual_work(name, self.bodies, k, self.frame)
+        if "damping" in self.effects:
+            terms["damping"] = damping(self.strains, self.bodies, k, self.structure.damping())
+        if self.applied:
+            terms["loads"] = load_work(self.applied, k)
+        return {name: term for name, term in terms.items() if not isinstance(term, int)}
+
+    @property
+    def residual(self) -> Any:
+        """F(q, v, a; δq), a UFL form."""
+        return sum(self.terms.values())
+
+    def energies(self) -> dict[str, Any]:
+        """Return UFL forms of degree 0, 1, 2 of the kinetic energy in the velocities, and of the strain energy (J).
+
+        T = T2 + T1 + T0 = ∫ ½ρ |ẋ + w×x|². In a frame that does not rotate T1 is missing and `momentum` is the
+        angular momentum about the hub (kg·m²/s) that the Jacobi integral needs there.
+        """
+        k, frame = self.structure.k, self.frame
+        forms: dict[str, Any] = {"strain": sum(s.energy for s in self.strains)}
+        forms["T2"] = sum(b.density * ufl.inner(k.rate(b.x), k.rate(b.x)) / 2 * b.measure for b in self.bodies)
+        if self.fixed:
+            forms["momentum"] = sum(b.density * ufl.cross(b.x, k.rate(b.x))[2] * b.measure for b in self.bodies)
+        if "coriolis" in self.effects:
+            forms["T1"] = sum(
+                b.density * ufl.inner(k.rate(b.x), ufl.cross(frame.w, b.x)) * b.measure for b in self.bodies
+            )
+        if "centrifugal" in self.effects:
+            wx = [(b, ufl.cross(frame.w, b.x)) for b in self.bodies]
+            forms["T0"] = sum(b.density * ufl.inner(s, s) / 2 * b.measure for b, s in wx)
+        dead = [load for load in self.applied if load.dead]
+        if dead:
+            forms["load_potential"] = -sum(ufl.inner(load.force, load.x) * load.measure for load in dead)
+        return forms
+
+
+class System:
+    """A compiled nonlinear system: residual and tangent at (q, v, a, t).
+
+    Attributes:
+        q, v, a: dolfinx functions that hold the state the forms are evaluated at.
+        linear: False; the affine system of a linear theory says True.
+        scale: size of each local unknown (m or 1), by which increments are judged.
+    """
+
+    linear = False
+
+    def __init__(self, model: Model):
+        self.model, self.structure, self.motion = model, model.structure, model.motion
+        k = self.structure.k
+        self.q, self.v, self.a, self.V = k.q, k.v, k.a, self.structure.V
+        self._state = tuple(x.x.array for x in (self.q, self.v, self.a))
+        self.scale = self.structure.scales()
+        self.time = 0.0
+        self.bcs = [fem.dirichletbc(fem.Function(self.V), self.structure.clamped)]
+        owned = self.V.dofmap.index_map.size_local
+        nodes = self.structure.clamped[self.structure.clamped < owned]
+        bs = self.V.dofmap.index_map_bs
+        self.clamped = (nodes[:, None] * bs + np.arange(bs)).ravel()
+        self._shifts = [self.structure.constant(c) for c in (1.0, 0.0, 1.0)]
+        self.clamp = TurningClamp(self.structure, self.motion) if model.fixed else None
+        self._energies = {name: fem.form(form) for name, form in model.energies().items()}
+        self._b = la.vector(self.V.dofmap.index_map, self.V.dofmap.index_map_bs)
+        self._b_array = self._b.array
+        self.b = compat.wrap(self._b)
+        self._compile()
+
+    def _compile(self) -> None:
+        F, du = self.model.residual, ufl.TrialFunction(self.V)
+        parts = (ufl.derivative(F, x, du) for x in (self.q, self.v, self.a))
+        J = sum(c * form for c, form in zip(self._shifts, parts, strict=True))
+        self.integrals = {"F": integral_count(F), "J": integral_count(J)}
+        self._F, self._J = fem.form(F), fem.form(J)
+        self.A = fem_petsc.create_matrix(self._J)
+
+    def set_state(self, q: Array, v: Array, a: Array) -> None:
+        """Write local dof arrays into the functions q, v, a that the forms are evaluated at."""
+        for target, value in zip(self._state, (q, v, a), strict=True):
+            target[:] = value
+
+    def set_time(self, t: float, motion: Motion | None = None, load_factor: float = 1.0) -> None:
+        """Write the frame and load constants of time t (s), for the scene's motion unless another is given.
+
+        Args:
+            t: time, s.
+            motion: another motion than the scene's.
+            load_factor: multiplies loads, gravity and base acceleration (not the spin).
+        """
+        motion = motion or self.motion
+        self.time = t
+        values = self.model.frame.values(motion, t)
+        self.model.frame.set({n: v * load_factor if n in ("a_o", "gravity") else v for n, v in values.items()})
+        for name, value in self.load_values(t, motion).items():
+            self.structure.load_constants[name][0].value[...] = load_factor * value
+
+    def load_values(self, t: float, motion: Motion) -> dict[str, Array]:
+        """Return the amplitude of every load constant at time t; dead loads of the frame turn with it when it is fixed."""
+        if not self.structure.load_constants:
+            return {}
+        Q = motion.rotation(t) if self.model.fixed else IDENTITY
+        turning = {load.name for load in self.model.applied if load.dead and self.model.fixed}
+        values = {}
+        for name, (_, at) in self.structure.load_constants.items():
+            value = np.atleast_1d(np.asarray(at(t), dtype=float))
+            n = value.size
+            values[name] = Q[:n, :n] @ value if name in turning and n > 1 else value
+        return values
+
+    def residual(self) -> Any:
+        """Return −F at the state in q, v, a as a PETSc vector (reused), zero at clamped unknowns."""
+        b = self._b_array
+        b[:] = 0.0
+        fem.assemble_vector(b, self._F)
+        if self.model.comm.size > 1:
+            self._b.scatter_reverse(la.InsertMode.add)
+        np.negative(b, out=b)
+        b[self.clamped] = 0.0
+        return self.b
+
+    def tangent(self, c_k: float, c_v: float, c_m: float) -> tuple[Any, bool]:
+        """Return (c_k K + c_v C + c_m M at the state, whether it changed); clamped rows are identity rows."""
+        for constant, value in zip(self._shifts, (c_k, c_v, c_m), strict=True):
+            constant.value = value
+        self.A.zeroEntries()
+        fem_petsc.assemble_matrix(self.A, self._J, self.bcs)
+        self.A.assemble()
+        return self.A, True
+
+    def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
+        """Return a new matrix c_k K + c_v C + c_m M at the state with `diagonal` at clamped unknowns."""
+        for constant, value in zip(self._shifts, (c_k, c_v, c_m), strict=True):
+            constant.value = value
+        A = fem_petsc.create_matrix(self._J)
+        fem_petsc.assemble_matrix(A, self._J, self.bcs, diagonal)
+        A.assemble()
+        return A
+
+    def mass_damping_stiffness(self) -> tuple[Any, Any, Any]:
+        """Return (M, C, K) at the state and time set; clamped unknowns have 1 in K, 0 in M and C."""
+        return self.matrix(0, 0, 1, 0.0), self.matrix(0, 1, 0, 0.0), self.matrix(1, 0, 0, 1.0)
+
+    def size(self, x: Array) -> float:
+        """Return the largest entry of a local dof array in units of `scale`, over all ranks."""
+        here = float(np.max(np.abs(x) / self.scale)) if x.size else 0.0
+        return here if self.model.comm.size == 1 else self.model.comm.allreduce(here, op=MPI.MAX)
+
+    def shape(self) -> dict[str, Array]:
+        """Return the deflected structure at the state: position X (m), u1, u2 (m), alpha, … in the turning frame."""
+        X, q = self.structure.nodes()
+        if self.clamp is not None:
+            q = self.clamp.relative(q, X, self.time)
+        return {"x": X, **{name: q[:, i] for i, name in enumerate(self.structure.components)}}
+
+    def energies(self) -> dict[str, float]:
+        """Return kinetic and strain energy and the Jacobi integral T2 − T0 + W (− work of dead loads), J."""
+        comm = self.model.comm
+        e = {name: comm.allreduce(float(fem.assemble_scalar(form))) for name, form in self._energies.items()}
+        kinetic = e["T2"] + e.get("T1", 0.0) + e.get("T0", 0.0)
+        if "momentum" in e:
+            jacobi = kinetic - self._spin() * e["momentum"] + e["strain"]
+        else:
+            jacobi = e["T2"] - e.get("T0", 0.0) + e["strain"]
+        return {"kinetic": kinetic, "strain": e["strain"], "jacobi": jacobi + e.get("load_potential", 0.0)}
+
+    def _spin(self) -> float:
+        return self.motion.speed(self.time) * float(self.motion.axis[2])
+
+
+def compile_system(model: Model) -> System:
+    """Return the affine system of a linear theory, the nonlinear one otherwise."""
+    from rotfem.affine import AffineSystem
+
+    return AffineSystem(model) if model.theory.linear else System(model)

@@ -1,0 +1,17 @@
+"""Von Kármán type: stretch of the axis, linear shear and bending, Simo & Vu-Quoc 1986 eqs. (15), (19).
+
+The axial strain is the elongation that Kane, Ryan & Banerjee take as a coordinate.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import ufl
+
+
+def planar_beam(q: Any) -> tuple[Any, Any, Any]:
+    """Return (Gamma_1, Gamma_2, kappa) of q = (u_1, u_2, alpha): axial, shear (both 1) and bending (1/m) strain."""
+    du1, du2, dalpha = (q[i].dx(0) for i in range(3))
+    alpha = q[2]
+    return ufl.sqrt((1 + du1) ** 2 + du2**2) - 1, du2 - alpha, dalpha

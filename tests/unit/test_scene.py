@@ -1,0 +1,570 @@
+"""Scenes: what is accepted, what it becomes, and what every bad scene is told."""
+
+from __future__ import annotations
+
+import copy
+import json
+import pickle
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+from pydantic import ValidationError
+
+from rotfem.errors import ComputationError, Problem, SceneError
+from rotfem.scene import (
+    EFFECTS,
+    BeamMesh,
+    PlanarBeamStructure,
+    PlateMesh,
+    PlateStructure,
+    Scene,
+    SpatialBeamStructure,
+    TableMotion,
+    load_scene,
+)
+
+SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
+PLANAR = {"type": "planar_beam", "length": 10.0, "section": SECTION}
+SPATIAL_SECTION = {"EA": 3.0, "GA2": 1.0, "GA3": 2.0, "GJ": 5.0, "EI2": 7.0, "EI3": 11.0, "mass_per_length": 13.0}
+SPATIAL = {"type": "spatial_beam", "length": 2.0, "section": SPATIAL_SECTION}
+PLATE = {"type": "plate", "length": 1.0, "width": 0.5, "thickness": 0.01, "E": 70e9, "nu": 0.3, "rho": 2700.0}
+STRUCTURES = {"planar": PLANAR, "spatial": SPATIAL, "plate": PLATE}
+SPIN_UP = {"type": "spin_up", "speed": 6.0, "duration": 15.0}
+
+SCENES = sorted((Path(__file__).resolve().parents[2].parent / "shared" / "scenes").glob("*.toml"))
+SCENE_FILES: list[Any] = [*SCENES] or [
+    pytest.param(None, marks=pytest.mark.skip(reason="the example scenes are not there"))
+]
+
+
+def tables(kind: str = "planar", /, **changes: Any) -> dict[str, Any]:
+    """Returns tables of a valid scene, changed at dotted keys (written with __ for the dot)."""
+    data: dict[str, Any] = {
+        "structure": copy.deepcopy(STRUCTURES[kind]),
+        "motion": {"type": "constant", "speed": 3.0},
+    }
+    for path, value in changes.items():
+        *parents, key = path.split("__")
+        table = data
+        for parent in parents:
+            table = table.setdefault(parent, {})
+        table[key] = value
+    return data
+
+
+def scene(kind: str = "planar", /, **changes: Any) -> Scene:
+    return Scene.from_dict(tables(kind, **changes), "test.toml")
+
+
+def refused(kind: str = "planar", /, **changes: Any) -> SceneError:
+    with pytest.raises(SceneError) as caught:
+        scene(kind, **changes)
+    assert caught.value.file == "test.toml"
+    assert str(caught.value).startswith("test.toml: ")
+    return caught.value
+
+
+# --- the example scenes ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", SCENE_FILES, ids=lambda path: path.stem if path else "absent")
+def test_example_scenes_are_valid_and_survive_a_round_trip(path: Path) -> None:
+    loaded = load_scene(path)
+    assert loaded.name == path.stem
+    loaded.check_run()
+    assert json.loads(json.dumps(loaded.to_dict())) == loaded.to_dict()
+    written = tomllib.loads(tomli_w.dumps(loaded.to_dict()))
+    assert Scene.from_dict(written).to_dict() == loaded.to_dict()
+
+
+@pytest.mark.parametrize("path", SCENE_FILES, ids=lambda path: path.stem if path else "absent")
+def test_example_scenes_effects(path: Path) -> None:
+    spin = ("coriolis", "centrifugal")
+    expected = {
+        "blade_modes": (*spin, "rotary_inertia", "tip_mass"),
+        "hub_torque": (*spin, "euler", "rotary_inertia", "hub_coupling"),
+        "iccia_hub_beam": (*spin, "euler", "rotary_inertia"),
+        "plate_modes": (*spin, "rotary_inertia"),
+        "spin_up": (*spin, "euler", "rotary_inertia"),
+    }
+    if path.stem not in expected:
+        pytest.skip("a scene this test does not know")
+    assert load_scene(path).effective_effects() == expected[path.stem]
+
+
+# --- defaults and normal forms --------------------------------------------------------------------------------------
+
+
+def test_defaults_of_a_beam() -> None:
+    s = scene()
+    assert (s.name, s.model.theory, s.model.effects, s.model.frame) == ("test.toml", "reissner", "auto", "rotating")
+    assert s.mesh == BeamMesh(elements=10, degree=3, integration="reduced")
+    assert s.time is None
+    assert (s.modes.count, s.modes.about) == (6, "steady")
+    assert (s.solver.increment_tolerance, s.solver.max_iterations) == (1e-9, 25)
+    assert s.motion.axis == (0.0, 0.0, 1.0)
+    assert s.structure.damping.is_zero
+
+
+def test_defaults_of_a_plate() -> None:
+    s = scene("plate")
+    assert s.mesh == PlateMesh(elements=(8, 8), degree=2, cell="quadrilateral", integration="reduced")
+    assert isinstance(s.structure, PlateStructure)
+    assert s.structure.shear_correction == pytest.approx(5 / 6)
+    assert s.structure.root_position == (0.0, 0.0, 0.0)
+
+
+def test_integers_become_floats() -> None:
+    s = scene(structure__length=10)
+    assert type(s.structure.length) is float
+
+
+def test_time_parameters_belong_to_the_scheme() -> None:
+    alpha = scene(time={"end": 1, "step": 0.1}).time
+    assert alpha is not None
+    assert (alpha.scheme, alpha.spectral_radius, alpha.beta, alpha.gamma) == ("generalised_alpha", 0.9, None, None)
+    newmark = scene(time={"end": 1, "tolerance": 1e-4, "scheme": "newmark"}).time
+    assert newmark is not None
+    assert (newmark.spectral_radius, newmark.beta, newmark.gamma, newmark.step) == (None, 0.25, 0.5, None)
+
+
+def test_plate_elements_may_be_one_number() -> None:
+    assert scene("plate", mesh__elements=4).mesh.elements == (4, 4)
+    assert scene("plate", mesh__elements=[2, 3]).mesh.elements == (2, 3)
+
+
+def test_pretwist_and_precone_in_either_table() -> None:
+    twist = [[0, 0], [2, 0.3]]
+    inside = scene("spatial", structure__section__pretwist=twist, structure__section__precone=0.1)
+    outside = scene("spatial", structure__pretwist=twist, structure__precone=0.1)
+    assert inside.to_dict() == outside.to_dict()
+    assert isinstance(inside.structure, SpatialBeamStructure)
+    assert inside.structure.pretwist == ((0.0, 0.0), (2.0, 0.3))
+
+
+def test_tip_inertia_of_a_spatial_beam() -> None:
+    isotropic = scene("spatial", structure__tip_inertia=2.0).structure
+    full = scene("spatial", structure__tip_inertia=[[2, 0.1, 0], [0.1, 3, 0], [0, 0, 4]]).structure
+    assert isinstance(isotropic, SpatialBeamStructure) and isinstance(full, SpatialBeamStructure)
+    np.testing.assert_array_equal(isotropic.tip_inertia_matrix, 2 * np.eye(3))
+    np.testing.assert_array_equal(full.tip_inertia_matrix, [[2, 0.1, 0], [0.1, 3, 0], [0, 0, 4]])
+
+
+def test_loads_in_all_their_forms() -> None:
+    bare = scene(loads__tip_force=[1, 2]).loads.tip_force
+    assert bare is not None
+    np.testing.assert_array_equal(bare.at(7.0), [1, 2, 0])
+    assert (bare.kind, bare.constant, bare.is_zero) == ("dead", True, False)
+    table = scene(loads__distributed={"table": [[0, 0, 0], [2, 4, 8]], "kind": "follower"}).loads.distributed
+    assert table is not None
+    np.testing.assert_allclose([table.at(t) for t in (-1, 0.5, 9)], [[0, 0, 0], [1, 2, 0], [4, 8, 0]])
+    assert (table.kind, table.constant) == ("follower", False)
+    moment = scene(loads__tip_moment=5).loads.tip_moment
+    assert moment is not None
+    np.testing.assert_array_equal(moment.at(0.0), [5.0])
+    spatial = scene("spatial", loads__tip_moment={"value": [1, 2, 3]}).loads.tip_moment
+    assert spatial is not None
+    np.testing.assert_array_equal(spatial.at(0.0), [1, 2, 3])
+    zero = scene(loads__tip_force=[[0, 0, 0], [1, 0, 0]]).loads.tip_force
+    assert zero is not None and zero.is_zero and zero.constant
+
+
+def test_dead_and_follower_loads() -> None:
+    s = scene(loads__tip_force=[1, 2], loads__distributed={"value": [1, 0], "kind": "follower"})
+    assert [s.is_dead(name) for name in ("tip_force", "distributed", "tip_moment")] == [True, False, False]
+
+
+def test_base_acceleration_as_table_and_function() -> None:
+    table = scene(motion__base_acceleration=[[0, 1, 0, 0], [2, 3, 0, 0]]).motion.base_acceleration
+    assert table is not None
+    np.testing.assert_allclose(table.at(1.0), [2, 0, 0])
+    function = scene(motion__base_acceleration=lambda t: (t, -t)).motion.base_acceleration
+    assert function is not None and not function.constant
+    np.testing.assert_allclose(function.at(2.0), [2, -2, 0])
+
+
+def test_unit_axis() -> None:
+    np.testing.assert_allclose(scene("spatial", motion__axis=[0, 3, 4]).motion.unit_axis, [0, 0.6, 0.8])
+
+
+def test_numpy_values_are_welcome() -> None:
+    s = scene(structure__length=np.float64(10), mesh__elements=np.int64(4), loads__gravity=np.array([0, -9.81]))
+    assert s.mesh.elements == 4
+    assert s.loads.gravity == (0.0, -9.81, 0.0)
+
+
+def test_scene_is_frozen_and_survives_pickling() -> None:
+    s = scene()
+    with pytest.raises(ValidationError):
+        s.structure.length = 3.0
+    again = pickle.loads(pickle.dumps(s))
+    assert (again.to_dict(), again.name) == (s.to_dict(), s.name)
+
+
+def test_from_dict_does_not_change_its_argument() -> None:
+    data = tables("spatial", structure__section__pretwist=0.1, mesh__elements=3)
+    before = copy.deepcopy(data)
+    Scene.from_dict(data)
+    assert data == before
+
+
+def test_to_dict_shows_functions_by_name() -> None:
+    def whirl(t: float) -> float:
+        return 2.0 * t
+
+    d = scene(motion={"type": "callable", "speed": whirl}).to_dict()
+    assert d["motion"]["speed"] == "<callable whirl>"
+    assert "rate" not in d["motion"]
+    tomli_w.dumps(d)
+
+
+def test_replace() -> None:
+    s = scene(time={"end": 1, "step": 0.1})
+    newmark = s.replace({"time.scheme": "newmark", "time.step": None, "time.tolerance": 1e-3})
+    assert newmark.time is not None and s.time is not None
+    assert (newmark.time.scheme, newmark.time.step, newmark.time.tolerance) == ("newmark", None, 1e-3)
+    assert (s.time.step, newmark.name) == (0.1, s.name)
+    with pytest.raises(SceneError, match="model.theory"):
+        s.replace({"model.theory": "exact"})
+
+
+# --- effects --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({}, {"coriolis", "centrifugal", "rotary_inertia"}),
+        ({"motion__speed": 0}, {"rotary_inertia"}),
+        ({"motion__speed": 0, "structure__section": SECTION | {"rotary_inertia": 0}}, set()),
+        ({"motion": SPIN_UP}, {"coriolis", "centrifugal", "euler", "rotary_inertia"}),
+        ({"motion": {"type": "table", "table": [[0, 0], [1, 0]]}}, {"rotary_inertia"}),
+        (
+            {"motion": {"type": "table", "table": [[0, 0], [1, 1]]}},
+            {"coriolis", "centrifugal", "euler", "rotary_inertia"},
+        ),
+        (
+            {"motion": {"type": "torque", "hub_inertia": 1, "coupled": False}},
+            {"coriolis", "centrifugal", "euler", "rotary_inertia"},
+        ),
+        ({"motion": {"type": "torque", "hub_inertia": 1}}, set(EFFECTS) - {"base", "gravity", "damping", "tip_mass"}),
+        ({"motion__base_acceleration": [1, 0]}, {"coriolis", "centrifugal", "rotary_inertia", "base"}),
+        ({"motion__base_acceleration": [0, 0]}, {"coriolis", "centrifugal", "rotary_inertia"}),
+        ({"loads__gravity": [0, -9.81]}, {"coriolis", "centrifugal", "rotary_inertia", "gravity"}),
+        ({"structure__damping__kelvin_voigt": 1e-3}, {"coriolis", "centrifugal", "rotary_inertia", "damping"}),
+        ({"structure__tip_inertia": 1e-3}, {"coriolis", "centrifugal", "rotary_inertia", "tip_mass"}),
+        ({"model__frame": "inertial", "motion": SPIN_UP | {"base_acceleration": [1, 0]}}, {"rotary_inertia"}),
+        ({"model__effects": ["gravity", "tip_mass", "damping", "base", "centrifugal"]}, {"centrifugal"}),
+        ({"model__effects": []}, set()),
+    ],
+)
+def test_effective_effects(changes: dict[str, Any], expected: set[str]) -> None:
+    effects = scene(**changes).effective_effects()
+    assert set(effects) == expected
+    assert list(effects) == [name for name in EFFECTS if name in expected]
+
+
+def test_a_speed_sweep_spins_even_a_scene_at_rest() -> None:
+    assert scene(motion__speed=0).effective_effects(spinning=True)[:2] == ("coriolis", "centrifugal")
+
+
+def test_point_masses_are_tip_masses() -> None:
+    assert "tip_mass" in scene("plate", structure__point_masses=[[1.0, 0.5, 2.0]]).effective_effects()
+
+
+# --- check_run ------------------------------------------------------------------------------------------------------
+
+
+def test_check_run() -> None:
+    scene().check_run()
+    scene(motion=SPIN_UP, time={"end": 1, "step": 0.1}).check_run()
+    with pytest.raises(SceneError, match="spin_up") as caught:
+        scene(motion=SPIN_UP).check_run()
+    assert caught.value.key == "time"
+
+
+# --- bad scenes -----------------------------------------------------------------------------------------------------
+
+TORQUE = {"type": "torque", "hub_inertia": 1.0}
+TIME = {"end": 1.0, "step": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("kind", "changes", "key", "message"),
+    [
+        ("planar", {"structure__lenght": 1}, "structure.lenght", 'did you mean "length"?'),
+        ("planar", {"motoin": {}}, "motoin", 'did you mean "motion"?'),
+        ("planar", {"time": TIME | {"stepp": 1}}, "time.stepp", 'did you mean "step"?'),
+        ("planar", {"structure__length": -1.0}, "structure.length", "greater than 0"),
+        ("planar", {"structure__length": 0}, "structure.length", "greater than 0"),
+        ("planar", {"structure__length": float("nan")}, "structure.length", "finite"),
+        ("planar", {"structure__length": float("inf")}, "structure.length", "finite"),
+        ("planar", {"structure__length": 10**400}, "structure.length", "finite"),
+        ("planar", {"structure__length": "10"}, "structure.length", "must be a number"),
+        ("planar", {"structure__length": True}, "structure.length", "must be a number"),
+        ("planar", {"structure__tip_mass": -1}, "structure.tip_mass", "at least 0"),
+        ("planar", {"structure__hub_offset": [0, 0, 0]}, "structure.hub_offset", "unknown key"),
+        ("planar", {"structure__section__EA": False}, "structure.section.EA", "must be a number greater than 0"),
+        ("planar", {"structure__section__EA": [[0, 1], [9, 1]]}, "structure.section.EA", "it ends at 9"),
+        ("planar", {"structure__type": "planar_baem"}, "structure.type", 'did you mean "planar_beam"?'),
+        ("planar", {"structure": {}}, "structure.type", "required key is missing"),
+        ("planar", {"structure": 3}, "structure", "must be a table"),
+        ("planar", {"structure": {"type": "planar_beam", "section": SECTION}}, "structure.length", "required key"),
+        ("planar", {"structure__damping__rayleigh": [0, -1]}, "structure.damping.rayleigh", "at least 0"),
+        ("planar", {"structure__damping": 0.1}, "structure.damping", "must be a table"),
+        ("planar", {"motion__type": "constnat"}, "motion.type", 'did you mean "constant"?'),
+        ("planar", {"motion": {"type": "constant"}}, "motion.speed", "required key is missing"),
+        ("planar", {"motion__axis": [0, 0, 0]}, "motion.axis", "must be a direction"),
+        ("planar", {"motion__axis": [0, 1, 0]}, "motion.axis", "planar_beam"),
+        ("planar", {"motion__axis": [0, 1]}, "motion.axis", "3 numbers"),
+        ("planar", {"motion__base_acceleration": [0, 0, 1]}, "motion.base_acceleration", "third component"),
+        ("planar", {"motion": SPIN_UP | {"duration": 0}}, "motion.duration", "greater than 0"),
+        ("planar", {"motion": {"type": "table", "table": [[0, 1], [0, 2]]}}, "motion.table", "increase strictly"),
+        ("planar", {"motion": {"type": "table", "table": "no.csv"}}, "motion.table", "file not found"),
+        ("planar", {"motion": TORQUE | {"pulses": [[1, 1, 1]]}}, "motion.pulses", "must end after"),
+        ("planar", {"motion": TORQUE | {"pulses": [[0, 1, 1]], "table": [[0, 1], [1, 1]]}}, "motion.table", "either"),
+        ("planar", {"motion": TORQUE | {"coupled": 1}}, "motion.coupled", "true or false"),
+        ("planar", {"motion": {"type": "callable", "speed": 3.0}}, "motion.speed", "Python function"),
+        ("planar", {"model__theory": "reisner"}, "model.theory", 'did you mean "reissner"?'),
+        ("planar", {"model__theory": "exact"}, "model.theory", '"consistent_linear"'),
+        ("planar", {"model__effects": ["corolis"]}, "model.effects", 'did you mean "coriolis"?'),
+        ("planar", {"model__effects": ["euler", "euler"]}, "model.effects", "twice"),
+        ("planar", {"model__effects": "all"}, "model.effects", '"auto" or a list'),
+        ("planar", {"model__tolerance": 0}, "model.tolerance", "greater than 0"),
+        ("planar", {"model": {"frame": "inertial", "theory": "linear"}}, "model.frame", "reissner"),
+        ("plate", {"model__frame": "inertial"}, "model.frame", "planar_beam"),
+        ("planar", {"model__frame": "inertial", "motion": TORQUE}, "model.frame", "torque"),
+        ("planar", {"model": {"frame": "inertial", "effects": ["euler"]}}, "model.effects", "clamp"),
+        ("planar", {"initial__tip_displacement": -10.0}, "initial.tip_displacement", "less than the length"),
+        ("plate", {"initial__tip_displacement": 0.1}, "initial.tip_displacement", "only for a planar_beam"),
+        (
+            "planar",
+            {"initial": {"tip_displacement": 0.1, "state": "steady"}},
+            "initial.tip_displacement",
+            "cannot be combined",
+        ),
+        ("planar", {"initial__state": "steady", "motion": SPIN_UP}, "initial.state", "constant"),
+        ("planar", {"loads__gravity": [0, 0, -9.81]}, "loads.gravity", "third component"),
+        ("planar", {"loads__gravity": 9.81}, "loads.gravity", "list of 2 or 3 numbers"),
+        ("planar", {"loads__tip_force": [0, 0, 1]}, "loads.tip_force", "third component"),
+        ("planar", {"loads__tip_force": {"kind": "dead"}}, "loads.tip_force", "exactly one"),
+        ("planar", {"loads__tip_force": {"value": [1, 1], "kind": "folower"}}, "loads.tip_force.kind", "follower"),
+        ("planar", {"loads__tip_moment": [1, 0, 0]}, "loads.tip_moment", "one component"),
+        ("spatial", {"loads__tip_moment": 1}, "loads.tip_moment", "three components"),
+        ("plate", {"loads__tip_moment": 1}, "loads.tip_moment", "only for beams"),
+        ("planar", {"mesh__elements": 0}, "mesh.elements", "at least 1"),
+        ("planar", {"mesh__elements": 2.0}, "mesh.elements", "integer"),
+        ("planar", {"mesh__elements": True}, "mesh.elements", "integer"),
+        ("planar", {"mesh__elements": [2, 2]}, "mesh.elements", "integer"),
+        ("planar", {"mesh__degree": 7}, "mesh.degree", "at most 6"),
+        ("planar", {"mesh__cell": "triangle"}, "mesh.cell", "unknown key"),
+        ("plate", {"mesh__cell": "triangel"}, "mesh.cell", 'did you mean "triangle"?'),
+        ("plate", {"mesh__elements": [2, 0]}, "mesh.elements", "at least 1"),
+        ("planar", {"time": {"end": 1.0}}, "time.step", "exactly one"),
+        ("planar", {"time": TIME | {"tolerance": 1e-3}}, "time.step", "exactly one"),
+        ("planar", {"time": {"step": 0.1}}, "time.end", "required key is missing"),
+        ("planar", {"time": TIME | {"step": 0}}, "time.step", "greater than 0"),
+        ("planar", {"time": TIME | {"step": 2}}, "time.step", "at most time.end"),
+        ("planar", {"time": TIME | {"max_step": 1}}, "time.max_step", "only with tolerance"),
+        (
+            "planar",
+            {"time": {"end": 1, "tolerance": 1e-3, "min_step": 0.2, "max_step": 0.1}},
+            "time.min_step",
+            "at most max_step",
+        ),
+        ("planar", {"time": TIME | {"spectral_radius": 1.1}}, "time.spectral_radius", "at most 1"),
+        ("planar", {"time": TIME | {"beta": 0.3}}, "time.beta", "no meaning"),
+        ("planar", {"time": TIME | {"scheme": "newmark", "gamma": 0.4}}, "time.gamma", "at least 0.5"),
+        ("planar", {"time": TIME | {"scheme": "newmark", "beta": 0}}, "time.beta", "greater than 0"),
+        ("planar", {"time": TIME | {"output_every": 0}}, "time.output_every", "at least 1"),
+        ("planar", {"modes__count": 0}, "modes.count", "at least 1"),
+        ("planar", {"modes__about": "deformed"}, "modes.about", '"undeformed"'),
+        ("planar", {"solver__max_iterations": 0}, "solver.max_iterations", "at least 1"),
+        ("spatial", {"structure__tip_inertia": [[1, 2, 0], [2, 1, 0], [0, 0, 1]]}, "structure.tip_inertia", "definite"),
+        ("spatial", {"structure__pretwist": [[0, 0], [1, 1]]}, "structure.pretwist", "it ends at 1"),
+        ("spatial", {"structure__section__precone": "a"}, "structure.section.precone", "must be a number"),
+        (
+            "spatial",
+            {"structure__precone": 0.1, "structure__section__precone": 0.1},
+            "structure.section.precone",
+            "given twice",
+        ),
+        ("spatial", {"structure__hub_radius": 1, "structure__hub_offset": [1, 0, 0]}, "structure.hub_offset", "either"),
+        ("plate", {"structure__nu": 0.5}, "structure.nu", "less than 0.5"),
+        ("plate", {"structure__E1": 1e9}, "structure", "cannot be combined"),
+        ("plate", {"structure__thickness": {"skin": 0.1}}, "structure.thickness", "needs a mesh"),
+        ("plate", {"structure__thickness": [[0, 0.1], [2, 0.1]]}, "structure.thickness", "it ends at 2"),
+        ("plate", {"structure__thickness": [[0, 0.1], [1, 0]]}, "structure.thickness", "greater than 0"),
+        ("plate", {"structure__mesh": "no.msh"}, "structure.mesh", "file not found"),
+        ("plate", {"structure__point_masses": [[2, 0, 1]]}, "structure.point_masses", "not on the plate"),
+        ("plate", {"structure__point_masses": [[0, 0, -1]]}, "structure.point_masses", "greater than 0"),
+    ],
+)
+def test_bad_scenes(kind: str, changes: dict[str, Any], key: str, message: str) -> None:
+    error = refused(kind, **changes)
+    assert error.key == key
+    assert message in str(error)
+
+
+def test_orthotropic_plate() -> None:
+    material = {"E1": 140e9, "E2": 10e9, "nu12": 0.3, "G12": 5e9}
+    plate = {key: value for key, value in PLATE.items() if key not in ("E", "nu")} | material
+    structure = scene(structure=plate).structure
+    assert isinstance(structure, PlateStructure) and structure.is_orthotropic
+    assert "not stable" in str(refused(structure=plate | {"nu12": 4.0}))
+
+
+def test_message_shows_file_key_value_and_what_is_allowed() -> None:
+    assert str(refused(structure__length=-1.0)) == "test.toml: structure.length = -1.0: must be greater than 0"
+    error = refused(structure__lenght=1.0)
+    assert str(error).startswith(
+        'test.toml: structure.lenght: unknown key; did you mean "length"? allowed: type, length'
+    )
+
+
+def test_all_problems_are_listed() -> None:
+    error = refused(structure__length=-1.0, mesh__elements=0, model__theory="x")
+    assert [problem.key for problem in error.problems] == ["structure.length", "model.theory", "mesh.elements"]
+    first, *others = str(error).splitlines()
+    assert first.endswith("(and 2 more)")
+    assert others[1].strip() == "mesh.elements = 0: must be an integer at least 1"
+
+
+# --- files and overrides --------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def scene_file(tmp_path: Path) -> Path:
+    path = tmp_path / "my_beam.toml"
+    path.write_text(tomli_w.dumps(tables()))
+    return path
+
+
+def test_load_scene(scene_file: Path) -> None:
+    loaded = load_scene(str(scene_file))
+    assert isinstance(loaded.structure, PlanarBeamStructure)
+    assert (loaded.name, loaded.file, loaded.structure.length) == ("my_beam", "my_beam.toml", 10.0)
+
+
+def test_missing_file_and_folder(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"absent\.toml: no such file"):
+        load_scene(tmp_path / "absent.toml")
+    with pytest.raises(SceneError, match="is a directory"):
+        load_scene(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"[structure]\nlength = = 3\n", r"not valid TOML: .*line 2, column 10"),
+        (b"[structure\n", r"not valid TOML: .*line 1"),
+        (b"a = '\xff'\n", "byte 5 is not UTF-8"),
+        (b"a = " + b"[" * 100_000, "bad.toml: "),
+        (b"", "structure: required key is missing"),
+    ],
+)
+def test_unreadable_toml(tmp_path: Path, content: bytes, message: str) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_bytes(content)
+    with pytest.raises(SceneError, match=message):
+        load_scene(path)
+
+
+def test_overrides(scene_file: Path) -> None:
+    loaded = load_scene(
+        scene_file,
+        ["model.theory=linear", "motion.speed = 7", "time.end=2", "time.step=0.5", 'model.frame="rotating"',
+         "loads.tip_force=[1, 2]", "motion.speed=8"],
+    )  # fmt: skip
+    assert (loaded.model.theory, loaded.to_dict()["motion"]["speed"]) == ("linear", 8.0)
+    assert loaded.time is not None and loaded.time.step == 0.5
+    assert loaded.to_dict()["loads"]["tip_force"]["value"] == [1.0, 2.0, 0.0]
+
+
+@pytest.mark.parametrize("override", ["model.theory", "=linear", "model.theory=", "model..theory=x", "a b=1", ""])
+def test_bad_override_syntax(scene_file: Path, override: str) -> None:
+    with pytest.raises(SceneError, match="table.key=value") as caught:
+        load_scene(scene_file, [override])
+    assert f'"{override}"' in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("override", "key"),
+    [
+        ("model.theory=quadratic", "model.theory"),
+        ("structure.length=-3", "structure.length"),
+        ("structure.length=ten", "structure.length"),
+        ("structure.lenght=3", "structure.lenght"),
+        ("structure.length.unit=m", "structure.length"),
+        ("structure.length=nan", "structure.length"),
+        ("structure.length=1\ntype=2", "structure.length"),
+    ],
+)
+def test_overrides_are_validated(scene_file: Path, override: str, key: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        load_scene(scene_file, [override])
+    assert caught.value.key == key
+
+
+def test_relative_paths_start_at_the_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "case"
+    folder.mkdir()
+    (folder / "speed.csv").write_text("t, Omega  # s, rad/s\n0, 0\n# ramp\n1.5, 3\n")
+    (folder / "blade.msh").write_text("")
+    (folder / "a.toml").write_text(tomli_w.dumps(tables(motion={"type": "table", "table": "speed.csv"})))
+    plate = {key: value for key, value in PLATE.items() if key not in ("length", "width")}
+    plate |= {"mesh": "blade.msh", "thickness": {"skin": 0.01, "spar": 0.02}}
+    (folder / "b.toml").write_text(tomli_w.dumps(tables(structure=plate)))
+    monkeypatch.chdir(tmp_path)
+
+    motion = load_scene("case/a.toml").motion
+    assert isinstance(motion, TableMotion)
+    assert motion.table == ((0.0, 0.0), (1.5, 3.0))
+
+    loaded = load_scene("case/b.toml")
+    assert isinstance(loaded.structure, PlateStructure)
+    assert loaded.structure.mesh == str(folder / "blade.msh")
+    assert loaded.structure.thickness == {"skin": 0.01, "spar": 0.02}
+    assert Scene.from_dict(loaded.to_dict()).to_dict() == loaded.to_dict()
+    with pytest.raises(SceneError, match="no meaning with structure.mesh"):
+        load_scene("case/b.toml", ["mesh.elements=3"])
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("0, 0\n1, x\n", "line 2"),
+        ("0, 0, 0\n1, 1, 1\n", "3 entries"),
+        ("t, w\n", "must be"),
+        ("0, 0\n0, 1\n", "strictly"),
+    ],
+)
+def test_bad_csv(tmp_path: Path, content: str, message: str) -> None:
+    (tmp_path / "speed.csv").write_text(content)
+    data = tables(motion={"type": "table", "table": "speed.csv"})
+    with pytest.raises(SceneError, match=message) as caught:
+        Scene.from_dict(data, directory=tmp_path)
+    assert caught.value.key == "motion.table"
+
+
+# --- the errors themselves ------------------------------------------------------------------------------------------
+
+
+def test_scene_error_survives_pickling() -> None:
+    error = SceneError("a.toml", "mesh.degree", 9, "must be at most 6", [Problem("time", None, "missing")])
+    again = pickle.loads(pickle.dumps(error))
+    assert str(again) == str(error) == "a.toml: mesh.degree = 9: must be at most 6 (and 1 more)\n  time: missing"
+    assert again.problems == error.problems
+
+
+def test_computation_error_joins_what_when_and_advice() -> None:
+    assert str(ComputationError("no convergence", 0.25, "try a smaller step")) == (
+        "no convergence at t = 0.25 s; try a smaller step"
+    )
+    assert str(ComputationError("no convergence")) == "no convergence"
+    error = pickle.loads(pickle.dumps(ComputationError("x", 1.0, "y")))
+    assert (error.what, error.time, error.advice) == ("x", 1.0, "y")

@@ -1,0 +1,270 @@
+"""Cross-sections: every way of giving one yields the properties of the closed formulas."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from rotfem.errors import SceneError
+from rotfem.scene import PlanarBeamStructure, Scene, SpatialBeamStructure
+from rotfem.section import PlanarSection
+from rotfem.section_spatial import SpatialSection
+
+MATERIAL = {"E": 210e9, "nu": 0.3, "rho": 7800.0}
+G = 210e9 / 2.6
+SPATIAL = {"EA": 3.0, "GA2": 1.0, "GA3": 2.0, "GJ": 5.0, "EI2": 7.0, "EI3": 11.0, "mass_per_length": 13.0}
+X = np.array([0.0, 0.5, 2.0])
+
+
+def planar(**section: Any) -> PlanarSection:
+    structure = {"type": "planar_beam", "length": 2.0, "section": section}
+    scene = Scene.from_dict({"structure": structure, "motion": {"type": "constant", "speed": 1.0}})
+    assert isinstance(scene.structure, PlanarBeamStructure)
+    return scene.structure.section
+
+
+def spatial(**section: Any) -> SpatialSection:
+    structure = {"type": "spatial_beam", "length": 2.0, "section": section}
+    scene = Scene.from_dict({"structure": structure, "motion": {"type": "constant", "speed": 1.0}})
+    assert isinstance(scene.structure, SpatialBeamStructure)
+    return scene.structure.section
+
+
+def test_stiffness_way_returns_what_was_given() -> None:
+    section = planar(EA=1, GA=2, EI=3, mass_per_length=4, rotary_inertia=5)
+    assert section.uniform
+    assert section.breakpoints == ()
+    values = section.at(X)
+    assert list(values) == ["EA", "GA", "EI", "mass_per_length", "rotary_inertia"]
+    for value, expected in zip(values.values(), (1, 2, 3, 4, 5), strict=True):
+        np.testing.assert_array_equal(value, np.full(3, float(expected)))
+
+
+def test_rotary_inertia_is_optional() -> None:
+    section = planar(EA=1, GA=2, EI=3, mass_per_length=4)
+    assert not section.has_rotary_inertia
+    np.testing.assert_array_equal(section.at(X)["rotary_inertia"], np.zeros(3))
+
+
+def test_material_way_default_and_given_shear_correction() -> None:
+    default = planar(**MATERIAL, area=2e-3, second_moment=4e-6).at(X)
+    np.testing.assert_allclose(default["EA"], 210e9 * 2e-3)
+    np.testing.assert_allclose(default["GA"], 5 / 6 * G * 2e-3)
+    np.testing.assert_allclose(default["EI"], 210e9 * 4e-6)
+    np.testing.assert_allclose(default["mass_per_length"], 7800 * 2e-3)
+    np.testing.assert_allclose(default["rotary_inertia"], 7800 * 4e-6)
+    given = planar(**MATERIAL, area=2e-3, second_moment=4e-6, shear_correction=0.5).at(X)
+    np.testing.assert_allclose(given["GA"], 0.5 * G * 2e-3)
+
+
+@pytest.mark.parametrize(
+    ("shape", "area", "second_moment", "correction"),
+    [
+        ({"shape": "rectangle", "width": 0.1, "height": 0.2}, 0.02, 0.1 * 0.2**3 / 12, 10 * 1.3 / (12 + 11 * 0.3)),
+        ({"shape": "circle", "radius": 0.1}, np.pi * 0.01, np.pi / 4 * 1e-4, 6 * 1.3 / (7 + 6 * 0.3)),
+        (
+            {"shape": "tube", "outer_radius": 0.1, "inner_radius": 0.05},
+            np.pi * 0.0075,
+            np.pi / 4 * (0.1**4 - 0.05**4),
+            6 * 1.3 * 1.25**2 / (8.8 * 1.25**2 + 23.6 * 0.25),
+        ),
+        # A thin tube tends to Cowper's own limit 2(1+ν)/(4+3ν).
+        (
+            {"shape": "tube", "outer_radius": 1.0, "wall": 1e-6},
+            2 * np.pi * 1e-6,
+            np.pi * 1e-6,
+            2 * 1.3 / (4 + 3 * 0.3),
+        ),
+    ],
+)
+def test_shapes(shape: dict[str, Any], area: float, second_moment: float, correction: float) -> None:
+    values = planar(**MATERIAL, **shape).at(0.0)
+    np.testing.assert_allclose(values["EA"], 210e9 * area, rtol=3e-6)
+    np.testing.assert_allclose(values["EI"], 210e9 * second_moment, rtol=3e-6)
+    np.testing.assert_allclose(values["GA"], correction * G * area, rtol=3e-6)
+    np.testing.assert_allclose(values["mass_per_length"], 7800 * area, rtol=3e-6)
+
+
+def test_taper_interpolates_dimensions_before_properties() -> None:
+    section = planar(**MATERIAL, shape="rectangle", width=0.1, height=[[0.0, 0.2], [0.5, 0.15], [2.0, 0.1]])
+    assert not section.uniform
+    assert section.breakpoints == (0.5,)
+    height = np.array([0.2, 0.15, 0.1])
+    np.testing.assert_allclose(section.at(X)["EI"], 210e9 * 0.1 * height**3 / 12)
+    np.testing.assert_allclose(section.at(1.25)["EI"], 210e9 * 0.1 * 0.125**3 / 12)
+
+
+def test_uniform_taper_counts_as_uniform() -> None:
+    assert planar(EA=[[0, 1], [2, 1]], GA=2, EI=3, mass_per_length=4).uniform
+
+
+def test_taper_end_tolerance() -> None:
+    planar(EA=[[0, 1], [2 * (1 + 5e-10), 1]], GA=2, EI=3, mass_per_length=4)
+    with pytest.raises(SceneError, match="it ends at 1.9"):
+        planar(EA=[[0, 1], [1.9, 1]], GA=2, EI=3, mass_per_length=4)
+
+
+@pytest.mark.parametrize(
+    ("taper", "message"),
+    [
+        ([[0, 1]], "at least two rows"),
+        ([], "must be a taper"),
+        ([[0.1, 1], [2, 1]], "must start at x = 0"),
+        ([[0, 1], [1, 1], [1, 2], [2, 2]], "increase strictly"),
+        ([[0, 1], [2, 0]], "greater than 0"),
+        ([[0, 1], [2, float("nan")]], "finite"),
+        ([[0, 1], [2, True]], "must be a number"),
+        ([[0, 1], [2]], "row 2 has 1 entries"),
+        ([[0, 1, 2], [2, 1, 2]], "row 1 has 3 entries"),
+        ([0, 1], "must be a taper"),
+    ],
+)
+def test_bad_tapers(taper: list[Any], message: str) -> None:
+    with pytest.raises(SceneError, match=message) as caught:
+        planar(EA=taper, GA=2, EI=3, mass_per_length=4)
+    assert caught.value.key == "structure.section.EA"
+
+
+@pytest.mark.parametrize(
+    ("section", "message"),
+    [
+        ({}, "none is given"),
+        ({"EA": 1, "GA": 1, "EI": 1}, "missing mass_per_length"),
+        ({"EA": 1, "GA": 1, "EI": 1, "mass_per_length": 1, "E": 1}, "E cannot be combined"),
+        ({**MATERIAL, "shape": "circle"}, "missing radius"),
+        ({**MATERIAL, "shape": "circle", "radius": 1, "wall": 1}, "wall cannot be combined"),
+        ({**MATERIAL, "shape": "tube", "outer_radius": 1, "inner_radius": 0.5, "wall": 0.5}, "cannot be combined"),
+        ({**MATERIAL, "shape": "tube", "outer_radius": 1, "inner_radius": 1}, "less than outer_radius"),
+        (
+            {**MATERIAL, "shape": "tube", "outer_radius": [[0, 2], [2, 1]], "inner_radius": 1.5},
+            "less than outer_radius",
+        ),
+        ({**MATERIAL, "nu": 0.6, "shape": "circle", "radius": 1}, "at most 0.5"),
+        ({**MATERIAL, "shape": "circel", "radius": 1}, 'did you mean "circle"'),
+    ],
+)
+def test_incomplete_and_mixed_sections(section: dict[str, Any], message: str) -> None:
+    with pytest.raises(SceneError, match=message) as caught:
+        planar(**section)
+    assert caught.value.key.startswith("structure.section")
+
+
+def test_incomplete_section_lists_the_possible_sets() -> None:
+    with pytest.raises(SceneError) as caught:
+        planar(EA=1)
+    assert "EA, GA, EI, mass_per_length (optional: rotary_inertia)" in str(caught.value)
+    assert 'shape = "tube", outer_radius, wall' in str(caught.value)
+
+
+def test_section_is_frozen() -> None:
+    section = planar(EA=1, GA=2, EI=3, mass_per_length=4)
+    with pytest.raises(ValidationError):
+        section.EA = 5.0
+
+
+def test_spatial_diagonal() -> None:
+    values = spatial(**SPATIAL, rotary_inertia2=0.5, rotary_inertia3=0.25).at(X)
+    assert values["stiffness"].shape == values["mass"].shape == (3, 6, 6)
+    np.testing.assert_array_equal(values["stiffness"][1], np.diag([3.0, 1, 2, 5, 7, 11]))
+    np.testing.assert_array_equal(values["mass"][1], np.diag([13, 13, 13, 0.75, 0.5, 0.25]))
+
+
+def test_spatial_offsets_follow_rigid_body_kinematics() -> None:
+    offsets = {"mass_center": [0.1, 0.2], "shear_center": [0.3, -0.1], "tension_center": [-0.2, 0.4]}
+    values = spatial(**SPATIAL, rotary_inertia2=0.5, rotary_inertia3=0.25, **offsets).at(0.0)
+    rng = np.random.default_rng(1)
+    v, w = rng.normal(size=3), rng.normal(size=3)
+    motion = np.concatenate([v, w])
+
+    at_mass = v + np.cross(w, [0, 0.1, 0.2])
+    kinetic = 13 * at_mass @ at_mass + np.array([0.75, 0.5, 0.25]) @ w**2
+    assert motion @ values["mass"] @ motion == pytest.approx(kinetic)
+
+    axial = (v + np.cross(w, [0, -0.2, 0.4]))[0]
+    shear = (v + np.cross(w, [0, 0.3, -0.1]))[1:]
+    energy = 3 * axial**2 + np.array([1, 2]) @ shear**2 + np.array([5, 7, 11]) @ w**2
+    assert motion @ values["stiffness"] @ motion == pytest.approx(energy)
+
+
+def test_spatial_axial_force_at_the_tension_center_does_not_bend() -> None:
+    stiffness = spatial(**SPATIAL, tension_center=[-0.2, 0.4]).at(0.0)["stiffness"]
+    y, z, force = -0.2, 0.4, 2.0
+    strain = np.linalg.solve(stiffness, [force, 0, 0, 0, z * force, -y * force])
+    np.testing.assert_allclose(strain, [force / 3, 0, 0, 0, 0, 0], atol=1e-15)
+
+
+def test_spatial_matrices_are_returned_at_every_position() -> None:
+    stiffness = np.diag([3.0, 1, 2, 5, 7, 11])
+    stiffness[3, 4] = stiffness[4, 3] = 1.5
+    section = spatial(stiffness=stiffness, mass=np.eye(6))
+    np.testing.assert_array_equal(section.at(X)["stiffness"], np.broadcast_to(stiffness, (3, 6, 6)))
+    assert section.uniform
+    assert section.has_rotary_inertia
+
+
+def _matrix(change: str) -> Any:
+    matrix = np.eye(6)
+    if change == "unsymmetric":
+        matrix[0, 1] = 0.5
+    elif change == "indefinite":
+        matrix[3, 4] = matrix[4, 3] = 1.5
+    elif change == "singular":
+        matrix[5, 5] = 0.0
+    elif change == "small":
+        return np.eye(5)
+    return matrix
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [("unsymmetric", "not symmetric"), ("indefinite", "definite"), ("singular", "definite"), ("small", "6×6")],
+)
+def test_bad_stiffness_matrices(change: str, message: str) -> None:
+    with pytest.raises(SceneError, match=message) as caught:
+        spatial(stiffness=_matrix(change), mass=np.eye(6))
+    assert caught.value.key == "structure.section.stiffness"
+
+
+def test_definiteness_does_not_depend_on_units() -> None:
+    section = spatial(stiffness=np.diag([1e12, 1e12, 1e12, 1e-3, 1e-3, 1e-3]), mass=_matrix("singular"))
+    assert section.at(0.0)["stiffness"][5, 5] == 1e-3
+
+
+def test_mass_without_rotary_part() -> None:
+    section = spatial(**SPATIAL)
+    assert not section.has_rotary_inertia
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "constant"),
+    # Timoshenko & Goodier, Theory of Elasticity, §109: k₁ for side ratios 1, 2 and 10.
+    [(1.0, 1.0, 0.1406), (2.0, 1.0, 0.229 * 2), (1.0, 2.0, 0.229 * 2), (10.0, 1.0, 0.312 * 10)],
+)
+def test_torsion_of_a_rectangle(width: float, height: float, constant: float) -> None:
+    stiffness = spatial(**MATERIAL, shape="rectangle", width=width, height=height).at(0.0)["stiffness"]
+    assert stiffness[3, 3] / G == pytest.approx(constant, rel=3e-3)
+
+
+def test_spatial_rectangle_axes_and_mass() -> None:
+    values = spatial(**MATERIAL, shape="rectangle", width=0.3, height=0.1).at(0.0)
+    stiffness, mass = values["stiffness"], values["mass"]
+    flap, lag = 0.3 * 0.1**3 / 12, 0.1 * 0.3**3 / 12
+    assert stiffness[4, 4] == pytest.approx(210e9 * flap)
+    assert stiffness[5, 5] == pytest.approx(210e9 * lag)
+    np.testing.assert_allclose(np.diag(mass)[3:], 7800 * np.array([flap + lag, flap, lag]))
+
+
+def test_spatial_material_way() -> None:
+    properties = {"area": 2e-3, "second_moment2": 1e-6, "second_moment3": 3e-6, "torsion_constant": 2e-6}
+    stiffness = spatial(**MATERIAL, **properties).at(X)["stiffness"]
+    expected = np.diag([210e9 * 2e-3, 5 / 6 * G * 2e-3, 5 / 6 * G * 2e-3, G * 2e-6, 210e9 * 1e-6, 210e9 * 3e-6])
+    np.testing.assert_allclose(stiffness, np.broadcast_to(expected, (3, 6, 6)))
+
+
+def test_spatial_taper() -> None:
+    section = spatial(**{**SPATIAL, "EI2": [[0, 8], [1, 4], [2, 2]]})
+    assert section.breakpoints == (1.0,)
+    np.testing.assert_allclose(section.at(X)["stiffness"][:, 4, 4], [8, 6, 2])
