@@ -20,7 +20,7 @@ from rotfem import compat
 from rotfem.effects import ACCELERATIONS
 from rotfem.motion import Motion
 from rotfem.solvers import DirectSolver, combine
-from rotfem.system import Model, System, integral_count
+from rotfem.system import System, integral_count
 
 Array = npt.NDArray[np.float64]
 

@@ -1,4 +1,7 @@
-"""The command line: parses, calls, prints. Exit status 0 done, 2 bad input, 3 the computation failed, 130 interrupted."""
+"""The command line: parses, calls, prints.
+
+Exit status 0 done, 2 bad input, 3 the computation failed, 130 interrupted.
+"""
 
 from __future__ import annotations
 
@@ -197,12 +200,11 @@ def report(summary: dict[str, Any], folder: Path) -> list[str]:
         )
         for name in ("tip_u1", "tip_u2", "tip_u3"):
             if f"{name}_min" in f:
-                lines.append(
-                    f"{name.replace('_', ' ')}: {f[f'{name}_min']:.6g} m at t = {f[f'{name}_min_time']:.4f} s … "
-                    f"{f[f'{name}_max']:.6g} m at t = {f[f'{name}_max_time']:.4f} s, at the end {f[f'{name}_final']:.6g} m"
-                )
+                low, high = (f"{f[f'{name}_{w}']:.6g} m at t = {f[f'{name}_{w}_time']:.4f} s" for w in ("min", "max"))
+                lines.append(f"{name.replace('_', ' ')}: {low} … {high}, at the end {f[f'{name}_final']:.6g} m")
     else:
-        values = (f"{k.removesuffix('_final').replace('_', ' ')} = {v:.6g}" for k, v in f.items() if k.endswith("_final"))
+        finals = {k.removesuffix("_final").replace("_", " "): v for k, v in f.items() if k.endswith("_final")}
+        values = (f"{name} = {value:.6g}" for name, value in finals.items())
         lines.append(f"steady state in {time['total']:.2f} s: {', '.join(values)}")
     return [*lines, f"results in {folder}"]
 
@@ -214,4 +216,3 @@ def _interrupt(signum: int, frame: object) -> NoReturn:
 def main() -> None:
     """Run the command line."""
     app()
-

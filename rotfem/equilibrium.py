@@ -18,9 +18,9 @@ Array = npt.NDArray[np.float64]
 SMALLEST_SHARE = 1e-3
 
 
-def newton_for(scene: Scene) -> Newton:
-    """Return the Newton control a scene asks for."""
-    return Newton(scene.solver.increment_tolerance, scene.solver.max_iterations)
+def newton_for(scene: Scene, monotone: bool = False) -> Newton:
+    """Return the Newton control a scene asks for; monotone for time steps."""
+    return Newton(scene.solver.increment_tolerance, scene.solver.max_iterations, monotone)
 
 
 def steady_state(system: System, omega: float, newton: Newton, start: Array | None = None) -> Array:

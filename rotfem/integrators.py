@@ -51,9 +51,10 @@ class Scheme:
         """Return the scheme a scene's [time] table asks for."""
         assert scene.time is not None
         t = scene.time
-        if t.scheme == "newmark":
-            return cls.newmark(t.beta, t.gamma)
-        return cls.generalised_alpha(t.spectral_radius)
+        if t.spectral_radius is not None:
+            return cls.generalised_alpha(t.spectral_radius)
+        assert t.beta is not None and t.gamma is not None
+        return cls.newmark(t.beta, t.gamma)
 
     def shifts(self, h: float) -> tuple[float, float, float]:
         """Return (∂q/∂q, ∂v/∂q, ∂q̈/∂q) at t_{n+1}: the factors of K, C, M in the tangent of a step h."""

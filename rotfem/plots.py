@@ -72,7 +72,9 @@ def stacked(data: dict[str, Any], x: str, columns: list[str], title: str, marker
             axis.set_xticklabels([])
     axis.set_xlabel(label(x))
     figure.align_ylabels()
-    figure.subplots_adjust(left=0.14, right=0.97, top=1 - 0.4 / figure.get_figheight(), bottom=0.55 / figure.get_figheight())
+    figure.subplots_adjust(
+        left=0.14, right=0.97, top=1 - 0.4 / figure.get_figheight(), bottom=0.55 / figure.get_figheight()
+    )
     return figure
 
 

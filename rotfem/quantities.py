@@ -7,6 +7,7 @@ become tuples, so that a validated scene cannot be changed by accident.
 from __future__ import annotations
 
 import difflib
+import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -161,7 +162,7 @@ def as_increasing_rows(value: Any, columns: Sequence[int], shape: str) -> tuple[
     rows = as_rows(value, columns, shape)
     if len(rows) < 2:
         raise problem("", value, f"must be {shape} with at least two rows")
-    for i, (before, after) in enumerate(zip(rows, rows[1:], strict=False), start=2):
+    for i, (before, after) in enumerate(itertools.pairwise(rows), start=2):
         if after[0] <= before[0]:
             raise problem("", value, f"the first column must increase strictly; row {i}: {after[0]:g} ≤ {before[0]:g}")
     return rows

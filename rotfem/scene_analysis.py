@@ -26,7 +26,7 @@ EFFECTS: tuple[str, ...] = (
     "hub_coupling",
 )
 # In the inertial frame these are not terms of the equations but follow from the motion of the clamp.
-FRAME_EFFECTS: tuple[str, ...] = ("coriolis", "centrifugal", "euler", "base")
+FRAME_EFFECTS: tuple[str, ...] = ("coriolis", "centrifugal", "euler")
 
 
 def _as_effects(value: Any) -> str | tuple[str, ...]:

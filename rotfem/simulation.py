@@ -58,7 +58,9 @@ def run(
     scene = as_scene(scene)
     scene.check_run()
     if scene.motion.type == "torque":
-        raise SceneError(scene.file, "motion.type", "torque", "a free hub cannot be computed yet; use a prescribed motion")
+        raise SceneError(
+            scene.file, "motion.type", "torque", "a free hub cannot be computed yet; use a prescribed motion"
+        )
     if scene.time is None or scene.initial.state == "steady":
         check_steady(scene)
     return Simulation(scene, comm).run(progress)
@@ -93,7 +95,8 @@ class Simulation:
             self._steady() if self.scene.time is None else self._march(progress or (lambda share: None))
         except (ComputationError, KeyboardInterrupt) as error:
             failure = error if isinstance(error, ComputationError) else None
-            error.result = self.result("interrupted" if failure is None else "failed", failure)  # type: ignore[union-attr]
+            status = "interrupted" if failure is None else "failed"
+            error.result = self.result(status, failure)  # type: ignore[union-attr]
             raise
         return self.result("done")
 
@@ -105,24 +108,23 @@ class Simulation:
         self._record(State(0.0, q, np.zeros_like(q), np.zeros_like(q), np.zeros_like(q)))
         if self.critical is not None and abs(omega) > self.critical:
             self.warnings.append(
-                f"the equilibrium is unstable: {abs(omega):g} rad/s is above the speed {self.critical:.6g} rad/s at which "
-                f"the {self.scene.model.theory} stiffness is singular"
+                f"the equilibrium is unstable: {abs(omega):g} rad/s is above the speed {self.critical:.6g} rad/s at "
+                f"which the {self.scene.model.theory} stiffness is singular"
             )
 
     def _march(self, progress: Progress) -> None:
         time = self.scene.time
         assert time is not None
-        self.stepper = Stepper(self.system, Scheme.of(self.scene), newton_for(self.scene))
+        self.stepper = Stepper(self.system, Scheme.of(self.scene), newton_for(self.scene, monotone=True))
         state = self.stepper.start(0.0, *self._initial())
         self._record(state)
         grid = self._fixed_steps if time.tolerance is None else self._adaptive_steps
-        for state in grid(state):
+        for new in grid(state):
             self.steps += 1
-            self._check(state)
-            last = state.t >= time.end
-            if last or self.steps % time.output_every == 0:
-                self._record(state)
-                progress(state.t / time.end)
+            self._check(new)
+            if new.t >= time.end or self.steps % time.output_every == 0:
+                self._record(new)
+                progress(new.t / time.end)
 
     def _initial(self) -> tuple[Array, Array]:
         """Return (q, v) at t = 0 in the frame of the system."""
@@ -133,7 +135,7 @@ class Simulation:
         elif initial.state == "steady":
             rotating = self.scene.replace({"model.frame": "rotating"}) if self.model.fixed else self.scene
             system = compile_system(Model(rotating, self.comm)) if self.model.fixed else self.system
-            q = steady_state(system, rotating.motion.speed, newton_for(self.scene))
+            q = steady_state(system, self.model.motion.speed(0.0), newton_for(self.scene))
         if self.system.clamp is not None:
             return self.system.clamp.rigid(q, 0.0)
         return q, np.zeros_like(q)
@@ -149,7 +151,7 @@ class Simulation:
             yield state
 
     def _adaptive_steps(self, state: State) -> Any:
-        """Yield states whose local error stays below the tolerance, relative to the largest displacement so far."""
+        """Yield states whose local errors add up to the tolerance, relative to the largest displacement so far."""
         time, stepper = self.scene.time, self.stepper
         assert time is not None and time.tolerance is not None and stepper is not None
         longest = time.max_step or time.end / 20
@@ -161,8 +163,9 @@ class Simulation:
             h = left if h >= left * (1 - 1e-9) else (left / 2 if h > 0.6 * left else h)
             new = stepper.advance(state, h)
             largest = max(largest, self.system.size(new.q))
-            error = stepper.local_error(new, state) / (time.tolerance * largest)
-            factor = float(np.clip(SAFETY * max(error, 1e-12) ** (-1 / 3), SHRINK, GROW))
+            allowed = time.tolerance * largest * h / time.end  # so that the errors of all steps add up to the tolerance
+            error = stepper.local_error(new, state) / allowed
+            factor = float(np.clip(SAFETY * max(error, 1e-12) ** (-1 / 2), SHRINK, GROW))
             if error > 1.0:
                 self.rejected += 1
                 h *= min(factor, 0.9)
@@ -200,8 +203,9 @@ class Simulation:
         theory, why = self.scene.model.theory, "the motion is unstable or its load too large for a linear theory"
         if self._critical_since is not None:
             why = (
-                f"its stiffness is not definite above {self.critical:.6g} rad/s, passed at t = {self._critical_since:.4g} s: "
-                "first-order strains keep the softening by the centrifugal force but not the stiffening"
+                f"its stiffness is not definite above {self.critical:.6g} rad/s, passed at "
+                f"t = {self._critical_since:.4g} s: first-order strains keep the softening by the centrifugal force "
+                "but not the stiffening"
             )
         raise ComputationError(
             f"the {theory} solution diverged (a displacement exceeds the length of the structure; {why})",
@@ -218,7 +222,9 @@ class Simulation:
             tip = system.clamp.relative(tip[None, :], self.model.structure.length, t)[0]
         energy = system.energies()
         motion = self.model.motion
-        self.history.append((t, motion.angle(t), motion.speed(t), *tip, *(energy[k] for k in ("kinetic", "strain", "jacobi"))))
+        self.history.append(
+            (t, motion.angle(t), motion.speed(t), *tip, *(energy[k] for k in ("kinetic", "strain", "jacobi")))
+        )
 
     # --- summary ------------------------------------------------------------------------------------------------------
 
@@ -236,8 +242,8 @@ class Simulation:
             self.warnings.append(f"Newton stopped at round-off, increments {newton.roundoff:.1e} (relative)")
         if status == "done" and self._critical_since is not None:
             self.warnings.append(
-                f"the speed is above {self.critical:.6g} rad/s, where the {self.scene.model.theory} stiffness is no longer "
-                f"definite, since t = {self._critical_since:.4g} s"
+                f"the speed is above {self.critical:.6g} rad/s, where the {self.scene.model.theory} stiffness is no "
+                f"longer definite, since t = {self._critical_since:.4g} s"
             )
         summary: dict[str, Any] = {
             "command": "run",
@@ -249,7 +255,9 @@ class Simulation:
             "effects": list(self.model.effects),
             "integrals": self.system.integrals,
             "dofs": self.system.V.dofmap.index_map.size_global * self.system.V.dofmap.index_map_bs,
-            "elements": self.model.structure.mesh.topology.index_map(self.model.structure.mesh.topology.dim).size_global,
+            "elements": self.model.structure.mesh.topology.index_map(
+                self.model.structure.mesh.topology.dim
+            ).size_global,
             "steps": self.steps,
             "newton_iterations": newton.iterations,
             "factorisations": self.stepper.factorisations if self.stepper else newton.iterations,

@@ -101,12 +101,15 @@ class Newton:
     Attributes:
         tolerance: largest accepted increment, relative to the scale of each unknown.
         max_iterations: iterations before failure.
+        monotone: whether an increment that grows is a failure. A time step starts close to its solution; where the
+            increments grow there, Newton is on its way to another root, and a shorter step is the remedy.
         iterations: total over all solves.
         roundoff: largest increment accepted because it had stopped shrinking at round-off level.
     """
 
     tolerance: float = 1e-9
     max_iterations: int = 25
+    monotone: bool = False
     iterations: int = 0
     roundoff: float = 0.0
     _kappa: float = field(default=np.inf, repr=False)
@@ -136,6 +139,8 @@ class Newton:
             if k > 2 and d > 0.3 * previous and d <= 1e-4 * max(size(), self.tolerance):
                 self.roundoff = max(self.roundoff, d)
                 return k
+            if self.monotone and k > 1 and d > previous:
+                raise ComputationError(f"Newton's increments grew from {previous:.1e} to {d:.1e} (scaled)")
             if k > 4 and d > 10 * first and d > 1:
                 raise ComputationError(f"Newton diverged: increments grew from {first:.1e} to {d:.1e} (scaled)")
             previous = d

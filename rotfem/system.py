@@ -162,7 +162,7 @@ class System:
             self.structure.load_constants[name][0].value[...] = load_factor * value
 
     def load_values(self, t: float, motion: Motion) -> dict[str, Array]:
-        """Return the amplitude of every load constant at time t; dead loads of the frame turn with it when it is fixed."""
+        """Return the amplitude of every load constant at time t (s); in a fixed frame dead loads turn with the hub."""
         if not self.structure.load_constants:
             return {}
         Q = motion.rotation(t) if self.model.fixed else IDENTITY

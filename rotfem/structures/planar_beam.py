@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from functools import partial
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -13,9 +14,8 @@ from dolfinx import default_scalar_type, fem, mesh
 from mpi4py import MPI
 
 from rotfem.kinematics import AppliedLoad, Body, Damping, Kinematics, Strain
-from rotfem.scene import Scene
+from rotfem.scene import BeamMesh, Load, PlanarBeamStructure, Scene
 from rotfem.structures.probe import Probe
-from rotfem.theories import Theory
 
 Array = npt.NDArray[np.float64]
 
@@ -38,6 +38,10 @@ def beam_nodes(length: float, elements: int, knots: tuple[float, ...]) -> Array:
     return np.concatenate([*pieces, [length]])
 
 
+def _in_plane(load: Load, t: float) -> Array:
+    return load.at(t)[:2]
+
+
 class PlanarBeam:
     """Discretised planar beam of a scene; all vectors are in frame components with a zero third one.
 
@@ -55,17 +59,20 @@ class PlanarBeam:
     components = ("u1", "u2", "alpha")
 
     def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD):
-        s = scene.structure
-        self.scene, self.comm = scene, comm
+        s = cast(PlanarBeamStructure, scene.structure)
+        grid = cast(BeamMesh, scene.mesh)
+        self.scene, self.comm, self.data = scene, comm, s
         self.length, self.hub_radius = s.length, s.hub_radius
-        nodes = beam_nodes(s.length, scene.mesh.elements, s.section.breakpoints)
+        nodes = beam_nodes(s.length, grid.elements, s.section.breakpoints)
         self.mesh = mesh.create_interval(comm, len(nodes) - 1, [0.0, s.length])
+        self.elements = len(nodes) - 1
         x = self.mesh.geometry.x
         x[:, 0] = np.interp(x[:, 0], np.linspace(0.0, s.length, len(nodes)), nodes)
-        k = scene.mesh.degree
+        k = grid.degree
         self.V = fem.functionspace(self.mesh, element("Lagrange", self.mesh.basix_cell(), k, shape=(3,)))
-        self.k = Kinematics(*(fem.Function(self.V, name=n) for n in "qva"), ufl.TestFunction(self.V))
-        reduced = 2 * k - 2 if scene.mesh.integration == "reduced" else 2 * k
+        q, v, a = (fem.Function(self.V, name=name) for name in "qva")
+        self.k = Kinematics(q, v, a, ufl.TestFunction(self.V))
+        reduced = 2 * k - 2 if grid.integration == "reduced" else 2 * k
         self.dx_elastic = ufl.dx(self.mesh, metadata={"quadrature_degree": reduced})
         self.dx = ufl.dx(self.mesh, metadata={"quadrature_degree": 2 * k})
         tip = mesh.locate_entities_boundary(self.mesh, 0, lambda p: np.isclose(p[0], s.length))
@@ -83,7 +90,7 @@ class PlanarBeam:
         return fem.Constant(self.mesh, np.asarray(value, dtype=default_scalar_type))
 
     def _property(self, name: str) -> Any:
-        section = self.scene.structure.section
+        section = self.data.section
         if section.uniform:
             return self.constant(section.at(np.zeros(1))[name][0])
         f = fem.Function(fem.functionspace(self.mesh, ("DG", TAPER_DEGREE)), name=name)
@@ -111,7 +118,7 @@ class PlanarBeam:
 
     def bodies(self, effects: tuple[str, ...]) -> list[Body]:
         """Return the bodies the effects call for: axis, section director, tip mass and its director."""
-        s, q = self.scene.structure, self.k.q
+        s, q = self.data, self.k.q
         r, director = self.position(q), self.triad(q)[1]
         bodies = [Body(r, self.section["mass_per_length"], self.dx)]
         if "rotary_inertia" in effects:
@@ -124,7 +131,7 @@ class PlanarBeam:
 
     def damping(self) -> Damping:
         """Return Kelvin–Voigt plus stiffness-proportional viscosity, and the mass-proportional rate."""
-        d = self.scene.structure.damping
+        d = self.data.damping
         eta, a0 = d.kelvin_voigt + d.rayleigh[1], d.rayleigh[0]
         return Damping(self.constant(eta) if eta > 0 else None, self.constant(a0) if a0 > 0 else None)
 
@@ -139,7 +146,7 @@ class PlanarBeam:
         ):
             if load is None or load.is_zero:
                 continue
-            f = self.add_load(name, 2, lambda t, load=load: load.at(t)[:2])
+            f = self.add_load(name, 2, partial(_in_plane, load))
             dead = load.kind == "dead"
             force = ufl.as_vector((f[0], f[1], 0)) if dead else f[0] * t_1 + f[1] * t_2
             out.append(AppliedLoad(name, force, self.position(q), measure, dead))

@@ -29,11 +29,11 @@ class Theory:
 
     def measures(self, structure: str) -> Callable[[Any], tuple[Any, ...]]:
         """Return the function q ↦ strains for a structure type ("planar_beam", …)."""
-        return getattr(self.strains, structure)  # type: ignore[no-any-return]
+        return getattr(self.strains, structure)
 
     def prestress_measures(self, structure: str) -> Callable[[Any], tuple[Any, ...]]:
         """Return the second-order strains, q ↦ strains, that an axial force of the linear structure works on."""
-        return getattr(self.prestressed, structure)  # type: ignore[no-any-return]
+        return getattr(self.prestressed, structure)
 
 
 THEORIES: dict[str, Theory] = {

@@ -257,7 +257,7 @@ def test_replace() -> None:
         ({"loads__gravity": [0, -9.81]}, {"coriolis", "centrifugal", "rotary_inertia", "gravity"}),
         ({"structure__damping__kelvin_voigt": 1e-3}, {"coriolis", "centrifugal", "rotary_inertia", "damping"}),
         ({"structure__tip_inertia": 1e-3}, {"coriolis", "centrifugal", "rotary_inertia", "tip_mass"}),
-        ({"model__frame": "inertial", "motion": SPIN_UP | {"base_acceleration": [1, 0]}}, {"rotary_inertia"}),
+        ({"model__frame": "inertial", "motion": SPIN_UP | {"base_acceleration": [1, 0]}}, {"rotary_inertia", "base"}),
         ({"model__effects": ["gravity", "tip_mass", "damping", "base", "centrifugal"]}, {"centrifugal"}),
         ({"model__effects": []}, set()),
     ],
