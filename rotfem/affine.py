@@ -13,7 +13,6 @@ import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
-from petsc4py import PETSc
 from ufl.algorithms import expand_derivatives
 
 from rotfem import compat
@@ -133,7 +132,7 @@ class AffineSystem(System):
         if kind == "f":
             b = compat.create_vector(self.V)
             fem_petsc.assemble_vector(b, form)
-            b.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+            b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
             b.array[self.clamped] = 0.0
             return b
         A = self.A.duplicate()

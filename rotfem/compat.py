@@ -7,6 +7,8 @@ from typing import Any
 from dolfinx import fem, la
 from petsc4py import PETSc
 
+ADD, REVERSE = PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE
+
 
 def create_vector(V: fem.FunctionSpace) -> Any:
     """Return a ghosted PETSc vector for the dofs of V (0.9 wants a form, 0.11 a space)."""

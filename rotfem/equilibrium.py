@@ -152,6 +152,9 @@ def _set_force(system: System, force: object, value: float) -> None:
 def critical_speed(system: AffineSystem) -> float | None:
     """Return the lowest speed (rad/s) at which the stiffness of a linear theory is singular; None if there is none.
 
+    Raises:
+        ComputationError: the eigensolver did not converge.
+
     K = K_1 + Omega² K_2: the least positive Omega² of K_1 x = −Omega² K_2 x.
     """
     K_1, K_2 = system.stiffness_pieces()
@@ -163,11 +166,11 @@ def critical_speed(system: AffineSystem) -> float | None:
     eps.setOperators(K_2, K_1)
     eps.setProblemType(SLEPc.EPS.ProblemType.GHEP)
     eps.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_REAL)
-    eps.setDimensions(1)
-    eps.setTolerances(1e-12, 500)
+    eps.setDimensions(1, min(K_1.getSize()[0], 100))
+    eps.setTolerances(1e-12, 2000)
     use_direct_solver(eps.getST().getKSP())
     eps.solve()
     if eps.getConverged() == 0:
-        return None
+        raise ComputationError("the eigenproblem of the critical speed did not converge")
     nu = eps.getEigenvalue(0).real
     return float(1 / np.sqrt(nu)) if nu > 0 else None

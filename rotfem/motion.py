@@ -57,7 +57,7 @@ class Motion:
 def smooth_spin_up(speed: float, duration: float) -> tuple[Scalar, Scalar, Scalar]:
     """Return (Omega, dOmega/dt, psi) of the spin-up Omega(t) = speed (t/T − sin(2πt/T)/2π), constant after T.
 
-    Kane, Ryan & Banerjee 1987; ICCIA 2017 eq. (17) with its misprinted factor put right.
+    Kane, Ryan & Banerjee 1987; ICCIA 2017 eq. (17).
     """
     T, k = duration, 2 * np.pi / duration
 

@@ -74,6 +74,78 @@ class RunResult:
         return written
 
 
+@dataclass
+class ModesResult:
+    """Outcome of `rotfem modes`.
+
+    Attributes:
+        summary: scene, speed, modes, self-checks, warnings, timings; JSON-able.
+        rows: one dictionary a mode: `mode`, `label`, `frequency` (rad/s), `frequency_hz`, `damping` (ratio), `growth`
+            (1/s), `stability`, `share_…` (of the kinetic energy), `residual` (backward error).
+        shapes: title ↦ columns along the structure: `x` (m), each component and its imaginary part, largest entry 1.
+    """
+
+    summary: dict[str, Any]
+    rows: list[dict[str, Any]]
+    shapes: dict[str, dict[str, Array]] = field(default_factory=dict)
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write modes.json, modes.csv, mode_shapes.csv and summary.json, each whole or not at all; return their paths.
+
+        Raises:
+            OutputError: the folder cannot be written.
+        """
+        folder = Path(folder)
+        shapes: dict[str, Array] = {}
+        for i, columns in enumerate(self.shapes.values(), start=1):
+            shapes |= {name if name == "x" else f"{name}_{i}": values for name, values in columns.items()}
+        return [
+            write_text(folder / "modes.csv", rows_text(self.rows)),
+            write_text(folder / "mode_shapes.csv", csv_text(shapes)),
+            write_text(folder / "modes.json", json_text({"speed": self.summary["speed"], "modes": self.rows})),
+            write_text(folder / "summary.json", json_text(self.summary)),
+        ]
+
+
+@dataclass
+class CampbellResult:
+    """Outcome of `rotfem campbell`.
+
+    Attributes:
+        summary: scene, branches, critical speeds, instabilities, self-checks, warnings, timings; JSON-able.
+        rows: one dictionary a speed and branch: `speed` (rad/s), `branch`, `label`, `mode` (its name at this speed),
+            `frequency` (rad/s), `frequency_hz`, `damping`, `growth` (1/s), `residual`, `share_…`, `confidence` (squared
+            correlation with the speed before), `refined` (1 where the speed was not asked for).
+    """
+
+    summary: dict[str, Any]
+    rows: list[dict[str, Any]]
+
+    def branches(self) -> dict[str, dict[str, Array]]:
+        """Return label ↦ columns `speed`, `frequency`, `growth`, … over all speeds solved."""
+        out: dict[str, dict[str, Array]] = {}
+        for label in dict.fromkeys(row["label"] for row in self.rows):
+            mine = [row for row in self.rows if row["label"] == label]
+            numbers = [k for k, v in mine[0].items() if isinstance(v, int | float)]
+            out[label] = {k: np.array([row[k] for row in mine], dtype=np.float64) for k in numbers}
+        return out
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write campbell.csv, campbell.json and summary.json, each whole or not at all; return their paths.
+
+        Raises:
+            OutputError: the folder cannot be written.
+        """
+        folder = Path(folder)
+        keys = ("branches", "critical_speeds", "instabilities", "ambiguous", "per_rev")
+        diagram = {**{k: self.summary[k] for k in keys}, "rows": self.rows}
+        return [
+            write_text(folder / "campbell.csv", rows_text(self.rows)),
+            write_text(folder / "campbell.json", json_text(diagram)),
+            write_text(folder / "summary.json", json_text(self.summary)),
+        ]
+
+
 def prepare_folder(folder: str | Path) -> Path:
     """Make the result folder and see that it can be written, before anything is computed.
 
@@ -96,6 +168,16 @@ def csv_text(columns: dict[str, Array]) -> str:
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(columns)
     writer.writerows(zip(*([repr(float(v)) for v in column] for column in columns.values()), strict=True))
+    return buffer.getvalue()
+
+
+def rows_text(rows: list[dict[str, Any]]) -> str:
+    """Return rows of named values as CSV with a header; numbers keep all their digits, what is absent stays empty."""
+    buffer = io.StringIO()
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    writer = csv.DictWriter(buffer, names, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({k: repr(v) if isinstance(v, float) else v for k, v in row.items()} for row in rows)
     return buffer.getvalue()
 
 

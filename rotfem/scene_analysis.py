@@ -97,7 +97,7 @@ class BeamMesh(SceneModel):
         integration: Quadrature of the elastic terms; ``reduced`` avoids locking.
     """
 
-    elements: Count = 10
+    elements: Count = 16
     degree: Degree = 3
     integration: Integration = "reduced"
 

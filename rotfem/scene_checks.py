@@ -63,6 +63,12 @@ def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:
         )
     if isinstance(motion, TorqueMotion):
         raise problem("model.frame", model.frame, 'is not available with motion.type = "torque"; use "rotating"')
+    if structure.damping.rayleigh[0] > 0.0:
+        raise problem(
+            "structure.damping.rayleigh",
+            list(structure.damping.rayleigh),
+            'the mass-proportional part must be 0 with frame = "inertial", where it would brake the revolution itself',
+        )
     for name in FRAME_EFFECTS:
         if model.effects != "auto" and name in model.effects:
             raise problem(

@@ -202,11 +202,9 @@ class Simulation:
             return
         theory, why = self.scene.model.theory, "the motion is unstable or its load too large for a linear theory"
         if self._critical_since is not None:
-            why = (
-                f"its stiffness is not definite above {self.critical:.6g} rad/s, passed at "
-                f"t = {self._critical_since:.4g} s: first-order strains keep the softening by the centrifugal force "
-                "but not the stiffening"
-            )
+            why = f"its stiffness is not definite above {self.critical:.6g} rad/s, passed at t = {self._critical_since:.4g} s"
+            if self.model.theory.prestressed is None:
+                why += ": first-order strains keep the softening by the centrifugal force but not the stiffening"
         raise ComputationError(
             f"the {theory} solution diverged (a displacement exceeds the length of the structure; {why})",
             time=state.t,

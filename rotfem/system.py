@@ -96,9 +96,13 @@ class Model:
         if "centrifugal" in self.effects:
             wx = [(b, ufl.cross(frame.w, b.x)) for b in self.bodies]
             forms["T0"] = sum(b.density * ufl.inner(s, s) / 2 * b.measure for b, s in wx)
-        dead = [load for load in self.applied if load.dead]
-        if dead:
-            forms["load_potential"] = -sum(ufl.inner(load.force, load.x) * load.measure for load in dead)
+        potentials = [-ufl.inner(load.force, load.x) * load.measure for load in self.applied if load.dead]
+        for name, field in (("base", 1), ("gravity", -1)):
+            if name in self.effects:
+                a = frame.a_o if name == "base" else frame.gravity
+                potentials += [field * b.density * ufl.inner(a, b.x) * b.measure for b in self.bodies if b.is_position]
+        if potentials:
+            forms["potential"] = sum(potentials)
         return forms
 
 
@@ -214,13 +218,17 @@ class System:
 
     def shape(self) -> dict[str, Array]:
         """Return the deflected structure at the state: position X (m), u1, u2 (m), alpha, … in the turning frame."""
-        X, q = self.structure.nodes()
+        X, q = self.structure.nodes(self.q.x.array)
         if self.clamp is not None:
             q = self.clamp.relative(q, X, self.time)
         return {"x": X, **{name: q[:, i] for i, name in enumerate(self.structure.components)}}
 
     def energies(self) -> dict[str, float]:
-        """Return kinetic and strain energy and the Jacobi integral T2 − T0 + W (− work of dead loads), J."""
+        """Return kinetic and strain energy and the Jacobi integral T2 − T0 + W + V, J.
+
+        V is the potential of dead loads, gravity and base acceleration; the integral is constant while these and the
+        spin are constant in the frame and nothing dissipates.
+        """
         comm = self.model.comm
         e = {name: comm.allreduce(float(fem.assemble_scalar(form))) for name, form in self._energies.items()}
         kinetic = e["T2"] + e.get("T1", 0.0) + e.get("T0", 0.0)
@@ -228,7 +236,11 @@ class System:
             jacobi = kinetic - self._spin() * e["momentum"] + e["strain"]
         else:
             jacobi = e["T2"] - e.get("T0", 0.0) + e["strain"]
-        return {"kinetic": kinetic, "strain": e["strain"], "jacobi": jacobi + e.get("load_potential", 0.0)}
+        potential = e.get("potential", 0.0)
+        if self.clamp is not None and "tip_moment" in self.structure.load_constants:
+            # A dead moment works on the rotation relative to the hub, alpha − psi.
+            potential += float(self.structure.load_constants["tip_moment"][0].value[0]) * self.clamp.angle(self.time)
+        return {"kinetic": kinetic, "strain": e["strain"], "jacobi": jacobi + potential}
 
     def _spin(self) -> float:
         return self.motion.speed(self.time) * float(self.motion.axis[2])

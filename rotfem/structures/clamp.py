@@ -29,13 +29,14 @@ class TurningClamp:
         self.dofs = (structure.clamped[:, None] * 3 + np.arange(3)).ravel()
         self._x = structure.V.tabulate_dof_coordinates()[:, 0] + structure.hub_radius
 
-    def _angle(self, t: float) -> float:
+    def angle(self, t: float) -> float:
+        """Return the angle of the hub about a_3 at time t (s), rad."""
         return float(self.motion.axis[2]) * self.motion.angle(t)
 
     def at(self, t: float) -> tuple[Array, Array, Array]:
         """Return q, q̇ and q̈ of the clamped unknowns at time t (s), inertial components."""
         R, sign = self.structure.hub_radius, float(self.motion.axis[2])
-        psi, w, dw = self._angle(t), sign * self.motion.speed(t), sign * self.motion.rate(t)
+        psi, w, dw = self.angle(t), sign * self.motion.speed(t), sign * self.motion.rate(t)
         c, s = np.cos(psi), np.sin(psi)
         q = np.array([R * (c - 1), R * s, psi])
         v = w * np.array([-R * s, R * c, 1.0])
@@ -51,9 +52,9 @@ class TurningClamp:
             t: time, s.
         """
         r = relative.reshape(-1, 3)
-        x, y = self._turn(self._x + r[:, 0], r[:, 1], self._angle(t))
+        x, y = self._turn(self._x + r[:, 0], r[:, 1], self.angle(t))
         w = float(self.motion.axis[2]) * self.motion.speed(t)
-        q = np.column_stack([x - self._x, y, r[:, 2] + self._angle(t)])
+        q = np.column_stack([x - self._x, y, r[:, 2] + self.angle(t)])
         return q.ravel(), (w * np.column_stack([-y, x, np.ones_like(x)])).ravel()
 
     def turned(self, q: Array, v: Array, t0: float, t1: float) -> Array:
@@ -62,15 +63,15 @@ class TurningClamp:
         w, h = float(self.motion.axis[2]) * self.motion.speed(t0), t1 - t0
         x, y = self._x + p[:, 0], p[:, 1]
         x, y = x + h * (u[:, 0] + w * y), y + h * (u[:, 1] - w * x)
-        turn = self._angle(t1) - self._angle(t0)
+        turn = self.angle(t1) - self.angle(t0)
         x, y = self._turn(x, y, turn)
         return np.column_stack([x - self._x, y, p[:, 2] + turn + h * (u[:, 2] - w)]).ravel()
 
     def relative(self, q: Array, X: Any, t: float) -> Array:
         """Return (u_1, u_2, alpha), shape (n, 3), in the turning frame from inertial q (n, 3) of points at X (m)."""
         reach = self.structure.hub_radius + X
-        x, y = self._turn(reach + q[:, 0], q[:, 1], -self._angle(t))
-        return np.column_stack([x - reach, y, q[:, 2] - self._angle(t)])
+        x, y = self._turn(reach + q[:, 0], q[:, 1], -self.angle(t))
+        return np.column_stack([x - reach, y, q[:, 2] - self.angle(t)])
 
     @staticmethod
     def _turn(x: Any, y: Any, angle: float) -> tuple[Any, Any]:

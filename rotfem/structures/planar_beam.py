@@ -56,6 +56,8 @@ class PlanarBeam:
     type = "planar_beam"
     planar = True
     prestressing = ("axial",)
+    #: Mode families: the components whose kinetic energy counts, and the one whose nodes are counted.
+    families = {"axial": ((0,), 0), "lag": ((1, 2), 1)}
     components = ("u1", "u2", "alpha")
 
     def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD):
@@ -81,13 +83,18 @@ class PlanarBeam:
         root = mesh.locate_entities_boundary(self.mesh, 0, lambda p: np.isclose(p[0], 0.0))
         self.clamped = fem.locate_dofs_topological(self.V, 0, root)
         self.section = {name: self._property(name) for name in s.section.at(np.zeros(1))}
-        self._hub_radius = self.constant(s.hub_radius)
+        #: Single numbers that the forms contain, by name.
+        self.scalars = {"hub_radius": self.constant(s.hub_radius)}
         self.load_constants: dict[str, tuple[fem.Constant, Callable[[float], Array]]] = {}
         self.probe = Probe(self.V, np.array([s.length, 0.0, 0.0]))
 
     def constant(self, value: npt.ArrayLike) -> fem.Constant:
         """Return a constant on the mesh: its value can change without a new compilation."""
         return fem.Constant(self.mesh, np.asarray(value, dtype=default_scalar_type))
+
+    def scalar(self, name: str, value: float) -> fem.Constant:
+        """Return the constant of a named number of the scene, one and the same at every call."""
+        return self.scalars.setdefault(name, self.constant(value))
 
     def _property(self, name: str) -> Any:
         section = self.data.section
@@ -102,7 +109,7 @@ class PlanarBeam:
     def position(self, q: Any) -> Any:
         """r = (R + X + u_1) a_1 + u_2 a_2, Simo & Vu-Quoc 1986 eq. (1a)."""
         X = ufl.SpatialCoordinate(self.mesh)[0]
-        return ufl.as_vector((self._hub_radius + X + q[0], q[1], 0))
+        return ufl.as_vector((self.scalars["hub_radius"] + X + q[0], q[1], 0))
 
     def triad(self, q: Any) -> tuple[Any, Any]:
         """(t_1, t_2), the section axes turned by alpha, Simo & Vu-Quoc 1986 eq. (1b)."""
@@ -124,9 +131,9 @@ class PlanarBeam:
         if "rotary_inertia" in effects:
             bodies.append(Body(director, self.section["rotary_inertia"], self.dx, is_position=False))
         if "tip_mass" in effects and s.tip_mass > 0:
-            bodies.append(Body(r, self.constant(s.tip_mass), self.ds_tip))
+            bodies.append(Body(r, self.scalar("tip_mass", s.tip_mass), self.ds_tip))
         if "tip_mass" in effects and s.tip_inertia > 0:
-            bodies.append(Body(director, self.constant(s.tip_inertia), self.ds_tip, is_position=False))
+            bodies.append(Body(director, self.scalar("tip_inertia", s.tip_inertia), self.ds_tip, is_position=False))
         return bodies
 
     def damping(self) -> Damping:
@@ -167,10 +174,14 @@ class PlanarBeam:
         nodes = self.V.dofmap.index_map.size_local + self.V.dofmap.index_map.num_ghosts
         return np.tile([self.length, self.length, 1.0], nodes)
 
-    def nodes(self) -> tuple[Array, Array]:
-        """Return (X, q): positions (n,) in m, increasing, and q (n, 3) at all nodes of the beam, on every rank."""
+    def nodes(self, values: Array) -> tuple[Array, Array]:
+        """Return (X, q): positions (n,) in m, increasing, and q (n, 3) at all nodes of the beam, on every rank.
+
+        Args:
+            values: local dof array of q (or of the owned part of it).
+        """
         owned = self.V.dofmap.index_map.size_local
         X = np.concatenate(self.comm.allgather(self.V.tabulate_dof_coordinates()[:owned, 0]))
-        q = np.concatenate(self.comm.allgather(self.k.q.x.array[: 3 * owned].reshape(-1, 3)))
+        q = np.concatenate(self.comm.allgather(values[: 3 * owned].reshape(-1, 3)))
         order = np.argsort(X)
         return X[order], q[order]

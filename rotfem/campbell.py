@@ -1,0 +1,358 @@
+"""`rotfem campbell`: modes followed over speed, named once, with critical speeds and the onset of instability.
+
+Two neighbouring speeds are joined by the bi-orthogonal correlation of left vectors at one with right vectors at the
+other, by an optimal one-to-one assignment. Where it is weak, or where two modes change places, the speed is refined:
+a veering then shows itself as two branches that keep their order, a true crossing as two that change it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+from scipy.optimize import brentq, linear_sum_assignment
+
+from rotfem.equilibrium import check_steady
+from rotfem.errors import ComputationError, SceneError
+from rotfem.modes import GROWTH, ModalAnalysis, Spinning, advice, instabilities, mode_rows, self_checks, stability
+from rotfem.pencil import SAME
+from rotfem.results import CampbellResult
+from rotfem.scene import Scene
+from rotfem.simulation import as_scene, versions
+
+Array = npt.NDArray[Any]
+
+#: Correlation (squared) from which a step needs no refinement, and below which it is called ambiguous.
+SURE, AMBIGUOUS = 0.9, 0.5
+
+#: Correlation below which two modes have nothing in common: the branch is lost, not joined to a stranger.
+STRANGER = 0.02
+
+#: Smallest refined step as a part of the speed range: a veering narrower than this passes as a crossing.
+FINEST = 1e-5
+
+#: Modes computed beyond those asked for, so that a branch that falls in the order is still there.
+SPARE = 3
+
+
+@dataclass
+class Node:
+    """Modes at one speed of a sweep; `order[b]` is the column of branch b, −1 where it was lost.
+
+    Attributes:
+        requested: whether the speed was asked for (else it refines a step).
+        confidence: squared correlation with the previous node, a branch each.
+    """
+
+    spinning: Spinning
+    requested: bool
+    order: Array = field(default_factory=lambda: np.empty(0, dtype=int))
+    confidence: Array = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def speed(self) -> float:
+        """Ω, rad/s."""
+        return self.spinning.speed
+
+    def value(self, branch: int) -> complex:
+        """Return λ of a branch, nan where it was lost."""
+        column = self.order[branch]
+        return complex(self.spinning.pairs.values[column]) if column >= 0 else complex(np.nan, np.nan)
+
+
+def correlation(a: Spinning, b: Spinning) -> Array:
+    """Return |y_i^H [(λ_i + μ_j) M + C] x_j|², shape (m_a, m_b), scaled to 1 for equal modes, 0 for different ones.
+
+    Both pencils serve in turn and the mean is taken, so the two speeds are treated alike.
+    """
+    ya, yb, xa, xb = a.pairs.left, b.pairs.left, a.pairs.right, b.pairs.right
+    la, lb = a.pairs.values, b.pairs.values
+    here, there = a.pencil.gram(ya, la, xb, lb), b.pencil.gram(yb, lb, xa, la)
+    own_a, own_b = np.diag(a.pencil.gram(ya, la, xa, la)), np.diag(b.pencil.gram(yb, lb, xb, lb))
+    size_a, size_b = np.abs(own_a), np.abs(own_b)
+    scale = np.sqrt(np.outer(np.maximum(size_a, 1e-300), np.maximum(size_b, 1e-300)))
+    # The two products cancel the unknown scaling of x_b and y_b against each other.
+    return np.asarray(np.abs(here) * np.abs(there.T) / scale**2)
+
+
+def assign(node: Node, following: Node) -> float:
+    """Join the branches of a node with the columns of the following one; return the least squared correlation.
+
+    A branch whose best partner is a stranger has the order −1 from there on.
+    """
+    known = np.flatnonzero(node.order >= 0)
+    c = np.clip(correlation(node.spinning, following.spinning)[node.order[known]], 0.0, 1.0)
+    rows, columns = linear_sum_assignment(-c)
+    following.order = np.full(len(node.order), -1)
+    following.confidence = np.zeros(len(node.order))
+    following.confidence[known[rows]] = c[rows, columns]
+    kin = c[rows, columns] >= STRANGER
+    following.order[known[rows[kin]]] = columns[kin]
+    return float(np.min(c[rows, columns], initial=1.0))
+
+
+def swapped(a: Node, b: Node) -> bool:
+    """Return whether two branches change their order by frequency between two nodes."""
+    both = [i for i in range(len(a.order)) if a.order[i] >= 0 and b.order[i] >= 0]
+    wa, wb = (np.array([n.value(i).imag for i in both]) for n in (a, b))
+    da, db = wa[:, None] - wa[None, :], wb[:, None] - wb[None, :]
+    level = SAME * max(float(np.max(np.abs(wa), initial=0.0)), float(np.max(np.abs(wb), initial=0.0)))
+    return bool(np.any((da > level) & (db < -level)))
+
+
+class Sweep:
+    """A Campbell diagram in the making.
+
+    Args:
+        analysis: compiled scene.
+        count: number of branches.
+    """
+
+    def __init__(self, analysis: ModalAnalysis, count: int):
+        self.analysis, self.count = analysis, count
+        self.nodes: list[Node] = []
+        self.solves = 0
+        self.ambiguous: list[dict[str, float]] = []
+
+    def solve(self, speed: float, start: Array | None, requested: bool) -> Node:
+        """Return the modes at a speed, its equilibrium continued from start."""
+        self.solves += 1
+        return Node(self.analysis.at(speed, self.count + SPARE, start), requested)
+
+    def run(self, speeds: Sequence[float]) -> None:
+        """Follow the modes over increasing speeds."""
+        first = self.solve(speeds[0], None, True)
+        total = len(first.spinning.pairs.values)
+        first.order, first.confidence = np.arange(total), np.ones(total)
+        self.nodes = [first]
+        self.finest = FINEST * max(speeds[-1] - speeds[0], 1e-300)
+        for speed in speeds[1:]:
+            self._advance(self.solve(speed, self.nodes[-1].spinning.q, True))
+
+    def _advance(self, target: Node) -> None:
+        """Append a node, and nodes before it as long as the step is not sure."""
+        last = self.nodes[-1]
+        confidence = assign(last, target)
+        near = self._watched(last, target)
+        if (confidence < SURE and near) or swapped(last, target):
+            if target.speed - last.speed > 2 * self.finest:
+                middle = 0.5 * (last.speed + target.speed)
+                self._advance(self.solve(middle, last.spinning.q, False))
+                self._advance(target)
+                return
+            weak = [b for b in range(self.count) if last.order[b] >= 0 and target.confidence[b] < AMBIGUOUS]
+            self.ambiguous += [
+                {"branch": b + 1, "speed": target.speed, "confidence": float(target.confidence[b])} for b in weak
+            ]
+        self.nodes.append(target)
+
+    def _watched(self, last: Node, target: Node) -> bool:
+        """Whether a branch that is asked for (not only a spare one) is unsure."""
+        return bool(np.any(target.confidence[: self.count][last.order[: self.count] >= 0] < SURE))
+
+    # --- what the diagram says ----------------------------------------------------------------------------------------
+
+    def between(self, left: Node, speed: float) -> Node:
+        """Return the modes at a speed to the right of a node, joined with its branches."""
+        node = self.solve(speed, left.spinning.q, False)
+        assign(left, node)
+        return node
+
+    def crossings(self, orders: int) -> list[dict[str, Any]]:
+        """Return the speeds where a branch meets k Ω, k = 1 … orders, by root finding on the true frequency."""
+        out = []
+        for left, right in zip(self.nodes[:-1], self.nodes[1:], strict=True):
+            for b in range(self.count):
+                for k in range(1, orders + 1):
+                    gap = [n.value(b).imag - k * abs(n.speed) for n in (left, right)]
+                    if not np.all(np.isfinite(gap)) or gap[0] == 0.0 or gap[0] * gap[1] > 0.0:
+                        continue
+
+                    def f(s: float, left: Node = left, b: int = b, k: int = k) -> float:
+                        return self.between(left, s).value(b).imag - k * abs(s)
+
+                    speed = right.speed if gap[1] == 0.0 else brentq(f, left.speed, right.speed, xtol=1e-12, rtol=1e-8)
+                    out.append({"branch": b + 1, "per_rev": k, "speed": float(speed), "frequency": k * abs(float(speed))})
+        return sorted(out, key=lambda c: c["speed"])
+
+    def onsets(self) -> list[dict[str, Any]]:
+        """Return the speeds where a mode becomes unstable, and of which kind, by bisection between two nodes."""
+        out = []
+        for left, right in zip(self.nodes[:-1], self.nodes[1:], strict=True):
+            kind = unstable(right.spinning)
+            if kind is None or unstable(left.spinning) is not None:
+                continue
+            speed = self._static_onset(left, right) if kind.startswith("static") else None
+            out.append({"speed": speed if speed is not None else self._bisect(left, right), "kind": kind})
+        return out
+
+    def _static_onset(self, left: Node, right: Node) -> float | None:
+        """Return the speed where λ² of the least eigenvalue passes zero; None if it does not between the nodes."""
+
+        def square(speed: float) -> float:
+            try:
+                values = self.solve(speed, left.spinning.q, False).spinning.pairs.values
+            except ComputationError:
+                return 0.0  # K is singular: this is the speed
+            return float((values[np.argmin(np.abs(values))] ** 2).real)
+
+        if square(left.speed) * square(right.speed) > 0.0:
+            return None
+        return float(brentq(square, left.speed, right.speed, xtol=1e-12, rtol=1e-10))
+
+    def _bisect(self, left: Node, right: Node) -> float:
+        """Return the lowest unstable speed between a stable and an unstable node."""
+        low, high, start = left.speed, right.speed, left.spinning.q
+        while high - low > 1e-9 * abs(high):
+            middle = self.solve(0.5 * (low + high), start, False).spinning
+            if unstable(middle) is None:
+                low, start = middle.speed, middle.q
+            else:
+                high = middle.speed
+        return high
+
+
+def unstable(spinning: Spinning) -> str | None:
+    """Return the kind of instability of the worst mode at a speed, None if all are stable."""
+    values = spinning.pairs.values
+    size = float(np.max(np.abs(values), initial=0.0))
+    worst = max(values, key=lambda lam: lam.real, default=0.0)
+    return stability(complex(worst)) if worst.real > GROWTH * min(abs(worst), size) else None
+
+
+def parse_speeds(text: str) -> list[float]:
+    """Return speeds (rad/s) from "first:last:number" or "s1,s2,…".
+
+    Raises:
+        SceneError: the text is neither, or the speeds do not increase.
+    """
+    allowed = "must be first:last:number (number at least 2) or a list s1,s2,… of at least two increasing speeds (rad/s)"
+    try:
+        if ":" in text:
+            first, last, number = text.split(":")
+            speeds = [float(s) for s in np.linspace(float(first), float(last), int(number))]
+        else:
+            speeds = [float(s) for s in text.split(",")]
+    except ValueError:
+        raise SceneError("command line", "--speeds", text, allowed) from None
+    if len(speeds) < 2 or not np.all(np.isfinite(speeds)) or np.any(np.diff(speeds) <= 0):
+        raise SceneError("command line", "--speeds", text, allowed)
+    return speeds
+
+
+def campbell(
+    scene: Scene | str | Path | Mapping[str, Any],
+    speeds: Sequence[float] | str,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    orders: int | None = None,
+) -> CampbellResult:
+    """Return the modes of a scene followed over speed.
+
+    Args:
+        scene: scene, path of a scene file, or nested tables; its own speed is not used.
+        speeds: increasing speeds in rad/s, or text such as "0:12:25".
+        comm: MPI communicator.
+        orders: per-rev lines 1Ω … orders·Ω to cross; by default as many as cross the lowest branch, at most 8.
+
+    Raises:
+        SceneError: the scene or the speeds are not valid.
+        ComputationError: no equilibrium at a speed, or eigenpairs that fail their check.
+    """
+    started = perf_counter()
+    scene = as_scene(scene)
+    values = parse_speeds(speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds))
+    if scene.modes.about == "steady":
+        check_steady(scene.replace({"motion": {"type": "constant", "speed": values[-1]}}) if any(scene.loads.gravity) else scene)
+    analysis = ModalAnalysis(scene, comm, sweep=True)
+    sweep = Sweep(analysis, scene.modes.count)
+    sweep.run(values)
+    count = min(scene.modes.count, len(sweep.nodes[0].order))
+    sweep.count = count
+    lowest = min((n.value(b).imag for n in sweep.nodes for b in range(count) if n.value(b).imag > 0), default=0.0)
+    fastest = max(abs(values[0]), abs(values[-1]))
+    highest = max((n.value(b).imag for n in sweep.nodes for b in range(count)), default=lowest)
+    orders = orders if orders is not None else int(np.clip(np.ceil(highest / max(fastest, 1e-300)), 1, 8))
+    labels = branch_labels(analysis, sweep.nodes[0], count)
+    rows = [row for node in sweep.nodes for row in node_rows(analysis, node, labels)]
+    crossings, onsets = sweep.crossings(orders), sweep.onsets()
+    for crossing in crossings:
+        crossing["label"] = labels[crossing["branch"] - 1]
+    lost = [labels[b] for b in range(count) if sweep.nodes[-1].order[b] < 0]
+    warnings = [*advice(analysis, fastest)]
+    warnings += [f"{name} left the computed modes before the last speed; more modes.count keeps it" for name in lost]
+    warnings += [
+        f"ambiguous: {labels[int(a['branch']) - 1]} at {a['speed']:.6g} rad/s, correlation {a['confidence']:.2f}"
+        for a in sweep.ambiguous
+    ]
+    warnings += [f"{onset['kind']} from {onset['speed']:.8g} rad/s on" for onset in onsets]
+    last = sweep.nodes[-1].spinning
+    warnings += [f"at {last.speed:g} rad/s, {text}" for text in instabilities(mode_rows(analysis, last)[:count])]
+    total = perf_counter() - started
+    summary: dict[str, Any] = {
+        "command": "campbell",
+        "status": "done",
+        "name": scene.name,
+        "theory": scene.model.theory,
+        "about": "undeformed" if analysis.system.linear else scene.modes.about,
+        "effects": list(analysis.model.effects),
+        "dofs": analysis.system.V.dofmap.index_map.size_global * analysis.system.V.dofmap.index_map_bs,
+        "branches": [{"branch": b + 1, "label": labels[b], **branch_summary(sweep, b)} for b in range(count)],
+        "per_rev": orders,
+        "critical_speeds": crossings,
+        "instabilities": onsets,
+        "ambiguous": sweep.ambiguous,
+        "speeds": len(values),
+        "speeds_solved": sweep.solves,
+        "checks": self_checks(analysis, last),
+        "lowest_frequency": lowest,
+        "warnings": warnings,
+        "timings": {**analysis.seconds, "other": total - sum(analysis.seconds.values()), "total": total},
+        "versions": versions(),
+        "ranks": comm.size,
+        "scene": scene.to_dict(),
+    }
+    return CampbellResult(summary, rows)
+
+
+def branch_labels(analysis: ModalAnalysis, first: Node, count: int) -> list[str]:
+    """Return the names of the branches, those of the first speed; a name that occurs again gets a letter."""
+    names = analysis.names(first.spinning)[:count]
+    return [n if names.count(n) == 1 else f"{n}{'abcdefgh'[names[:i].count(n)]}" for i, n in enumerate(names)]
+
+
+def branch_summary(sweep: Sweep, b: int) -> dict[str, float]:
+    """Return the least confidence of a branch and its frequency at both ends (rad/s)."""
+    confidence = min(float(n.confidence[b]) for n in sweep.nodes)
+    first, last = (float(sweep.nodes[i].value(b).imag) for i in (0, -1))
+    return {"confidence": confidence, "frequency_first": first, "frequency_last": last}
+
+
+def node_rows(analysis: ModalAnalysis, node: Node, labels: list[str]) -> list[dict[str, Any]]:
+    """Return one row a branch at one speed; `mode` is its present name, `label` the name of the branch."""
+    columns = mode_rows(analysis, node.spinning)
+    rows = []
+    for b, label in enumerate(labels):
+        if node.order[b] < 0:
+            continue
+        row = columns[node.order[b]]
+        kept = {k: row[k] for k in ("frequency", "frequency_hz", "damping", "growth", "residual")}
+        shares = {k: v for k, v in row.items() if k.startswith("share_")}
+        rows.append(
+            {
+                "speed": node.speed,
+                "branch": b + 1,
+                "label": label,
+                "mode": row["label"],
+                **kept,
+                **shares,
+                "confidence": float(node.confidence[b]),
+                "refined": int(not node.requested),
+            }
+        )
+    return rows

@@ -1,0 +1,299 @@
+"""`rotfem modes`: gyroscopic eigenmodes of the spinning structure, named and checked.
+
+Small motions e^{λt} x about an equilibrium q̄ at constant speed satisfy (λ² M + λ C + K) x = 0 with M = ∂F/∂a,
+C = ∂F/∂v, K = ∂F/∂q at (q̄, 0, 0).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from rotfem.affine import AffineSystem
+from rotfem.equilibrium import check_steady, newton_for, steady_state
+from rotfem.errors import SceneError
+from rotfem.pencil import SAME, Eigenpairs, Pencil
+from rotfem.results import ModesResult
+from rotfem.scene import Scene
+from rotfem.simulation import as_scene, versions
+from rotfem.solvers import Newton
+from rotfem.system import Model, System, compile_system
+
+Array = npt.NDArray[Any]
+
+#: Share of kinetic energy from which a mode belongs to one family; below it is named as mixed.
+PURE = 0.8
+
+#: Part of the largest amplitude below which a shape counts as zero when its nodes are counted.
+NODE_NOISE = 1e-3
+
+#: Part of the least eigenvalue a real part must exceed to count as growth.
+GROWTH = 1e-6
+
+
+@dataclass
+class Spinning:
+    """The structure at one speed: its equilibrium, pencil and eigenpairs.
+
+    Attributes:
+        speed: Ω, rad/s.
+        q: equilibrium, local dof array.
+        pencil: M, C, K there.
+        pairs: eigenpairs, sorted by |λ|, one of each conjugate pair.
+    """
+
+    speed: float
+    q: Array
+    pencil: Pencil
+    pairs: Eigenpairs
+
+
+class ModalAnalysis:
+    """Compiled once, solved at any speed.
+
+    Args:
+        scene: validated scene; its own speed is only a default.
+        comm: MPI communicator.
+    """
+
+    def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD, sweep: bool = False):
+        if scene.motion.type == "torque":
+            raise SceneError(scene.file, "motion.type", "torque", "modes of a free hub cannot be computed yet")
+        started = perf_counter()
+        rotating = scene.replace({"model.frame": "rotating"}) if scene.model.frame == "inertial" else scene
+        self.scene, self.comm = rotating, comm
+        self.model = Model(rotating, comm, rotating.effective_effects(spinning=True) if sweep else None)
+        self.system: System = compile_system(self.model)
+        self.newton: Newton = newton_for(rotating)
+        self.seconds = {"compile": perf_counter() - started, "equilibrium": 0.0, "assemble": 0.0, "eigen": 0.0}
+
+    def at(self, speed: float, count: int, start: Array | None = None) -> Spinning:
+        """Return equilibrium and eigenpairs at a speed (rad/s); start is an equilibrium nearby, to continue from.
+
+        Raises:
+            ComputationError: no equilibrium, or eigenpairs not to be trusted.
+        """
+        t0 = perf_counter()
+        q = self.equilibrium(speed, start)
+        t1 = perf_counter()
+        pencil = Pencil(*self.system.mass_damping_stiffness())
+        t2 = perf_counter()
+        pairs = pencil.solve(count)
+        t3 = perf_counter()
+        for name, span in (("equilibrium", t1 - t0), ("assemble", t2 - t1), ("eigen", t3 - t2)):
+            self.seconds[name] += span
+        return Spinning(speed, q, pencil, pairs)
+
+    def equilibrium(self, speed: float, start: Array | None = None) -> Array:
+        """Return the state the modes are about, left in the system's functions: steady, or undeformed."""
+        s = self.system
+        zero = np.zeros_like(s.q.x.array)
+        if self.scene.modes.about == "undeformed" or s.linear:
+            s.set_time(0.0, s.motion.at_speed(speed))
+            s.set_state(zero, zero, zero)
+            return zero
+        return steady_state(s, speed, self.newton, start)
+
+    # --- names ------------------------------------------------------------------------------------------------------
+
+    def shares(self, spinning: Spinning) -> dict[str, Array]:
+        """Return family ↦ share of the kinetic energy x^H M x in its components, shape (m,)."""
+        X = spinning.pairs.right
+        MX = spinning.pencil.apply(spinning.pencil.M, X)
+        bs = self.system.V.dofmap.index_map_bs
+        local = np.real(X.conj() * MX).reshape(-1, bs, X.shape[1]).sum(axis=0)
+        energy = self.comm.allreduce(local) if self.comm.size > 1 else local
+        total = energy.sum(axis=0)
+        families = self.model.structure.families
+        return {name: energy[list(components)].sum(axis=0) / total for name, (components, _) in families.items()}
+
+    def names(self, spinning: Spinning) -> list[str]:
+        """Return "family n" for every mode, n one more than the nodes of its shape; mixed ones name both families."""
+        shares = self.shares(spinning)
+        families = list(shares)
+        table = np.array([shares[name] for name in families])
+        out = []
+        for j in range(table.shape[1]):
+            order = np.argsort(-table[:, j])
+            first = families[order[0]]
+            number = self.nodes(spinning.pairs.right[:, j], self.model.structure.families[first][1]) + 1
+            mixed = len(order) > 1 and table[order[0], j] < PURE
+            out.append(f"{first}–{families[order[1]]} {number}" if mixed else f"{first} {number}")
+        return out
+
+    def nodes(self, x: Array, component: int) -> int:
+        """Return the number of zeros of one component along the structure, its clamped end not counted."""
+        y = self.shape(x)[1][:, component]
+        y = np.real(y * np.exp(-1j * np.angle(y[np.argmax(np.abs(y))])))
+        y = y[np.abs(y) > NODE_NOISE * np.max(np.abs(y))]
+        return int(np.count_nonzero(np.diff(np.sign(y))))
+
+    def shape(self, x: Array) -> tuple[Array, Array]:
+        """Return (X, values): node positions (n,) in m and the complex components (n, bs) of a mode, on every rank."""
+        structure = self.model.structure
+        X, real = structure.nodes(x.real)
+        _, imaginary = structure.nodes(x.imag)
+        return X, real + 1j * imaginary
+
+
+def modes(scene: Scene | str | Path | Mapping[str, Any], comm: MPI.Comm = MPI.COMM_WORLD) -> ModesResult:
+    """Return the modes of a scene at its speed: the speed at the end of [time], or the constant one.
+
+    Args:
+        scene: scene, path of a scene file, or nested tables.
+        comm: MPI communicator; every rank gets the whole result.
+
+    Raises:
+        SceneError: the scene is not valid, or has no steady state.
+        ComputationError: no equilibrium, or eigenpairs that fail the check of their backward error.
+    """
+    started = perf_counter()
+    scene = as_scene(scene)
+    if scene.modes.about == "steady":
+        check_steady(scene)
+    analysis = ModalAnalysis(scene, comm)
+    speed = final_speed(analysis)
+    spinning = analysis.at(speed, scene.modes.count)
+    spinning.pairs = spinning.pairs.select(np.arange(min(scene.modes.count, len(spinning.pairs.values))))
+    rows = mode_rows(analysis, spinning)
+    checks = self_checks(analysis, spinning)
+    warnings = [*advice(analysis, speed), *instabilities(rows)]
+    shapes = {f"mode {i + 1}: {row['label']}": scaled_shape(analysis, spinning, i) for i, row in enumerate(rows)}
+    total = perf_counter() - started
+    summary: dict[str, Any] = {
+        "command": "modes",
+        "status": "done",
+        "name": scene.name,
+        "theory": scene.model.theory,
+        "about": "undeformed" if analysis.system.linear else scene.modes.about,
+        "speed": speed,
+        "effects": list(analysis.model.effects),
+        "dofs": analysis.system.V.dofmap.index_map.size_global * analysis.system.V.dofmap.index_map_bs,
+        "modes": rows,
+        "checks": checks,
+        "warnings": warnings,
+        "timings": {**analysis.seconds, "other": total - sum(analysis.seconds.values()), "total": total},
+        "versions": versions(),
+        "ranks": comm.size,
+        "scene": scene.to_dict(),
+    }
+    return ModesResult(summary, rows, shapes)
+
+
+def final_speed(analysis: ModalAnalysis) -> float:
+    """Return the speed of the modes: at the end of the motion where the scene has one, constant otherwise (rad/s)."""
+    scene = analysis.scene
+    if scene.motion.type == "spin_up":
+        return float(scene.motion.speed)
+    return analysis.model.motion.speed(scene.time.end if scene.time is not None else 0.0)
+
+
+def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any]]:
+    """Return one row a mode: frequency (rad/s, Hz), damping ratio, growth (1/s), label, shares, backward error."""
+    shares, names = analysis.shares(spinning), analysis.names(spinning)
+    rows = []
+    for i, (lam, error) in enumerate(zip(spinning.pairs.values, spinning.pairs.errors, strict=True)):
+        size = abs(lam)
+        rows.append(
+            {
+                "mode": i + 1,
+                "label": names[i],
+                "frequency": float(lam.imag),
+                "frequency_hz": float(lam.imag / (2 * np.pi)),
+                "damping": float(-lam.real / size) if size > 0 else 0.0,
+                "growth": float(lam.real),
+                "stability": stability(lam),
+                **{f"share_{name}": float(share[i]) for name, share in shares.items()},
+                "residual": float(error),
+            }
+        )
+    return rows
+
+
+def stability(lam: complex) -> str:
+    """Return "stable", "static instability" (real growth) or "dynamic instability" (growing oscillation)."""
+    if lam.real <= GROWTH * abs(lam):
+        return "stable"
+    return "static instability" if lam.imag <= SAME * abs(lam) else "dynamic instability"
+
+
+def instabilities(rows: list[dict[str, Any]]) -> list[str]:
+    """Return a warning for every unstable mode."""
+    return [
+        f"{row['stability']}: {row['label']} grows as exp({row['growth']:.6g} t)"
+        for row in rows
+        if row["stability"] != "stable"
+    ]
+
+
+def advice(analysis: ModalAnalysis, speed: float) -> list[str]:
+    """Return warnings about the model: a rotating-frame frequency without Coriolis forces is not one."""
+    if speed != 0.0 and "coriolis" not in analysis.model.effects:
+        return [
+            "coriolis is not among model.effects: frequencies in the rotating frame are wrong without it, and ω² can "
+            "come out negative"
+        ]
+    return []
+
+
+def self_checks(analysis: ModalAnalysis, spinning: Spinning) -> dict[str, float]:
+    """Return how far symmetry, the spectrum and the linearisation are from what theory says (all relative).
+
+    M and K symmetric and C skew without damping and follower loads; then −λ̄ is an eigenvalue with λ. The tangents are
+    compared with central differences of the residual.
+    """
+    out = {f"asymmetry_{name}": value for name, value in spinning.pencil.asymmetries().items()}
+    if spinning.pencil.spectrum_error is not None:
+        out["spectrum"] = spinning.pencil.spectrum_error
+    out["linearisation"] = linearisation_error(analysis, spinning)
+    return out
+
+
+def linearisation_error(analysis: ModalAnalysis, spinning: Spinning) -> float:
+    """Return the relative difference between M, C, K times a vector and central differences of the residual."""
+    system, pencil = analysis.system, spinning.pencil
+    if isinstance(system, AffineSystem):
+        return 0.0  # the residual is made of these very matrices
+    zero = np.zeros_like(spinning.q)
+    # A direction without structure: for a mode, K x is what is left when large axial terms cancel.
+    system.q.x.array[:] = np.random.default_rng(1).standard_normal(zero.size) * system.scale
+    system.q.x.scatter_forward()
+    direction = system.q.x.array.copy()
+    system.set_time(0.0, system.motion.at_speed(spinning.speed))
+    worst, step = 0.0, 1e-7
+
+    def residual(q: Array, v: Array, a: Array) -> Array:
+        system.set_state(q, v, a)
+        return -system.residual().array.copy()
+
+    owned = len(spinning.pairs.right)
+    direction[system.clamped] = 0.0
+    for A, slot in ((pencil.K, 0), (pencil.C, 1), (pencil.M, 2)):
+        plus, minus = [spinning.q, zero, zero], [spinning.q, zero, zero]
+        plus[slot], minus[slot] = plus[slot] + step * direction, minus[slot] - step * direction
+        difference = (residual(*plus) - residual(*minus)) / (2 * step)
+        exact = pencil.apply(A, direction[:owned, None].astype(complex))[:, 0].real
+        exact[system.clamped] = 0.0
+        sums = np.array([np.sum((difference - exact) ** 2), np.sum(exact**2)])
+        error, size = analysis.comm.allreduce(sums)
+        worst = max(worst, float(np.sqrt(error / size)) if size > 0 else 0.0)
+    system.set_state(spinning.q, zero, zero)
+    return worst
+
+
+def scaled_shape(analysis: ModalAnalysis, spinning: Spinning, i: int) -> dict[str, Array]:
+    """Return a mode shape along the structure: x (m) and the real and imaginary part of each component, largest 1."""
+    X, values = analysis.shape(spinning.pairs.right[:, i])
+    peak = values.ravel()[np.argmax(np.abs(values))]
+    values = values / peak
+    columns: dict[str, Array] = {"x": X}
+    for c, name in enumerate(analysis.model.structure.components):
+        columns[name], columns[f"{name}_imag"] = values[:, c].real, values[:, c].imag
+    return columns

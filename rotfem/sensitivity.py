@@ -1,0 +1,281 @@
+"""Derivatives dλ/dp of eigenvalues to section properties, hub radius, tip mass and speed, by the adjoint formula.
+
+With Q(λ; q̄, p) = λ² M + λ C + K about the equilibrium R(q̄, p) = 0,
+
+    dλ/dp = − [ y^H Q_p x − z^T R_p ] / [ y^H (2λ M + C) x ],     K_R^T z = ∂(y^H Q x)/∂q̄ ,
+
+(Adhikari & Friswell 2001 for the first term; the second carries the dependence of the equilibrium on p). All
+derivatives are `ufl.derivative` and `ufl.diff` of the residual.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
+from ufl.algorithms import expand_derivatives
+
+from rotfem import compat
+from rotfem.affine import AffineSystem
+from rotfem.modes import ModalAnalysis, Spinning
+from rotfem.solvers import DirectSolver
+
+Array = npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A quantity of the scene: its constant (or field) in the forms, and what a relative change multiplies.
+
+    Attributes:
+        name: "EI", "hub_radius", "speed", …
+        symbol: the UFL constant, component or field that is replaced.
+        value: its value; a tapered property counts as 1 and its derivative is that of a common factor.
+    """
+
+    name: str
+    symbol: Any
+    value: float
+
+
+class Sensitivity:
+    """Derivatives of eigenvalues at one spinning state.
+
+    Args:
+        analysis: compiled scene.
+        spinning: equilibrium and eigenpairs.
+    """
+
+    def __init__(self, analysis: ModalAnalysis, spinning: Spinning):
+        self.analysis, self.spinning = analysis, spinning
+        self.system, self.model = analysis.system, analysis.model
+        self.structure, self.V = analysis.model.structure, analysis.system.V
+        k = self.structure.k
+        self.base = k.q
+        self.vectors = {name: fem.Function(self.V) for name in ("xr", "xi", "yr", "yi")}
+        self.factors = {name: self.structure.constant(0.0) for name in ("a", "b", "c", "d")}
+        if isinstance(self.system, AffineSystem):
+            self._prepare_linear(self.system)
+        else:
+            self.equation = self.model.residual
+            self.pencil_form = self.model.residual
+            self.base_state = spinning.q
+        self.s = self._bilinear()
+        self._stiffness: Any = None
+
+    def _prepare_linear(self, system: AffineSystem) -> None:
+        """Write the linear theory as a residual: its base state q̄ is the linear response that carries N⁰."""
+        k, model = self.structure.k, self.model
+        internal = model.terms["internal"]
+        loads = sum(t for name, t in model.terms.items() if name not in ("internal", "damping"))
+        at_rest = {k.q: fem.Function(self.V), k.v: fem.Function(self.V), k.a: fem.Function(self.V)}
+        # f(p) is the residual of the undeformed structure; K q̄ = −f defines N⁰.
+        self.equation = internal + (ufl.replace(loads, at_rest) if not isinstance(loads, int) else 0)
+        self.pencil_form = model.residual
+        self.base_state = self._static(system)
+
+    def _static(self, system: AffineSystem) -> Array:
+        zero = np.zeros_like(self.spinning.q)
+        system.set_time(0.0, system.motion.at_speed(self.spinning.speed))
+        system.set_state(zero, zero, zero)
+        if system.model.theory.prestressed is None:
+            return zero
+        solution = fem.Function(self.V)
+        x = compat.wrap(solution.x)
+        b = system.residual().copy()
+        material = next(p.operator for p in system.pieces if p.kind == "K" and p.key == ())
+        DirectSolver(material).solve(b, x)
+        solution.x.scatter_forward()
+        return solution.x.array.copy()
+
+    # --- the forms ---------------------------------------------------------------------------------------------------
+
+    def _operators(self) -> dict[str, Any]:
+        """Return K, C, M as functions (u, w) ↦ form, at the base state in k.q."""
+        k = self.structure.k
+        F = self.pencil_form
+
+        def tangent(variable: Any) -> Any:
+            return lambda u, w: ufl.replace(ufl.derivative(F, variable, w), {k.dq: u})
+
+        if not isinstance(self.system, AffineSystem):
+            return {"K": tangent(k.q), "C": tangent(k.v), "M": tangent(k.a)}
+
+        # Linear theory: tangents at the undeformed state, and the geometric stiffness of the base state.
+        rest = fem.Function(self.V)
+
+        def at_rest(variable: Any) -> Any:
+            def form(u: Any, w: Any) -> Any:
+                expanded = expand_derivatives(ufl.derivative(F, variable, w))
+                return ufl.replace(expanded, {k.dq: u, k.q: rest})
+
+            return form
+
+        def stiffness(u: Any, w: Any) -> Any:
+            return at_rest(k.q)(u, w) + self._geometric(u, w, rest)
+
+        return {"K": stiffness, "C": at_rest(k.v), "M": at_rest(k.a)}
+
+    def _geometric(self, u: Any, w: Any, rest: Any) -> Any:
+        """∫ N⁰ D²Γ₁[u, w] with N⁰ of the base state in k.q (0 without a prestressed theory)."""
+        theory, structure, k = self.model.theory, self.structure, self.structure.k
+        if theory.prestressed is None:
+            return 0
+        second = structure.strains(theory.prestress_measures(structure.type))
+        out: Any = 0
+        for first, higher in zip(self.model.strains, second, strict=True):
+            if first.name in structure.prestressing:
+                curvature = expand_derivatives(ufl.derivative(ufl.derivative(higher.value, k.q, u), k.q, w))
+                curvature = ufl.replace(curvature, {k.q: rest})
+                out += ufl.inner(first.force(first.value), curvature) * higher.measure
+        return out
+
+    def _bilinear(self) -> dict[str, Any]:
+        """Return the real and imaginary part of y^H Q(λ) x as forms of the base state and the constants.
+
+        λ² = a + i b, λ = c + i d; y^H A x = (y_r·A x_r + y_i·A x_i) + i (y_r·A x_i − y_i·A x_r).
+        """
+        v, f = self.vectors, self.factors
+        parts: dict[str, Any] = {}
+        for name, form in self._operators().items():
+            parts[f"{name}_re"] = form(v["yr"], v["xr"]) + form(v["yi"], v["xi"])
+            parts[f"{name}_im"] = form(v["yr"], v["xi"]) - form(v["yi"], v["xr"])
+        re = parts["K_re"] + f["c"] * parts["C_re"] - f["d"] * parts["C_im"]
+        im = parts["K_im"] + f["c"] * parts["C_im"] + f["d"] * parts["C_re"]
+        re += f["a"] * parts["M_re"] - f["b"] * parts["M_im"]
+        im += f["a"] * parts["M_im"] + f["b"] * parts["M_re"]
+        return {"re": re, "im": im}
+
+    # --- parameters -----------------------------------------------------------------------------------------------------
+
+    def parameters(self) -> list[Parameter]:
+        """Return the parameters of the scene that its forms contain."""
+        out = []
+        for name, symbol in self.structure.section.items():
+            value = float(symbol.value) if isinstance(symbol, fem.Constant) else 1.0
+            out.append(Parameter(name, symbol, value))
+        for name, symbol in self.structure.scalars.items():
+            out.append(Parameter(name, symbol, float(symbol.value)))
+        if "w" in self.model.frame.constants:
+            out.append(Parameter("speed", self.model.frame.constants["w"], self.spinning.speed))
+        return out
+
+    def _shifted(self, form: Any, parameter: Parameter, s: Any) -> Any:
+        """Return the form with the parameter p replaced by p (1 + s) (a speed by w + s e, a zero value by s)."""
+        symbol = parameter.symbol
+        if parameter.name == "speed":
+            axis = self.system.motion.axis[-symbol.value.size :]
+            return ufl.replace(form, {symbol: ufl.as_vector([symbol[i] + s * float(e) for i, e in enumerate(axis)])})
+        if parameter.value == 0.0:
+            return ufl.replace(form, {symbol: symbol + s})
+        return ufl.replace(form, {symbol: symbol * (1 + s)})
+
+    def of(self, modes: range) -> list[dict[str, complex]]:
+        """Return name ↦ dλ/dp for every mode (per unit of p; of a tapered property, per unit factor)."""
+        parameters = self.parameters()
+        s = self.structure.constant(0.0)
+        variable = ufl.variable(s)
+        equations, pencils = {}, {}
+        for p in parameters:
+            equations[p.name] = self._compiled_diff(self.equation, p, variable)
+            pencils[p.name] = [self._compiled_diff(self.s[part], p, variable) for part in ("re", "im")]
+        gradients = {part: fem.form(ufl.derivative(self.s[part], self.base)) for part in ("re", "im")}
+        system = self.system
+        zero = np.zeros_like(self.base_state)
+        system.set_time(0.0, system.motion.at_speed(self.spinning.speed))
+        solver = DirectSolver(self._base_tangent())
+        out = []
+        for j in modes:
+            self._write(j)
+            system.set_state(self.base_state, zero, zero)
+            adjoint = [self._adjoint(gradients[part], solver) for part in ("re", "im")]
+            denominator = self._denominator(j)
+            row = {}
+            for p in parameters:
+                direct = [0.0 if f is None else self._scalar(f) for f in pencils[p.name]]
+                if equations[p.name] is not None:
+                    R_p = self._vector(equations[p.name])
+                    direct = [d - self._dot(z, R_p) for d, z in zip(direct, adjoint, strict=True)]
+                unit = 1.0 if p.name == "speed" or p.value == 0.0 else p.value
+                row[p.name] = -complex(*direct) / denominator / unit
+            out.append(row)
+        return out
+
+    def _compiled_diff(self, form: Any, parameter: Parameter, variable: Any) -> Any:
+        derivative = expand_derivatives(ufl.diff(self._shifted(form, parameter, variable), variable))
+        return None if derivative.empty() else fem.form(derivative)
+
+    def _base_tangent(self) -> Any:
+        """Return K_Rᵀ of the base equation, clamped rows 1."""
+        system = self.system
+        zero = np.zeros_like(self.base_state)
+        if isinstance(system, AffineSystem):
+            return next(p.operator for p in system.pieces if p.kind == "K" and p.key == ())
+        system.set_state(self.base_state, zero, zero)
+        from rotfem.pencil import transposed
+
+        return transposed(system.matrix(1.0, 0.0, 0.0, 1.0))
+
+    def _write(self, j: int) -> None:
+        pairs = self.spinning.pairs
+        lam, x, y = pairs.values[j], pairs.right[:, j], pairs.left[:, j]
+        for name, part in (("xr", x.real), ("xi", x.imag), ("yr", y.real), ("yi", y.imag)):
+            f = self.vectors[name]
+            f.x.array[: len(part)] = part
+            f.x.scatter_forward()
+        square = lam * lam
+        for name, value in (("a", square.real), ("b", square.imag), ("c", lam.real), ("d", lam.imag)):
+            self.factors[name].value = value
+
+    def _denominator(self, j: int) -> complex:
+        """y^H (2λ M + C) x of one pair."""
+        pairs = self.spinning.pairs.select(np.array([j]))
+        return complex(self.spinning.pencil.gram(pairs.left, pairs.values, pairs.right, pairs.values)[0, 0])
+
+    def _scalar(self, form: Any) -> float:
+        return float(self.analysis.comm.allreduce(fem.assemble_scalar(form)))
+
+    def _vector(self, form: Any) -> Any:
+        b = compat.create_vector(self.V)
+        fem_petsc.assemble_vector(b, form)
+        b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
+        b.array[self.system.clamped] = 0.0
+        return b
+
+    def _adjoint(self, form: Any, solver: DirectSolver) -> Any:
+        b = self._vector(form)
+        z = b.duplicate()
+        solver.solve(b, z)
+        return z
+
+    def _dot(self, z: Any, r: Any) -> float:
+        return float(self.analysis.comm.allreduce(float(np.dot(z.array, r.array))))
+
+
+def sensitivities(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any]]:
+    """Return one row a mode and parameter: dω/dp, dσ/dp (λ = σ + iω) and the relative p/ω dω/dp.
+
+    Rows hold `mode` (from 1), `parameter`, `value`, `dfrequency` (rad/s per unit), `dgrowth` (1/s per unit), `relative`.
+    """
+    study = Sensitivity(analysis, spinning)
+    values = {p.name: p.value for p in study.parameters()}
+    rows = []
+    for j, row in enumerate(study.of(range(len(spinning.pairs.values)))):
+        omega = float(spinning.pairs.values[j].imag)
+        for name, derivative in row.items():
+            rows.append(
+                {
+                    "mode": j + 1,
+                    "parameter": name,
+                    "value": values[name],
+                    "dfrequency": derivative.imag,
+                    "dgrowth": derivative.real,
+                    "relative": values[name] * derivative.imag / omega if omega > 0 else 0.0,
+                }
+            )
+    return rows
