@@ -24,7 +24,7 @@ from rotfem.modes import GROWTH, ModalAnalysis, Spinning, advice, instabilities,
 from rotfem.pencil import SAME
 from rotfem.results import CampbellResult
 from rotfem.scene import Scene
-from rotfem.simulation import as_scene, versions
+from rotfem.simulation import Progress, as_scene, versions
 
 Array = npt.NDArray[Any]
 
@@ -125,15 +125,16 @@ class Sweep:
         self.solves += 1
         return Node(self.analysis.at(speed, self.count + SPARE, start), requested)
 
-    def run(self, speeds: Sequence[float]) -> None:
+    def run(self, speeds: Sequence[float], progress: Progress) -> None:
         """Follow the modes over increasing speeds."""
         first = self.solve(speeds[0], None, True)
         total = len(first.spinning.pairs.values)
         first.order, first.confidence = np.arange(total), np.ones(total)
         self.nodes = [first]
         self.finest = FINEST * max(speeds[-1] - speeds[0], 1e-300)
-        for speed in speeds[1:]:
+        for i, speed in enumerate(speeds[1:], start=1):
             self._advance(self.solve(speed, self.nodes[-1].spinning.q, True))
+            progress(i / (len(speeds) - 1))
 
     def _advance(self, target: Node) -> None:
         """Append a node, and nodes before it as long as the step is not sure."""
@@ -178,7 +179,9 @@ class Sweep:
                         return self.between(left, s).value(b).imag - k * abs(s)
 
                     speed = right.speed if gap[1] == 0.0 else brentq(f, left.speed, right.speed, xtol=1e-12, rtol=1e-8)
-                    out.append({"branch": b + 1, "per_rev": k, "speed": float(speed), "frequency": k * abs(float(speed))})
+                    out.append(
+                        {"branch": b + 1, "per_rev": k, "speed": float(speed), "frequency": k * abs(float(speed))}
+                    )
         return sorted(out, key=lambda c: c["speed"])
 
     def onsets(self) -> list[dict[str, Any]]:
@@ -232,7 +235,9 @@ def parse_speeds(text: str) -> list[float]:
     Raises:
         SceneError: the text is neither, or the speeds do not increase.
     """
-    allowed = "must be first:last:number (number at least 2) or a list s1,s2,… of at least two increasing speeds (rad/s)"
+    allowed = (
+        "must be first:last:number (number at least 2) or a list s1,s2,… of at least two increasing speeds (rad/s)"
+    )
     try:
         if ":" in text:
             first, last, number = text.split(":")
@@ -251,6 +256,7 @@ def campbell(
     speeds: Sequence[float] | str,
     comm: MPI.Comm = MPI.COMM_WORLD,
     orders: int | None = None,
+    progress: Progress | None = None,
 ) -> CampbellResult:
     """Return the modes of a scene followed over speed.
 
@@ -258,7 +264,8 @@ def campbell(
         scene: scene, path of a scene file, or nested tables; its own speed is not used.
         speeds: increasing speeds in rad/s, or text such as "0:12:25".
         comm: MPI communicator.
-        orders: per-rev lines 1Ω … orders·Ω to cross; by default as many as cross the lowest branch, at most 8.
+        orders: per-rev lines 1Ω … orders·Ω to cross; by default as many as meet a branch in the range, at most 4.
+        progress: called with the share of the speeds done, between 0 and 1.
 
     Raises:
         SceneError: the scene or the speeds are not valid.
@@ -268,16 +275,18 @@ def campbell(
     scene = as_scene(scene)
     values = parse_speeds(speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds))
     if scene.modes.about == "steady":
-        check_steady(scene.replace({"motion": {"type": "constant", "speed": values[-1]}}) if any(scene.loads.gravity) else scene)
+        check_steady(
+            scene.replace({"motion": {"type": "constant", "speed": values[-1]}}) if any(scene.loads.gravity) else scene
+        )
     analysis = ModalAnalysis(scene, comm, sweep=True)
     sweep = Sweep(analysis, scene.modes.count)
-    sweep.run(values)
+    sweep.run(values, progress or (lambda share: None))
     count = min(scene.modes.count, len(sweep.nodes[0].order))
     sweep.count = count
     lowest = min((n.value(b).imag for n in sweep.nodes for b in range(count) if n.value(b).imag > 0), default=0.0)
     fastest = max(abs(values[0]), abs(values[-1]))
     highest = max((n.value(b).imag for n in sweep.nodes for b in range(count)), default=lowest)
-    orders = orders if orders is not None else int(np.clip(np.ceil(highest / max(fastest, 1e-300)), 1, 8))
+    orders = orders if orders is not None else int(np.clip(np.ceil(highest / max(fastest, 1e-300)), 1, 4))
     labels = branch_labels(analysis, sweep.nodes[0], count)
     rows = [row for node in sweep.nodes for row in node_rows(analysis, node, labels)]
     crossings, onsets = sweep.crossings(orders), sweep.onsets()

@@ -64,7 +64,65 @@ def run(
                 session.write(partial, folder, plots=not no_plots)
             raise
         session.write(result, folder, plots=not no_plots)
-        session.say(result.summary, folder)
+        session.say(run_report(result.summary, folder))
+
+
+@app.command()
+def modes(
+    scene: ScenePath,
+    output: Output = None,
+    overrides: Overrides = [],  # noqa: B006
+    sensitivities: Annotated[
+        bool, typer.Option("--sensitivities", help="derivatives to section, hub and speed")
+    ] = False,
+    state_space: Annotated[bool, typer.Option("--state-space", help="write the modal model state_space.npz")] = False,
+    matrices: Annotated[bool, typer.Option("--matrices", help="write M, C, K as Matrix Market and npz")] = False,
+    as_json: Json = False,
+    no_plots: NoPlots = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Compute the gyroscopic eigenmodes of SCENE at its speed."""
+    with Session(as_json, quiet, debug) as session:
+        loaded = load_scene(scene, overrides)
+        folder = session.folder(output or Path("results") / loaded.name)
+        from rotfem.modes import modes as analyse
+
+        result = analyse(loaded, sensitivities=sensitivities)
+        if state_space or matrices:
+            from rotfem.state_space import state_space as reduce
+            from rotfem.state_space import write_matrices
+
+            if state_space:
+                reduce(result.analysis, result.spinning, loaded.modes.count).write(folder / "state_space.npz")
+            if matrices:
+                write_matrices(result.analysis, result.spinning, folder)
+        session.write(result, folder, plots=not no_plots)
+        session.say(modes_report(result.summary, folder))
+
+
+@app.command()
+def campbell(
+    scene: ScenePath,
+    speeds: Annotated[str, typer.Option("--speeds", metavar="RANGE", help="first:last:number or s1,s2,… in rad/s")],
+    per_rev: Annotated[int | None, typer.Option("--per-rev", min=0, help="per-rev lines 1Ω … NΩ to cross")] = None,
+    output: Output = None,
+    overrides: Overrides = [],  # noqa: B006
+    as_json: Json = False,
+    no_plots: NoPlots = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Follow the modes of SCENE over a range of speeds."""
+    with Session(as_json, quiet, debug) as session:
+        loaded = load_scene(scene, overrides)
+        folder = session.folder(output or Path("results") / loaded.name)
+        from rotfem.campbell import campbell as sweep
+
+        with session.progress(f"{loaded.name}: {loaded.model.theory}") as progress:
+            result = sweep(loaded, speeds, orders=per_rev, progress=progress)
+        session.write(result, folder, plots=not no_plots)
+        session.say(campbell_report(result.summary, folder))
 
 
 class Session:
@@ -137,9 +195,9 @@ class Session:
             return
         result.write(folder)
         if plots:
-            from rotfem.plots import plot_run
+            from rotfem.plots import plot
 
-            plot_run(result, folder)
+            plot(result, folder)
         if self.as_json:
             from rotfem.results import json_text
 
@@ -148,10 +206,10 @@ class Session:
             if not self.quiet:
                 print(f"warning: {warning}", file=sys.stderr)
 
-    def say(self, summary: dict[str, Any], folder: Path) -> None:
-        """Print what was done, in a few lines."""
+    def say(self, lines: list[str]) -> None:
+        """Print what was done."""
         if self.first and not (self.quiet or self.as_json):
-            print("\n".join(report(summary, folder)))
+            print("\n".join(lines))
 
 
 class ProgressBar:
@@ -184,7 +242,7 @@ class ProgressBar:
             self._bar.stop()
 
 
-def report(summary: dict[str, Any], folder: Path) -> list[str]:
+def run_report(summary: dict[str, Any], folder: Path) -> list[str]:
     """Return the lines a run prints."""
     f, time = summary["figures"], summary["timings"]
     lines = [
@@ -206,6 +264,37 @@ def report(summary: dict[str, Any], folder: Path) -> list[str]:
         finals = {k.removesuffix("_final").replace("_", " "): v for k, v in f.items() if k.endswith("_final")}
         values = (f"{name} = {value:.6g}" for name, value in finals.items())
         lines.append(f"steady state in {time['total']:.2f} s: {', '.join(values)}")
+    return [*lines, f"results in {folder}"]
+
+
+def modes_report(summary: dict[str, Any], folder: Path) -> list[str]:
+    """Return the lines `modes` prints: a table."""
+    lines = [
+        f"{summary['name']}: {summary['theory']} about the {summary['about']} state at {summary['speed']:g} rad/s, "
+        f"{summary['dofs']} dofs, in {summary['timings']['total']:.2f} s",
+        f"effects: {', '.join(summary['effects']) or 'none'}",
+        f"{'mode':>4}  {'label':<16}{'rad/s':>14}{'Hz':>12}{'damping':>12}{'error':>10}",
+    ]
+    for row in summary["modes"]:
+        lines.append(
+            f"{row['mode']:>4}  {row['label']:<16}{row['frequency']:>14.6f}{row['frequency_hz']:>12.6f}"
+            f"{row['damping']:>12.3e}{row['residual']:>10.1e}"
+        )
+    return [*lines, f"results in {folder}"]
+
+
+def campbell_report(summary: dict[str, Any], folder: Path) -> list[str]:
+    """Return the lines `campbell` prints: branches and critical speeds."""
+    lines = [
+        f"{summary['name']}: {summary['theory']}, {summary['speeds']} speeds ({summary['speeds_solved']} solved), "
+        f"{summary['dofs']} dofs, in {summary['timings']['total']:.2f} s",
+        f"{'branch':>6}  {'label':<16}{'first rad/s':>14}{'last rad/s':>14}{'confidence':>12}",
+    ]
+    for b in summary["branches"]:
+        first, last = (f"{b[k]:.6f}" if b[k] == b[k] else "lost" for k in ("frequency_first", "frequency_last"))
+        lines.append(f"{b['branch']:>6}  {b['label']:<16}{first:>14}{last:>14}{b['confidence']:>12.3f}")
+    for c in summary["critical_speeds"]:
+        lines.append(f"critical speed {c['speed']:.6f} rad/s: {c['label']} meets {c['per_rev']}Ω")
     return [*lines, f"results in {folder}"]
 
 

@@ -143,12 +143,17 @@ class ModalAnalysis:
         return X, real + 1j * imaginary
 
 
-def modes(scene: Scene | str | Path | Mapping[str, Any], comm: MPI.Comm = MPI.COMM_WORLD) -> ModesResult:
-    """Return the modes of a scene at its speed: the speed at the end of [time], or the constant one.
+def modes(
+    scene: Scene | str | Path | Mapping[str, Any],
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    sensitivities: bool = False,
+) -> ModesResult:
+    """Return the modes of a scene at its final speed: that of a spin-up, at the end of [time], or the constant one.
 
     Args:
         scene: scene, path of a scene file, or nested tables.
         comm: MPI communicator; every rank gets the whole result.
+        sensitivities: also compute the derivatives of all eigenvalues to the scene's parameters.
 
     Raises:
         SceneError: the scene is not valid, or has no steady state.
@@ -184,7 +189,12 @@ def modes(scene: Scene | str | Path | Mapping[str, Any], comm: MPI.Comm = MPI.CO
         "ranks": comm.size,
         "scene": scene.to_dict(),
     }
-    return ModesResult(summary, rows, shapes)
+    result = ModesResult(summary, rows, shapes, analysis=analysis, spinning=spinning)
+    if sensitivities:
+        from rotfem.sensitivity import sensitivities as derivatives
+
+        result.sensitivities = derivatives(analysis, spinning)
+    return result
 
 
 def final_speed(analysis: ModalAnalysis) -> float:

@@ -126,8 +126,8 @@ class Pencil:
             left = self._mirrored(values, right)
             self.spectrum_error = self._mirror_error(values)
         else:
-            adjoint = (transposed(A) for A in (self.M, self.C, self.K))
-            left = self._matched(values, *self._right(*adjoint, count, target)[:2])
+            M, C, K = (transposed(A) for A in (self.M, self.C, self.K))
+            left = self._matched(values, *self._right(M, C, K, count, target)[:2])
         pairs = Eigenpairs(values, right, left, errors)
         worst = float(np.max(pairs.errors, initial=0.0))
         if worst > BACKWARD_TOLERANCE:
@@ -136,7 +136,9 @@ class Pencil:
                 advice="fewer modes.count or another mesh",
             )
         # Of ± pairs of real eigenvalues of a conservative pencil, the growing one tells all.
-        upper = np.flatnonzero((values.imag > 0.0) | ((values.imag == 0.0) & ((values.real >= 0.0) | (not conservative))))
+        upper = np.flatnonzero(
+            (values.imag > 0.0) | ((values.imag == 0.0) & ((values.real >= 0.0) | (not conservative)))
+        )
         order = upper[np.argsort(np.abs(values[upper]), kind="stable")]
         return pairs.select(order)
 

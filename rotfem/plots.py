@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from rotfem.errors import OutputError
-from rotfem.results import RunResult
+from rotfem.results import CampbellResult, ModesResult, RunResult
 
 #: Label and unit of every column that is plotted.
 LABELS = {
@@ -30,6 +31,15 @@ def label(column: str) -> str:
     """Return the axis label of a column, with its unit."""
     name = column.removeprefix("tip_")
     return ("tip " if column.startswith("tip_") else "") + LABELS.get(name, name)
+
+
+def plot(result: RunResult | ModesResult | CampbellResult, folder: Path) -> list[Path]:
+    """Write the figures of a result into a folder; return their paths."""
+    if isinstance(result, RunResult):
+        return plot_run(result, folder)
+    if isinstance(result, ModesResult):
+        return [save(shapes_figure(result), folder / "modes.png")]
+    return [save(campbell_figure(result), folder / "campbell.png")]
 
 
 def plot_run(result: RunResult, folder: Path) -> list[Path]:
@@ -56,6 +66,62 @@ def shape_figure(result: RunResult, title: str) -> Figure:
     """Return the components of the final shape along the structure."""
     s = result.shape
     return stacked(s, "x", [c for c in s if c != "x"], title + ", steady state", marker=".")
+
+
+def shapes_figure(result: ModesResult) -> Figure:
+    """Return the shapes of all modes along the structure, largest component 1; imaginary parts dashed."""
+    shapes = result.shapes
+    figure = Figure(figsize=(9, 1.7 * len(shapes) + 0.8))
+    for i, ((title, columns), row) in enumerate(zip(shapes.items(), result.rows, strict=True), start=1):
+        axis = figure.add_subplot(len(shapes), 1, i)
+        names = [name for name in columns if name != "x" and not name.endswith("_imag")]
+        for c, name in enumerate(names):
+            axis.plot(columns["x"], columns[name], lw=1.3, color=f"C{c}", label=label(name).split(" (")[0])
+            if np.max(np.abs(columns[f"{name}_imag"])) > 1e-3:
+                axis.plot(columns["x"], columns[f"{name}_imag"], lw=1.0, ls="--", color=f"C{c}")
+        axis.set_title(f"{title}, {row['frequency']:.4g} rad/s", fontsize=9, pad=3)
+        axis.set_ylabel("shape (–)", fontsize=8)
+        axis.grid(True, lw=0.4, alpha=0.6)
+        if i < len(shapes):
+            axis.set_xticklabels([])
+        if i == 1:
+            axis.legend(fontsize=8, ncols=len(names), loc="upper left")
+    axis.set_xlabel(label("x") + "; imaginary parts dashed")
+    height = figure.get_figheight()
+    figure.subplots_adjust(left=0.1, right=0.97, top=1 - 0.35 / height, bottom=0.55 / height, hspace=0.35)
+    return figure
+
+
+def campbell_figure(result: CampbellResult) -> Figure:
+    """Return frequency over speed with labelled branches, per-rev lines, their crossings and instabilities."""
+    figure = Figure(figsize=(9, 6.5))
+    axis = figure.add_subplot()
+    branches = result.branches()
+    top = 1.05 * max(float(np.max(b["frequency"])) for b in branches.values())
+    last = max(float(b["speed"][-1]) for b in branches.values())
+    for i, (name, b) in enumerate(branches.items()):
+        axis.plot(b["speed"], b["frequency"], lw=1.6, color=f"C{i % 10}")
+        axis.annotate(name, (b["speed"][-1], b["frequency"][-1]), (5, -3), textcoords="offset points", fontsize=8)
+        unstable = b["growth"] > 1e-6 * (np.abs(b["frequency"]) + np.abs(b["growth"]))
+        axis.plot(b["speed"][unstable], b["frequency"][unstable], "x", ms=5, color=f"C{i % 10}")
+    for k in range(1, result.summary["per_rev"] + 1):
+        end = min(last, top / k)
+        axis.plot([0, end], [0, k * end], lw=0.7, ls=":", color="0.4")
+        axis.annotate(f"{k}Ω", (end, k * end), (-2, 3), textcoords="offset points", fontsize=7, color="0.4", ha="right")
+    crossings = result.summary["critical_speeds"]
+    axis.plot([c["speed"] for c in crossings], [c["frequency"] for c in crossings], "ko", ms=3.5, mfc="none")
+    for onset in result.summary["instabilities"]:
+        axis.axvline(onset["speed"], color="C3", lw=0.8, ls="-.")
+        axis.annotate(
+            onset["kind"], (onset["speed"], top), (3, -10), textcoords="offset points", fontsize=7, color="C3"
+        )
+    axis.set_xlim(min(0.0, *(float(b["speed"][0]) for b in branches.values())), last * 1.12)
+    axis.set_ylim(0, top)
+    axis.set_xlabel(label("psi_dot"))
+    axis.set_ylabel("frequency in the rotating frame (rad/s)")
+    axis.set_title(f"{result.summary['name']}: {result.summary['theory']}")
+    axis.grid(True, lw=0.4, alpha=0.6)
+    return figure
 
 
 def stacked(data: dict[str, Any], x: str, columns: list[str], title: str, marker: str = "") -> Figure:

@@ -83,11 +83,17 @@ class ModesResult:
         rows: one dictionary a mode: `mode`, `label`, `frequency` (rad/s), `frequency_hz`, `damping` (ratio), `growth`
             (1/s), `stability`, `share_…` (of the kinetic energy), `residual` (backward error).
         shapes: title ↦ columns along the structure: `x` (m), each component and its imaginary part, largest entry 1.
+        sensitivities: one dictionary a mode and parameter: `mode`, `parameter`, `value`, `dfrequency` (rad/s per unit),
+            `dgrowth` (1/s per unit), `relative` (p/ω dω/dp); empty if not asked for.
+        analysis, spinning: the compiled scene and its eigenpairs, for further work in Python.
     """
 
     summary: dict[str, Any]
     rows: list[dict[str, Any]]
     shapes: dict[str, dict[str, Array]] = field(default_factory=dict)
+    sensitivities: list[dict[str, Any]] = field(default_factory=list)
+    analysis: Any = field(default=None, repr=False)
+    spinning: Any = field(default=None, repr=False)
 
     def write(self, folder: str | Path) -> list[Path]:
         """Write modes.json, modes.csv, mode_shapes.csv and summary.json, each whole or not at all; return their paths.
@@ -99,7 +105,11 @@ class ModesResult:
         shapes: dict[str, Array] = {}
         for i, columns in enumerate(self.shapes.values(), start=1):
             shapes |= {name if name == "x" else f"{name}_{i}": values for name, values in columns.items()}
+        written = []
+        if self.sensitivities:
+            written.append(write_text(folder / "sensitivities.csv", rows_text(self.sensitivities)))
         return [
+            *written,
             write_text(folder / "modes.csv", rows_text(self.rows)),
             write_text(folder / "mode_shapes.csv", csv_text(shapes)),
             write_text(folder / "modes.json", json_text({"speed": self.summary["speed"], "modes": self.rows})),

@@ -260,7 +260,8 @@ class Sensitivity:
 def sensitivities(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any]]:
     """Return one row a mode and parameter: dω/dp, dσ/dp (λ = σ + iω) and the relative p/ω dω/dp.
 
-    Rows hold `mode` (from 1), `parameter`, `value`, `dfrequency` (rad/s per unit), `dgrowth` (1/s per unit), `relative`.
+    Rows hold `mode` (from 1), `parameter`, `value`, `dfrequency` (rad/s per unit), `dgrowth` (1/s per unit) and
+    `relative`.
     """
     study = Sensitivity(analysis, spinning)
     values = {p.name: p.value for p in study.parameters()}

@@ -202,7 +202,8 @@ class Simulation:
             return
         theory, why = self.scene.model.theory, "the motion is unstable or its load too large for a linear theory"
         if self._critical_since is not None:
-            why = f"its stiffness is not definite above {self.critical:.6g} rad/s, passed at t = {self._critical_since:.4g} s"
+            passed = f"passed at t = {self._critical_since:.4g} s"
+            why = f"its stiffness is not definite above {self.critical:.6g} rad/s, {passed}"
             if self.model.theory.prestressed is None:
                 why += ": first-order strains keep the softening by the centrifugal force but not the stiffening"
         raise ComputationError(

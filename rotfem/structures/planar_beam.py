@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -56,8 +56,10 @@ class PlanarBeam:
     type = "planar_beam"
     planar = True
     prestressing = ("axial",)
+    #: Conjugates of the tip's components: inputs of the state-space model.
+    tip_inputs = ("tip_force_1", "tip_force_2", "tip_moment")
     #: Mode families: the components whose kinetic energy counts, and the one whose nodes are counted.
-    families = {"axial": ((0,), 0), "lag": ((1, 2), 1)}
+    families: ClassVar = {"axial": ((0,), 0), "lag": ((1, 2), 1)}
     components = ("u1", "u2", "alpha")
 
     def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD):
