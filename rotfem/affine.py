@@ -202,6 +202,26 @@ class AffineSystem(System):
             self._changed, self._shift = False, shift
         return self.A, changed
 
+    def spin_derivative(self, c_v: float, c_m: float, out: Any) -> None:
+        """Write c_v ∂F/∂Omega + c_m ∂F/∂Omega' of the state into a PETSc vector: the speed along the axis varies."""
+        axis = self.motion.axis[2:] if self.structure.planar else self.motion.axis
+        values = {name: constant.value.ravel() for name, constant in self._constants().items()}
+        states = dict(zip("KCM", self._qva, strict=True))
+        out.zeroEntries()
+        for p in self.pieces:
+            slope = 0.0
+            for i, (name, component) in enumerate(p.key):
+                if name in ("w", "dw"):
+                    others = np.prod([values[n][c] for j, (n, c) in enumerate(p.key) if j != i])
+                    slope += (c_v if name == "w" else c_m) * axis[component] * float(others)
+            if slope == 0.0:
+                continue
+            if p.kind == "f":
+                out.axpy(slope, p.operator)
+            else:
+                p.operator.mult(states[p.kind], self._work)
+                out.axpy(slope, self._work)
+
     def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
         """Return a new matrix c_k K + c_v C + c_m M with `diagonal` at clamped unknowns (where K has 1)."""
         A = self.A.duplicate()

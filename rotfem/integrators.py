@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -64,17 +65,18 @@ class Scheme:
 
 @dataclass
 class State:
-    """q, v = q̇, a = q̈ and the auxiliary acceleration, local dof arrays, at time t (s)."""
+    """q, v = q̇, a = q̈ and the auxiliary acceleration, local dof arrays, at time t (s).
+
+    Of a free hub, `hub` holds angle, speed, acceleration, auxiliary acceleration, and the work (J) and angular impulse
+    (N·m·s) that torque and brake have given it since t = 0, shape (6,).
+    """
 
     t: float
     q: Array
     v: Array
     a: Array
     auxiliary: Array
-
-    def copy(self) -> State:
-        """Return an independent copy."""
-        return State(self.t, self.q.copy(), self.v.copy(), self.a.copy(), self.auxiliary.copy())
+    hub: Array | None = None
 
 
 class Stepper:
@@ -92,6 +94,7 @@ class Stepper:
         self._dx = Increment(system.V)
         self.seconds = {"assemble": 0.0, "solve": 0.0}
         self.substeps = 0
+        self._hub_increment = 0.0
         self.clamp = system.clamp
 
     @property
@@ -123,26 +126,16 @@ class Stepper:
         self._prescribe(new)
 
         def increment() -> float:
-            started = perf_counter()
             self._write(new)
-            b = s.residual()
-            A, changed = s.tangent(c_q, c_v, c_m)
-            assembled = perf_counter()
-            if self._solver is None:
-                self._solver = DirectSolver(A)
-            elif changed:
-                self._solver.refresh()
-            dq = self._dx.solve(self._solver, b)
-            self.seconds["assemble"] += assembled - started
-            self.seconds["solve"] += perf_counter() - assembled
+            dq = self._correction(new, (c_q, c_v, c_m), h)
             new.q += dq
             new.v += c_v * dq
             new.a += c_m * dq
             new.auxiliary += dq / (p.beta * h * h)
-            return s.size(dq)
+            return max(s.size(dq), self._hub_increment)
 
         try:
-            if s.linear:
+            if s.linear and new.hub is None:
                 self.newton.iterations += 1
                 if not np.isfinite(increment()):
                     raise ComputationError("the solution is not finite")
@@ -151,6 +144,25 @@ class Stepper:
         except ComputationError as error:
             raise ComputationError(error.what, time=new.t, advice=error.advice) from None
         return new
+
+    def _correction(self, new: State, shifts: tuple[float, float, float], h: float) -> Array:
+        """Return the Newton correction of q at the state written into the system (a local array, reused)."""
+        started = perf_counter()
+        b = self.system.residual()
+        A, changed = self.system.tangent(*shifts)
+        assembled = perf_counter()
+        self._factor(A, changed)
+        assert self._solver is not None
+        dq = self._dx.solve(self._solver, b)
+        self.seconds["assemble"] += assembled - started
+        self.seconds["solve"] += perf_counter() - assembled
+        return dq
+
+    def _factor(self, A: Any, changed: bool) -> None:
+        if self._solver is None:
+            self._solver = DirectSolver(A)
+        elif changed:
+            self._solver.refresh()
 
     def advance(self, state: State, h: float, halvings: int = 5) -> State:
         """Return the state at state.t + h, in halved steps where Newton does not manage the whole one.

@@ -69,6 +69,10 @@ class AppliedLoad:
     measure: Any
     dead: bool = True
 
+    def turn(self, e: Any) -> Any:
+        """Return the change of x in a unit rigid turn about the axis e: e×x of a position, 1 of an angle about e."""
+        return ufl.cross(e, self.x) if ufl.as_ufl(self.x).ufl_shape else e[2]
+
 
 @dataclass(frozen=True)
 class Damping:

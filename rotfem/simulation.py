@@ -15,10 +15,11 @@ from mpi4py import MPI
 
 from rotfem.affine import AffineSystem
 from rotfem.equilibrium import check_steady, critical_speed, newton_for, static_tip_shape, steady_state
-from rotfem.errors import ComputationError, SceneError
+from rotfem.errors import ComputationError
+from rotfem.hub import Hub, HubStepper
 from rotfem.integrators import Scheme, State, Stepper
 from rotfem.results import RunResult, Table
-from rotfem.scene import Scene, load_scene
+from rotfem.scene import Scene, TorqueMotion, load_scene
 from rotfem.solvers import Newton
 from rotfem.system import Model, System, compile_system
 
@@ -57,10 +58,6 @@ def run(
     """
     scene = as_scene(scene)
     scene.check_run()
-    if scene.motion.type == "torque":
-        raise SceneError(
-            scene.file, "motion.type", "torque", "a free hub cannot be computed yet; use a prescribed motion"
-        )
     if scene.time is None or scene.initial.state == "steady":
         check_steady(scene)
     return Simulation(scene, comm).run(progress)
@@ -80,8 +77,11 @@ class Simulation:
         self.model = Model(scene, comm)
         self.system: System = compile_system(self.model)
         self.compiled = perf_counter() - self.started
+        motion, effects = scene.motion, self.model.effects
+        self.hub = Hub(self.system, motion, "hub_coupling" in effects) if isinstance(motion, TorqueMotion) else None
         names = tuple(f"tip_{c}" for c in self.model.structure.components)
-        self.history = Table(("t", "psi", "psi_dot", *names, "kinetic", "strain", "jacobi"))
+        free = ("torque", "hub_kinetic", "angular_momentum", "impulse", "work") if self.hub is not None else ()
+        self.history = Table(("t", "psi", "psi_dot", *names, "kinetic", "strain", "jacobi", *free))
         self.newton = newton_for(scene)
         self.stepper: Stepper | None = None
         self.warnings: list[str] = []
@@ -115,7 +115,11 @@ class Simulation:
     def _march(self, progress: Progress) -> None:
         time = self.scene.time
         assert time is not None
-        self.stepper = Stepper(self.system, Scheme.of(self.scene), newton_for(self.scene, monotone=True))
+        scheme, newton = Scheme.of(self.scene), newton_for(self.scene, monotone=True)
+        if self.hub is not None:
+            self.stepper = HubStepper(self.system, self.hub, scheme, newton)
+        else:
+            self.stepper = Stepper(self.system, scheme, newton)
         state = self.stepper.start(0.0, *self._initial())
         self._record(state)
         grid = self._fixed_steps if time.tolerance is None else self._adaptive_steps
@@ -144,10 +148,15 @@ class Simulation:
         time, stepper = self.scene.time, self.stepper
         assert time is not None and time.step is not None and stepper is not None
         n = int(np.ceil(time.end / time.step - 1e-9))
+        jumps = [] if self.hub is None else [t for t in self.hub.torque.jumps if 0.0 < t < time.end]
         for i in range(1, n + 1):
             t = time.end if i == n else i * time.step
-            state = stepper.advance(state, t - state.t)
-            state.t = t
+            close = 1e-9 * time.step
+            for stop in [*(j for j in jumps if state.t + close < j < t - close), t]:
+                state = stepper.advance(state, stop - state.t)
+                state.t = stop
+                if isinstance(stepper, HubStepper) and any(abs(stop - j) <= close for j in jumps):
+                    state = stepper.restart(state)
             yield state
 
     def _adaptive_steps(self, state: State) -> Any:
@@ -157,11 +166,15 @@ class Simulation:
         longest = time.max_step or time.end / 20
         shortest = time.min_step or 1e-9 * time.end
         h, largest = min(longest, 1e-4 * time.end), FLOOR
+        jumps = [] if self.hub is None else [t for t in self.hub.torque.jumps if 0.0 < t < time.end]
         while state.t < time.end:
-            h = min(h, longest)
-            left = time.end - state.t
-            h = left if h >= left * (1 - 1e-9) else (left / 2 if h > 0.6 * left else h)
+            stop = min((j for j in jumps if j > state.t), default=time.end)
+            left = stop - state.t
+            wanted = min(h, longest)
+            h = left if wanted >= left * (1 - 1e-9) else (left / 2 if wanted > 0.6 * left else wanted)
             new = stepper.advance(state, h)
+            if h == left:
+                new.t = stop
             largest = max(largest, self.system.size(new.q))
             allowed = time.tolerance * largest * h / time.end  # so that the errors of all steps add up to the tolerance
             error = stepper.local_error(new, state) / allowed
@@ -176,11 +189,12 @@ class Simulation:
                         advice="a looser time.tolerance, a smaller time.min_step, or some damping",
                     )
                 continue
-            if not KEEP[0] <= factor <= KEEP[1]:
+            if isinstance(stepper, HubStepper) and new.t in jumps:
+                new = stepper.restart(new)
+                h = min(h, 1e-4 * time.end)
+            elif not KEEP[0] <= factor <= KEEP[1]:
                 stepper.resize(new, state, h * factor)
                 h *= factor
-            if h >= time.end - new.t or abs(new.t - time.end) < 1e-12 * time.end:
-                new.t = min(new.t, time.end) if time.end - new.t > 1e-12 * time.end else time.end
             state = new
             yield state
 
@@ -214,6 +228,8 @@ class Simulation:
 
     def _record(self, state: State) -> None:
         system, t = self.system, state.t
+        if self.hub is not None and state.hub is not None:
+            self.hub.values[:] = state.hub[:3]
         system.set_time(t)
         system.set_state(state.q, state.v, state.a)
         tip = self.model.structure.probe(state.q)
@@ -221,9 +237,11 @@ class Simulation:
             tip = system.clamp.relative(tip[None, :], self.model.structure.length, t)[0]
         energy = system.energies()
         motion = self.model.motion
-        self.history.append(
-            (t, motion.angle(t), motion.speed(t), *tip, *(energy[k] for k in ("kinetic", "strain", "jacobi")))
-        )
+        row = [t, motion.angle(t), motion.speed(t), *tip, *(energy[k] for k in ("kinetic", "strain", "jacobi"))]
+        if self.hub is not None and state.hub is not None:
+            hub = self.hub
+            row += [hub.torque.at(t, after=True), hub.kinetic(), hub.angular_momentum(), state.hub[5], state.hub[4]]
+        self.history.append(row)
 
     # --- summary ------------------------------------------------------------------------------------------------------
 

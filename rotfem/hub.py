@@ -1,0 +1,293 @@
+"""The free hub: its angle psi as one more unknown, driven by a torque (Yigit, Scott & Ulsoy 1988).
+
+The hub equation is the virtual work of all inertia forces in a rigid turn δx = e×x δpsi about the axis e,
+
+    I_R psi'' + c psi' + Σ ∫ ρ a·(e×x) − (moment of the loads) = M(t),
+
+so it holds the angular momentum of hub and structure, exactly and for every theory. Together with F(q, …) = 0 it is
+solved by block elimination, one factorisation for both right-hand sides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
+from ufl.algorithms import expand_derivatives
+
+from rotfem import compat
+from rotfem.affine import AffineSystem
+from rotfem.effects import ACCELERATIONS
+from rotfem.errors import ComputationError
+from rotfem.integrators import Scheme, State, Stepper
+from rotfem.motion import Motion
+from rotfem.scene import TorqueMotion
+from rotfem.solvers import DirectSolver, Increment, Newton
+from rotfem.system import System
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Torque:
+    """M(t) about the axis, N·m, with the times at which it jumps.
+
+    Attributes:
+        scene: the motion table of the scene.
+    """
+
+    scene: TorqueMotion
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """Times (s) of discontinuity."""
+        return tuple(sorted({t for start, end, _ in self.scene.pulses or () for t in (start, end)}))
+
+    def at(self, t: float, after: bool = False) -> float:
+        """Return M(t): the limit from the left, or from the right with `after` (they differ at a jump)."""
+        if self.scene.table is not None:
+            rows = np.array(self.scene.table)
+            return float(np.interp(t, rows[:, 0], rows[:, 1]))
+        inside = (lambda a, b: a <= t < b) if after else (lambda a, b: a < t <= b)
+        return float(sum(torque for start, end, torque in self.scene.pulses or () if inside(start, end)))
+
+
+class Hub:
+    """Compiled hub equation of a system.
+
+    Args:
+        system: equations of motion; its motion is replaced by the hub's own.
+        data: motion table of the scene.
+        coupled: whether the hub feels the elastic motion; otherwise it turns as if the structure were rigid.
+    """
+
+    def __init__(self, system: System, data: TorqueMotion, coupled: bool):
+        self.system, self.data, self.coupled = system, data, coupled
+        self.torque = Torque(data)
+        self.values = np.array([0.0, data.speed, 0.0])
+        psi = self.values
+        old = system.motion
+        system.motion = Motion(
+            speed=lambda t: float(psi[1]),
+            rate=lambda t: float(psi[2]),
+            angle=lambda t: float(psi[0]),
+            axis=old.axis,
+            base_acceleration=old.base_acceleration,
+            constant=False,
+        )
+        system.model.motion = system.motion
+        self._compile()
+
+    def _compile(self) -> None:
+        model, system = self.system.model, self.system
+        k, frame = system.structure.k, model.frame
+        e = ufl.as_vector([float(c) for c in system.motion.axis])
+        h: Any = 0
+        for name in ("inertia", *model.effects):
+            if name not in ACCELERATIONS:
+                continue
+            for body in model.bodies:
+                a = ACCELERATIONS[name][0](body, k, frame)
+                if a is not None:
+                    h += body.density * ufl.inner(a, ufl.cross(e, body.x)) * body.measure
+        for load in model.applied:
+            turn = load.turn(e)
+            h -= ufl.inner(load.force, turn) * load.measure
+        self._h = fem.form(h)
+        momentum = sum(
+            b.density * ufl.inner(ufl.cross(e, b.x), k.rate(b.x) + ufl.cross(frame.w, b.x)) * b.measure
+            for b in model.bodies
+        )
+        self._momentum = fem.form(momentum)
+        s = system.structure.constant(0.0)
+        spin, rate = ufl.variable(s), ufl.variable(s)
+        self._dh = [self._by_spin(h, name, variable) for name, variable in (("w", spin), ("dw", rate))]
+        shifts = [system.structure.constant(0.0) for _ in range(3)]
+        self._shifts = shifts
+        row = sum(c * ufl.derivative(h, x, k.dq) for c, x in zip(shifts, (k.q, k.v, k.a), strict=True))
+        self._row = fem.form(row)
+        if not isinstance(system, AffineSystem):
+            F = model.residual
+            self._dF = [self._by_spin(F, name, variable) for name, variable in (("w", spin), ("dw", rate))]
+        self._vectors = [compat.create_vector(system.V) for _ in range(2)]
+
+    def _by_spin(self, form: Any, name: str, s: Any) -> Any:
+        """Compile ∂form/∂s where the constant w (or its rate) is w + s e; None if it is not in the form."""
+        constant = self.system.model.frame.constants.get(name)
+        if constant is None:
+            return None
+        axis = self.system.motion.axis[-constant.value.size :]
+        shifted = ufl.as_vector([constant[i] + s * float(e) for i, e in enumerate(axis)])
+        derivative = expand_derivatives(ufl.diff(ufl.replace(form, {constant: shifted}), s))
+        return None if derivative.empty() else fem.form(derivative)
+
+    # --- the hub equation at the state written into the system ---------------------------------------------------------
+
+    def _scalar(self, form: Any) -> float:
+        return 0.0 if form is None else float(self.system.model.comm.allreduce(float(fem.assemble_scalar(form))))
+
+    def _at_rest(self, form: Any) -> float:
+        """Evaluate a form with the structure undeformed and at rest in the frame."""
+        state = [x.x.array.copy() for x in (self.system.q, self.system.v, self.system.a)]
+        zero = np.zeros_like(state[0])
+        self.system.set_state(zero, zero, zero)
+        value = self._scalar(form)
+        self.system.set_state(*state)
+        return value
+
+    def residual(self, t: float, after: bool = False) -> float:
+        """Return I_R psi'' + c psi' + (moment of inertia forces and loads) − M(t), N·m."""
+        reaction = self._scalar(self._h) if self.coupled else self._at_rest(self._h)
+        own = self.data.hub_inertia * self.values[2] + self.data.hub_damping * self.values[1]
+        return float(own + reaction - self.torque.at(t, after))
+
+    def diagonal(self, c_v: float, c_m: float) -> float:
+        """Return ∂(hub residual)/∂psi_{n+1}: c_v ∂/∂psi' + c_m ∂/∂psi''."""
+        value = self._scalar if self.coupled else self._at_rest
+        by_speed = value(self._dh[0]) + self.data.hub_damping
+        by_rate = value(self._dh[1]) + self.data.hub_inertia
+        return c_v * by_speed + c_m * by_rate
+
+    def row(self, shifts: tuple[float, float, float]) -> Any:
+        """Return ∂(hub residual)/∂q_{n+1} as a PETSc vector (reused); zero if uncoupled."""
+        r = self._vectors[0]
+        if not self.coupled:
+            r.zeroEntries()
+            return r
+        for constant, value in zip(self._shifts, shifts, strict=True):
+            constant.value = value
+        return self._assembled(self._row, r)
+
+    def column(self, c_v: float, c_m: float) -> Any:
+        """Return ∂F/∂psi_{n+1} = c_v ∂F/∂psi' + c_m ∂F/∂psi'' as a PETSc vector (reused)."""
+        out = self._vectors[1]
+        if isinstance(self.system, AffineSystem):
+            self.system.spin_derivative(c_v, c_m, out)
+        else:
+            out.zeroEntries()
+            for form, factor in zip(self._dF, (c_v, c_m), strict=True):
+                if form is not None and factor != 0.0:
+                    part = self._assembled(form, compat.create_vector(self.system.V))
+                    out.axpy(factor, part)
+        out.array[self.system.clamped] = 0.0
+        return out
+
+    def _assembled(self, form: Any, b: Any) -> Any:
+        with b.localForm() as local:
+            local.set(0.0)
+        fem_petsc.assemble_vector(b, form)
+        b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
+        b.array[self.system.clamped] = 0.0
+        return b
+
+    def angular_momentum(self) -> float:
+        """Return the angular momentum of hub and structure about the axis, kg·m²/s (rigid structure if uncoupled)."""
+        value = self._scalar if self.coupled else self._at_rest
+        return self.data.hub_inertia * float(self.values[1]) + value(self._momentum)
+
+    def kinetic(self) -> float:
+        """Return ½ I_R psi'², J."""
+        return 0.5 * self.data.hub_inertia * float(self.values[1]) ** 2
+
+
+class HubStepper(Stepper):
+    """Advances structure and hub together; psi follows the same scheme as q.
+
+    Args:
+        system: equations of motion.
+        hub: hub equation of the system.
+        scheme: parameters.
+        newton: iteration control.
+    """
+
+    def __init__(self, system: System, hub: Hub, scheme: Scheme, newton: Newton):
+        super().__init__(system, scheme, newton)
+        self.hub = hub
+        self._dz = Increment(system.V)
+
+    def start(self, t: float, q: Array, v: Array) -> State:
+        """Return the state at t with the accelerations of structure and hub that balance (torque after a jump)."""
+        s, hub = self.system, self.hub
+        hub.values[2] = 0.0
+        s.set_time(t)
+        zero = np.zeros_like(q)
+        s.set_state(q, v, zero)
+        solver = DirectSolver(s.matrix(0.0, 0.0, 1.0, 1.0))
+        y = self._dx.solve(solver, s.residual()).copy()
+        z = self._dz.solve(solver, hub.column(0.0, 1.0))
+        c = hub.row((0.0, 0.0, 1.0))
+        psi = self._eliminate(-hub.residual(t, after=True), hub.diagonal(0.0, 1.0), c, y, z)
+        hub.values[2] = psi
+        a = y - z * psi
+        values = np.array([hub.values[0], hub.values[1], psi, psi, 0.0, 0.0])
+        return State(t, q.copy(), v.copy(), a, a.copy(), values)
+
+    def restart(self, state: State) -> State:
+        """Return a state with the accelerations that hold after a jump of the torque."""
+        assert state.hub is not None
+        self.hub.values[:2] = state.hub[:2]
+        new = self.start(state.t, state.q, state.v)
+        assert new.hub is not None
+        new.hub[4:] = state.hub[4:]
+        return new
+
+    def step(self, state: State, h: float) -> State:
+        """Return the state at state.t + h (see `Stepper.step`)."""
+        new = super().step(state, h)
+        assert new.hub is not None and state.hub is not None
+        turn, speed = new.hub[0] - state.hub[0], 0.5 * (new.hub[1] + state.hub[1])
+        mean = 0.5 * (self.hub.torque.at(state.t, after=True) + self.hub.torque.at(new.t))
+        brake = self.hub.data.hub_damping
+        new.hub[4] = state.hub[4] + mean * turn - brake * speed**2 * h
+        new.hub[5] = state.hub[5] + mean * h - brake * turn
+        return new
+
+    def _predict(self, state: State, h: float) -> State:
+        p = self.scheme
+        new = super()._predict(state, h)
+        assert state.hub is not None
+        psi, speed, rate, old = state.hub[:4]
+        auxiliary = (rate - p.alpha_m * old) / (1 - p.alpha_m)
+        angle = psi + h * speed + h * h * ((0.5 - p.beta) * old + p.beta * auxiliary)
+        ahead = speed + h * ((1 - p.gamma) * old + p.gamma * auxiliary)
+        new.hub = np.array([angle, ahead, rate, auxiliary, *state.hub[4:]])
+        self.hub.values[:] = new.hub[:3]
+        return new
+
+    def _correction(self, new: State, shifts: tuple[float, float, float], h: float) -> Array:
+        """Return the correction of q and apply that of psi: A y = R, A z = b, dpsi = (r − c·y)/(d − c·z)."""
+        s, hub, (_, c_v, c_m) = self.system, self.hub, shifts
+        assert new.hub is not None
+        started = perf_counter()
+        hub.values[:] = new.hub[:3]
+        s.set_time(new.t)
+        R = s.residual()
+        A, changed = s.tangent(*shifts)
+        b, c = hub.column(c_v, c_m), hub.row(shifts)
+        r, d = -hub.residual(new.t), hub.diagonal(c_v, c_m)
+        assembled = perf_counter()
+        self._factor(A, changed)
+        assert self._solver is not None
+        y = self._dx.solve(self._solver, R)
+        z = self._dz.solve(self._solver, b)
+        dpsi = self._eliminate(r, d, c, y, z)
+        self.seconds["assemble"] += assembled - started
+        self.seconds["solve"] += perf_counter() - assembled
+        new.hub[:4] += dpsi * np.array([1.0, c_v, c_m, 1 / (self.scheme.beta * h * h)])
+        hub.values[:] = new.hub[:3]
+        self._hub_increment = abs(dpsi)
+        return y - z * dpsi
+
+    def _eliminate(self, r: float, d: float, c: Any, y: Array, z: Array) -> float:
+        row = c.array
+        sums = np.array([row @ y[: len(row)], row @ z[: len(row)]])
+        cy, cz = self.system.model.comm.allreduce(sums) if self.system.model.comm.size > 1 else sums
+        if d == cz:
+            raise ComputationError("the hub equation is singular")
+        return float((r - cy) / (d - cz))
