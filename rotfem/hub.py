@@ -19,6 +19,7 @@ import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
+from petsc4py import PETSc
 from ufl.algorithms import expand_derivatives
 
 from rotfem import compat
@@ -56,6 +57,30 @@ class Torque:
             return float(np.interp(t, rows[:, 0], rows[:, 1]))
         inside = (lambda a, b: a <= t < b) if after else (lambda a, b: a < t <= b)
         return float(sum(torque for start, end, torque in self.scene.pulses or () if inside(start, end)))
+
+
+def border(A: Any, row: Array, column: Array, corner: float) -> Any:
+    """Return [[A, column], [row, corner]] as a new PETSc matrix; the last rank holds the new row.
+
+    Args:
+        A: square PETSc matrix.
+        row, column: owned parts of the vectors.
+        corner: the last diagonal entry.
+    """
+    comm = A.comm.tompi4py()
+    size, last = A.getSize()[0], comm.rank == comm.size - 1
+    indptr, indices, data = A.getValuesCSR()
+    ends = indptr[1:]
+    data, indices = np.insert(data, ends, column), np.insert(indices, ends, size)
+    indptr = indptr + np.arange(len(indptr), dtype=indptr.dtype)
+    whole = np.concatenate(comm.allgather(row))
+    if last:
+        data = np.concatenate([data, whole, [corner]])
+        indices = np.concatenate([indices, np.arange(size + 1)]).astype(indptr.dtype)
+        indptr = np.append(indptr, indptr[-1] + size + 1).astype(indptr.dtype)
+    local = len(row) + int(last)
+    shape = ((local, size + 1), (local, size + 1))
+    return PETSc.Mat().createAIJ(shape, csr=(indptr, indices.astype(indptr.dtype), data), comm=A.comm)
 
 
 class Hub:
@@ -127,7 +152,7 @@ class Hub:
         derivative = expand_derivatives(ufl.diff(ufl.replace(form, {constant: shifted}), s))
         return None if derivative.empty() else fem.form(derivative)
 
-    # --- the hub equation at the state written into the system ---------------------------------------------------------
+    # --- the hub equation at the state written into the system --------------------------------------------------------
 
     def _scalar(self, form: Any) -> float:
         return 0.0 if form is None else float(self.system.model.comm.allreduce(float(fem.assemble_scalar(form))))
@@ -177,6 +202,18 @@ class Hub:
                     out.axpy(factor, part)
         out.array[self.system.clamped] = 0.0
         return out
+
+    def bordered(self, M: Any, C: Any, K: Any) -> tuple[Any, Any, Any]:
+        """Return M, C, K with one more unknown, the last: the angle of the hub, about the state and speed set."""
+        out = []
+        for A, shifts, factors in (
+            (M, (0.0, 0.0, 1.0), (0.0, 1.0)),
+            (C, (0.0, 1.0, 0.0), (1.0, 0.0)),
+            (K, (1.0, 0.0, 0.0), (0.0, 0.0)),
+        ):
+            row, column = self.row(shifts).array.copy(), self.column(*factors).array.copy()
+            out.append(border(A, row, column, self.diagonal(*factors)))
+        return out[0], out[1], out[2]
 
     def _assembled(self, form: Any, b: Any) -> Any:
         with b.localForm() as local:

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.scene import Scene
@@ -103,13 +104,25 @@ class Stepper:
         return self._solver.factorisations if self._solver else 0
 
     def start(self, t: float, q: Array, v: Array) -> State:
-        """Return the state at t with the acceleration that the equations of motion give: M q̈ = −F(q, v, 0)."""
+        """Return the state at t with the acceleration that the equations of motion give: M q̈ = −F(q, v, 0).
+
+        Unknowns without inertia (the rotation, where rotary inertia is absent or off) follow the others at once: their
+        acceleration keeps their equation in balance, K q̈ = 0 in their rows.
+        """
         s = self.system
         s.set_time(t)
         state = State(t, q.copy(), v.copy(), np.zeros_like(q), np.zeros_like(q))
         self._prescribe(state)
         self._write(state)
-        state.a += self._dx.solve(DirectSolver(s.matrix(0.0, 0.0, 1.0, 1.0)), s.residual())
+        M, b = s.matrix(0.0, 0.0, 1.0, 1.0), s.residual()
+        massless = M.getDiagonal()
+        massless.array[:] = massless.array == 0.0
+        if massless.norm() > 0.0:
+            K = s.matrix(1.0, 0.0, 0.0, 1.0)
+            K.diagonalScale(massless)
+            M.axpy(1.0, K, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            b.array[massless.array > 0.0] = 0.0
+        state.a += self._dx.solve(DirectSolver(M), b)
         state.auxiliary[:] = state.a
         return state
 

@@ -18,10 +18,10 @@ from mpi4py import MPI
 
 from rotfem.affine import AffineSystem
 from rotfem.equilibrium import check_steady, newton_for, steady_state
-from rotfem.errors import SceneError
+from rotfem.hub import Hub
 from rotfem.pencil import SAME, Eigenpairs, Pencil
 from rotfem.results import ModesResult
-from rotfem.scene import Scene
+from rotfem.scene import Scene, TorqueMotion
 from rotfem.simulation import as_scene, versions
 from rotfem.solvers import Newton
 from rotfem.system import Model, System, compile_system
@@ -33,6 +33,9 @@ PURE = 0.8
 
 #: Part of the largest amplitude below which a shape counts as zero when its nodes are counted.
 NODE_NOISE = 1e-3
+
+#: Part of the median |λ| below which an eigenvalue of a free hub counts as zero, the rigid-body mode.
+RIGID = 1e-3
 
 #: Part of the least eigenvalue a real part must exceed to count as growth.
 GROWTH = 1e-6
@@ -47,12 +50,16 @@ class Spinning:
         q: equilibrium, local dof array.
         pencil: M, C, K there.
         pairs: eigenpairs, sorted by |λ|, one of each conjugate pair.
+        clamped: M, C, K without the hub's unknown (the same pencil where the hub is not free).
+        rigid: whether hub and structure can turn as a rigid body (λ = 0, not among the pairs).
     """
 
     speed: float
     q: Array
     pencil: Pencil
     pairs: Eigenpairs
+    clamped: Pencil
+    rigid: bool = False
 
 
 class ModalAnalysis:
@@ -64,13 +71,14 @@ class ModalAnalysis:
     """
 
     def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD, sweep: bool = False):
-        if scene.motion.type == "torque":
-            raise SceneError(scene.file, "motion.type", "torque", "modes of a free hub cannot be computed yet")
         started = perf_counter()
         rotating = scene.replace({"model.frame": "rotating"}) if scene.model.frame == "inertial" else scene
         self.scene, self.comm = rotating, comm
         self.model = Model(rotating, comm, rotating.effective_effects(spinning=True) if sweep else None)
         self.system: System = compile_system(self.model)
+        motion = rotating.motion
+        coupled = "hub_coupling" in self.model.effects
+        self.hub = Hub(self.system, motion, coupled) if isinstance(motion, TorqueMotion) else None
         self.newton: Newton = newton_for(rotating)
         self.seconds = {"compile": perf_counter() - started, "equilibrium": 0.0, "assemble": 0.0, "eigen": 0.0}
 
@@ -83,13 +91,18 @@ class ModalAnalysis:
         t0 = perf_counter()
         q = self.equilibrium(speed, start)
         t1 = perf_counter()
-        pencil = Pencil(*self.system.mass_damping_stiffness())
+        matrices = self.system.mass_damping_stiffness()
+        clamped = Pencil(*matrices)
+        pencil = clamped if self.hub is None else Pencil(*self.hub.bordered(*matrices))
         t2 = perf_counter()
-        pairs = pencil.solve(count)
+        pairs = pencil.solve(count, clamped.scale() if self.hub is not None else 0.0)
         t3 = perf_counter()
         for name, span in (("equilibrium", t1 - t0), ("assemble", t2 - t1), ("eigen", t3 - t2)):
             self.seconds[name] += span
-        return Spinning(speed, q, pencil, pairs)
+        if self.hub is None:
+            return Spinning(speed, q, pencil, pairs, clamped)
+        flexible = np.flatnonzero(np.abs(pairs.values) > RIGID * np.median(np.abs(pairs.values)))
+        return Spinning(speed, q, pencil, pairs.select(flexible), clamped, rigid=len(flexible) < len(pairs.values))
 
     def equilibrium(self, speed: float, start: Array | None = None) -> Array:
         """Return the state the modes are about, left in the system's functions: steady, or undeformed."""
@@ -108,16 +121,21 @@ class ModalAnalysis:
         X = spinning.pairs.right
         MX = spinning.pencil.apply(spinning.pencil.M, X)
         bs = self.system.V.dofmap.index_map_bs
-        local = np.real(X.conj() * MX).reshape(-1, bs, X.shape[1]).sum(axis=0)
-        energy = self.comm.allreduce(local) if self.comm.size > 1 else local
+        products = np.real(X.conj() * MX)
+        owned = self.system.V.dofmap.index_map.size_local * bs
+        local = products[:owned].reshape(-1, bs, X.shape[1]).sum(axis=0)
+        hub = products[owned:].sum(axis=0, keepdims=True)  # one more unknown on the last rank, if the hub is free
+        energy = np.concatenate([local, hub])
+        energy = self.comm.allreduce(energy) if self.comm.size > 1 else energy
         total = energy.sum(axis=0)
         families = self.model.structure.families
-        return {name: energy[list(components)].sum(axis=0) / total for name, (components, _) in families.items()}
+        shares = {name: energy[list(components)].sum(axis=0) / total for name, (components, _) in families.items()}
+        return shares if self.hub is None else {**shares, "hub": energy[-1] / total}
 
     def names(self, spinning: Spinning) -> list[str]:
         """Return "family n" for every mode, n one more than the nodes of its shape; mixed ones name both families."""
         shares = self.shares(spinning)
-        families = list(shares)
+        families = [name for name in shares if name != "hub"]
         table = np.array([shares[name] for name in families])
         out = []
         for j in range(table.shape[1]):
@@ -166,11 +184,14 @@ def modes(
     analysis = ModalAnalysis(scene, comm)
     speed = final_speed(analysis)
     spinning = analysis.at(speed, scene.modes.count)
-    spinning.pairs = spinning.pairs.select(np.arange(min(scene.modes.count, len(spinning.pairs.values))))
+    flexible = scene.modes.count - int(spinning.rigid)
+    spinning.pairs = spinning.pairs.select(np.arange(min(flexible, len(spinning.pairs.values))))
     rows = mode_rows(analysis, spinning)
     checks = self_checks(analysis, spinning)
     warnings = [*advice(analysis, speed), *instabilities(rows)]
     shapes = {f"mode {i + 1}: {row['label']}": scaled_shape(analysis, spinning, i) for i, row in enumerate(rows)}
+    if spinning.rigid:
+        rows = [rigid_row(rows), *({**row, "mode": row["mode"] + 1} for row in rows)]
     total = perf_counter() - started
     summary: dict[str, Any] = {
         "command": "modes",
@@ -227,6 +248,12 @@ def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any
     return rows
 
 
+def rigid_row(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the row of the rigid-body mode: hub and structure turn together, λ = 0."""
+    row = {name: 0.0 for name in (rows[0] if rows else ())}
+    return {**row, "mode": 1, "label": "rigid body", "stability": "neutral", "share_hub": 1.0}
+
+
 def stability(lam: complex) -> str:
     """Return "stable", "static instability" (real growth) or "dynamic instability" (growing oscillation)."""
     if lam.real <= GROWTH * abs(lam):
@@ -239,7 +266,7 @@ def instabilities(rows: list[dict[str, Any]]) -> list[str]:
     return [
         f"{row['stability']}: {row['label']} grows as exp({row['growth']:.6g} t)"
         for row in rows
-        if row["stability"] != "stable"
+        if row["stability"] not in ("stable", "neutral")
     ]
 
 
@@ -268,7 +295,7 @@ def self_checks(analysis: ModalAnalysis, spinning: Spinning) -> dict[str, float]
 
 def linearisation_error(analysis: ModalAnalysis, spinning: Spinning) -> float:
     """Return the relative difference between M, C, K times a vector and central differences of the residual."""
-    system, pencil = analysis.system, spinning.pencil
+    system, pencil = analysis.system, spinning.clamped
     if isinstance(system, AffineSystem):
         return 0.0  # the residual is made of these very matrices
     zero = np.zeros_like(spinning.q)
@@ -283,7 +310,7 @@ def linearisation_error(analysis: ModalAnalysis, spinning: Spinning) -> float:
         system.set_state(q, v, a)
         return -system.residual().array.copy()
 
-    owned = len(spinning.pairs.right)
+    owned = system.V.dofmap.index_map.size_local * system.V.dofmap.index_map_bs
     direction[system.clamped] = 0.0
     for A, slot in ((pencil.K, 0), (pencil.C, 1), (pencil.M, 2)):
         plus, minus = [spinning.q, zero, zero], [spinning.q, zero, zero]

@@ -106,14 +106,22 @@ class Pencil:
         """Whether M and K are symmetric and C skew to round-off, so that left vectors are right vectors of −λ̄."""
         return all(value < 1e-10 for value in self.asymmetries().values())
 
-    def solve(self, count: int) -> Eigenpairs:
+    def scale(self) -> float:
+        """Return the least |λ|."""
+        return float(np.min(np.abs(self._right(self.M, self.C, self.K, 1, 0.0)[0])))
+
+    def solve(self, count: int, target: float = 0.0) -> Eigenpairs:
         """Return at least `count` pairs (fewer if there are no more) of smallest |λ|, sorted by |λ|.
+
+        Args:
+            count: number of pairs; of conjugate ones, one counts.
+            target: where to aim, beside zero where zero is an eigenvalue (1/s).
 
         Raises:
             ComputationError: the solver did not converge, or a pair's backward error is above BACKWARD_TOLERANCE.
         """
         try:
-            return self._solve(count, 0.0)
+            return self._solve(count, target)
         except ComputationError:
             # K is singular or nearly so (a critical speed, a rigid-body mode): aim beside zero.
             return self._solve(count, 0.1 * self._smallest)

@@ -151,7 +151,7 @@ class Sensitivity:
         im += f["a"] * parts["M_im"] + f["b"] * parts["M_re"]
         return {"re": re, "im": im}
 
-    # --- parameters -----------------------------------------------------------------------------------------------------
+    # --- parameters ------------------------------------------------------------------------------------------------
 
     def parameters(self) -> list[Parameter]:
         """Return the parameters of the scene that its forms contain."""
