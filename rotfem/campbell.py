@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -185,15 +186,33 @@ class Sweep:
         return sorted(out, key=lambda c: c["speed"])
 
     def onsets(self) -> list[dict[str, Any]]:
-        """Return the speeds where a mode becomes unstable, and of which kind, by bisection between two nodes."""
-        out = []
-        for left, right in zip(self.nodes[:-1], self.nodes[1:], strict=True):
-            kind = unstable(right.spinning)
-            if kind is None or unstable(left.spinning) is not None:
+        """Return the ranges in which a mode is unstable, and how: `speed` where each begins, `kind`, and `until`.
+
+        A range that the sweep begins with has the first speed; `until` is None where none of the speeds ends it.
+        """
+        kinds = [unstable(node.spinning) for node in self.nodes]
+        out: list[dict[str, Any]] = []
+        if kinds[0] is not None:
+            out.append({"speed": self.nodes[0].speed, "kind": kinds[0], "until": None})
+        for i, (before, after) in enumerate(pairwise(kinds)):
+            if before == after:
                 continue
-            speed = self._static_onset(left, right) if kind.startswith("static") else None
-            out.append({"speed": speed if speed is not None else self._bisect(left, right), "kind": kind})
+            speed = self._change(self.nodes[i], self.nodes[i + 1], before, after)
+            if speed is None:
+                continue
+            if before is not None and out:
+                out[-1]["until"] = speed
+            if after is not None:
+                out.append({"speed": speed, "kind": after, "until": None})
         return out
+
+    def _change(self, left: Node, right: Node, before: str | None, after: str | None) -> float | None:
+        """Return the speed where the kind of instability changes; None if it only left the computed modes."""
+        if None in (before, after) and "static instability" in (before, after):
+            speed = self._static_onset(left, right)
+            if speed is not None or after is None:
+                return speed
+        return self._bisect(left, right, before, after)
 
     def _static_onset(self, left: Node, right: Node) -> float | None:
         """Return the speed where λ² of the least eigenvalue passes zero; None if it does not between the nodes."""
@@ -209,16 +228,17 @@ class Sweep:
             return None
         return float(brentq(square, left.speed, right.speed, xtol=1e-12, rtol=1e-10))
 
-    def _bisect(self, left: Node, right: Node) -> float:
-        """Return the lowest unstable speed between a stable and an unstable node."""
-        low, high, start = left.speed, right.speed, left.spinning.q
-        while high - low > 1e-9 * abs(high):
-            middle = self.solve(0.5 * (low + high), start, False).spinning
-            if unstable(middle) is None:
-                low, start = middle.speed, middle.q
+    def _bisect(self, left: Node, right: Node, before: str | None, after: str | None) -> float | None:
+        """Return the lowest speed that is no longer of the kind before; None where growth ends with a jump."""
+        low, high = left.spinning, right.speed
+        while high - low.speed > 1e-9 * max(abs(high), abs(low.speed)):
+            middle = self.solve(0.5 * (low.speed + high), low.q, False).spinning
+            if unstable(middle) == before:
+                low = middle
             else:
                 high = middle.speed
-        return high
+        worst = max(low.pairs.values, key=lambda lam: lam.real)
+        return None if after is None and worst.real > 1e-2 * abs(worst) else high
 
 
 def unstable(spinning: Spinning) -> str | None:
@@ -241,7 +261,8 @@ def parse_speeds(text: str) -> list[float]:
     try:
         if ":" in text:
             first, last, number = text.split(":")
-            speeds = [float(s) for s in np.linspace(float(first), float(last), int(number))]
+            ends = float(first), float(last)
+            speeds = [float(s) for s in np.linspace(*ends, int(number))] if np.all(np.isfinite(ends)) else []
         else:
             speeds = [float(s) for s in text.split(",")]
     except ValueError:
@@ -299,7 +320,11 @@ def campbell(
         f"ambiguous: {labels[int(a['branch']) - 1]} at {a['speed']:.6g} rad/s, correlation {a['confidence']:.2f}"
         for a in sweep.ambiguous
     ]
-    warnings += [f"{onset['kind']} from {onset['speed']:.8g} rad/s on" for onset in onsets]
+    warnings += [
+        f"{onset['kind']} from {onset['speed']:.8g} rad/s "
+        + ("on" if onset["until"] is None else f"to {onset['until']:.8g} rad/s")
+        for onset in onsets
+    ]
     last = sweep.nodes[-1].spinning
     warnings += [f"at {last.speed:g} rad/s, {text}" for text in instabilities(mode_rows(analysis, last)[:count])]
     total = perf_counter() - started

@@ -18,7 +18,7 @@ from rotfem.scene import load_scene
 
 app = typer.Typer(
     name="rotfem",
-    help="Rotating beams and plates with FEniCSx. A scene is a TOML file; see the README for its keys.",
+    help="Rotating beams and plates with FEniCSx. A scene is a TOML file; docs/scene.md lists its keys.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -304,4 +304,4 @@ def _interrupt(signum: int, frame: object) -> NoReturn:
 
 def main() -> None:
     """Run the command line."""
-    app()
+    app(prog_name="rotfem")

@@ -60,6 +60,7 @@ def steady_state(system: System, omega: float, newton: Newton, start: Array | No
             continue
         done = target
         share *= 1.5
+    system.structure.check_range(q)
     return q
 
 
@@ -168,7 +169,7 @@ def critical_speed(system: AffineSystem) -> float | None:
     eps.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_REAL)
     eps.setDimensions(1, min(K_1.getSize()[0], 100))
     eps.setTolerances(1e-12, 2000)
-    use_direct_solver(eps.getST().getKSP())
+    use_direct_solver(eps.getST().getKSP(), K_1.getSize()[0])
     eps.solve()
     if eps.getConverged() == 0:
         raise ComputationError("the eigenproblem of the critical speed did not converge")

@@ -19,7 +19,7 @@ from mpi4py import MPI
 from rotfem.affine import AffineSystem
 from rotfem.equilibrium import check_steady, newton_for, steady_state
 from rotfem.hub import Hub
-from rotfem.pencil import SAME, Eigenpairs, Pencil
+from rotfem.pencil import SAME, ZERO, Eigenpairs, Pencil
 from rotfem.results import ModesResult
 from rotfem.scene import Scene, TorqueMotion
 from rotfem.simulation import as_scene, versions
@@ -33,9 +33,6 @@ PURE = 0.8
 
 #: Part of the largest amplitude below which a shape counts as zero when its nodes are counted.
 NODE_NOISE = 1e-3
-
-#: Part of the median |λ| below which an eigenvalue of a free hub counts as zero, the rigid-body mode.
-RIGID = 1e-3
 
 #: Part of the least eigenvalue a real part must exceed to count as growth.
 GROWTH = 1e-6
@@ -101,7 +98,7 @@ class ModalAnalysis:
             self.seconds[name] += span
         if self.hub is None:
             return Spinning(speed, q, pencil, pairs, clamped)
-        flexible = np.flatnonzero(np.abs(pairs.values) > RIGID * np.median(np.abs(pairs.values)))
+        flexible = np.flatnonzero(np.abs(pairs.values) > ZERO * np.median(np.abs(pairs.values)))
         return Spinning(speed, q, pencil, pairs.select(flexible), clamped, rigid=len(flexible) < len(pairs.values))
 
     def equilibrium(self, speed: float, start: Array | None = None) -> Array:
@@ -121,10 +118,10 @@ class ModalAnalysis:
         X = spinning.pairs.right
         MX = spinning.pencil.apply(spinning.pencil.M, X)
         bs = self.system.V.dofmap.index_map_bs
-        products = np.real(X.conj() * MX)
         owned = self.system.V.dofmap.index_map.size_local * bs
-        local = products[:owned].reshape(-1, bs, X.shape[1]).sum(axis=0)
-        hub = products[owned:].sum(axis=0, keepdims=True)  # one more unknown on the last rank, if the hub is free
+        along = [self.model.structure.oriented(Y[:owned].reshape(-1, bs, X.shape[1])) for Y in (X, MX)]
+        local = np.real(along[0].conj() * along[1]).sum(axis=0)
+        hub = np.real(X[owned:].conj() * MX[owned:]).sum(axis=0, keepdims=True)  # on the last rank, if it is free
         energy = np.concatenate([local, hub])
         energy = self.comm.allreduce(energy) if self.comm.size > 1 else energy
         total = energy.sum(axis=0)
@@ -148,7 +145,7 @@ class ModalAnalysis:
 
     def nodes(self, x: Array, component: int) -> int:
         """Return the number of zeros of one component along the structure, its clamped end not counted."""
-        y = self.shape(x)[1][:, component]
+        y = self.model.structure.oriented(self.shape(x)[1])[:, component]
         y = np.real(y * np.exp(-1j * np.angle(y[np.argmax(np.abs(y))])))
         y = y[np.abs(y) > NODE_NOISE * np.max(np.abs(y))]
         return int(np.count_nonzero(np.diff(np.sign(y))))

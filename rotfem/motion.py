@@ -165,6 +165,8 @@ class Frame:
         self._domain, self.planar, self.fixed = domain, planar, fixed
         self._gravity = np.asarray(gravity, dtype=float)
         self.constants: dict[str, fem.Constant] = {}
+        turn, plane = (slice(2, 3), slice(0, 2)) if planar else (slice(0, 3), slice(0, 3))
+        self._slices = {"w": turn, "dw": turn, "a_o": plane, "gravity": plane}
 
     def _constant(self, name: str, size: int) -> fem.Constant:
         if name not in self.constants:
@@ -204,19 +206,18 @@ class Frame:
 
     def values(self, motion: Motion, t: float) -> dict[str, Array]:
         """Return the value of every constant in use at time t (s), as arrays of the constants' sizes."""
-        Q = motion.rotation(t) if "gravity" in self.constants or self.fixed else IDENTITY
-        all_values = {
-            "w": lambda: motion.speed(t) * motion.axis,
-            "dw": lambda: motion.rate(t) * motion.axis,
-            "a_o": lambda: Q @ motion.base_acceleration(t) if self.fixed else motion.base_acceleration(t),
-            "gravity": lambda: self._gravity if self.fixed else Q.T @ self._gravity,
-        }
-        out = {}
-        for name, constant in self.constants.items():
-            value = np.asarray(all_values[name](), dtype=float)
-            if self.planar:
-                value = value[2:] if name in ("w", "dw") else value[:2]
-            out[name] = value.reshape(constant.value.shape)
+        out: dict[str, Array] = {}
+        for name in self.constants:
+            if name == "w":
+                value = motion.speed(t) * motion.axis
+            elif name == "dw":
+                value = motion.rate(t) * motion.axis
+            elif name == "a_o":
+                value = motion.base_acceleration(t)
+                value = motion.rotation(t) @ value if self.fixed else value
+            else:
+                value = self._gravity if self.fixed else motion.rotation(t).T @ self._gravity
+            out[name] = value[self._slices[name]]
         return out
 
     def set(self, values: dict[str, Array]) -> None:

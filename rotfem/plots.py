@@ -21,6 +21,7 @@ LABELS = {
     "u2": "u₂ (m)",
     "u3": "u₃ (m)",
     "alpha": "rotation α (rad)",
+    **{f"theta{i}": f"rotation θ{sub} (rad)" for i, sub in zip((1, 2, 3), "₁₂₃", strict=True)},
     "kinetic": "kinetic energy (J)",
     "strain": "strain energy (J)",
     "jacobi": "Jacobi integral (J)",

@@ -124,7 +124,7 @@ class Time(SceneModel):
     Attributes:
         end: Final time (s).
         step: Time step (s), or ``None`` for adaptive steps.
-        tolerance: Relative error per step for adaptive steps, or ``None``.
+        tolerance: Error of all adaptive steps together, relative to the largest displacement, or ``None``.
         max_step: Longest adaptive step (s), or ``None``.
         min_step: Shortest adaptive step (s), or ``None``.
         scheme: ``generalised_alpha`` or ``newmark``.

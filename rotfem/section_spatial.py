@@ -42,6 +42,7 @@ Point = Annotated[tuple[float, float], PlainValidator(_as_point)]
 
 _CENTERS = ("mass_center", "shear_center", "tension_center")
 _STIFFNESSES = ("EA", "GA2", "GA3", "GJ", "EI2", "EI3")
+_INERTIAS = ("mass_per_length", "rotary_inertia2", "rotary_inertia3")
 
 
 class SpatialSection(Section):
@@ -120,7 +121,9 @@ class SpatialSection(Section):
                 "stiffness": np.broadcast_to(np.array(self.stiffness), shape).copy(),
                 "mass": np.broadcast_to(np.array(self.mass), shape).copy(),
             }
-        stiffnesses, m, J2, J3 = self._diagonals(x)
+        central = self.central(x)
+        stiffnesses = np.stack([central[key] for key in _STIFFNESSES], axis=-1)
+        m, J2, J3 = (central[key] for key in _INERTIAS)
         B = _offset(axial=self.tension_center, transverse=self.shear_center)
         B_mass = _offset(axial=self.mass_center, transverse=self.mass_center)
         masses = np.stack([m, m, m, J2 + J3, J2, J3], axis=-1)
@@ -129,14 +132,25 @@ class SpatialSection(Section):
             "mass": B_mass.T @ (masses[..., None] * B_mass),
         }
 
-    def _diagonals(self, x: Array) -> tuple[Array, Array, Array, Array]:
-        """Returns the six stiffnesses about their centers, shape (…, 6), the mass and the two rotary inertias."""
+    def central(self, x: npt.ArrayLike) -> dict[str, Array]:
+        """Section properties about their own centers, where both matrices are diagonal; not for full matrices.
+
+        Args:
+            x: Positions from the clamp (m), any shape.
+
+        Returns:
+            ``EA``, ``GA2``, ``GA3`` (N), ``GJ``, ``EI2``, ``EI3`` (N·m²), ``mass_per_length`` (kg/m),
+            ``rotary_inertia2`` and ``rotary_inertia3`` (kg·m), each of the shape of x.
+        """
+        x = np.asarray(x, dtype=np.float64)
+        return dict(zip((*_STIFFNESSES, *_INERTIAS), self._stiffnesses_and_inertias(x), strict=True))
+
+    def _stiffnesses_and_inertias(self, x: Array) -> tuple[Array, ...]:
         if self.way.name == "stiffness":
-            stiffnesses = np.stack([self._at(key, x) for key in _STIFFNESSES], axis=-1)
             zero = np.zeros(x.shape)
             J2 = zero if self.rotary_inertia2 is None else self._at("rotary_inertia2", x)
             J3 = zero if self.rotary_inertia3 is None else self._at("rotary_inertia3", x)
-            return stiffnesses, self._at("mass_per_length", x), J2, J3
+            return *(self._at(key, x) for key in _STIFFNESSES), self._at("mass_per_length", x), J2, J3
         if self.way.name == "shape":
             geometry = self._geometry(x)
             area, k = geometry.area, geometry.shear_correction
@@ -148,8 +162,7 @@ class SpatialSection(Section):
             k = self._at("shear_correction", x)
         E, rho = self._at("E", x), self._at("rho", x)
         G = E / (2.0 * (1.0 + self._at("nu", x)))
-        stiffnesses = np.stack([E * area, k * G * area, k * G * area, G * J, E * I2, E * I3], axis=-1)
-        return stiffnesses, rho * area, rho * I2, rho * I3
+        return E * area, k * G * area, k * G * area, G * J, E * I2, E * I3, rho * area, rho * I2, rho * I3
 
 
 def _offset(axial: tuple[float, float] | None, transverse: tuple[float, float] | None) -> Array:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+import rotfem
 from rotfem.affine import AffineSystem
 from rotfem.equilibrium import check_steady, critical_speed, newton_for, static_tip_shape, steady_state
 from rotfem.errors import ComputationError
@@ -74,6 +75,12 @@ class Simulation:
     def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD):
         self.started = perf_counter()
         self.scene, self.comm = scene, comm
+        self.warnings: list[str] = []
+        if scene.time is None and scene.model.frame == "inertial":
+            self.scene = scene = scene.replace({"model.frame": "rotating"})
+            self.warnings.append("a steady state is one only in the rotating frame, where it was computed")
+        if scene.model.tolerance is not None:
+            self.warnings.append("model.tolerance has no effect on a run: theory and effects are as the scene says")
         self.model = Model(scene, comm)
         self.system: System = compile_system(self.model)
         self.compiled = perf_counter() - self.started
@@ -84,7 +91,6 @@ class Simulation:
         self.history = Table(("t", "psi", "psi_dot", *names, "kinetic", "strain", "jacobi", *free))
         self.newton = newton_for(scene)
         self.stepper: Stepper | None = None
-        self.warnings: list[str] = []
         self.steps = self.rejected = 0
         self.critical = critical_speed(self.system) if isinstance(self.system, AffineSystem) else None
         self._critical_since: float | None = None
@@ -221,13 +227,15 @@ class Simulation:
             if self.model.theory.prestressed is None:
                 why += ": first-order strains keep the softening by the centrifugal force but not the stiffening"
         raise ComputationError(
-            f"the {theory} solution diverged (a displacement exceeds the length of the structure; {why})",
+            f"the {theory} solution diverged (a displacement exceeds the length, or a rotation 1 rad; {why})",
             time=state.t,
             advice='use model.theory = "consistent_linear" for small or "reissner" for any deflection',
         )
 
     def _record(self, state: State) -> None:
         system, t = self.system, state.t
+        if not system.linear:
+            self.model.structure.check_range(state.q, t)
         if self.hub is not None and state.hub is not None:
             self.hub.values[:] = state.hub[:3]
         system.set_time(t)
@@ -333,8 +341,8 @@ def extreme(t: Array, y: Array, sign: int) -> tuple[float, float]:
 
 def versions() -> dict[str, str]:
     """Return the versions of the program and of what it computes with."""
-    out = {"python": platform.python_version()}
-    for name in ("rotfem", "fenics-dolfinx", "fenics-ufl", "petsc4py", "slepc4py", "numpy", "scipy"):
+    out = {"rotfem": rotfem.__version__, "python": platform.python_version()}
+    for name in ("fenics-dolfinx", "fenics-ufl", "petsc4py", "slepc4py", "numpy", "scipy"):
         try:
             out[name.removeprefix("fenics-")] = metadata.version(name)
         except metadata.PackageNotFoundError:

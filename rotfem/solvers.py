@@ -28,12 +28,16 @@ def combine(target: Any, matrices: list[Any], weights: Array) -> None:
             target.axpy(weight, A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
 
 
-def use_direct_solver(ksp: Any, size: int = 0) -> None:
-    """Make a KSP apply one LU factorisation: PETSc's own where that is quickest, MUMPS in parallel or above SMALL."""
+def use_direct_solver(ksp: Any, size: int) -> None:
+    """Make a KSP apply one LU factorisation: PETSc's own up to SMALL unknowns, MUMPS above."""
     ksp.setType(PETSc.KSP.Type.PREONLY)
     pc = ksp.getPC()
+    if ksp.comm.size > 1 and size <= SMALL:
+        # Every process factors the whole small matrix: far quicker than sharing it out.
+        pc.setType(PETSc.PC.Type.REDUNDANT)
+        return
     pc.setType(PETSc.PC.Type.LU)
-    if ksp.comm.size > 1 or size > SMALL:
+    if size > SMALL:
         pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
 
 

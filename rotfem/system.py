@@ -129,7 +129,8 @@ class System:
         nodes = self.structure.clamped[self.structure.clamped < owned]
         bs = self.V.dofmap.index_map_bs
         self.clamped = (nodes[:, None] * bs + np.arange(bs)).ravel()
-        self._shifts = [self.structure.constant(c) for c in (1.0, 0.0, 1.0)]
+        self._shift_values: tuple[float, ...] = (1.0, 0.0, 1.0)
+        self._shifts = [self.structure.constant(c) for c in self._shift_values]
         self.clamp = TurningClamp(self.structure, self.motion) if model.fixed else None
         self._energies = {name: fem.form(form) for name, form in model.energies().items()}
         self._b = la.vector(self.V.dofmap.index_map, self.V.dofmap.index_map_bs)
@@ -191,17 +192,21 @@ class System:
 
     def tangent(self, c_k: float, c_v: float, c_m: float) -> tuple[Any, bool]:
         """Return (c_k K + c_v C + c_m M at the state, whether it changed); clamped rows are identity rows."""
-        for constant, value in zip(self._shifts, (c_k, c_v, c_m), strict=True):
-            constant.value = value
+        self._set_shifts(c_k, c_v, c_m)
         self.A.zeroEntries()
         fem_petsc.assemble_matrix(self.A, self._J, self.bcs)
         self.A.assemble()
         return self.A, True
 
+    def _set_shifts(self, *shifts: float) -> None:
+        if shifts != self._shift_values:
+            for constant, value in zip(self._shifts, shifts, strict=True):
+                constant.value = value
+            self._shift_values = shifts
+
     def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
         """Return a new matrix c_k K + c_v C + c_m M at the state with `diagonal` at clamped unknowns."""
-        for constant, value in zip(self._shifts, (c_k, c_v, c_m), strict=True):
-            constant.value = value
+        self._set_shifts(c_k, c_v, c_m)
         A = fem_petsc.create_matrix(self._J)
         fem_petsc.assemble_matrix(A, self._J, self.bcs, diagonal)
         A.assemble()

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 from mpi4py import MPI
 
 from rotfem.errors import SceneError
 from rotfem.scene import Scene
+from rotfem.structures.beam import Beam
 from rotfem.structures.planar_beam import PlanarBeam
+from rotfem.structures.spatial_beam import SpatialBeam
 
-STRUCTURES = {"planar_beam": PlanarBeam}
+STRUCTURES: dict[str, Callable[..., Beam]] = {"planar_beam": PlanarBeam, "spatial_beam": SpatialBeam}
 
 
-def build(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> PlanarBeam:
+def build(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Any:
     """Return the discretised structure of a scene.
 
     Raises:

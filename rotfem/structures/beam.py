@@ -118,7 +118,7 @@ class Beam:
         """Return the constant of a named number of the scene, one and the same at every call."""
         return self.scalars.setdefault(name, self.constant(value))
 
-    def property(self, name: str, at: Callable[[Array], Array]) -> Any:
+    def profile(self, name: str, at: Callable[[Array], Array]) -> Any:
         """Return at(X) as a constant where the section is uniform, else as a field."""
         if self._section.uniform:
             return self.constant(at(np.zeros(1))[0])
@@ -175,3 +175,14 @@ class Beam:
         q = np.concatenate(self.comm.allgather(values[: self.size * owned].reshape(-1, self.size)))
         order = np.argsort(X)
         return X[order], q[order]
+
+    def oriented(self, values: Array) -> Array:
+        """Return the components along the undeformed beam of nodal values (n, components, …): modes are named by it."""
+        return values
+
+    def check_range(self, q: Array, time: float | None = None) -> None:
+        """Refuse a state (local dof array) outside the range of the unknowns; there is none here.
+
+        Raises:
+            ComputationError: never here; see the spatial beam.
+        """

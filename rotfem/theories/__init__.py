@@ -27,11 +27,11 @@ class Theory:
     linear: bool = False
     prestressed: Any = None
 
-    def measures(self, structure: str) -> Callable[[Any], tuple[Any, ...]]:
+    def measures(self, structure: str) -> Callable[..., tuple[Any, ...]]:
         """Return the function q ↦ strains for a structure type ("planar_beam", …)."""
         return getattr(self.strains, structure)
 
-    def prestress_measures(self, structure: str) -> Callable[[Any], tuple[Any, ...]]:
+    def prestress_measures(self, structure: str) -> Callable[..., tuple[Any, ...]]:
         """Return the second-order strains, q ↦ strains, that an axial force of the linear structure works on."""
         return getattr(self.prestressed, structure)
 

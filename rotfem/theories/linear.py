@@ -4,9 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
+import ufl
+
 
 def planar_beam(q: Any) -> tuple[Any, Any, Any]:
     """Return (Gamma_1, Gamma_2, kappa) of q = (u_1, u_2, alpha): axial, shear (both 1) and bending (1/m) strain."""
     du1, du2, dalpha = (q[i].dx(0) for i in range(3))
     alpha = q[2]
     return du1, du2 - alpha, dalpha
+
+
+def spatial_beam(du: Any, theta: Any, dtheta: Any) -> tuple[Any, Any]:
+    """Return (Gamma, K), vectors (3,): Γ = u' − θ×e_1 (1) and K = θ' (1/m).
+
+    Args:
+        du, theta, dtheta: u', θ, θ' along the undeformed section axes t_i⁰.
+    """
+    return ufl.as_vector((du[0], du[1] - theta[2], du[2] + theta[1])), dtheta

@@ -6,9 +6,21 @@ from typing import Any
 
 import ufl
 
+from rotfem.rotations import material_rate, rotate_back
+
 
 def planar_beam(q: Any) -> tuple[Any, Any, Any]:
     """Return (Gamma_1, Gamma_2, kappa) of q = (u_1, u_2, alpha): axial, shear (both 1) and bending (1/m) strain."""
     du1, du2, dalpha = (q[i].dx(0) for i in range(3))
     c, s = ufl.cos(q[2]), ufl.sin(q[2])
     return (1 + du1) * c + du2 * s - 1, -(1 + du1) * s + du2 * c, dalpha
+
+
+def spatial_beam(du: Any, theta: Any, dtheta: Any) -> tuple[Any, Any]:
+    """Return (Gamma, K), vectors (3,): Γ = Λᵀ(e_1 + u') − e_1 (1) and K = axial(Λᵀ Λ') (1/m), Simo 1985.
+
+    Args:
+        du, theta, dtheta: u', θ, θ' along the undeformed section axes t_i⁰.
+    """
+    e_1 = ufl.as_vector((1, 0, 0))
+    return rotate_back(theta, e_1 + du) - e_1, material_rate(theta, dtheta)

@@ -4,9 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
+import ufl
+
 
 def planar_beam(q: Any) -> tuple[Any, Any, Any]:
     """Return (Gamma_1, Gamma_2, kappa) of q = (u_1, u_2, alpha): axial, shear (both 1) and bending (1/m) strain."""
     du1, du2, dalpha = (q[i].dx(0) for i in range(3))
     alpha = q[2]
     return du1 + alpha * du2 - alpha**2 / 2, du2 - alpha - alpha * du1, dalpha
+
+
+def spatial_beam(du: Any, theta: Any, dtheta: Any) -> tuple[Any, Any]:
+    """Return (Gamma, K), vectors (3,): Γ = u' − θ×(e_1 + u') + ½ θ×(θ×e_1) (1) and K = θ' − ½ θ×θ' (1/m).
+
+    Args:
+        du, theta, dtheta: u', θ, θ' along the undeformed section axes t_i⁰.
+    """
+    e_1 = ufl.as_vector((1, 0, 0))
+    Gamma = du - ufl.cross(theta, e_1 + du) + 0.5 * ufl.cross(theta, ufl.cross(theta, e_1))
+    return Gamma, dtheta - 0.5 * ufl.cross(theta, dtheta)

@@ -15,3 +15,13 @@ def planar_beam(q: Any) -> tuple[Any, Any, Any]:
     du1, du2, dalpha = (q[i].dx(0) for i in range(3))
     alpha = q[2]
     return ufl.sqrt((1 + du1) ** 2 + du2**2) - 1, du2 - alpha, dalpha
+
+
+def spatial_beam(du: Any, theta: Any, dtheta: Any) -> tuple[Any, Any]:
+    """Return (Gamma, K), vectors (3,): Γ_1 = |e_1 + u'| − 1, else of first order (1), and K = θ' (1/m).
+
+    Args:
+        du, theta, dtheta: u', θ, θ' along the undeformed section axes t_i⁰.
+    """
+    stretch = ufl.sqrt((1 + du[0]) ** 2 + du[1] ** 2 + du[2] ** 2)
+    return ufl.as_vector((stretch - 1, du[1] - theta[2], du[2] + theta[1])), dtheta

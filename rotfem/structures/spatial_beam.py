@@ -1,0 +1,191 @@
+"""The spatial beam q = (u, θ): axis and section triad in space, with pretwist, precone, hub offset and tip body.
+
+The section axes are t_i = Λ(θ) t_i⁰ (Simo & Vu-Quoc 1986, Comput. Meth. Appl. Mech. Eng. 58, 79), θ the rotation vector
+relative to the undeformed triad t_i⁰, all in components of the rotating frame. t_1⁰ is the undeformed axis
+e = (cos β, 0, sin β), β the precone; t_2⁰ and t_3⁰ are turned about it by the pretwist. With p, φ, κ the components of
+u', θ, θ' along t_i⁰,
+
+    Γ = Λ_tᵀ r' − e_1 = Λ(φ)ᵀ (e_1 + p) − e_1,        K = axial(Λ_tᵀ Λ_t') − K⁰ = T(φ) κ,
+
+since Λ_tᵀ Λ_t' = t⁰ᵀ (Λᵀ Λ') t⁰ + t⁰ᵀ t⁰', whose last part, the twist rate K⁰, drops out exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, ClassVar, cast
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from rotfem.errors import ComputationError
+from rotfem.kinematics import AppliedLoad, Body, Strain
+from rotfem.quantities import evaluate
+from rotfem.rotations import FULL_TURN, material_rate, rotate, rotate_second_order, spatial_rate
+from rotfem.scene import MomentLoad, Scene, SpatialBeamStructure
+from rotfem.structures.beam import Array, Beam
+from rotfem.structures.spatial_section import SectionForms, euler_tensor
+from rotfem.theories import THEORIES
+
+
+def _moment(load: MomentLoad, t: float) -> Array:
+    return np.ravel(load.at(t))
+
+
+class SpatialBeam(Beam):
+    """Discretised spatial beam of a scene.
+
+    Directors and centres of mass turn with Λ of second order in θ in linear theories, which is all that enters there,
+    and with the exact Λ in the others.
+
+    Args:
+        scene: a validated scene whose structure is a spatial beam.
+        comm: communicator the mesh is distributed over.
+
+    Raises:
+        SceneError: a 6×6 mass matrix that no section has.
+    """
+
+    type = "spatial_beam"
+    planar = False
+    components = ("u1", "u2", "u3", "theta1", "theta2", "theta3")
+    dimension = 3
+    #: Conjugates of the tip's components: inputs of the state-space model (a moment works on θ there).
+    tip_inputs = ("tip_force_1", "tip_force_2", "tip_force_3", "tip_moment_1", "tip_moment_2", "tip_moment_3")
+    #: Mode families: the components whose kinetic energy counts, and the one whose nodes are counted.
+    families: ClassVar = {"axial": ((0,), 0), "lag": ((1, 5), 1), "flap": ((2, 4), 2), "torsion": ((3,), 3)}
+
+    def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD):
+        self.data = s = cast(SpatialBeamStructure, scene.structure)
+        knots = {x for x, _ in s.pretwist[1:-1]} if isinstance(s.pretwist, tuple) else set()
+        super().__init__(scene, s, comm, tuple(sorted(knots | set(s.section.breakpoints))))
+        self._rotate = rotate_second_order if THEORIES[scene.model.theory].linear else rotate
+        self._forms = SectionForms(self, s.section, scene.file)
+        if s.hub_offset is None:
+            self._root = ufl.as_vector((self.scalar("hub_radius", s.hub_radius), 0, 0))
+        else:
+            parts = [self.scalar(f"hub_offset_{i}", x) for i, x in enumerate(s.hub_offset, start=1)]
+            self._root = ufl.as_vector(parts)
+        self._triad = self._undeformed_triad()
+
+    # --- the undeformed beam ------------------------------------------------------------------------------------
+
+    def _undeformed_triad(self) -> tuple[Any, Any, Any]:
+        """t_1⁰, t_2⁰, t_3⁰; without precone and pretwist they are unit vectors that vanish from the forms."""
+        cone, twist = self.data.precone, self.data.pretwist
+        beta = self.scalar("precone", cone) if cone != 0.0 else 0
+        c, s = (ufl.cos(beta), ufl.sin(beta)) if cone != 0.0 else (1, 0)
+        e_1, e_2, e_3 = ufl.as_vector((c, 0, s)), ufl.as_vector((0, 1, 0)), ufl.as_vector((-s, 0, c))
+        if isinstance(twist, tuple) and any(angle != 0.0 for _, angle in twist):
+            angle = fem.Function(fem.functionspace(self.mesh, ("Lagrange", 1)), name="pretwist")
+            angle.interpolate(lambda x: evaluate(twist, x[0]))  # exact: the knots are nodes
+            self.section["pretwist"] = angle
+        elif isinstance(twist, float) and twist != 0.0:
+            angle = self.scalar("pretwist", twist)
+        else:
+            return e_1, e_2, e_3
+        c, s = ufl.cos(angle), ufl.sin(angle)
+        return e_1, c * e_2 + s * e_3, c * e_3 - s * e_2
+
+    def _along_triad(self, v: Any) -> Any:
+        """Components of v along t_i⁰."""
+        return ufl.as_vector([sum(t[i] * v[i] for i in range(3)) for t in self._triad])
+
+    def _from_triad(self, components: Any) -> Any:
+        """Vector with these components along t_i⁰."""
+        return ufl.as_vector([sum(c * t[i] for c, t in zip(components, self._triad, strict=True)) for i in range(3)])
+
+    def oriented(self, values: Array) -> Array:
+        """Return components along the undeformed beam, without its pretwist, of nodal values (n, 6, …)."""
+        c, s = np.cos(self.data.precone), np.sin(self.data.precone)
+        R = np.kron(np.eye(2), np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]))
+        return np.einsum("ij,nj...->ni...", R, values)
+
+    # --- kinematics ---------------------------------------------------------------------------------------------
+
+    def _rotation(self, q: Any) -> Any:
+        return ufl.as_vector([q[i] for i in (3, 4, 5)])
+
+    def position(self, q: Any) -> Any:
+        """r = r_root + X e + u."""
+        X = ufl.SpatialCoordinate(self.mesh)[0]
+        return self._root + X * self._triad[0] + ufl.as_vector([q[i] for i in (0, 1, 2)])
+
+    def turned(self, q: Any, v: Any) -> Any:
+        """Λ(θ) v."""
+        return self._rotate(self._rotation(q), v)
+
+    def strains(self, measures: Callable[..., tuple[Any, Any]]) -> list[Strain]:
+        """Return the strains (Γ, K) of one theory's measures with the section's stiffness."""
+        q = self.k.q
+        dq = q.dx(0)
+        parts = (ufl.as_vector([dq[i] for i in (0, 1, 2)]), self._rotation(q), self._rotation(dq))
+        Gamma, K = measures(*(self._along_triad(v) for v in parts))
+        return self._forms.strains(Gamma, K, self.dx_elastic)
+
+    def bodies(self, effects: tuple[str, ...]) -> list[Body]:
+        """Return the bodies the effects call for: mass-centre line, section directors, tip body and its directors."""
+        q, forms = self.k.q, self._forms
+        bodies = [Body(self._offset(forms.mass_center), forms.mass, self.dx)]
+        if "rotary_inertia" in effects:
+            for axis, moment in forms.directors:
+                director = self.turned(q, self._from_triad(axis))
+                bodies.append(Body(director, moment, self.dx, is_position=False))
+        return bodies + self._tip_bodies() if "tip_mass" in effects else bodies
+
+    def _offset(self, components: tuple[Any, ...]) -> Any:
+        """r + Λ c, a point fixed in the section; c has these components along t_i⁰."""
+        q = self.k.q
+        if all(isinstance(c, int) for c in components):
+            return self.position(q)
+        return self.position(q) + self.turned(q, self._from_triad(components))
+
+    def _tip_bodies(self) -> list[Body]:
+        s, q, out = self.data, self.k.q, []
+        if s.tip_mass > 0:
+            pairs = enumerate(s.tip_offset, start=1)
+            center = tuple(self.scalar(f"tip_offset_{i}", c) if c != 0.0 else 0 for i, c in pairs)
+            out.append(Body(self._offset(center), self.scalar("tip_mass", s.tip_mass), self.ds_tip))
+        for i, (moment, axis) in enumerate(euler_tensor(s.tip_inertia_matrix), start=1):
+            if isinstance(s.tip_inertia, float):  # isotropic: each director has half of it
+                density = self.scalar("tip_inertia", s.tip_inertia) / 2
+            else:
+                density = self.scalar(f"tip_director_inertia_{i}", moment)
+            director = self.turned(q, self._from_triad(axis))
+            out.append(Body(director, density, self.ds_tip, is_position=False))
+        return out
+
+    def loads(self) -> list[AppliedLoad]:
+        """Return the scene's non-zero loads.
+
+        Components are those of the frame; a follower has them in the undeformed state and turns with Λ. A moment M does
+        the work M·k(δθ), k the spatial rate of turning, so its conjugate on δθ is T(θ) M; that of a follower Λ M is
+        T(θ)ᵀ M. A dead moment has a potential, −M·θ, only as long as θ keeps to one axis (Argyris 1982).
+        """
+        moment, out = self.scene.loads.tip_moment, self.forces()
+        if moment is not None and not moment.is_zero:
+            m, theta = self.add_load("tip_moment", 3, partial(_moment, moment)), self._rotation(self.k.q)
+            dead = moment.kind == "dead"
+            conjugate = material_rate(theta, m) if dead else spatial_rate(theta, m)
+            out.append(AppliedLoad("tip_moment", conjugate, theta, self.ds_tip, dead))
+        return out
+
+    def check_range(self, q: Array, time: float | None = None) -> None:
+        """Refuse a state in which some section has turned by more than a full turn.
+
+        Raises:
+            ComputationError: says where; rotation vectors stand for rotations one to one only up to there.
+        """
+        X, values = self.nodes(q)
+        turns = np.linalg.norm(values[:, 3:], axis=1)
+        worst = int(np.argmax(turns))
+        if turns[worst] > FULL_TURN:
+            raise ComputationError(
+                f"the section at X = {X[worst]:.4g} m has turned by {turns[worst] / (2 * np.pi):.3g} turns relative to "
+                "the frame; a spatial beam's rotations are limited to one",
+                time,
+                'a smaller load, or structure.type = "planar_beam" where the motion is in a plane',
+            )

@@ -1,0 +1,153 @@
+"""`rotfem modes` and `rotfem campbell` as a user calls them: exit status, what is printed where, what is written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from rotfem.cli import app
+
+SCENE = """\
+[structure]
+type = "planar_beam"
+length = 1.0
+hub_radius = 0.5
+[structure.section]
+EA = 400.0
+GA = 130.0
+EI = 1.0
+mass_per_length = 1.0
+rotary_inertia = 0.0025
+[motion]
+type = "constant"
+speed = 3.0
+[model]
+theory = "consistent_linear"
+[mesh]
+elements = 4
+[modes]
+count = 3
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the working directory, with the scene in it."""
+    (tmp_path / "beam.toml").write_text(SCENE)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+class Done(NamedTuple):
+    status: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def rotfem(folder: Path, capsys: pytest.CaptureFixture[str]) -> Callable[..., Done]:
+    """Return a function that runs `rotfem …` there, in this process."""
+
+    def run(*arguments: str) -> Done:
+        with pytest.raises(SystemExit) as end:
+            app(list(arguments))
+        return Done(int(end.value.code or 0), *capsys.readouterr())
+
+    return run
+
+
+def written(path: Path) -> set[str]:
+    return {file.name for file in path.iterdir()}
+
+
+def test_modes_prints_a_table_and_writes_files(folder: Path, rotfem: Callable[..., Done]) -> None:
+    done = rotfem("modes", "beam.toml")
+    assert done.status == 0, done.err
+    assert done.err == ""
+    lines = done.out.splitlines()
+    assert lines[0].startswith("beam: consistent_linear about the undeformed state at 3 rad/s")
+    assert "lag 1" in done.out and "rad/s" in done.out and "damping" in done.out
+    out = folder / "results" / "beam"
+    assert written(out) == {"modes.csv", "modes.json", "mode_shapes.csv", "modes.png", "summary.json"}
+    assert len(json.loads((out / "modes.json").read_text())["modes"]) == 3
+
+
+def test_modes_json_is_alone_on_stdout(folder: Path, rotfem: Callable[..., Done]) -> None:
+    """A warning (an unstable mode, here) goes to stderr."""
+    options = ("--set", "model.theory=linear", "--set", "motion.speed=5", "--no-plots", "-o", "out")
+    done = rotfem("modes", "beam.toml", "--json", *options)
+    assert done.status == 0
+    summary = json.loads(done.out)
+    assert summary["modes"][0]["stability"] == "static instability"
+    assert done.err.startswith("warning: static instability")
+    assert written(folder / "out") == {"modes.csv", "modes.json", "mode_shapes.csv", "summary.json"}
+    quiet = rotfem("modes", "beam.toml", "-q", *options)
+    assert quiet == (0, "", "")
+
+
+def test_modes_exports(folder: Path, rotfem: Callable[..., Done]) -> None:
+    done = rotfem("modes", "beam.toml", "-q", "--no-plots", "--state-space", "--matrices", "-o", "out")
+    assert done.status == 0, done.err
+    assert {"state_space.npz", "M.mtx", "C.mtx", "K.mtx", "M.npz", "unknowns.csv"} <= written(folder / "out")
+    with np.load(folder / "out" / "state_space.npz") as file:
+        assert file["A"].shape == (6, 6)
+
+
+def test_campbell_prints_branches_and_writes_files(folder: Path, rotfem: Callable[..., Done]) -> None:
+    done = rotfem("campbell", "beam.toml", "--speeds", "0:6:4", "--per-rev", "2")
+    assert done.status == 0, done.err
+    assert "critical speed" in done.out and "meets 2Ω" in done.out and "confidence" in done.out
+    out = folder / "results" / "beam"
+    assert written(out) == {"campbell.csv", "campbell.json", "campbell.png", "summary.json"}
+    rows = json.loads((out / "campbell.json").read_text())["rows"]
+    assert {row["speed"] for row in rows if not row["refined"]} == {0.0, 2.0, 4.0, 6.0}
+
+
+def test_campbell_json_and_quiet(folder: Path, rotfem: Callable[..., Done]) -> None:
+    options = ("--speeds", "0,2,3.5", "--set", "model.theory=linear", "--no-plots", "-o", "out")
+    done = rotfem("campbell", "beam.toml", "--json", *options)
+    assert done.status == 0, done.err
+    summary = json.loads(done.out)
+    assert summary["speeds"] == 3
+    assert summary["instabilities"][0]["kind"] == "static instability"
+    assert "warning: static instability from 3.4" in done.err
+    quiet = rotfem("campbell", "beam.toml", "-q", *options)
+    assert quiet == (0, "", "")
+
+
+BENT = tuple(
+    word
+    for change in ("model.theory=reissner", "loads.tip_force=[0, 50]", "solver.max_iterations=1")
+    for word in ("--set", change)
+)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        (("campbell", "beam.toml", "--speeds", "5"), 2, "--speeds"),
+        (("campbell", "beam.toml", "--speeds", "12:0:4"), 2, "increasing speeds"),
+        (("campbell", "beam.toml", "--speeds", "0:12:x"), 2, "first:last:number"),
+        (("campbell", "beam.toml", "--speeds", "0:inf:3"), 2, "first:last:number"),
+        (("campbell", "beam.toml"), 2, "--speeds"),
+        (("campbell", "missing.toml", "--speeds", "0:1:2"), 2, "missing.toml"),
+        (("modes", "beam.toml", "--set", "modes.count=0"), 2, "modes.count"),
+        (("modes", "beam.toml", "--set", "modes.about=elsewhere"), 2, "modes.about"),
+        (("modes", "beam.toml", "-o", "beam.toml/out"), 2, "beam.toml/out"),
+        # One Newton iteration is too few for a bent beam, however small the steps of the load.
+        (("modes", "beam.toml", *BENT), 3, "no steady state"),
+    ],
+)
+def test_what_cannot_be_done(
+    rotfem: Callable[..., Done], arguments: tuple[str, ...], status: int, message: str
+) -> None:
+    done = rotfem(*arguments)
+    assert done.status == status
+    assert done.out == ""
+    assert message in done.err
+    assert "Traceback" not in done.err

@@ -1,0 +1,92 @@
+"""Two processes compute what one does, and only the first speaks."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotfem.results import read_csv
+
+ROOT = Path(__file__).resolve().parents[2]
+MPIRUN = shutil.which("mpirun")
+
+pytestmark = [pytest.mark.mpi, pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")]
+
+SCENE = """\
+[structure]
+type = "planar_beam"
+length = 10.0
+tip_mass = 1.0
+[structure.section]
+EA = 2.8e7
+GA = 1.0e7
+EI = 1.4e4
+mass_per_length = 1.2
+rotary_inertia = 6.0e-4
+[structure.damping]
+kelvin_voigt = 1e-3
+[motion]
+type = "spin_up"
+speed = 6.0
+duration = 2.0
+[mesh]
+elements = 8
+degree = 3
+[time]
+end = 0.3
+step = 0.01
+"""
+
+
+def run(folder: Path, ranks: int, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run `rotfem run beam.toml -o r<ranks> …` in a folder on that many processes."""
+    start = [str(MPIRUN), "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
+    environment = os.environ | {
+        "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
+        "OMPI_ALLOW_RUN_AS_ROOT": "1",
+        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+        "OMPI_MCA_mpi_yield_when_idle": "1",  # where there are fewer cores than processes
+        "OMP_NUM_THREADS": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+    }
+    command = [*start, sys.executable, "-m", "rotfem", "run", "beam.toml", "--no-plots", "-o", f"r{ranks}", *arguments]
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize(
+    ("theory", "frame"),
+    [("reissner", "rotating"), ("reissner", "inertial"), ("consistent_linear", "rotating")],
+)
+def test_history_is_that_of_one_process(tmp_path: Path, theory: str, frame: str) -> None:
+    (tmp_path / "beam.toml").write_text(SCENE)
+    changes = ("--json", "--set", f"model.theory={theory}", "--set", f"model.frame={frame}")
+    one, two = (run(tmp_path, ranks, *changes) for ranks in (1, 2))
+    assert one.returncode == 0, one.stderr
+    assert two.returncode == 0, two.stderr
+    summary = json.loads(two.stdout)  # once: both ranks speaking would not be JSON
+    assert summary["ranks"] == 2
+    assert summary["dofs"] == json.loads(one.stdout)["dofs"]
+    for name in ("history.csv", "shape.csv"):
+        serial, parallel = (read_csv(tmp_path / f"r{ranks}" / name) for ranks in (1, 2))
+        assert list(serial) == list(parallel)
+        for column, values in serial.items():
+            scale = max(1.0, float(np.max(np.abs(values))))
+            np.testing.assert_allclose(parallel[column], values, rtol=0, atol=1e-8 * scale, err_msg=column)
+
+
+def test_errors_are_told_once(tmp_path: Path) -> None:
+    (tmp_path / "beam.toml").write_text(SCENE)
+    bad = run(tmp_path, 2, "--set", "structure.length=-1")
+    assert bad.stderr.count("structure.length = -1") == 1
+    assert bad.returncode == 2
+    failed = run(tmp_path, 2, "--set", "model.theory=linear", "--set", "time.end=20.0", "--set", "time.step=0.05")
+    assert failed.returncode == 3
+    assert failed.stderr.count("diverged") == 1
+    assert json.loads((tmp_path / "r2" / "summary.json").read_text())["status"] == "failed"

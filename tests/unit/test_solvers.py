@@ -1,0 +1,130 @@
+"""Newton's iteration: when it stops, when it gives up, and what it says; the direct solver."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from petsc4py import PETSc
+
+from rotfem.errors import ComputationError
+from rotfem.solvers import DirectSolver, Newton, combine
+
+
+class Scalar:
+    """Newton for f(x) = 0 with one unknown."""
+
+    def __init__(self, f: Callable[[float], float], slope: Callable[[float], float], x: float):
+        self.f, self.slope, self.x = f, slope, x
+
+    def increment(self) -> float:
+        d = -self.f(self.x) / self.slope(self.x)
+        self.x += d
+        return abs(d)
+
+    def size(self) -> float:
+        return abs(self.x)
+
+
+def test_converges_quadratically_and_counts() -> None:
+    newton, root = Newton(tolerance=1e-9), Scalar(lambda x: x * x - 2, lambda x: 2 * x, 1.5)
+    count = newton.solve(root.increment, root.size)
+    assert root.x == pytest.approx(np.sqrt(2), abs=1e-15)
+    assert count <= 4 and newton.iterations == count
+
+
+def test_a_linear_problem_takes_two_iterations_at_first_and_one_then() -> None:
+    """The second increment is zero, which shows that the problem is linear: kappa = 0, and one is enough afterwards."""
+    newton = Newton()
+    for expected in (2, 1):
+        assert newton.solve(*methods(Scalar(lambda x: 3 * x - 6, lambda x: 3, 0.0))) == expected
+
+
+def test_one_iteration_is_enough_once_the_quadratic_constant_is_known() -> None:
+    """A start 1e-6 off has a next increment of 1e-12·f''/2f', below tolerance; the result is as exact as promised."""
+    newton = Newton(tolerance=1e-9)
+    newton.solve(*methods(Scalar(lambda x: x * x - 2, lambda x: 2 * x, 1.5)))
+    near = Scalar(lambda x: x * x - 2, lambda x: 2 * x, np.sqrt(2) + 1e-6)
+    assert newton.solve(*methods(near)) == 1
+    assert abs(near.x - np.sqrt(2)) < 1e-9
+    far = Scalar(lambda x: x * x - 2, lambda x: 2 * x, np.sqrt(2) + 1e-2)
+    assert newton.solve(*methods(far)) > 1
+
+
+def methods(root: Scalar) -> tuple[Callable[[], float], Callable[[], float]]:
+    return root.increment, root.size
+
+
+def test_too_many_iterations() -> None:
+    """x³ has a triple root: increments fall by a third only."""
+    root = Scalar(lambda x: x**3, lambda x: 3 * x * x, 1.0)
+    with pytest.raises(ComputationError, match="did not converge in 7 iterations.*wanted 1e-09"):
+        Newton(max_iterations=7).solve(*methods(root))
+
+
+def test_not_finite() -> None:
+    with pytest.raises(ComputationError, match="iteration 3 gave an increment that is not finite"):
+        values = iter((1.0, 0.5, np.nan))
+        Newton().solve(lambda: next(values), lambda: 1.0)
+
+
+def test_divergence() -> None:
+    """arctan from x = 2: increments grow without end."""
+    with pytest.raises(ComputationError, match="diverged|not finite"):
+        Newton().solve(*methods(Scalar(np.arctan, lambda x: 1 / (1 + x * x), 2.0)))
+
+
+def test_monotone_gives_up_at_the_first_growth() -> None:
+    values = [1e-2, 1e-3, 5e-3, 1e-12]
+    assert Newton().solve(iter(values).__next__, lambda: 1.0) == 4
+    with pytest.raises(ComputationError, match=r"grew from 1.0e-03 to 5.0e-03"):
+        Newton(monotone=True).solve(iter(values).__next__, lambda: 1.0)
+
+
+def test_stops_at_round_off_and_says_so() -> None:
+    """Increments that no longer shrink, small beside the unknown, are round-off; large ones are not."""
+    newton = Newton(tolerance=1e-9)
+    values = iter((1e-2, 1e-5, 3e-8, 2e-8, 2e-8))
+    assert newton.solve(lambda: next(values), lambda: 1.0) == 4
+    assert newton.roundoff == 2e-8
+    stuck = iter([1e-2] * 30)
+    with pytest.raises(ComputationError, match="did not converge"):
+        Newton().solve(lambda: next(stuck), lambda: 1.0)
+
+
+def matrix(values: list[list[float]]) -> PETSc.Mat:
+    A = PETSc.Mat().createDense((len(values), len(values)), array=np.array(values))
+    A = A.convert("aij")
+    A.assemble()
+    return A
+
+
+def test_direct_solver_refactors_only_when_told() -> None:
+    A = matrix([[2.0, 1.0], [1.0, 3.0]])
+    solver, b, x = DirectSolver(A), A.createVecLeft(), A.createVecRight()
+    b.set(1.0)
+    for _ in range(2):
+        solver.solve(b, x)
+    np.testing.assert_allclose(x.array, [0.4, 0.2])
+    assert solver.factorisations == 1
+    A.scale(2.0)
+    solver.refresh()
+    solver.solve(b, x)
+    np.testing.assert_allclose(x.array, [0.2, 0.1])
+    assert solver.factorisations == 2
+
+
+def test_a_singular_matrix_is_a_computation_error() -> None:
+    A = matrix([[1.0, 1.0], [1.0, 1.0]])
+    b, x = A.createVecLeft(), A.createVecRight()
+    b.set(1.0)
+    with pytest.raises(ComputationError, match="singular"):
+        DirectSolver(A).solve(b, x)
+
+
+def test_combine() -> None:
+    A, B = matrix([[1.0, 2.0], [3.0, 4.0]]), matrix([[1.0, 1.0], [1.0, 1.0]])
+    target = A.duplicate()
+    combine(target, [A, B], np.array([2.0, -1.0]))
+    np.testing.assert_array_equal(target.convert("dense").getDenseArray(), [[1, 3], [5, 7]])

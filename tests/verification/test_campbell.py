@@ -1,0 +1,220 @@
+"""Campbell diagrams: branches through veerings and crossings, critical speeds, unstable ranges, what is written."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from rotfem import SceneError, campbell, modes
+from rotfem.campbell import AMBIGUOUS, SURE, parse_speeds
+from rotfem.plots import plot
+from rotfem.results import CampbellResult
+
+Array = npt.NDArray[np.float64]
+
+MESH = {"elements": 12, "degree": 3}
+
+
+def slender(r: float) -> dict[str, float]:
+    """Return the section of the unit beam with radius of gyration r, as in the reference values."""
+    return {"EA": r**-2, "GA": r**-2 / 3.059, "EI": 1.0, "mass_per_length": 1.0, "rotary_inertia": r**2}
+
+
+#: theory, L/r, hub radius, last speed: lag and axial modes meet at least twice on the way
+DIAGRAMS = [("reissner", 20, 1.0, 12.0), ("von_karman_linear", 25, 0.0, 60.0)]
+
+
+def scene(unit_beam: Any, theory: str, slenderness: int, radius: float, **changes: Any) -> Any:
+    tables = {"structure.section": slender(1 / slenderness), "structure.hub_radius": radius, "model.theory": theory}
+    return unit_beam(tables | changes, mesh=MESH)
+
+
+def by_branch(result: CampbellResult, name: str) -> dict[int, dict[float, Any]]:
+    """Return branch ↦ speed ↦ one entry of its rows."""
+    out: dict[int, dict[float, Any]] = {}
+    for row in result.rows:
+        out.setdefault(row["branch"], {})[row["speed"]] = row[name]
+    return out
+
+
+def exchanges(result: CampbellResult) -> int:
+    """Return how many times a branch passes from a share of lag above 0.5 to one below, or back."""
+    count = 0
+    for shares in by_branch(result, "share_lag").values():
+        lag = np.array([shares[s] for s in sorted(shares)]) > 0.5
+        count += int(np.count_nonzero(np.diff(lag.astype(int))))
+    return count
+
+
+# --- E: branches -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("theory", "slenderness", "radius", "last"), DIAGRAMS)
+def test_veering_branches_do_not_swap(
+    unit_beam: Any, theory: str, slenderness: int, radius: float, last: float
+) -> None:
+    """Nine speeds give the branches of 81, at every common speed; and both are the spectrum in its order.
+
+    The second half is independent of any tracking: with Coriolis force lag and axial motion are coupled, so eigenvalues
+    of the one-parameter family do not cross, and the k-th branch is the k-th frequency.
+    """
+    beam = scene(unit_beam, theory, slenderness, radius)
+    coarse, fine = (campbell(beam, np.linspace(0.0, last, n), orders=0) for n in (9, 81))
+    assert exchanges(fine) >= 4  # two branches take part in each of at least two veerings
+    a, b = (by_branch(result, "frequency") for result in (coarse, fine))
+    compared = 0
+    for branch in range(1, 7):
+        common = sorted(a[branch].keys() & b[branch].keys())
+        assert len(common) >= 9
+        np.testing.assert_allclose([a[branch][s] for s in common], [b[branch][s] for s in common], rtol=1e-7, atol=1e-7)
+        compared += len(common)
+    for result, table in ((coarse, a), (fine, b)):
+        for speed in table[1]:
+            assert np.all(np.diff([table[branch][speed] for branch in range(1, 7)]) > 0)
+        assert result.summary["ambiguous"] == []
+        assert min(row["confidence"] for row in result.rows) >= SURE - 1e-12
+    veerings, solved = exchanges(fine) // 2, coarse.summary["speeds_solved"]
+    print(f"E {theory}: {compared} values compared, {veerings} veerings, {solved} solves for 9 speeds")
+
+
+@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
+def test_crossing_branches_cross(unit_beam: Any, theory: str) -> None:
+    """Without Coriolis force lag and axial modes do not know of each other: branches keep their family and cross."""
+    beam = scene(unit_beam, theory, 20, 1.0, **{"model.effects": ["centrifugal", "rotary_inertia"]})
+    coarse, fine = (campbell(beam, np.linspace(0.0, 9.0, n), orders=0) for n in (4, 31))
+    for result in (coarse, fine):
+        assert exchanges(result) == 0
+        families = by_branch(result, "mode")
+        for names in families.values():
+            assert len({name.split(" ")[0] for name in names.values()}) == 1
+        assert any("coriolis" in text for text in result.summary["warnings"])
+    ends = [b["frequency_last"] for b in coarse.summary["branches"]]
+    assert np.any(np.diff(ends) < 0)  # they did change places
+    np.testing.assert_allclose(ends, [b["frequency_last"] for b in fine.summary["branches"]], rtol=1e-9)
+
+
+def test_branches_are_the_modes_of_their_speed(unit_beam: Any) -> None:
+    """One row of a sweep, refined in between and continued from speed to speed, against `modes` at that speed."""
+    beam = scene(unit_beam, "reissner", 20, 1.0)
+    result = campbell(beam, "0:12:5", orders=0)
+    for speed in (3.0, 12.0):
+        alone = modes(beam.replace({"motion.speed": speed}))
+        rows = [row for row in result.rows if row["speed"] == speed]
+        assert not any(row["refined"] for row in rows)
+        np.testing.assert_allclose(
+            sorted(row["frequency"] for row in rows), [row["frequency"] for row in alone.rows], rtol=1e-8
+        )
+    assert {row["speed"] for row in result.rows if not row["refined"]} == {0.0, 3.0, 6.0, 9.0, 12.0}
+    assert all(0.0 <= row["confidence"] <= 1.0 for row in result.rows)
+    assert all(row["residual"] < 1e-8 for row in result.rows)
+
+
+def test_lost_and_ambiguous_branches_are_said_to_be(unit_beam: Any) -> None:
+    """consistent_linear beyond N0 = GA_s, the end of the theory: short waves come in at once and push branches out."""
+    result = campbell(scene(unit_beam, "consistent_linear", 30, 0.0), "0:40:9", orders=0)
+    summary = result.summary
+    lost = [b["label"] for b in summary["branches"] if not np.isfinite(b["frequency_last"])]
+    assert lost
+    for label in lost:
+        assert any(text.startswith(label) and "left the computed modes" in text for text in summary["warnings"])
+        assert max(result.branches()[label]["speed"]) < 40.0  # no row pretends to follow it
+    assert summary["ambiguous"]
+    for entry in summary["ambiguous"]:
+        assert 0.0 <= entry["confidence"] < AMBIGUOUS and 0.0 < entry["speed"] <= 40.0
+        label = summary["branches"][entry["branch"] - 1]["label"]
+        assert any(text.startswith(f"ambiguous: {label} at") for text in summary["warnings"])
+    assert all(0.0 <= row["confidence"] <= 1.0 for row in result.rows)
+    assert any(onset["kind"] == "static instability" for onset in summary["instabilities"])
+
+
+def test_a_sweep_may_turn_backwards(unit_beam: Any) -> None:
+    """The lag frequencies of a straight beam do not depend on the sense of rotation."""
+    result = campbell(scene(unit_beam, "reissner", 20, 0.0), [-4.0, -2.0, 0.0, 2.0, 4.0], orders=0)
+    for values in by_branch(result, "frequency").values():
+        assert values[-4.0] == pytest.approx(values[4.0], rel=1e-9)
+        assert values[-2.0] == pytest.approx(values[2.0], rel=1e-9)
+
+
+# --- critical speeds and instability ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+def test_critical_speeds(spin_up: Any, theory: str) -> None:
+    """Where a branch meets k Ω: found between the speeds asked for, checked by `modes` at the speed found."""
+    beam = spin_up({"model.theory": theory, "modes.count": 4})
+    result = campbell(beam, "0:8:5", orders=4)
+    crossings = result.summary["critical_speeds"]
+    assert result.summary["per_rev"] == 4
+    expected = [("lag 1", 4), ("lag 1", 3), ("lag 1", 2), ("lag 1", 1), ("lag 2", 4)]
+    assert [(c["label"], c["per_rev"]) for c in crossings] == expected
+    for c in crossings:
+        assert c["frequency"] == pytest.approx(c["per_rev"] * c["speed"], rel=1e-12)
+        rows = modes(beam.replace({"motion": {"type": "constant", "speed": c["speed"]}})).rows
+        nearest = min(abs(row["frequency"] - c["frequency"]) for row in rows)
+        assert nearest < 1e-6 * c["frequency"]
+
+
+def test_onset_and_end_of_flutter(unit_beam: Any) -> None:
+    """A follower force just above Beck's load: the beam at rest flutters, the centrifugal force steadies it."""
+    load = {"tip_force": {"value": [-22.0, 0.0], "kind": "follower"}}
+    beam = unit_beam({"structure.section": slender(1e-2), "modes.count": 3}, mesh=MESH, loads=load)
+    (ending,) = campbell(beam, [0.0, 2.0, 4.0], orders=0).summary["instabilities"]
+    assert ending["speed"] == 0.0 and ending["kind"] == "dynamic instability" and 2.0 < ending["until"] < 4.0
+    result = campbell(beam, [-4.0, -2.0, 0.0], orders=0)
+    (starting,) = result.summary["instabilities"]
+    assert starting["speed"] == pytest.approx(-ending["until"], rel=1e-6) and starting["until"] is None
+    assert any(text.startswith("dynamic instability from -2.") for text in result.summary["warnings"])
+    for factor, kinds in ((0.9999, {"stable", "dynamic instability"}), (1.0001, {"stable"})):
+        rows = modes(beam.replace({"motion.speed": factor * ending["until"]})).rows
+        assert {row["stability"] for row in rows} == kinds
+
+
+def test_unstable_at_the_first_speed(hub_beam: Any) -> None:
+    """A sweep that begins beyond the critical speed says so."""
+    result = campbell(hub_beam({"model.theory": "linear", "modes.count": 2}), [4.0, 5.0], orders=0)
+    assert result.summary["instabilities"] == [{"speed": 4.0, "kind": "static instability", "until": None}]
+    assert any(text.startswith("static instability from 4 rad/s on") for text in result.summary["warnings"])
+
+
+# --- what is written -------------------------------------------------------------------------------------------------
+
+
+def test_results_read_back(unit_beam: Any, tmp_path: Path) -> None:
+    result = campbell(scene(unit_beam, "reissner", 20, 1.0), "0:12:4", orders=2)
+    assert {path.name for path in result.write(tmp_path)} == {"campbell.csv", "campbell.json", "summary.json"}
+    with (tmp_path / "campbell.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    texts = {"label", "mode"}
+    read = [{k: v if k in texts else float(v) for k, v in row.items()} for row in rows]
+    assert read == result.rows
+    diagram = json.loads((tmp_path / "campbell.json").read_text())
+    assert diagram["rows"] == result.rows
+    assert diagram["critical_speeds"] == result.summary["critical_speeds"]
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["status"] == "done" and summary["speeds"] == 4 and summary["speeds_solved"] >= 4
+    assert set(result.branches()) == {b["label"] for b in diagram["branches"]}
+    (figure,) = plot(result, tmp_path)
+    assert figure.read_bytes().startswith(b"\x89PNG")
+
+
+def test_speeds_as_text() -> None:
+    assert parse_speeds("0:12:4") == [0.0, 4.0, 8.0, 12.0]
+    assert parse_speeds("1, 2.5,4") == [1.0, 2.5, 4.0]
+    for bad in ("", "3", "0:12", "0:12:1", "12:0:5", "1,1,2", "2,1", "a:b:c", "0:inf:3", "1,nan", "0:1:2.5"):
+        with pytest.raises(SceneError, match="--speeds") as caught:
+            parse_speeds(bad)
+        assert "first:last:number" in str(caught.value)
+
+
+def test_as_many_lines_as_meet_a_branch(unit_beam: Any) -> None:
+    """Lines 1Ω … 4Ω at most, fewer where the last speed is above all frequencies; none where none are wanted."""
+    beam = scene(unit_beam, "consistent_linear", 20, 0.0, **{"modes.count": 2})
+    assert campbell(beam, "0:5:2").summary["per_rev"] == 4
+    assert campbell(beam, "0:10.5:3").summary["per_rev"] == 3
+    assert campbell(beam, "0:5:2", orders=0).summary["critical_speeds"] == []

@@ -1,0 +1,195 @@
+"""Effects: what is off leaves no term behind, "auto" is what the scene needs, and dropping one has its consequence."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import ufl
+
+from rotfem import Scene, run
+from rotfem.affine import AffineSystem
+from rotfem.scene import EFFECTS
+from rotfem.system import Model, integral_count
+
+Array = npt.NDArray[np.float64]
+
+#: A scene that has data for every effect of a prescribed motion.
+ALL: dict[str, Any] = {
+    "structure.damping.kelvin_voigt": 0.01,
+    "structure.tip_mass": 0.2,
+    "motion": {"type": "spin_up", "speed": 3.0, "duration": 1.0, "base_acceleration": [0.2, 0.1]},
+    "loads.gravity": [0.0, -0.3],
+}
+PRESENT = tuple(name for name in EFFECTS if name != "hub_coupling")
+TIME = {"end": 0.02, "step": 0.01}
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+@pytest.mark.parametrize("name", PRESENT)
+def test_an_effect_that_is_off_leaves_nothing_behind(unit_beam: Any, theory: str, name: str) -> None:
+    """Model without the effect: its term, its body and its frame constant are gone, and no other."""
+    scene = unit_beam(ALL | {"model.theory": theory, "mesh.degree": 1})
+    assert scene.effective_effects() == PRESENT
+    full = Model(scene)
+    less = Model(scene.replace({"model.effects": [e for e in PRESENT if e != name]}))
+    assert less.effects == tuple(e for e in PRESENT if e != name)
+    if name in ("rotary_inertia", "tip_mass"):
+        assert len(less.bodies) == len(full.bodies) - 1
+        assert set(less.terms) == set(full.terms)
+    else:
+        assert set(full.terms) - set(less.terms) == {name}
+        assert len(less.bodies) == len(full.bodies)
+    used = {"euler": {"dw"}, "base": {"a_o"}, "gravity": {"gravity"}}.get(name, set())
+    assert set(full.frame.constants) - set(less.frame.constants) == used
+    both = Model(scene.replace({"model.effects": [e for e in PRESENT if e not in ("coriolis", "centrifugal")]}))
+    assert "w" not in both.frame.constants
+
+
+def counts(model: Model) -> tuple[int, int]:
+    """Return the numbers of integrals in the residual and in its tangent."""
+    F, k = model.residual, model.structure.k
+    du = ufl.TrialFunction(model.structure.V)
+    return integral_count(F), integral_count(sum(ufl.derivative(F, x, du) for x in (k.q, k.v, k.a)))
+
+
+@pytest.mark.parametrize("name", PRESENT)
+def test_an_effect_that_is_off_leaves_no_integral(unit_beam: Any, name: str) -> None:
+    scene = unit_beam(ALL | {"mesh.degree": 1})
+    full = counts(Model(scene))
+    less = counts(Model(scene.replace({"model.effects": [e for e in PRESENT if e != name]})))
+    assert less[0] < full[0]
+    if name in ("base", "gravity"):  # forces that do not depend on q are not in the tangent anyway
+        assert less[1] == full[1]
+    else:
+        assert less[1] < full[1]
+
+
+def test_summary_states_the_integrals(unit_beam: Any) -> None:
+    """Three strains and one inertia are the least; rotary inertia adds one; what is stated is what is there."""
+    for effects, expected in (([], 4), (["rotary_inertia"], 5), ("auto", 5)):
+        scene = unit_beam({"model.effects": effects, "mesh.degree": 1}, time=TIME)
+        stated = run(scene).summary["integrals"]
+        assert (stated["F"], stated["J"]) == counts(Model(scene))
+        assert stated["F"] == expected
+
+
+def test_pieces_of_a_linear_theory(unit_beam: Any) -> None:
+    """A linear theory has integrals and pieces for each operator of each effect; what is off is missing in both."""
+    scene = unit_beam({"model.theory": "consistent_linear", "motion": ALL["motion"], "mesh.degree": 1})
+    full = AffineSystem(Model(scene))
+    less = AffineSystem(Model(scene.replace({"model.effects": ["rotary_inertia"]})))
+    assert less.integrals["J"] < full.integrals["J"]
+    # stiffness, and mass of the axis and of its director
+    assert [(p.kind, p.key) for p in less.pieces] == [("K", ()), ("M", ())]
+    constants = {name for p in full.pieces for name, _ in p.key}
+    assert constants == {"w", "dw", "a_o"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "effects"),
+    [
+        ({}, {"rotary_inertia"}),
+        ({"motion": {"type": "constant", "speed": 1.0}}, {"coriolis", "centrifugal", "rotary_inertia"}),
+        (
+            {"motion": {"type": "spin_up", "speed": 1.0, "duration": 1.0}},
+            {"coriolis", "centrifugal", "euler", "rotary_inertia"},
+        ),
+        ({"structure.section.rotary_inertia": 0.0}, set()),
+        ({"structure.tip_mass": 0.1}, {"rotary_inertia", "tip_mass"}),
+        ({"loads.gravity": [0.0, -1.0]}, {"rotary_inertia", "gravity"}),
+        ({"structure.damping.rayleigh": [0.1, 0.0]}, {"rotary_inertia", "damping"}),
+        ({"motion.base_acceleration": [0.0, 1.0]}, {"rotary_inertia", "base"}),
+    ],
+)
+def test_auto_is_what_the_scene_makes_non_zero(unit_beam: Any, changes: dict[str, Any], effects: set[str]) -> None:
+    model = Model(unit_beam({**changes, "mesh": {"elements": 2, "degree": 1}}))
+    assert set(model.effects) == effects
+    assert set(model.terms) == {"internal", "inertia"} | (effects - {"rotary_inertia", "tip_mass"})
+    assert len(model.bodies) == 1 + len(effects & {"rotary_inertia", "tip_mass"})
+
+
+def test_auto_drops_nothing_that_matters(unit_beam: Any) -> None:
+    """All effects asked for by name give the same history as "auto", to the last digit."""
+    for changes in ({}, {"motion": {"type": "spin_up", "speed": 2.0, "duration": 1.0}}):
+        auto, everything = (
+            run(unit_beam({**changes, "model.effects": e}, time={"end": 0.1, "step": 0.01})).history
+            for e in ("auto", list(PRESENT))
+        )
+        for name in auto:
+            np.testing.assert_array_equal(auto[name], everything[name])
+
+
+# --- consequences ----------------------------------------------------------------------------------------------------
+
+
+def tip(scene: Scene) -> dict[str, Array]:
+    return run(scene).history
+
+
+def test_without_euler_force_a_spin_up_does_not_bend(unit_beam: Any) -> None:
+    """Only Ω̇ bends a beam that starts straight: without it u2 stays zero to round-off."""
+    tables = {"motion": {"type": "spin_up", "speed": 1.0, "duration": 1.0}, "time": {"end": 0.5, "step": 0.01}}
+    with_it = tip(unit_beam({}, **tables))
+    without = tip(unit_beam({"model.effects": ["centrifugal", "rotary_inertia"]}, **tables))
+    assert np.max(np.abs(with_it["tip_u2"])) > 1e-2
+    assert np.max(np.abs(without["tip_u2"])) < 1e-12
+    assert np.max(np.abs(without["tip_u1"])) > 1e-7  # the centrifugal force still stretches it
+
+
+def test_without_centrifugal_force_there_is_no_stretch(unit_beam: Any) -> None:
+    """Steady spin: u1 = tan(kL)/k − L with k = Ω√(A_rho/EA) = 0.1, exact; nothing without the centrifugal force."""
+    spin = {"type": "constant", "speed": 2.0}
+    k = 2.0 / 20.0
+    assert tip(unit_beam(motion=spin))["tip_u1"][-1] == pytest.approx(np.tan(k) / k - 1, rel=1e-8)
+    assert tip(unit_beam({"model.effects": ["coriolis"]}, motion=spin))["tip_u1"][-1] == 0.0
+
+
+def test_without_coriolis_force_axial_and_lateral_motion_are_apart(unit_beam: Any) -> None:
+    """Released at constant speed the axial motion bends the beam through the Coriolis force only."""
+    tables = {"motion": {"type": "constant", "speed": 2.0}, "time": {"end": 0.3, "step": 0.005}}
+    with_it = tip(unit_beam({}, **tables))
+    without = tip(unit_beam({"model.effects": ["centrifugal", "rotary_inertia"]}, **tables))
+    assert np.max(np.abs(with_it["tip_u2"])) > 1e-5
+    assert np.max(np.abs(without["tip_u2"])) < 1e-12
+    assert np.max(np.abs(without["tip_u1"])) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("gravity", {"loads.gravity": [0.0, -0.3]}),
+        ("base", {"motion.base_acceleration": [0.0, 0.3]}),
+    ],
+)
+def test_without_its_force_a_beam_at_rest_stays_straight(unit_beam: Any, name: str, changes: dict[str, Any]) -> None:
+    assert tip(unit_beam(changes))["tip_u2"][-1] < -1e-2
+    assert tip(unit_beam({**changes, "model.effects": ["rotary_inertia"]}))["tip_u2"][-1] == 0.0
+
+
+@pytest.mark.parametrize("name", ["damping", "tip_mass", "rotary_inertia"])
+def test_effects_on_a_free_vibration(unit_beam: Any, name: str) -> None:
+    """Released from a tip displacement: damping takes energy out; masses make the vibration slower."""
+    changes = {"structure.damping.rayleigh": [1.0, 0.0], "structure.tip_mass": 0.2, "initial.tip_displacement": 0.02}
+    changes |= {"structure.section.rotary_inertia": 0.02}
+    time = {"end": 1.0, "step": 0.01, "spectral_radius": 1.0}
+    names = ["rotary_inertia", "damping", "tip_mass"]
+    full = tip(unit_beam(changes, time=time))
+    less = tip(unit_beam(changes | {"model.effects": [n for n in names if n != name]}, time=time))
+    if name == "damping":
+        # 2a0 T is taken out: less than a0·t = 1 of the energy in one second, and more than a tenth of it
+        start = full["jacobi"][0]
+        assert less["jacobi"][-1] == pytest.approx(start, rel=1e-6)
+        assert 0.1 * start < start - full["jacobi"][-1] < start
+        return
+    assert first_zero(less) < first_zero(full)
+
+
+def first_zero(h: dict[str, Array]) -> float:
+    """Return the first time (s) at which tip u2 passes through zero."""
+    i = int(np.argmax(h["tip_u2"] <= 0))
+    assert i > 0
+    a, b = h["tip_u2"][i - 1 : i + 1]
+    return float(h["t"][i - 1] + (h["t"][i] - h["t"][i - 1]) * a / (a - b))

@@ -1,0 +1,442 @@
+"""Limits in which the answer is known: thin beams, circles, no spin, small motion, equivalent frames, one mode."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import scipy.linalg as sl
+from scipy.integrate import quad, solve_ivp
+from scipy.optimize import brentq
+
+from rotfem import Scene, run
+from rotfem.equilibrium import newton_for, steady_state
+from rotfem.integrators import Scheme, State, Stepper
+from rotfem.motion import smooth_spin_up
+from rotfem.system import Model, System, compile_system
+from rotfem.theories import THEORIES
+
+Array = npt.NDArray[np.float64]
+
+NONLINEAR = [name for name, theory in THEORIES.items() if not theory.linear]
+
+
+def slender(r: float, **more: float) -> dict[str, Any]:
+    """Return the section of the unit beam with radius of gyration r, as in the reference values."""
+    stiffness = {"EA": r**-2, "GA": r**-2 / 3.059, "EI": 1.0, "mass_per_length": 1.0, "rotary_inertia": r**2}
+    return {"structure.section": stiffness | more}
+
+
+def tip(scene: Scene) -> Array:
+    """Return (u1, u2, alpha) of the tip of a steady state."""
+    h = run(scene).history
+    return np.array([h[f"tip_{c}"][-1] for c in ("u1", "u2", "alpha")])
+
+
+def dense(A: Any) -> Array:
+    return np.asarray(A.convert("dense").getDenseArray()).copy()
+
+
+def first_mode(system: System, about: Array | None = None) -> tuple[float, Array]:
+    """Return (frequency, mode as local dof array with unit tip) of M, K at a state at rest, without gyroscopy."""
+    system.set_time(0.0)
+    zero = np.zeros_like(system.q.x.array)
+    system.set_state(zero if about is None else about, zero, zero)
+    M, _, K = (dense(A) for A in system.mass_damping_stiffness())
+    free = np.setdiff1d(np.arange(len(M)), system.clamped)
+    # nu = 1/omega² of M x = nu K x: the lowest mode is the largest value, so round-off leaves it alone.
+    n = len(free)
+    nu, vectors = sl.eigh(M[np.ix_(free, free)], K[np.ix_(free, free)], subset_by_index=[n - 1, n - 1])
+    mode = np.zeros(len(M))
+    mode[free] = vectors[:, 0]
+    return float(1 / np.sqrt(nu[0])), mode / system.structure.probe(mode)[1]
+
+
+# --- thin beams ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4])
+@pytest.mark.parametrize("theory", ["linear", "reissner"])
+def test_thin_limit_under_a_tip_load(unit_beam: Any, degree: int, theory: str) -> None:
+    """Exact Timoshenko beam: u2 = F(L³/3EI + L/GA_s), alpha = F L²/2EI; no locking from r/L = 1e-1 to 1e-5.
+
+    P1 leaves F L³/12EI n² whatever r is (one-point integration of the curvature, exact); from P2 on the nodes are
+    exact but for round-off, which grows as (n L/r)² times 1e-16 (the condition of the stiffness of n elements).
+    """
+    n, F = 10, 1e-4  # so small that the exact strains are linear to 1e-9
+    for r in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5):
+        changes = slender(r) | {"model.theory": theory, "mesh": {"elements": n, "degree": degree}}
+        _, u2, alpha = tip(unit_beam(changes, loads={"tip_force": [0.0, F]})) / F
+        exact = 1 / 3 + 3.059 * r**2
+        missing = 1 / (12 * n**2) if degree == 1 else 0.0
+        roundoff = 1e-12 + 2e-16 * (n / r) ** 2
+        assert u2 == pytest.approx(exact - missing, rel=2e-8 + roundoff)
+        assert alpha == pytest.approx(0.5, rel=2e-8 + roundoff)
+
+
+def test_full_integration_locks(unit_beam: Any) -> None:
+    """The test above can fail: with full integration ten P1 elements at r/L = 1e-4 hardly move."""
+    changes = slender(1e-4) | {"mesh": {"elements": 10, "degree": 1, "integration": "full"}, "model.theory": "linear"}
+    assert tip(unit_beam(changes, loads={"tip_force": [0.0, 1.0]}))[1] < 1e-3 / 3
+
+
+@pytest.mark.parametrize(
+    ("degree", "elements", "tolerance"), [(1, 64, 1e-3), (2, 10, 1e-5), (3, 8, 1e-8), (4, 6, 1e-8)]
+)
+def test_roll_up_to_a_half_circle(unit_beam: Any, degree: int, elements: int, tolerance: float) -> None:
+    """A tip moment pi EI/L bends the exact beam to a half circle of length L: the tip lies at (0, 2L/pi), exact.
+
+    P1 is a polygon whose sides are as long as their arcs: its diameter is too large by about (pi/n)²/24 in relation.
+    """
+    changes = slender(1e-4) | {"model.theory": "reissner", "mesh": {"elements": elements, "degree": degree}}
+    u1, u2, alpha = tip(unit_beam(changes, loads={"tip_moment": np.pi}))
+    assert u1 == pytest.approx(-1.0, abs=tolerance)
+    assert u2 == pytest.approx(2 / np.pi, abs=tolerance)
+    assert alpha == pytest.approx(np.pi, abs=tolerance)
+
+
+# --- large static deflection -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("F", "expected"),
+    [
+        # Mattiasson, Int. J. Num. Meth. Eng. 17 (1981) 145, elliptic integrals: −u1/L, u2/L, alpha for F L²/EI
+        (1.0, (0.05643, 0.30172, 0.46135)),
+        (10.0, (0.55500, 0.81061, 1.43029)),
+    ],
+)
+def test_elastica(unit_beam: Any, F: float, expected: tuple[float, float, float]) -> None:
+    changes = slender(1e-4) | {"model.theory": "reissner"}
+    u1, u2, alpha = tip(unit_beam(changes, loads={"tip_force": [0.0, F]}))
+    np.testing.assert_allclose([-u1, u2, alpha], expected, rtol=0, atol=1e-5)
+
+
+def elastica(F: float, follower: bool) -> Array:
+    """Return (u1, u2, alpha) at the tip of the inextensible, unshearable unit beam, integrated from the tip."""
+
+    def root(c: float) -> Array:
+        """Return (angle, curvature, x, y) at the clamp seen from a tip at angle c to the normal of the force."""
+        start, force = [c, 0.0, 0.0, 0.0], (lambda s, y: [y[1], -F * np.cos(y[0]), np.cos(y[0]), np.sin(y[0])])
+        return solve_ivp(force, (1.0, 0.0), start, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+
+    c = 0.0 if follower else brentq(lambda c: root(c)[0], 0.0, 1.5, xtol=1e-12)
+    angle, _, x, y = root(c)
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.array([-(cos * x + sin * y) - 1, -(cos * y - sin * x), c - angle])
+
+
+@pytest.mark.parametrize("kind", ["dead", "follower"])
+def test_dead_and_follower_loads(unit_beam: Any, kind: str) -> None:
+    """Against the elastica; the follower stays normal to the tip and bends the beam further."""
+    changes = slender(1e-4) | {"model.theory": "reissner"}
+    found = tip(unit_beam(changes, loads={"tip_force": {"value": [0.0, 2.0], "kind": kind}}))
+    np.testing.assert_allclose(found, elastica(2.0, kind == "follower"), rtol=0, atol=1e-6)
+    other = elastica(2.0, kind == "dead")
+    assert abs(found[1] - other[1]) > 1e-2
+
+
+def test_theories_agree_to_their_orders(unit_beam: Any) -> None:
+    """Static tip load F: u2 is odd in F, so that theories of first order differ from the exact one by F³, u1 by F²."""
+    forces = np.array([0.1, 0.05])
+    found = {
+        name: np.array([tip(unit_beam({"model.theory": name}, loads={"tip_force": [0.0, F]})) for F in forces])
+        for name in ("linear", "second_order", "von_karman", "reissner")
+    }
+    shortening = abs(found["linear"][0, 0] - found["reissner"][0, 0])
+    for name in ("linear", "second_order", "von_karman"):
+        difference = np.abs(found[name] - found["reissner"])
+        orders = np.log2(difference[0] / difference[1])
+        assert orders[1] == pytest.approx(3.0, abs=0.05)
+        assert orders[2] == pytest.approx(3.0, abs=0.05)
+        if name == "linear":
+            assert orders[0] == pytest.approx(2.0, abs=0.05)
+        elif name == "second_order":
+            assert orders[0] > 2.9
+        else:  # the elongation contains half the square of the shear strain, here 5 % of the slope
+            assert difference[0, 0] < 0.03 * shortening
+
+
+# --- tapers, tip masses -----------------------------------------------------------------------------------------------
+
+
+def test_tapered_beam_under_tip_forces(unit_beam: Any) -> None:
+    """Wedge with height 0.2 → 0.1 m: u1 = ∫F/EA, u2 = ∫F(L−x)²/EI + F/GA_s, by adaptive quadrature."""
+    E, nu, rho, width = 1e4, 0.25, 1.0, 0.3
+    section = {"E": E, "nu": nu, "rho": rho, "shape": "rectangle", "width": width, "height": [[0.0, 0.2], [1.0, 0.1]]}
+    section["shear_correction"] = 5 / 6
+
+    def height(x: float) -> float:
+        return 0.2 - 0.1 * x
+
+    G = E / (2 * (1 + nu))
+    along = quad(lambda x: 1 / (E * width * height(x)), 0, 1)[0]
+    across = quad(lambda x: (1 - x) ** 2 / (E * width * height(x) ** 3 / 12), 0, 1)[0]
+    shear = quad(lambda x: 1 / (5 / 6 * G * width * height(x)), 0, 1)[0]
+    changes = {"structure.section": section, "model.theory": "linear"}
+    u1, u2, _ = tip(unit_beam(changes, loads={"tip_force": [1.0, 0.5]}))
+    assert u1 == pytest.approx(along, rel=1e-7)
+    assert u2 == pytest.approx(0.5 * (across + shear), rel=1e-6)
+
+
+def test_taper_with_a_kink(unit_beam: Any) -> None:
+    """EI stepped over 0.01 m in the middle: nodes are put at the knots, so the integral stays exact."""
+    profile = [[0.0, 2.0], [0.5, 2.0], [0.51, 1.0], [1.0, 1.0]]
+    x, values = np.array(profile).T
+    exact = quad(lambda s: (1 - s) ** 2 / np.interp(s, x, values), 0, 1, points=list(x), epsabs=1e-13)[0]
+    changes = slender(1e-3, EI=profile) | {"model.theory": "linear"}  # type: ignore[arg-type]
+    u2 = tip(unit_beam(changes, loads={"tip_force": [0.0, 1.0]}))[1]
+    assert u2 == pytest.approx(exact + 3.059e-6, rel=1e-6)
+
+
+def test_spinning_tapered_rod(unit_beam: Any) -> None:
+    """Stretch of a tapered rod at small speed: u1(L) = ∫ N/EA, N = Ω² ∫_x^L A_rho s ds; (kL)² is 1e-6."""
+    omega = 1e-2
+    changes = slender(0.1, EA=[[0.0, 100.0], [1.0, 50.0]], mass_per_length=[[0.0, 1.0], [1.0, 0.5]])  # type: ignore[arg-type]
+    force = lambda x: quad(lambda s: (1 - 0.5 * s) * s, x, 1)[0]  # noqa: E731
+    exact = omega**2 * quad(lambda x: force(x) / (100 - 50 * x), 0, 1)[0]
+    changes |= {"model.theory": "reissner"}
+    assert tip(unit_beam(changes, motion={"type": "constant", "speed": omega}))[0] == pytest.approx(exact, rel=2e-6)
+
+
+@pytest.mark.parametrize(("mu", "J"), [(0.5, 0.0), (2.0, 0.05)])
+def test_frequency_with_a_tip_mass(unit_beam: Any, mu: float, J: float) -> None:
+    """Euler–Bernoulli beam with mass mu and inertia J at its end; own determinant of the four boundary conditions."""
+
+    def mismatch(b: float) -> float:
+        c, s, ch, sh = np.cos(b), np.sin(b), np.cosh(b), np.sinh(b)
+        # w = A (cosh − cos) + B (sinh − sin);  w''' + mu b⁴ w = 0,  w'' − J b⁴ w' = 0 at X = 1
+        shear = [b**3 * (sh - s) + mu * b**4 * (ch - c), b**3 * (ch + c) + mu * b**4 * (sh - s)]
+        moment = [b**2 * (ch + c) - J * b**5 * (sh + s), b**2 * (sh + s) - J * b**5 * (ch - c)]
+        return float(np.linalg.det([shear, moment]))
+
+    exact = brentq(mismatch, 0.5, 1.8) ** 2
+    changes = slender(1e-3) | {"structure.tip_mass": mu, "structure.tip_inertia": J, "model.theory": "linear"}
+    omega, _ = first_mode(compile_system(Model(unit_beam(changes))))
+    assert omega == pytest.approx(exact, rel=1e-5)  # shear and rotary inertia take off a few r²/L² = 1e-6
+
+
+def test_weight_of_beam_and_tip_mass(unit_beam: Any) -> None:
+    """At rest under gravity g: u2 = −g (A_rho L⁴/8EI + A_rho L²/2GA_s + m(L³/3EI + L/GA_s)), exact."""
+    g, m, GA = 0.01, 0.7, 400 / 3.059
+    changes = {"structure.tip_mass": m, "model.theory": "linear"}
+    u2 = tip(unit_beam(changes, loads={"gravity": [0.0, -g]}))[1]
+    assert u2 == pytest.approx(-g * (1 / 8 + 1 / (2 * GA) + m * (1 / 3 + 1 / GA)), rel=1e-9)
+
+
+# --- rotation --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("theory", list(THEORIES))
+@pytest.mark.parametrize(
+    ("row", "speed", "expected"),
+    [
+        # spinning_rod.csv: u1(L) = tan(kL)/k − L, k = Ω √(A_rho/EA), exact
+        ("KRB beam 6 rad/s", 6.0, 5.14317455043403e-4),
+        ("KRB 100 rad/s", 100.0, 1.45349355577063e-1),
+    ],
+)
+def test_spinning_rod(
+    spin_up: Any, reference: Callable[[str], Path], theory: str, row: str, speed: float, expected: float
+) -> None:
+    k = speed * np.sqrt(1.2 / 2.8e7)
+    assert np.tan(10 * k) / k - 10 == pytest.approx(expected, rel=1e-9)
+    u1, u2, _ = tip(spin_up({"model.theory": theory}, motion={"type": "constant", "speed": speed}))
+    assert u1 == pytest.approx(expected, rel=1e-9)
+    assert abs(u2) < 1e-10
+    with reference("spinning_rod.csv").open(newline="") as file:
+        table = {line["case"]: line for line in csv.DictReader(file)}
+    assert u1 == pytest.approx(float(table[row]["u1(L) exact"]), rel=1e-9)
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "von_karman_linear"])
+def test_without_spin_the_linear_theories_are_one(unit_beam: Any, theory: str) -> None:
+    """The prestress grows from nothing: at Ω → 0 the stiffness is that of `linear`, and leaves it as Ω²."""
+
+    def stiffness(name: str, omega: float) -> Array:
+        scene = unit_beam({"model.theory": name}, motion={"type": "constant", "speed": 1.0})
+        system = compile_system(Model(scene))
+        system.set_time(0.0, system.motion.at_speed(omega))
+        return dense(system.mass_damping_stiffness()[2])
+
+    np.testing.assert_array_equal(stiffness(theory, 0.0), stiffness("linear", 0.0))
+    far, near = (stiffness(theory, w) - stiffness("linear", w) for w in (0.2, 0.1))
+    np.testing.assert_allclose(far, 4 * near, rtol=0, atol=1e-10 * np.max(np.abs(stiffness("linear", 0.0))))
+    assert np.max(np.abs(near)) > 0
+
+
+@pytest.mark.parametrize(
+    ("linear", "nonlinear"),
+    [("consistent_linear", "reissner"), ("consistent_linear", "second_order"), ("von_karman_linear", "von_karman")],
+)
+def test_consistent_linearisation_of_a_stiff_rod(unit_beam: Any, linear: str, nonlinear: str) -> None:
+    """First frequency at 3 rad/s: it differs from that about the true steady state by the stretch, ½Ω²L²A_rho/EA."""
+    difference = {}
+    for r in (0.01, 0.005):
+        found = []
+        for theory in (linear, nonlinear):
+            scene = unit_beam(slender(r) | {"model.theory": theory}, motion={"type": "constant", "speed": 3.0})
+            system = compile_system(Model(scene))
+            q = steady_state(system, 3.0, newton_for(scene))
+            found.append(first_mode(system, q)[0])
+        difference[r] = abs(found[0] / found[1] - 1)
+    assert difference[0.01] < 2 * 4.5 * 0.01**2
+    assert difference[0.01] / difference[0.005] == pytest.approx(4.0, rel=0.05)
+
+
+def test_no_spin_is_a_common_cantilever(unit_beam: Any) -> None:
+    """First frequency of the thin cantilever at rest in every theory: 3.516015 (any text), less a few r²/L²."""
+    for theory in THEORIES:
+        omega, _ = first_mode(compile_system(Model(unit_beam(slender(1e-3) | {"model.theory": theory}))))
+        assert omega == pytest.approx(3.516015, rel=1e-5)
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+def test_rotary_inertia_may_vanish(spin_up: Any, theory: str) -> None:
+    """Without rotary inertia the mass matrix is singular; the motion is the limit of that with very little of it."""
+    time = {"end": 1.0, "step": 0.01}
+    none, little = (
+        run(spin_up({"model.theory": theory, "structure.section.rotary_inertia": value}, time=time)).history
+        for value in (0.0, 1e-9)
+    )
+    assert np.max(np.abs(none["tip_u2"])) > 1e-2
+    for column in ("tip_u1", "tip_u2", "tip_alpha"):
+        np.testing.assert_allclose(none[column], little[column], rtol=0, atol=1e-8)
+
+
+# --- damping ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("damping", "theory"),
+    [
+        ({"kelvin_voigt": 0.02}, "linear"),
+        ({"rayleigh": [0.2, 0.0]}, "linear"),
+        ({"rayleigh": [0.2, 0.03], "kelvin_voigt": 0.01}, "linear"),
+        ({"rayleigh": [0.2, 0.03], "kelvin_voigt": 0.01}, "reissner"),
+    ],
+)
+def test_decay_of_the_first_mode(unit_beam: Any, damping: dict[str, Any], theory: str) -> None:
+    """x(t) = e^(−ζωt) (cos ω_d t + ζω/ω_d sin ω_d t) with 2ζω = a0 + (a1 + eta) ω², exact."""
+    scene = unit_beam({"structure.damping": damping, "model.theory": theory})
+    system = compile_system(Model(scene))
+    omega, mode = first_mode(system)
+    a0, a1 = damping.get("rayleigh", (0.0, 0.0))
+    rate = (a0 + (a1 + damping.get("kelvin_voigt", 0.0)) * omega**2) / 2
+    damped = np.sqrt(omega**2 - rate**2)
+    amplitude, h = 1e-4, 0.005
+    stepper = Stepper(system, Scheme.newmark(), newton_for(scene))
+    state: State = stepper.start(0.0, amplitude * mode, np.zeros_like(mode))
+    for _ in range(800):
+        state = stepper.step(state, h)
+        x = np.exp(-rate * state.t) * (np.cos(damped * state.t) + rate / damped * np.sin(damped * state.t))
+        # the trapezoidal rule is late by ω³h²t/12
+        assert system.structure.probe(state.q)[1] / amplitude == pytest.approx(x, abs=omega**3 * h**2 * 4.0 / 12)
+    assert np.exp(-rate * state.t) < 0.7  # so there was decay to be seen
+
+
+# --- frames and forces that are the same ------------------------------------------------------------------------------
+
+TIME = {"end": 1.5, "step": 0.0025, "output_every": 20, "spectral_radius": 0.9}
+SPIN = {"type": "spin_up", "speed": 3.0, "duration": 1.0}
+
+
+def tips(scene: Scene) -> Array:
+    """Return the tip's (u1, u2, alpha) over time, shape (3, n)."""
+    h = run(scene).history
+    return np.array([h[f"tip_{c}"] for c in ("u1", "u2", "alpha")])
+
+
+@pytest.mark.parametrize(
+    "forces",
+    [
+        {"loads": {"gravity": [0.3, -0.5]}},
+        {"motion": SPIN | {"base_acceleration": [0.3, -0.5]}},
+        {"loads": {"tip_force": [0.1, 0.2]}},
+        {"loads": {"distributed": {"value": [0.1, 0.2], "kind": "follower"}}},
+    ],
+    ids=["gravity", "base", "dead", "follower"],
+)
+def test_rotating_and_inertial_frame(unit_beam: Any, forces: dict[str, Any]) -> None:
+    """The same physics in both frames; each force changes the answer by more than a hundred times the tolerance."""
+    tables = {"motion": SPIN, "time": TIME} | forces
+    changes = {"structure.hub_radius": 0.3, "structure.tip_mass": 0.1}
+    rotating, inertial = (tips(unit_beam(changes | {"model.frame": f}, **tables)) for f in ("rotating", "inertial"))
+    np.testing.assert_allclose(inertial, rotating, rtol=0, atol=5e-4)
+    plain = tips(unit_beam(changes, motion=SPIN, time=TIME))
+    assert np.max(np.abs(rotating - plain)) > 5e-2
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+def test_base_acceleration_is_minus_gravity(unit_beam: Any, theory: str) -> None:
+    """Einstein's lift, turning: a_o = −Q(psi)ᵀ g gives the same forces as gravity g, to round-off."""
+    g, angle = np.array([0.3, -0.5]), smooth_spin_up(1.0, 1.0)[2]
+
+    def lift(t: float) -> Array:
+        c, s = np.cos(angle(t)), np.sin(angle(t))
+        return -np.array([c * g[0] + s * g[1], -s * g[0] + c * g[1], 0.0])
+
+    changes = {"model.theory": theory, "structure.tip_mass": 0.1}
+    motion = SPIN | {"speed": 1.0}
+    weight = tips(unit_beam(changes, motion=motion, loads={"gravity": list(g)}, time=TIME))
+    lifted = tips(unit_beam(changes, motion=motion | {"base_acceleration": lift}, time=TIME))
+    assert np.max(np.abs(weight)) > 0.05
+    np.testing.assert_allclose(lifted, weight, rtol=0, atol=1e-9)
+
+
+def test_constant_base_acceleration_at_rest(unit_beam: Any) -> None:
+    """The same for a beam at rest, as steady states; and the consistent theories see the axial part as prestress."""
+    for theory in ("linear", "consistent_linear", "reissner"):
+        changes = {"model.theory": theory, "structure.tip_mass": 0.3}
+        weight = tip(unit_beam(changes, loads={"gravity": [0.4, -0.1]}))
+        lifted = tip(unit_beam(changes, motion={"type": "constant", "speed": 0.0, "base_acceleration": [-0.4, 0.1]}))
+        np.testing.assert_allclose(lifted, weight, rtol=1e-10, atol=1e-14)
+    up, down = (
+        tip(unit_beam({"model.theory": "consistent_linear"}, loads={"gravity": [gx, -0.1]}))[1] for gx in (0.4, -0.4)
+    )
+    assert abs(up) < 0.98 * abs(down)  # tension stiffens, compression softens
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "second_order", "reissner"])
+def test_mirror_image(unit_beam: Any, theory: str) -> None:
+    """Turning the other way gives the mirror image: u1 the same, u2 and alpha of opposite sign."""
+    time = TIME | {"end": 0.8}
+    one = tips(unit_beam({"model.theory": theory}, motion=SPIN, time=time))
+    by_speed = tips(unit_beam({"model.theory": theory}, motion=SPIN | {"speed": -3.0}, time=time))
+    by_axis = tips(unit_beam({"model.theory": theory}, motion=SPIN | {"axis": [0, 0, -1]}, time=time))
+    mirrored = one * np.array([[1.0], [-1.0], [-1.0]])
+    assert np.max(np.abs(one[1])) > 0.05
+    np.testing.assert_allclose(by_speed, mirrored, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(by_axis, mirrored, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+def test_steady_state_stays(unit_beam: Any, theory: str) -> None:
+    """A history that starts from the steady state does not leave it, in either frame."""
+    tables = {"motion": {"type": "constant", "speed": 3.0}, "loads": {"tip_force": [0.0, 0.3]}}
+    at_rest = tip(unit_beam({"model.theory": theory}, **tables))
+    time = {"end": 0.5, "step": 0.005, "spectral_radius": 1.0}
+    moving = tips(unit_beam({"model.theory": theory}, **tables, time=time, initial={"state": "steady"}))
+    np.testing.assert_allclose(moving, np.repeat(at_rest[:, None], moving.shape[1], axis=1), rtol=0, atol=1e-9)
+
+
+def test_initial_tip_displacement(unit_beam: Any) -> None:
+    """The initial shape is that of a static tip force: F from the exact u2(F), which is then released from rest."""
+    for theory in ("linear", "reissner"):
+        time = {"end": 0.01, "step": 0.01}
+        h = run(unit_beam({"model.theory": theory}, initial={"tip_displacement": 0.2}, time=time)).history
+        start = [h[f"tip_{c}"][0] for c in ("u1", "u2", "alpha")]
+        assert start[1] == pytest.approx(0.2, abs=1e-10)
+        load = brentq(
+            lambda F, theory=theory: tip(unit_beam({"model.theory": theory}, loads={"tip_force": [0.0, F]}))[1] - 0.2,
+            0.5,
+            0.7,
+        )
+        held = tip(unit_beam({"model.theory": theory}, loads={"tip_force": [0.0, load]}))
+        np.testing.assert_allclose(start, held, rtol=0, atol=1e-8)
+        assert h["kinetic"][0] == 0.0

@@ -1,0 +1,484 @@
+"""Modes of the planar beam: reference frequencies, theorems on spectrum and left vectors, instabilities, self-checks.
+
+The reference values are of spectral codes. The model `spectral` below, Legendre–Galerkin in (u1, u2, alpha), shares
+nothing with the finite elements; it is checked against those values and then serves where there are none.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import scipy.linalg as sl
+from numpy.polynomial import legendre
+from scipy.io import mmread
+from scipy.optimize import brentq, minimize_scalar, newton
+
+from rotfem import ComputationError, Scene, SceneError, modes, pencil
+from rotfem.affine import AffineSystem
+from rotfem.campbell import campbell
+from rotfem.equilibrium import critical_speed
+from rotfem.modes import ModalAnalysis, linearisation_error
+from rotfem.results import ModesResult
+from rotfem.state_space import write_matrices
+
+Array = npt.NDArray[Any]
+
+#: Name of the linearisation in the reference values, and here.
+GEO = {"svq": "consistent_linear", "vk": "von_karman_linear", "exact": "reissner", "exactvk": "von_karman"}
+
+#: 16 elements of degree 3, as by default: 145 unknowns without the clamp's.
+MESH = {"elements": 16, "degree": 3}
+
+
+def section(r: float, **more: float) -> dict[str, float]:
+    """Return the section of the unit beam with radius of gyration r, as in the reference values."""
+    return {"EA": r**-2, "GA": r**-2 / 3.059, "EI": 1.0, "mass_per_length": 1.0, "rotary_inertia": r**2} | more
+
+
+def frequencies(result: ModesResult) -> Array:
+    return np.array([row["frequency"] for row in result.rows])
+
+
+def table(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+# --- the spectral model ----------------------------------------------------------------------------------------------
+
+
+def spectral(
+    theory: str, s: dict[str, float], length: float, radius: float, speed: float, coriolis: bool = True
+) -> Array:
+    """Return eigenvalues λ of a uniform beam about its straight steady state, upper half plane, by size.
+
+    With e = u1' and N of that state, the second variation of the stored energy is
+    ∫ EA u1'² + GA (u2' − c α)² + EI α'² + N Γ, with Γ the quadratic part of the axial strain and c = 1 + e or 1.
+    """
+    count, points = 18, 48
+    t, w = legendre.leggauss(points)
+    X, w = length * (t + 1) / 2, w * length / 2
+    series = [legendre.legmul([0.5, 0.5], np.eye(k + 1)[k]) for k in range(count)]
+    f = np.array([legendre.legval(t, c) for c in series])
+    df = np.array([legendre.legval(t, legendre.legder(c)) for c in series]) * 2 / length
+    m, J = s["mass_per_length"], s["rotary_inertia"]
+    if theory in ("linear", "consistent_linear", "von_karman_linear"):  # about the undeformed state
+        e = np.zeros(points)
+        N = m * speed**2 * (radius * (length - X) + (length**2 - X**2) / 2) * (theory != "linear")
+    else:  # EA u'' + m Ω² (R + X + u) = 0
+        k = max(speed, 1e-9) * np.sqrt(m / s["EA"])
+        b = (1 + radius * k * np.sin(k * length)) / (k * np.cos(k * length))
+        e = k * (b * np.cos(k * X) - radius * np.sin(k * X)) - 1
+        N = s["EA"] * e
+    c = 1 + e if theory in ("reissner", "second_order") else np.ones(points)
+
+    def product(a: Array, b: Array, weight: Any) -> Array:
+        return (a * (weight * w)) @ b.T
+
+    zero = np.zeros((count, count))
+    mass, cross = product(f, f, m), product(df, f, -s["GA"] * c)
+    slope, square = product(df, df, s["GA"]), product(f, f, s["GA"] * c**2) + product(df, df, s["EI"])
+    if "von_karman" in theory:  # Γ = u2'²/(1 + e)
+        slope = slope + product(df, df, N / (1 + e))
+    elif theory != "linear":  # Γ = 2 α u2' − (1 + e) α², its last factor 1 to second order
+        cross = cross + product(df, f, N)
+        square = square - product(f, f, N * (1 + e if theory == "reissner" else 1))
+    axial = product(df, df, s["EA"]) - speed**2 * mass
+    M = sl.block_diag(mass, mass, product(f, f, J))
+    K = np.block([[axial, zero, zero], [zero, slope - speed**2 * mass, cross], [zero, cross.T, square]])
+    C = np.zeros_like(M)
+    if coriolis:
+        C[:count, count : 2 * count], C[count : 2 * count, :count] = -2 * speed * mass, 2 * speed * mass
+    return state_space_eigenvalues(M, C, K)
+
+
+def state_space_eigenvalues(M: Array, C: Array, K: Array) -> Array:
+    """Return λ of (λ M_z + K_z) Y = 0, the form ICCIA (21), (22); with Im λ > 0 or λ real and positive, by size."""
+    zero, one = np.zeros_like(M), np.eye(len(M))
+    M_z, K_z = np.block([[M, zero], [zero, one]]), np.block([[C, K], [-one, zero]])
+    mu = sl.eigvals(-M_z, K_z)  # 1/λ: the wanted ones are the largest, so round-off leaves them alone
+    values = 1 / mu[np.abs(mu) > 1e-12 * np.abs(mu).max()]
+    real = np.abs(values.imag) < 1e-8 * np.abs(values)
+    values = np.where(real, values.real, values)
+    upper = values[np.where(real, values.real > 0, values.imag > 0)]
+    return upper[np.argsort(np.abs(upper))]
+
+
+def transverse(eta: float, delta: float) -> Array:
+    """Return the first lag frequencies of the Euler–Bernoulli unit beam without extension, hub radius delta."""
+    t, w = legendre.leggauss(48)
+    X, w = (t + 1) / 2, w / 2
+    clamped = legendre.legmul([0.5, 0.5], [0.5, 0.5])
+    series = [legendre.legmul(clamped, np.eye(k + 1)[k]) for k in range(16)]
+    f, df, ddf = (np.array([2.0**d * legendre.legval(t, legendre.legder(c, d)) for c in series]) for d in range(3))
+    M, N = (f * w) @ f.T, eta**2 * (delta * (1 - X) + (1 - X**2) / 2)
+    K = (ddf * w) @ ddf.T + (df * (w * N)) @ df.T - eta**2 * M
+    return np.sqrt(sl.eigh(K, M, eigvals_only=True)[:3])
+
+
+def test_spectral_models_give_the_reference_values(reference: Callable[[str], Path]) -> None:
+    """All digits of the files; from other programs."""
+    for row in table(reference("timoshenko_rotating.csv")):
+        if row["dir"] == "lag":
+            values = spectral(
+                GEO[row["geo"]], section(1 / 30), 1.0, 0.0, float(row["eta"]), coriolis=row["coriolis"] == "1"
+            )
+            np.testing.assert_allclose(values.imag[:4], [float(row[f"w{i}"]) for i in range(1, 5)], rtol=1e-9)
+    for row in table(reference("euler_bernoulli_rotating.csv")):
+        expected = [float(row[f"lag{i}"]) for i in range(1, 4)]
+        np.testing.assert_allclose(transverse(float(row["eta"]), float(row["delta"])), expected, rtol=1e-9)
+
+
+# --- A to D: frequencies ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("delta", [0.0, 1.0, 5.0])
+@pytest.mark.parametrize("theory", ["consistent_linear", "von_karman_linear", "reissner"])
+def test_euler_bernoulli_limit(unit_beam: Any, theory: str, delta: float) -> None:
+    """r/L = 1e-4: the first three lag frequencies of the beam without shear, extension and rotary inertia."""
+    changes = {"structure.section": section(1e-4), "structure.hub_radius": delta, "model.theory": theory}
+    analysis = ModalAnalysis(unit_beam(changes, mesh=MESH), sweep=True)
+    q, worst = None, 0.0
+    for eta in (0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0):
+        spinning = analysis.at(eta, 3, q)
+        q = spinning.q
+        expected = transverse(eta, delta)
+        worst = max(worst, float(np.max(np.abs(spinning.pairs.values.imag[:3] / expected - 1))))
+        assert analysis.names(spinning)[:3] == ["lag 1", "lag 2", "lag 3"]
+    print(f"A {theory} delta={delta:g}: {worst:.1e}")
+    assert worst < 1e-5
+
+
+@pytest.mark.parametrize("coriolis", [True, False])
+@pytest.mark.parametrize("geo", list(GEO))
+def test_timoshenko_beam(unit_beam: Any, reference: Callable[[str], Path], geo: str, coriolis: bool) -> None:
+    """r/L = 1/30, eta = 0 … 12: lag and axial modes, four of them."""
+    effects = ["coriolis"] * coriolis + ["centrifugal", "rotary_inertia"]
+    changes = {"structure.section": section(1 / 30), "model.theory": GEO[geo], "model.effects": effects}
+    analysis = ModalAnalysis(unit_beam(changes, mesh=MESH), sweep=True)
+    rows = table(reference("timoshenko_rotating.csv"))
+    rows = [r for r in rows if r["dir"] == "lag" and r["geo"] == geo and r["coriolis"] == str(int(coriolis))]
+    assert len(rows) == 4
+    worst = 0.0
+    for row in rows:
+        spinning = analysis.at(float(row["eta"]), 4)
+        expected = np.array([float(row[f"w{i}"]) for i in range(1, 5)])
+        worst = max(worst, float(np.max(np.abs(spinning.pairs.values.imag[:4] / expected - 1))))
+    print(f"B {GEO[geo]} coriolis={coriolis}: {worst:.1e}")
+    assert worst < 1e-6
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "von_karman_linear", "second_order", "von_karman", "reissner"])
+def test_thick_beam(unit_beam: Any, theory: str) -> None:
+    """r/L = 1/10, against the spectral model; at eta = 8 the steady strain at the clamp is 0.4, with a hub 1.3."""
+    worst = 0.0
+    for delta in (0.0, 1.0):
+        changes = {"structure.section": section(0.1), "structure.hub_radius": delta, "model.theory": theory}
+        analysis = ModalAnalysis(unit_beam(changes, mesh=MESH), sweep=True)
+        for eta in (2.0, 4.0, 8.0) if delta == 0 else (2.0, 4.0):
+            expected = spectral(theory, section(0.1), 1.0, delta, eta)[:4]
+            values = analysis.at(eta, 4).pairs.values[:4]
+            worst = max(worst, float(np.max(np.abs(values / expected - 1))))
+    print(f"B 1/r=10 {theory}: {worst:.1e}")
+    assert worst < 1e-6
+
+
+ICCIA_ROWS = {
+    "Timoshenko zero-order, gyro": ("linear", True),
+    "Timoshenko one-order vk (KRB), gyro": ("von_karman_linear", True),
+    "Timoshenko one-order svq, gyro": ("consistent_linear", True),
+    "Timoshenko exact Reissner linearisation, gyro": ("reissner", True),
+    "Timoshenko exact Reissner linearisation, no gyro": ("reissner", False),
+}
+
+
+@pytest.mark.parametrize("name", list(ICCIA_ROWS))
+def test_iccia_beam(hub_beam: Any, reference: Callable[[str], Path], name: str) -> None:
+    """Its frequencies at R = 0, 1 and Ω = 0, 2, 4 from the file, at R = 2 and Ω = 8 from the spectral model."""
+    theory, coriolis = ICCIA_ROWS[name]
+    rows = [r for r in table(reference("iccia_frequencies.csv")) if r["model"] == name]
+    cases = [(float(r["R"]), float(r["Omega"]), r) for r in rows] + [
+        (1.0, 8.0, None),
+        (2.0, 2.0, None),
+        (2.0, 8.0, None),
+    ]
+    worst, analyses = 0.0, {}
+    for radius, speed, row in cases:
+        effects = ["coriolis"] * coriolis + ["centrifugal", "rotary_inertia"]
+        changes = {"structure.hub_radius": radius, "model.theory": theory, "model.effects": effects}
+        if radius not in analyses:
+            analyses[radius] = ModalAnalysis(hub_beam(changes, mesh={"elements": 24, "degree": 3}))
+        found = analyses[radius].at(speed, 4).pairs.values
+        if row is not None:
+            cells = [row["w1 rad/s"], row["w2"], row["w3"], row["w4"]]
+            expected = np.array([float(c[len("div(growth ") : -1]) if "div" in c else 1j * float(c) for c in cells])
+        else:
+            s = analyses[radius].scene.structure.section
+            properties = {name: float(value[0]) for name, value in s.at(np.zeros(1)).items()}
+            expected = spectral(theory, properties, 8.0, radius, speed, coriolis)[:4]
+        worst = max(worst, float(np.max([np.abs(found - e).min() / abs(e) for e in expected])))
+    print(f"C {name}: {worst:.1e}")
+    assert worst < 1e-6
+
+
+@pytest.mark.parametrize("theory", ["linear", "consistent_linear", "reissner"])
+def test_state_space_eigenproblem_of_iccia_22(hub_beam: Any, tmp_path: Path, theory: str) -> None:
+    """(p M_z + K_z) Y = 0 of the matrices as exported, all eigenvalues by LAPACK, against the quadratic problem."""
+    changes = {"structure.hub_radius": 1.0, "model.theory": theory, "motion": {"type": "constant", "speed": 4.0}}
+    result = modes(hub_beam(changes))
+    write_matrices(result.analysis, result.spinning, tmp_path)
+    M, C, K = (mmread(tmp_path / f"{name}.mtx").toarray() for name in "MCK")
+    expected = state_space_eigenvalues(M, C, K)[:6]
+    assert len(result.rows) == 6
+    np.testing.assert_allclose(np.sort(frequencies(result)), np.sort(expected.imag), rtol=1e-7, atol=1e-7)
+    assert max(row["growth"] for row in result.rows) == pytest.approx(expected.real.max(), abs=1e-7)
+
+
+def test_critical_speed_of_the_linear_theory(unit_beam: Any, hub_beam: Any, spin_up: Any) -> None:
+    """Its stiffness is singular where the speed meets the first frequency at rest without rotary inertia.
+
+    3.5160152685 is the first frequency of the Euler–Bernoulli cantilever, x² with 1 + cos x cosh x = 0; the shear of
+    r/L = 1e-4 takes 7e-8 of it.
+    """
+    slender = {"structure.section": section(1e-4), "model.theory": "linear"}
+    cases = [(unit_beam(slender, mesh={"elements": 6, "degree": 4}), 3.5160152685002)]
+    for make in (unit_beam, hub_beam, spin_up):
+        scene: Scene = make({"model.theory": "linear", "motion": {"type": "constant", "speed": 0.0}})
+        s = {name: float(value[0]) for name, value in scene.structure.section.at(np.zeros(1)).items()}
+        length = scene.structure.length
+        at_rest = spectral("linear", s | {"rotary_inertia": 1e-9 * s["rotary_inertia"]}, length, 0.0, 0.0)
+        cases.append((scene, float(at_rest[0].imag)))
+    for scene, expected in cases:
+        system = ModalAnalysis(scene, sweep=True).system
+        assert isinstance(system, AffineSystem)
+        static = critical_speed(system)
+        result = campbell(scene, [0.5 * expected, 0.9 * expected, 1.1 * expected], orders=1)
+        (onset,) = result.summary["instabilities"]
+        print(f"D expected {expected:.9f}, singular at {static:.9f}, unstable from {onset['speed']:.9f}")
+        assert static == pytest.approx(expected, rel=1e-6)
+        assert onset["kind"] == "static instability"
+        assert onset["speed"] == pytest.approx(expected, rel=1e-6)
+        assert any(text.startswith("static instability from") for text in result.summary["warnings"])
+
+
+def test_stiffening(hub_beam: Any) -> None:
+    """The first frequency falls to zero with `linear`, and rises with the consistent and the exact theories."""
+    speeds = np.linspace(0.0, 2.8, 8)
+    first = {}
+    for theory in ("linear", "consistent_linear", "von_karman_linear", "reissner"):
+        result = campbell(hub_beam({"model.theory": theory}), speeds, orders=0)
+        first[theory] = result.branches()["lag 1"]["frequency"]
+        assert len(first[theory]) == len(speeds)  # smooth: nothing refined
+    assert np.all(np.diff(first["linear"]) < 0) and first["linear"][-1] < 0.3 * first["linear"][0]
+    for theory in ("consistent_linear", "von_karman_linear", "reissner"):
+        assert np.all(np.diff(first[theory]) > 0)
+        np.testing.assert_allclose(first[theory], first["consistent_linear"], rtol=2e-5)
+    beyond = modes(hub_beam({"model.theory": "linear", "motion": {"type": "constant", "speed": 4.0}}))
+    assert beyond.rows[0]["stability"] == "static instability"
+    assert beyond.rows[0]["growth"] == pytest.approx(2.743576669, rel=1e-6)  # iccia_frequencies.csv
+    assert any("static instability: lag 1 grows" in text for text in beyond.summary["warnings"])
+
+
+# --- theorems --------------------------------------------------------------------------------------------------------
+
+
+def test_kelvin_voigt_damping_ratio(unit_beam: Any) -> None:
+    """At rest C = η K, so every mode has |λ| = ω and ζ = η ω/2, exact."""
+    eta = 2e-3
+    free = modes(unit_beam({"model.theory": "reissner"}))
+    damped = modes(unit_beam({"model.theory": "reissner", "structure.damping": {"kelvin_voigt": eta}}))
+    omega = frequencies(free)
+    np.testing.assert_allclose([row["damping"] for row in damped.rows], eta * omega / 2, rtol=1e-8)
+    np.testing.assert_allclose([-row["growth"] for row in damped.rows], eta * omega**2 / 2, rtol=1e-8)
+    np.testing.assert_allclose(frequencies(damped), omega * np.sqrt(1 - (eta * omega / 2) ** 2), rtol=1e-8)
+    assert all(row["stability"] == "stable" for row in damped.rows)
+    assert all(abs(row["damping"]) < 1e-10 for row in free.rows)
+
+
+def beck(P: float, square: complex) -> complex:
+    """Return the characteristic function of Beck's column (EI = A_rho = L = 1) at omega² = square.
+
+    Clamped at 0, follower compression P at 1; Beck, Z. angew. Math. Phys. 3 (1952) 225.
+    """
+    root = np.sqrt(P**2 / 4 + square + 0j)
+    a, b = np.sqrt(root - P / 2), np.sqrt(root + P / 2)
+    w = np.sqrt(square + 0j)
+    return complex(P**2 + 2 * square + 2 * square * np.cosh(a) * np.cos(b) + P * w * np.sinh(a) * np.sin(b))
+
+
+def test_follower_force_flutters(unit_beam: Any) -> None:
+    """Beck's column, non-conservative: two modes coalesce at P = 20.0509 EI/L² and one of them grows beyond."""
+
+    def critical() -> float:
+        """The largest P at which the characteristic function has a double root in omega."""
+
+        def least(P: float) -> float:
+            return float(minimize_scalar(lambda s: beck(P, s).real, bounds=(60.0, 200.0), method="bounded").fun)
+
+        return float(brentq(least, 15.0, 22.0))
+
+    P_c = critical()
+    assert P_c == pytest.approx(20.05, abs=5e-3)  # Beck 1952; Bolotin 1963 in four digits
+
+    def column(theory: str, P: float) -> ModesResult:
+        load = {"tip_force": {"value": [-P, 0.0], "kind": "follower"}}
+        changes = {"structure.section": section(1e-3), "model.theory": theory}
+        return modes(unit_beam(changes, loads=load, mesh={"elements": 8, "degree": 3}))
+
+    for theory in ("consistent_linear", "reissner"):
+        below, above = column(theory, 0.9995 * P_c), column(theory, 1.0005 * P_c)
+        assert all(row["stability"] == "stable" for row in below.rows)
+        assert [row["stability"] for row in above.rows].count("dynamic instability") == 1
+        assert any(text.startswith("dynamic instability") for text in above.summary["warnings"])
+        assert above.summary["checks"]["asymmetry_K"] > 1e-8
+        # Frequency and growth of the flutter from the complex root of the characteristic function.
+        result = column(theory, 24.0)
+        square = complex(newton(lambda s: beck(24.0, s), 120 + 40j, tol=1e-13))
+        omega = np.sqrt(square)
+        (row,) = [row for row in result.rows if row["stability"] == "dynamic instability"]
+        print(f"flutter {theory}: {row['frequency']:.6f} {row['growth']:.6f}, exact {omega}, P_c {P_c:.6f}")
+        assert row["frequency"] == pytest.approx(omega.real, rel=1e-4)
+        assert row["growth"] == pytest.approx(abs(omega.imag), rel=1e-3)
+
+
+def test_dead_compression_buckles(unit_beam: Any) -> None:
+    """A dead force is conservative: static instability from Euler's pi²/4 EI/L² on."""
+
+    def column(P: float) -> ModesResult:
+        return modes(unit_beam({"structure.section": section(1e-3)}, loads={"tip_force": [-P, 0.0]}))
+
+    euler = np.pi**2 / 4
+    assert column(0.9999 * euler).rows[0]["stability"] == "stable"
+    assert column(1.0001 * euler).rows[0]["stability"] == "static instability"
+
+
+NONCONSERVATIVE = {
+    "structure.hub_radius": 0.5,
+    "structure.damping": {"kelvin_voigt": 1e-3},
+    "loads": {"tip_force": {"value": [-1.0, 0.3], "kind": "follower"}},
+    "motion.speed": 4.0,
+}
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+@pytest.mark.parametrize("conservative", [True, False])
+def test_left_vectors(unit_beam: Any, theory: str, conservative: bool) -> None:
+    """y^H (λ² M + λ C + K) = 0, and y_i^H [(λ_i + λ_j) M + C] x_j = 0 for i ≠ j."""
+    changes = {"motion.speed": 4.0} if conservative else NONCONSERVATIVE
+    spinning = modes(unit_beam(changes | {"model.theory": theory})).spinning
+    p, pairs = spinning.pencil, spinning.pairs
+    assert p.conservative is conservative
+    transposed = [pencil.transposed(A) for A in (p.M, p.C, p.K)]
+    for j, lam in enumerate(pairs.values):
+        for operators, x, z in (((p.M, p.C, p.K), pairs.right, lam), (transposed, pairs.left, lam.conjugate())):
+            terms = [c * p.apply(A, x[:, j]) for c, A in zip((z**2, z, 1.0), operators, strict=True)]
+            assert np.linalg.norm(sum(terms)) < 1e-9 * np.linalg.norm(terms[0])
+    gram = p.gram(pairs.left, pairs.values, pairs.right, pairs.values)
+    size = np.sqrt(np.outer(np.abs(np.diag(gram)), np.abs(np.diag(gram))))
+    np.testing.assert_allclose(np.abs(gram) / size, np.eye(len(size)), atol=1e-7)
+
+
+def test_rows_and_names(unit_beam: Any) -> None:
+    """A beam at rest: lag 1 … with 0, 1, 2, … nodes, axial 1 at (pi/2) √(EA/A_rho) with all its energy in u1."""
+    result = modes(unit_beam({"structure.section": section(1 / 30)}, modes={"count": 5}))
+    assert [row["label"] for row in result.rows] == ["lag 1", "lag 2", "axial 1", "lag 3", "lag 4"]
+    axial = result.rows[2]
+    assert axial["frequency"] == pytest.approx(np.pi / 2 * 30, rel=1e-8)
+    assert axial["frequency_hz"] == pytest.approx(7.5, rel=1e-8)
+    assert axial["share_axial"] == pytest.approx(1.0, abs=1e-12)
+    for row, (title, shape) in zip(result.rows, result.shapes.items(), strict=True):
+        assert row["label"] in title
+        assert row["share_axial"] + row["share_lag"] == pytest.approx(1.0, abs=1e-12)
+        assert row["residual"] < 1e-12
+        assert max(np.max(np.hypot(shape[c], shape[f"{c}_imag"])) for c in ("u1", "u2", "alpha")) == pytest.approx(1.0)
+        assert shape["x"][0] == 0.0 and abs(shape["u2"][0]) < 1e-12
+    sine = result.shapes["mode 3: axial 1"]
+    np.testing.assert_allclose(sine["u1"], np.sin(np.pi / 2 * sine["x"]), atol=1e-6)
+
+
+def test_mixed_mode_says_so(unit_beam: Any) -> None:
+    """Where lag 2 and axial 1 veer, both share the energy, and the name holds both families."""
+    scene = unit_beam({"structure.section": section(1 / 20), "structure.hub_radius": 1.0, "motion.speed": 9.0})
+    mixed = [row for row in modes(scene).rows if "–" in row["label"]]
+    assert len(mixed) >= 2
+    for row in mixed:
+        assert {part.split(" ")[0] for part in row["label"].split("–")} == {"lag", "axial"}
+        assert max(row["share_axial"], row["share_lag"]) < 0.8
+
+
+def test_about_the_undeformed_state(unit_beam: Any) -> None:
+    """Without the steady stretch there is no stiffening: the exact theory about X = 0 is the linear one."""
+    changes = {"structure.section": section(1 / 30), "motion.speed": 3.0, "model.theory": "reissner"}
+    undeformed = modes(unit_beam(changes, modes={"about": "undeformed"}))
+    linear = modes(unit_beam(changes | {"model.theory": "linear"}))
+    steady = modes(unit_beam(changes))
+    np.testing.assert_allclose(frequencies(undeformed), frequencies(linear), rtol=1e-9)
+    assert undeformed.rows[0]["frequency"] < 0.6 * steady.rows[0]["frequency"]
+    assert undeformed.summary["about"] == "undeformed" and steady.summary["about"] == "steady"
+
+
+def test_speed_of_the_modes(hub_beam: Any) -> None:
+    """A spin-up means its final speed, with or without [time]; the inertial frame is a way to compute, not a scene."""
+    first = [
+        modes(hub_beam({"motion.speed": 2.0, "model.theory": "reissner"} | changes)).rows[0]["frequency"]
+        for changes in ({}, {"model.frame": "inertial"}, {"motion": {"type": "constant", "speed": 2.0}})
+    ]
+    np.testing.assert_allclose(first, 3.03628366179, rtol=1e-6)  # iccia_frequencies.csv
+
+
+def test_turning_gravity_is_refused(unit_beam: Any) -> None:
+    with pytest.raises(SceneError, match="loads.gravity"):
+        modes(unit_beam({"motion.speed": 1.0}, loads={"gravity": [0.0, -9.81, 0.0]}))
+
+
+# --- self-checks -----------------------------------------------------------------------------------------------------
+
+
+def test_self_checks(unit_beam: Any) -> None:
+    for theory in ("linear", "von_karman_linear", "second_order", "reissner"):
+        checks = modes(unit_beam({"motion.speed": 3.0, "model.theory": theory})).summary["checks"]
+        assert set(checks) == {"asymmetry_M", "asymmetry_C", "asymmetry_K", "spectrum", "linearisation"}
+        assert all(checks[f"asymmetry_{name}"] < 1e-14 for name in "MCK")
+        assert checks["spectrum"] < 1e-10
+        assert checks["linearisation"] < 1e-6
+    damped = modes(unit_beam(NONCONSERVATIVE)).summary["checks"]
+    assert damped["asymmetry_C"] > 1e-6 and damped["asymmetry_K"] > 1e-6 and "spectrum" not in damped
+
+
+@pytest.mark.parametrize("name", ["M", "C", "K"])
+def test_linearisation_check_sees_a_wrong_tangent(unit_beam: Any, name: str) -> None:
+    result = modes(unit_beam({"motion.speed": 3.0, "model.theory": "reissner"}))
+    getattr(result.spinning.pencil, name).scale(1.001)
+    assert linearisation_error(result.analysis, result.spinning) == pytest.approx(1e-3, rel=1e-2)
+
+
+def test_backward_error_above_the_tolerance_is_an_error(unit_beam: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pencil, "BACKWARD_TOLERANCE", 1e-20)
+    with pytest.raises(ComputationError, match="backward error"):
+        modes(unit_beam())
+
+
+def test_missing_coriolis_force_is_warned_of(unit_beam: Any) -> None:
+    effects = {"model.effects": ["centrifugal", "rotary_inertia"]}
+
+    def warned(changes: dict[str, Any]) -> bool:
+        return any("coriolis" in text for text in modes(unit_beam(changes)).summary["warnings"])
+
+    assert warned(effects | {"motion.speed": 3.0})
+    assert not warned(effects)  # at rest there is none
+    assert not warned({"motion.speed": 3.0})
+
+
+def test_results_read_back(unit_beam: Any, tmp_path: Path) -> None:
+    result = modes(unit_beam({"motion.speed": 3.0}))
+    paths = {path.name for path in result.write(tmp_path)}
+    assert paths == {"modes.csv", "mode_shapes.csv", "modes.json", "summary.json"}
+    rows = table(tmp_path / "modes.csv")
+    assert [row["label"] for row in rows] == [row["label"] for row in result.rows]
+    assert [float(row["frequency"]) for row in rows] == [row["frequency"] for row in result.rows]

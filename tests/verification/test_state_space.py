@@ -1,0 +1,140 @@
+"""The modal state-space model against the time integration, and the exported matrices against the model they are of."""
+
+from __future__ import annotations
+
+import csv
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import scipy.linalg as sl
+from scipy import signal
+from scipy.io import mmread
+from scipy.sparse import load_npz
+
+from rotfem import OutputError, modes, run
+from rotfem.state_space import state_space, write_matrices
+
+Array = npt.NDArray[np.float64]
+
+SPINNING = {"structure.hub_radius": 1.0, "motion": {"type": "constant", "speed": 6.0}, "modes.count": 6}
+OUTPUTS = ("tip_u1", "tip_u2", "tip_alpha")
+
+
+@pytest.mark.parametrize(("theory", "viscosity"), [("reissner", 1e-3), ("reissner", 0.0), ("consistent_linear", 1e-3)])
+def test_step_response(spin_up: Any, theory: str, viscosity: float) -> None:
+    """A force of 1 N across the tip at t = 0: six modes against 3000 steps of the full equations."""
+    scene = spin_up(SPINNING | {"model.theory": theory, "structure.damping": {"kelvin_voigt": viscosity}})
+    result = modes(scene)
+    model = state_space(result.analysis, result.spinning, 6)
+    load = {"table": [[0.0, 0.0, 0.0], [1e-9, 0.0, 1.0]]}
+    start = {"initial": {"state": "steady"}, "time": {"end": 6.0, "step": 0.002}}
+    history = run(scene.replace({"loads": {"tip_force": load}} | start)).history
+    t = history["t"]
+    u = np.zeros((len(t), 3))
+    u[:, model.inputs.index("tip_force_2")] = 1.0
+    _, y, _ = signal.lsim(model.system(), u, t)
+    expected = history["tip_u2"] - history["tip_u2"][0]
+    difference = np.max(np.abs(y[:, model.outputs.index("tip_u2")] - expected)) / np.max(np.abs(expected))
+    print(f"G {theory} viscosity={viscosity:g}: {100 * difference:.3f} % of {np.max(np.abs(expected)):.4f} m")
+    assert difference < 0.01
+    assert np.max(np.abs(y[0])) < 1e-12 + 0.01 * np.max(np.abs(y))
+
+
+@pytest.mark.parametrize(("given", "seen"), [("tip_force_2", "tip_alpha"), ("tip_moment", "tip_u2")])
+def test_step_response_of_moment_and_rotation(spin_up: Any, given: str, seen: str) -> None:
+    """Force to rotation and moment to deflection: 1 % of the peak too. Moment to rotation needs more modes than six."""
+    scene = spin_up(SPINNING | {"structure.damping": {"kelvin_voigt": 1e-3}, "model.theory": "reissner"})
+    result = modes(scene)
+    model = state_space(result.analysis, result.spinning, 6)
+    force = {"tip_force": {"table": [[0.0, 0.0, 0.0], [1e-9, 0.0, 1.0]]}}
+    moment = {"tip_moment": {"table": [[0.0, 0.0], [1e-9, 1.0]]}}
+    load = moment if given == "tip_moment" else force
+    start = {"initial": {"state": "steady"}, "time": {"end": 3.0, "step": 0.002}}
+    history = run(scene.replace({"loads": load} | start)).history
+    u = np.zeros((len(history["t"]), 3))
+    u[:, model.inputs.index(given)] = 1.0
+    _, y, _ = signal.lsim(model.system(), u, history["t"])
+    expected = history[seen] - history[seen][0]
+    difference = np.max(np.abs(y[:, model.outputs.index(seen)] - expected)) / np.max(np.abs(expected))
+    print(f"G {given} to {seen}: {100 * difference:.3f} % of {np.max(np.abs(expected)):.3g}")
+    assert difference < 0.01
+
+
+def test_what_scipy_makes_of_it(unit_beam: Any, tmp_path: Path) -> None:
+    """signal.StateSpace takes it; poles are the eigenvalues, the gain at zero frequency is the static answer."""
+    damped = {"structure.damping": {"kelvin_voigt": 1e-3}, "motion.speed": 3.0, "structure.hub_radius": 0.5}
+    result = modes(unit_beam(damped))
+    model = state_space(result.analysis, result.spinning, 4)
+    system = signal.StateSpace(*model.system())
+    values = result.spinning.pairs.values[:4]
+    np.testing.assert_allclose(
+        np.sort_complex(np.linalg.eigvals(system.A)), np.sort_complex([*values, *values.conj()]), rtol=1e-9
+    )
+    assert (model.A.shape, model.B.shape, model.C.shape, model.D.shape) == ((8, 8), (8, 3), (3, 8), (3, 3))
+    gain = model.D - model.C @ np.linalg.solve(model.A, model.B)
+    forces = ({"tip_force": [1e-6, 0.0]}, {"tip_force": [0.0, 1e-6]}, {"tip_moment": 1e-6})
+    at_rest = np.array([run(unit_beam(damped)).history[name][0] for name in OUTPUTS])
+    for column, load in enumerate(forces):
+        h = run(unit_beam(damped, loads=load)).history
+        static = (np.array([h[name][0] for name in OUTPUTS]) - at_rest) / 1e-6
+        np.testing.assert_allclose(gain[:, column], static, rtol=1e-5, atol=1e-7)
+    file = np.load(model.write(tmp_path / "state_space.npz"))
+    for name in "ABCD":
+        np.testing.assert_array_equal(file[name], getattr(model, name))
+    assert tuple(file["inputs"]) == ("tip_force_1", "tip_force_2", "tip_moment")
+    assert tuple(file["outputs"]) == OUTPUTS and float(file["speed"]) == 3.0
+
+
+def test_frequency_response_converges_with_the_modes(unit_beam: Any) -> None:
+    """Tip compliance (s²M + sC + K)⁻¹ at half the second frequency: what the left-out modes miss falls as 1/ω⁴."""
+    result = modes(unit_beam({"motion.speed": 3.0, "modes.count": 24}))
+    tip = result.analysis.model.structure.probe.dofs
+    s = 0.5j * result.rows[1]["frequency"]
+    p = result.spinning.pencil
+    n = p.K.getSize()[0]
+    M, C, K = (p.apply(A, np.eye(n)) for A in (p.M, p.C, p.K))
+    full = np.linalg.solve(s**2 * M + s * C + K, np.eye(n))[tip, tip]
+    errors = []
+    for count in (2, 6, 12, 24):
+        A, B, C, D = state_space(result.analysis, result.spinning, count).system()
+        reduced = C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D
+        errors.append(float(np.max(np.abs(reduced - full)) / np.max(np.abs(full))))
+    print(errors)
+    assert all(b < a for a, b in pairwise(errors)) and errors[-1] < 3e-5
+
+
+def test_unstable_mode_is_in_the_model(hub_beam: Any) -> None:
+    """A real growing eigenvalue is one state, and its pole is the growth rate."""
+    result = modes(hub_beam({"model.theory": "linear", "motion": {"type": "constant", "speed": 4.0}}))
+    model = state_space(result.analysis, result.spinning, 2)
+    assert np.max(np.linalg.eigvals(model.A).real) == pytest.approx(2.743576669, rel=1e-6)  # iccia_frequencies.csv
+
+
+def test_exported_matrices(unit_beam: Any, tmp_path: Path) -> None:
+    """Matrix Market and npz hold the same matrices, without the clamp; they give the frequencies of `modes`."""
+    scene = unit_beam({"motion.speed": 3.0, "structure.tip_mass": 0.1, "model.theory": "reissner"})
+    result = modes(scene)
+    paths = write_matrices(result.analysis, result.spinning, tmp_path)
+    names = {"M.mtx", "C.mtx", "K.mtx", "M.npz", "C.npz", "K.npz", "unknowns.csv"}
+    assert {path.name for path in paths} == names
+    M, C, K = (mmread(tmp_path / f"{name}.mtx").toarray() for name in "MCK")
+    for name, matrix in zip("MCK", (M, C, K), strict=True):
+        np.testing.assert_array_equal(load_npz(tmp_path / f"{name}.npz").toarray(), matrix)
+    zero, one = np.zeros_like(M), np.eye(len(M))
+    values = sl.eigvals(np.block([[zero, one], [-K, -C]]), np.block([[one, zero], [zero, M]]))
+    found = np.sort(values.imag[values.imag > 1e-6])[:6]
+    np.testing.assert_allclose(found, [row["frequency"] for row in result.rows], rtol=1e-7)
+    with (tmp_path / "unknowns.csv").open(newline="") as file:
+        unknowns = list(csv.DictReader(file))
+    assert [int(row["row"]) for row in unknowns] == list(range(len(M)))
+    x = np.array([float(row["x1"]) for row in unknowns])
+    assert x.min() > 0.0 and x.max() == 1.0
+    mass = np.array([row["component"] == "u2" for row in unknowns], dtype=float)
+    # A rigid translation of the beam but for its first element has less than the whole mass, 1.1, and not much less.
+    assert 1.0 < mass @ M @ mass < 1.1
+    with pytest.raises(OutputError, match="missing"):
+        write_matrices(result.analysis, result.spinning, tmp_path / "missing")
