@@ -13,15 +13,24 @@ from typing import TYPE_CHECKING, Any
 
 from rotfem.errors import ComputationError, OutputError, SceneError
 from rotfem.scene import Scene, load_scene
+from rotfem.version import __version__
 
 if TYPE_CHECKING:
     from rotfem.campbell import campbell
     from rotfem.modes import modes
     from rotfem.simulation import run
 
-__version__ = "0.1.0"
-
-__all__ = ["ComputationError", "OutputError", "Scene", "SceneError", "campbell", "load_scene", "modes", "run"]
+__all__ = [
+    "ComputationError",
+    "OutputError",
+    "Scene",
+    "SceneError",
+    "__version__",
+    "campbell",
+    "load_scene",
+    "modes",
+    "run",
+]
 
 
 def _verb(name: str, module: str) -> property:

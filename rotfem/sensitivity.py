@@ -10,6 +10,7 @@ derivatives are `ufl.derivative` and `ufl.diff` of the residual.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -57,8 +58,8 @@ class Sensitivity:
         self.structure, self.V = analysis.model.structure, analysis.system.V
         k = self.structure.k
         self.base = k.q
-        self.vectors = {name: fem.Function(self.V) for name in ("xr", "xi", "yr", "yi")}
-        self.factors = {name: self.structure.constant(0.0) for name in ("a", "b", "c", "d")}
+        self.vectors = {name: fem.Function(self.V) for name in "yx"}
+        self.factors = {name: self.structure.constant(0.0) for name in "KCM"}
         if isinstance(self.system, AffineSystem):
             self._prepare_linear(self.system)
         else:
@@ -135,21 +136,32 @@ class Sensitivity:
                 out += ufl.inner(first.force(first.value), curvature) * higher.measure
         return out
 
-    def _bilinear(self) -> dict[str, Any]:
-        """Return the real and imaginary part of y^H Q(λ) x as forms of the base state and the constants.
+    def _bilinear(self) -> Any:
+        """Return y·(k K + c C + m M) x as a form of real vectors, the base state and the constants k, c, m.
 
-        λ² = a + i b, λ = c + i d; y^H A x = (y_r·A x_r + y_i·A x_i) + i (y_r·A x_i − y_i·A x_r).
+        y^H Q(λ) x is a sum of these, see `_combinations`: so each form is differentiated once, not in four variants.
         """
-        v, f = self.vectors, self.factors
-        parts: dict[str, Any] = {}
-        for name, form in self._operators().items():
-            parts[f"{name}_re"] = form(v["yr"], v["xr"]) + form(v["yi"], v["xi"])
-            parts[f"{name}_im"] = form(v["yr"], v["xi"]) - form(v["yi"], v["xr"])
-        re = parts["K_re"] + f["c"] * parts["C_re"] - f["d"] * parts["C_im"]
-        im = parts["K_im"] + f["c"] * parts["C_im"] + f["d"] * parts["C_re"]
-        re += f["a"] * parts["M_re"] - f["b"] * parts["M_im"]
-        im += f["a"] * parts["M_im"] + f["b"] * parts["M_re"]
-        return {"re": re, "im": im}
+        y, x = self.vectors["y"], self.vectors["x"]
+        return sum(self.factors[name] * form(y, x) for name, form in self._operators().items())
+
+    def _combinations(self, j: int) -> Iterator[complex]:
+        """Write the real products that y^H Q(λ) x consists of into vectors and factors; yield what multiplies each.
+
+        y^H A x = (y_r·A x_r + y_i·A x_i) + i (y_r·A x_i − y_i·A x_r), with A = Re Q and i Im Q in turn.
+        """
+        pairs = self.spinning.pairs
+        lam, x, y = pairs.values[j], pairs.right[:, j], pairs.left[:, j]
+        powers = {"K": 1.0 + 0.0j, "C": complex(lam), "M": complex(lam * lam)}
+        products = ((y.real, x.real, 1), (y.imag, x.imag, 1), (y.real, x.imag, 1j), (y.imag, x.real, -1j))
+        for y_part, x_part, unit in products:
+            for name, part in (("y", y_part), ("x", x_part)):
+                f = self.vectors[name]
+                f.x.array[: len(part)] = part
+                f.x.scatter_forward()
+            for imaginary in (False, True):
+                for name, power in powers.items():
+                    self.factors[name].value = power.imag if imaginary else power.real
+                yield unit * (1j if imaginary else 1)
 
     # --- parameters ------------------------------------------------------------------------------------------------
 
@@ -183,26 +195,29 @@ class Sensitivity:
         equations, pencils = {}, {}
         for p in parameters:
             equations[p.name] = self._compiled_diff(self.equation, p, variable)
-            pencils[p.name] = [self._compiled_diff(self.s[part], p, variable) for part in ("re", "im")]
-        gradients = {part: fem.form(ufl.derivative(self.s[part], self.base)) for part in ("re", "im")}
+            pencils[p.name] = self._compiled_diff(self.s, p, variable)
+        gradient = fem.form(ufl.derivative(self.s, self.base))
         system = self.system
         zero = np.zeros_like(self.base_state)
         system.set_time(0.0, system.motion.at_speed(self.spinning.speed))
         solver = DirectSolver(self._base_tangent())
         out = []
         for j in modes:
-            self._write(j)
             system.set_state(self.base_state, zero, zero)
-            adjoint = [self._adjoint(gradients[part], solver) for part in ("re", "im")]
+            direct = dict.fromkeys(pencils, 0j)
+            force = np.zeros(len(self._vector(gradient).array), dtype=complex)
+            for factor in self._combinations(j):
+                force += factor * self._vector(gradient).array
+                for name, form in pencils.items():
+                    direct[name] += factor * self._scalar(form) if form is not None else 0.0
+            z = self._adjoint(force.real, solver) + 1j * self._adjoint(force.imag, solver)
             denominator = self._denominator(j)
             row = {}
             for p in parameters:
-                direct = [0.0 if f is None else self._scalar(f) for f in pencils[p.name]]
                 if equations[p.name] is not None:
-                    R_p = self._vector(equations[p.name])
-                    direct = [d - self._dot(z, R_p) for d, z in zip(direct, adjoint, strict=True)]
+                    direct[p.name] -= self._dot(z, self._vector(equations[p.name]).array)
                 unit = 1.0 if p.name == "speed" or p.value == 0.0 else p.value
-                row[p.name] = -complex(*direct) / denominator / unit
+                row[p.name] = -direct[p.name] / denominator / unit
             out.append(row)
         return out
 
@@ -221,17 +236,6 @@ class Sensitivity:
 
         return transposed(system.matrix(1.0, 0.0, 0.0, 1.0))
 
-    def _write(self, j: int) -> None:
-        pairs = self.spinning.pairs
-        lam, x, y = pairs.values[j], pairs.right[:, j], pairs.left[:, j]
-        for name, part in (("xr", x.real), ("xi", x.imag), ("yr", y.real), ("yi", y.imag)):
-            f = self.vectors[name]
-            f.x.array[: len(part)] = part
-            f.x.scatter_forward()
-        square = lam * lam
-        for name, value in (("a", square.real), ("b", square.imag), ("c", lam.real), ("d", lam.imag)):
-            self.factors[name].value = value
-
     def _denominator(self, j: int) -> complex:
         """y^H (2λ M + C) x of one pair."""
         pairs = self.spinning.pairs.select(np.array([j]))
@@ -247,14 +251,15 @@ class Sensitivity:
         b.array[self.system.clamped] = 0.0
         return b
 
-    def _adjoint(self, form: Any, solver: DirectSolver) -> Any:
-        b = self._vector(form)
+    def _adjoint(self, force: Array, solver: DirectSolver) -> Array:
+        b = compat.create_vector(self.V)
+        b.array[:] = force
         z = b.duplicate()
         solver.solve(b, z)
-        return z
+        return np.asarray(z.array.copy())
 
-    def _dot(self, z: Any, r: Any) -> float:
-        return float(self.analysis.comm.allreduce(float(np.dot(z.array, r.array))))
+    def _dot(self, z: Array, r: Array) -> complex:
+        return complex(self.analysis.comm.allreduce(complex(np.dot(z, r))))
 
 
 def sensitivities(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any]]:

@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-import rotfem
 from rotfem.affine import AffineSystem
 from rotfem.equilibrium import check_steady, critical_speed, newton_for, static_tip_shape, steady_state
 from rotfem.errors import ComputationError
@@ -23,6 +22,7 @@ from rotfem.results import RunResult, Table
 from rotfem.scene import Scene, TorqueMotion, load_scene
 from rotfem.solvers import Newton
 from rotfem.system import Model, System, compile_system
+from rotfem.version import __version__
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -341,7 +341,7 @@ def extreme(t: Array, y: Array, sign: int) -> tuple[float, float]:
 
 def versions() -> dict[str, str]:
     """Return the versions of the program and of what it computes with."""
-    out = {"rotfem": rotfem.__version__, "python": platform.python_version()}
+    out = {"rotfem": __version__, "python": platform.python_version()}
     for name in ("fenics-dolfinx", "fenics-ufl", "petsc4py", "slepc4py", "numpy", "scipy"):
         try:
             out[name.removeprefix("fenics-")] = metadata.version(name)

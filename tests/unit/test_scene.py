@@ -102,7 +102,7 @@ def test_example_scenes_effects(path: Path) -> None:
 def test_defaults_of_a_beam() -> None:
     s = scene()
     assert (s.name, s.model.theory, s.model.effects, s.model.frame) == ("test.toml", "reissner", "auto", "rotating")
-    assert s.mesh == BeamMesh(elements=10, degree=3, integration="reduced")
+    assert s.mesh == BeamMesh(elements=16, degree=3, integration="reduced")
     assert s.time is None
     assert (s.modes.count, s.modes.about) == (6, "steady")
     assert (s.solver.increment_tolerance, s.solver.max_iterations) == (1e-9, 25)
