@@ -28,7 +28,7 @@ REFERENCE = 8.8572904  # rad/s; Legendre–Galerkin with 18 functions a field, a
 
 def main(figure: Path | None = None) -> float:
     """Return the speed (rad/s) at which the first frequency is that of the rotation."""
-    result = rotfem.campbell(SCENE, "0:12:25")
+    result = rotfem.campbell(SCENE, "0:10:21")
     summary = result.summary
     say(f"{summary['speeds']} speeds asked for, {summary['speeds_solved']} solved")
     for name, branch in result.branches().items():

@@ -219,7 +219,7 @@ class Stepper:
     def _predict(self, state: State, h: float) -> State:
         """Return the step that keeps q̈, which is free of residual when the acceleration is constant."""
         p = self.scheme
-        auxiliary = (state.a - p.alpha_m * state.auxiliary) / (1 - p.alpha_m)
+        auxiliary: Array = np.divide(state.a - p.alpha_m * state.auxiliary, 1 - p.alpha_m, dtype=np.float64)
         q = state.q + h * state.v + h * h * ((0.5 - p.beta) * state.auxiliary + p.beta * auxiliary)
         v = state.v + h * ((1 - p.gamma) * state.auxiliary + p.gamma * auxiliary)
         new = State(state.t + h, q, v, state.a.copy(), auxiliary)

@@ -18,6 +18,7 @@ from mpi4py import MPI
 
 from rotfem.affine import AffineSystem
 from rotfem.equilibrium import check_steady, newton_for, steady_state
+from rotfem.errors import SceneError
 from rotfem.hub import Hub
 from rotfem.pencil import SAME, ZERO, Eigenpairs, Pencil
 from rotfem.results import ModesResult
@@ -96,10 +97,21 @@ class ModalAnalysis:
         t3 = perf_counter()
         for name, span in (("equilibrium", t1 - t0), ("assemble", t2 - t1), ("eigen", t3 - t2)):
             self.seconds[name] += span
+        # A PETSc matrix must not outlive the mesh it was made on: their communicator goes with the mesh.
+        clamped.owner = pencil.owner = self
         if self.hub is None:
             return Spinning(speed, q, pencil, pairs, clamped)
         flexible = np.flatnonzero(np.abs(pairs.values) > ZERO * np.median(np.abs(pairs.values)))
         return Spinning(speed, q, pencil, pairs.select(flexible), clamped, rigid=len(flexible) < len(pairs.values))
+
+    def needs_fixed_hub(self, what: str) -> None:
+        """Refuse what is not there for a free hub.
+
+        Raises:
+            SceneError: the hub is free.
+        """
+        if self.hub is not None:
+            raise SceneError(self.scene.file, "motion.type", "torque", f"{what} cannot be computed for a free hub yet")
 
     def equilibrium(self, speed: float, start: Array | None = None) -> Array:
         """Return the state the modes are about, left in the system's functions: steady, or undeformed."""
@@ -186,9 +198,10 @@ def modes(
     rows = mode_rows(analysis, spinning)
     checks = self_checks(analysis, spinning)
     warnings = [*advice(analysis, speed), *instabilities(rows)]
-    shapes = {f"mode {i + 1}: {row['label']}": scaled_shape(analysis, spinning, i) for i, row in enumerate(rows)}
+    rows = [{**row, "mode": row["mode"] + spinning.rigid} for row in rows]
+    shapes = {f"mode {row['mode']}: {row['label']}": scaled_shape(analysis, spinning, i) for i, row in enumerate(rows)}
     if spinning.rigid:
-        rows = [rigid_row(rows), *({**row, "mode": row["mode"] + 1} for row in rows)]
+        rows = [rigid_row(rows), *rows]
     total = perf_counter() - started
     summary: dict[str, Any] = {
         "command": "modes",

@@ -66,10 +66,14 @@ class Pencil:
 
     Args:
         M: mass, C: gyroscopic and damping, K: stiffness matrix.
+
+    Attributes:
+        owner: kept alive with the matrices.
     """
 
     def __init__(self, M: Any, C: Any, K: Any):
         self.M, self.C, self.K = M, C, K
+        self.owner: Any = None
         self.comm: MPI.Comm = M.comm.tompi4py()
         self._x, self._y = K.createVecs()
         self._smallest = 1.0

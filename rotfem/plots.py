@@ -72,8 +72,9 @@ def shape_figure(result: RunResult, title: str) -> Figure:
 def shapes_figure(result: ModesResult) -> Figure:
     """Return the shapes of all modes along the structure, largest component 1; imaginary parts dashed."""
     shapes = result.shapes
+    rows = result.rows[len(result.rows) - len(shapes) :]  # a rigid-body mode comes first and has no shape
     figure = Figure(figsize=(9, 1.7 * len(shapes) + 0.8))
-    for i, ((title, columns), row) in enumerate(zip(shapes.items(), result.rows, strict=True), start=1):
+    for i, ((title, columns), row) in enumerate(zip(shapes.items(), rows, strict=True), start=1):
         axis = figure.add_subplot(len(shapes), 1, i)
         names = [name for name in columns if name != "x" and not name.endswith("_imag")]
         for c, name in enumerate(names):

@@ -267,7 +267,11 @@ def sensitivities(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str,
 
     Rows hold `mode` (from 1), `parameter`, `value`, `dfrequency` (rad/s per unit), `dgrowth` (1/s per unit) and
     `relative`.
+
+    Raises:
+        SceneError: the hub is free.
     """
+    analysis.needs_fixed_hub("sensitivities")
     study = Sensitivity(analysis, spinning)
     values = {p.name: p.value for p in study.parameters()}
     rows = []

@@ -51,8 +51,8 @@ def rectangle(width: Array, height: Array, nu: Array) -> Geometry:
     series = np.sum(np.tanh(_ODD * np.pi * (a / (2.0 * b))[..., None]) / _ODD**5, axis=-1)
     return Geometry(
         area=width * height,
-        second_moment2=width * height**3 / 12.0,
-        second_moment3=height * width**3 / 12.0,
+        second_moment2=np.asarray(width * height**3 / 12.0, dtype=np.float64),
+        second_moment3=np.asarray(height * width**3 / 12.0, dtype=np.float64),
         torsion_constant=a * b**3 / 3.0 * (1.0 - 192.0 / np.pi**5 * (b / a) * series),
         shear_correction=10.0 * (1.0 + nu) / (12.0 + 11.0 * nu),
     )

@@ -149,10 +149,11 @@ def write_matrices(analysis: ModalAnalysis, spinning: Spinning, folder: Path) ->
 
 
 def serial(analysis: ModalAnalysis, what: str) -> None:
-    """Refuse to gather a distributed system.
+    """Refuse to gather a distributed system, and a free hub, whose angle is no unknown of the mesh.
 
     Raises:
-        SceneError: there is more than one process.
+        SceneError: there is more than one process, or the hub is free.
     """
+    analysis.needs_fixed_hub(what)
     if analysis.comm.size > 1:
         raise SceneError("command line", "mpirun -n", analysis.comm.size, f"{what} needs one process")

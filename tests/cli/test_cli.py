@@ -161,13 +161,7 @@ def test_run_writes_its_results(rotfem: Run, here: Path) -> None:
     assert summary["status"] == "done" and summary["steps"] == 50
     assert summary["effects"] == ["coriolis", "centrifugal", "euler", "rotary_inertia"]
     assert summary["scene"]["structure"]["length"] == 10.0
-    assert {"rotfem", "python", "dolfinx"} >= set(summary["versions"]) - {
-        "ufl",
-        "petsc4py",
-        "slepc4py",
-        "numpy",
-        "scipy",
-    }
+    assert {"rotfem", "python", "numpy"} <= set(summary["versions"])
 
 
 def test_json_is_all_there_is_on_stdout(rotfem: Run, here: Path) -> None:

@@ -7,6 +7,7 @@ nothing with the finite elements; it is checked against those values and then se
 from __future__ import annotations
 
 import csv
+import gc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -24,8 +25,9 @@ from rotfem.affine import AffineSystem
 from rotfem.campbell import campbell
 from rotfem.equilibrium import critical_speed
 from rotfem.modes import ModalAnalysis, linearisation_error
+from rotfem.plots import plot
 from rotfem.results import ModesResult
-from rotfem.state_space import write_matrices
+from rotfem.state_space import state_space, write_matrices
 
 Array = npt.NDArray[Any]
 
@@ -371,8 +373,8 @@ NONCONSERVATIVE = {
 def test_left_vectors(unit_beam: Any, theory: str, conservative: bool) -> None:
     """y^H (λ² M + λ C + K) = 0, and y_i^H [(λ_i + λ_j) M + C] x_j = 0 for i ≠ j."""
     changes = {"motion.speed": 4.0} if conservative else NONCONSERVATIVE
-    spinning = modes(unit_beam(changes | {"model.theory": theory})).spinning
-    p, pairs = spinning.pencil, spinning.pairs
+    result = modes(unit_beam(changes | {"model.theory": theory}))
+    p, pairs = result.spinning.pencil, result.spinning.pairs
     assert p.conservative is conservative
     transposed = [pencil.transposed(A) for A in (p.M, p.C, p.K)]
     for j, lam in enumerate(pairs.values):
@@ -435,6 +437,31 @@ def test_speed_of_the_modes(hub_beam: Any) -> None:
 def test_turning_gravity_is_refused(unit_beam: Any) -> None:
     with pytest.raises(SceneError, match="loads.gravity"):
         modes(unit_beam({"motion.speed": 1.0}, loads={"gravity": [0.0, -9.81, 0.0]}))
+
+
+def test_free_hub(unit_beam: Any, tmp_path: Path) -> None:
+    """Its rigid-body mode is the first row and has no shape; what is not there for a free hub is refused."""
+    torque = {"type": "torque", "hub_inertia": 1.0, "pulses": [[0.0, 0.1, 1.0]]}
+    result = modes(unit_beam(motion=torque, modes={"count": 3}))
+    assert [row["mode"] for row in result.rows] == [1, 2, 3]
+    assert [row["label"] for row in result.rows] == ["rigid body", "lag 1", "lag 2"]
+    assert list(result.shapes) == ["mode 2: lag 1", "mode 3: lag 2"]
+    assert plot(result, tmp_path)[0].is_file()
+    for refused in (
+        lambda: modes(unit_beam(motion=torque), sensitivities=True),
+        lambda: write_matrices(result.analysis, result.spinning, tmp_path),
+        lambda: state_space(result.analysis, result.spinning, 2),
+    ):
+        with pytest.raises(SceneError, match="free hub"):
+            refused()
+
+
+def test_pencil_outlives_its_result(unit_beam: Any) -> None:
+    """PETSc matrices need the communicator of the mesh they were made on, so they keep it."""
+    pencils = [modes(unit_beam({"motion.speed": speed})).spinning.pencil for speed in (0.0, 3.0)]
+    gc.collect()
+    at_rest, spinning = (p.solve(2).values[0].imag for p in pencils)
+    assert at_rest < spinning
 
 
 # --- self-checks -----------------------------------------------------------------------------------------------------
