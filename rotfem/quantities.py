@@ -45,7 +45,7 @@ def did_you_mean(name: object, names: Iterable[str]) -> str:
 class SceneModel(BaseModel):
     """A table of the scene: immutable, and unknown or missing keys are errors that say what is allowed."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
     @model_validator(mode="before")
     @classmethod

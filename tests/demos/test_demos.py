@@ -34,6 +34,8 @@ NUMBERS = [
     ("theory_ladder", 0.106966, 1e-4),  # %: 0.574448569/0.573834759 − 1
     ("iccia_hub_beam", -0.66008, 2e-4),  # m: Legendre–Ritz, known to about 3e-5; the demo gives −0.66003
     ("torque_pulse", -0.0143691, 1e-5),  # m: Legendre–Ritz with 10 and 13 functions differ by 2e-7
+    ("campbell", 8.8572904, 1e-6),  # rad/s: Legendre–Galerkin in (u1, u2, alpha) about the exact stretched state
+    ("iccia_precise_model", 25.88822, 2e-3),  # %: Legendre–Ritz without shear, 8.079190/6.417749 − 1
     ("steady_state", 0.145349355577063, 1e-12),  # m: sin(kL)/(k cos kL) − L at 100 rad/s
 ]
 

