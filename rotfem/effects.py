@@ -24,22 +24,23 @@ Acceleration = Callable[[Body, Kinematics, Frame], Any]
 
 def inertia(body: Body, k: Kinematics, frame: Frame) -> Any:
     """ẍ, the acceleration relative to the frame."""
-    return k.second_rate(body.x)
+    return body.second_rate(k)
 
 
 def coriolis(body: Body, k: Kinematics, frame: Frame) -> Any:
     """2 w×ẋ."""
-    return 2 * cross(frame.w, k.rate(body.x))
+    return 2 * cross(body.resolve(frame.w), body.rate(k))
 
 
 def centrifugal(body: Body, k: Kinematics, frame: Frame) -> Any:
     """w×(w×x)."""
-    return cross(frame.w, cross(frame.w, body.x))
+    w = body.resolve(frame.w)
+    return cross(w, cross(w, body.x))
 
 
 def euler(body: Body, k: Kinematics, frame: Frame) -> Any:
     """ẇ×x."""
-    return cross(frame.dw, body.x)
+    return cross(body.resolve(frame.dw), body.x)
 
 
 def base(body: Body, k: Kinematics, frame: Frame) -> Any:
@@ -70,7 +71,7 @@ def virtual_work(name: str, bodies: list[Body], k: Kinematics, frame: Frame) -> 
     for body in bodies:
         a = acceleration(body, k, frame)
         if a is not None:
-            work += body.density * ufl.inner(a, k.variation(body.x)) * body.measure
+            work += body.density * ufl.inner(a, body.variation(k)) * body.measure
     return work
 
 
@@ -84,10 +85,10 @@ def damping(strains: list[Strain], bodies: list[Body], k: Kinematics, coefficien
     if eta is not None:
         work += sum(ufl.inner(eta * s.force(k.rate(s.value)), k.variation(s.value)) * s.measure for s in strains)
     if a0 is not None:
-        work += sum(a0 * b.density * ufl.inner(k.rate(b.x), k.variation(b.x)) * b.measure for b in bodies)
+        work += sum(a0 * b.density * ufl.inner(b.rate(k), b.variation(k)) * b.measure for b in bodies)
     return work
 
 
 def load_work(point_loads: list[AppliedLoad], k: Kinematics) -> Any:
     """Return −Σ ∫ (force · δx) over applied forces and moments, a UFL form in k.dq."""
-    return -sum(ufl.inner(load.force, k.variation(load.x)) * load.measure for load in point_loads)
+    return -sum(ufl.inner(load.force, load.variation(k)) * load.measure for load in point_loads)

@@ -120,13 +120,15 @@ class Hub:
             for body in model.bodies:
                 a = ACCELERATIONS[name][0](body, k, frame)
                 if a is not None:
-                    h += body.density * ufl.inner(a, ufl.cross(e, body.x)) * body.measure
+                    h += body.density * ufl.inner(a, ufl.cross(body.resolve(e), body.x)) * body.measure
         for load in model.applied:
             turn = load.turn(e)
             h -= ufl.inner(load.force, turn) * load.measure
         self._h = fem.form(h)
         momentum = sum(
-            b.density * ufl.inner(ufl.cross(e, b.x), k.rate(b.x) + ufl.cross(frame.w, b.x)) * b.measure
+            b.density
+            * ufl.inner(ufl.cross(b.resolve(e), b.x), b.rate(k) + ufl.cross(b.resolve(frame.w), b.x))
+            * b.measure
             for b in model.bodies
         )
         self._momentum = fem.form(momentum)

@@ -24,6 +24,22 @@ class Body:
     measure: Any
     is_position: bool = True
 
+    def rate(self, k: Kinematics) -> Any:
+        """Return ẋ relative to the frame."""
+        return k.rate(self.x)
+
+    def second_rate(self, k: Kinematics) -> Any:
+        """Return ẍ relative to the frame."""
+        return k.second_rate(self.x)
+
+    def variation(self, k: Kinematics) -> Any:
+        """Return δx."""
+        return k.variation(self.x)
+
+    def resolve(self, v: Any) -> Any:
+        """Return a vector of the frame in the axes that x and its rates are given in, here those of the frame."""
+        return v
+
 
 @dataclass(frozen=True)
 class Strain:
@@ -68,6 +84,10 @@ class AppliedLoad:
     x: Any
     measure: Any
     dead: bool = True
+
+    def variation(self, k: Kinematics) -> Any:
+        """Return what the force works on in a variation of q, δx."""
+        return k.variation(self.x)
 
     def turn(self, e: Any) -> Any:
         """Return the change of x in a unit rigid turn about the axis e: e×x of a position, 1 of an angle about e."""

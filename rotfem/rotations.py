@@ -11,15 +11,15 @@ K(θ') is one-to-one up to |θ| = 2π, where A = B = 0 takes away every change o
 
 from __future__ import annotations
 
-from math import factorial
+from dataclasses import dataclass, field
+from math import factorial, pi
 from typing import Any
 
-import numpy as np
 import ufl
 from ufl import cross
 
 #: Largest |θ| of the rotation vector, rad; a little beyond, so that a full circle itself can be reached.
-FULL_TURN = 2 * np.pi * (1 + 1e-6)
+FULL_TURN = 2 * pi * (1 + 1e-6)
 
 #: |θ|² below which A, B and C are power series: beyond, the closed forms lose no digits even when derived three times.
 SERIES_UP_TO = 1.0
@@ -46,36 +46,44 @@ def _series(s: Any, n: int) -> Any:
     return out
 
 
-def _map(theta: Any, first: Any, second: Any, v: Any) -> Any:
-    """v + first θ×v + second θ×(θ×v)."""
-    turned = cross(theta, v)
-    return v + first * turned + second * cross(theta, turned)
+@dataclass(frozen=True)
+class Turn:
+    """The rotation Λ(θ) and its rates.
 
+    Attributes:
+        theta: rotation vector θ, an expression.
+        exact: False takes A, B, C at θ = 0: Λ and T are then right to second order in θ.
+    """
 
-def rotate(theta: Any, v: Any) -> Any:
-    """Λ(θ) v."""
-    a, b, _ = factors(theta)
-    return _map(theta, a, b, v)
+    theta: Any
+    exact: bool = True
+    _factors: tuple[Any, Any, Any] = field(init=False, repr=False, compare=False)
 
+    def __post_init__(self) -> None:
+        values = factors(self.theta) if self.exact else (1, 1 / 2, 1 / 6)
+        object.__setattr__(self, "_factors", values)
 
-def rotate_back(theta: Any, v: Any) -> Any:
-    """Λ(θ)ᵀ v."""
-    a, b, _ = factors(theta)
-    return _map(theta, -a, b, v)
+    def rotate(self, v: Any) -> Any:
+        """Return Λ v."""
+        a, b, _ = self._factors
+        return self._map(a, b, v)
 
+    def rotate_back(self, v: Any) -> Any:
+        """Return Λᵀ v."""
+        a, b, _ = self._factors
+        return self._map(-a, b, v)
 
-def rotate_second_order(theta: Any, v: Any) -> Any:
-    """Λ(θ) v to second order in θ."""
-    return _map(theta, 1, 0.5, v)
+    def material_rate(self, dtheta: Any) -> Any:
+        """Return K: the rate of turning along the turned axes, for a rate dθ of the rotation vector."""
+        _, b, c = self._factors
+        return self._map(-b, c, dtheta)
 
+    def spatial_rate(self, dtheta: Any) -> Any:
+        """Return k: the rate of turning along the fixed axes, for a rate dθ of the rotation vector."""
+        _, b, c = self._factors
+        return self._map(b, c, dtheta)
 
-def material_rate(theta: Any, dtheta: Any) -> Any:
-    """K: the rate of turning along the turned axes for a rate dθ of the rotation vector."""
-    _, b, c = factors(theta)
-    return _map(theta, -b, c, dtheta)
-
-
-def spatial_rate(theta: Any, dtheta: Any) -> Any:
-    """k: the rate of turning along the fixed axes for a rate dθ; its transpose is `material_rate`."""
-    _, b, c = factors(theta)
-    return _map(theta, b, c, dtheta)
+    def _map(self, first: Any, second: Any, v: Any) -> Any:
+        """v + first θ×v + second θ×(θ×v)."""
+        turned = cross(self.theta, v)
+        return v + first * turned + second * cross(self.theta, turned)

@@ -86,15 +86,15 @@ class Model:
         """
         k, frame = self.structure.k, self.frame
         forms: dict[str, Any] = {"strain": sum(s.energy for s in self.strains)}
-        forms["T2"] = sum(b.density * ufl.inner(k.rate(b.x), k.rate(b.x)) / 2 * b.measure for b in self.bodies)
+        forms["T2"] = sum(b.density * ufl.inner(b.rate(k), b.rate(k)) / 2 * b.measure for b in self.bodies)
         if self.fixed:
-            forms["momentum"] = sum(b.density * ufl.cross(b.x, k.rate(b.x))[2] * b.measure for b in self.bodies)
+            forms["momentum"] = sum(b.density * ufl.cross(b.x, b.rate(k))[2] * b.measure for b in self.bodies)
         if "coriolis" in self.effects:
             forms["T1"] = sum(
-                b.density * ufl.inner(k.rate(b.x), ufl.cross(frame.w, b.x)) * b.measure for b in self.bodies
+                b.density * ufl.inner(b.rate(k), ufl.cross(b.resolve(frame.w), b.x)) * b.measure for b in self.bodies
             )
         if "centrifugal" in self.effects:
-            wx = [(b, ufl.cross(frame.w, b.x)) for b in self.bodies]
+            wx = [(b, ufl.cross(b.resolve(frame.w), b.x)) for b in self.bodies]
             forms["T0"] = sum(b.density * ufl.inner(s, s) / 2 * b.measure for b, s in wx)
         potentials = [-ufl.inner(load.force, load.x) * load.measure for load in self.applied if load.dead]
         for name, field in (("base", 1), ("gravity", -1)):
