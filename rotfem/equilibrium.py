@@ -86,6 +86,8 @@ def _balance(system: System, omega: float, share: float, guess: Array, newton: N
         newton.iterations += 1
     else:
         newton.solve(increment, lambda: system.size(q))
+        if system.model.inside_out():
+            raise ComputationError("Newton met a state that is turned inside out (an axial strain below −1)")
     return q
 
 

@@ -16,8 +16,10 @@ from rotfem.quantities import (
     NonNegative,
     Number,
     Positive,
+    Profile,
     SceneModel,
     Vector,
+    as_rows,
     as_symmetric_matrix,
     check_profile_length,
     problem,
@@ -32,6 +34,17 @@ def _as_inertia(value: Any) -> float | Matrix:
     if isinstance(value, list | tuple):
         return as_symmetric_matrix(value, 3, definite=False)
     return Bounds(ge=0.0).number(value)
+
+
+def _as_sweep(value: Any) -> Profile:
+    """Returns a number or rows (x, angle); linear between, and a jump where one x stands in two rows."""
+    if not isinstance(value, list | tuple):
+        return Bounds().profile(value)
+    rows = as_rows(value, (2,), "a profile [[x, angle], …]")
+    x = [row[0] for row in rows]
+    if len(x) < 2 or x[0] != 0.0 or sorted(x) != x or any(x.count(v) > (1 if v in (x[0], x[-1]) else 2) for v in x):
+        raise problem("", value, "must be [[x, angle], …] from x = 0, x not decreasing; two rows of one x are a kink")
+    return tuple((row[0], row[1]) for row in rows)
 
 
 class PlanarBeamStructure(SceneModel):
@@ -85,6 +98,8 @@ class SpatialBeamStructure(SceneModel):
         section: Cross-section.
         pretwist: Angle of the section axes about the beam axis (rad), a number or a taper. May also stand in the
             section table.
+        sweep: Angle of the axis in the plane (1, 2), towards direction 2 (rad), over the length of arc: a number, or
+            rows (x, angle), which are arcs between, and a kink where one x stands twice.
         precone: Angle of the beam axis out of the plane (1, 2), towards direction 3 (rad). May also stand in the
             section table.
         damping: Damping coefficients.
@@ -99,6 +114,7 @@ class SpatialBeamStructure(SceneModel):
     tip_offset: Vector = (0.0, 0.0, 0.0)
     section: SpatialSection = Field(description="a table of section properties")
     pretwist: AnyProfile = 0.0
+    sweep: Annotated[Profile, PlainValidator(_as_sweep)] = 0.0
     precone: Number = 0.0
     damping: Damping = Damping()
 
@@ -145,6 +161,7 @@ class SpatialBeamStructure(SceneModel):
     def _check(self) -> Self:
         _check_section_length(self.section, self.length)
         check_profile_length("pretwist", self.pretwist, self.length)
+        check_profile_length("sweep", self.sweep, self.length)
         check_one_hub(self.hub_radius, self.hub_offset)
         return self
 

@@ -128,7 +128,7 @@ class Newton:
         Raises:
             ComputationError: not finite, growing, or too many iterations; says which.
         """
-        previous, first = np.inf, np.inf
+        previous, first, stalled = np.inf, np.inf, 0
         for k in range(1, self.max_iterations + 1):
             d = increment()
             self.iterations += 1
@@ -140,10 +140,11 @@ class Newton:
                 self._kappa = max(0.5 * self._kappa if np.isfinite(self._kappa) else 0.0, d / first**2)
             if d <= self.tolerance or (k == 1 and 4 * self._kappa * d**2 <= self.tolerance):
                 return k
-            if k > 2 and d > 0.3 * previous and d <= 1e-4 * max(size(), self.tolerance):
+            stalled = stalled + 1 if d > 0.3 * previous else 0
+            if stalled >= 3 and d <= 1e-4 * max(size(), self.tolerance):
                 self.roundoff = max(self.roundoff, d)
                 return k
-            if self.monotone and k > 1 and d > previous:
+            if self.monotone and k > 1 and d > previous and d > 1e-6 * size():
                 raise ComputationError(f"Newton's increments grew from {previous:.1e} to {d:.1e} (scaled)")
             if k > 4 and d > 10 * first and d > 1:
                 raise ComputationError(f"Newton diverged: increments grew from {first:.1e} to {d:.1e} (scaled)")

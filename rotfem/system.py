@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import basix
 import numpy as np
 import numpy.typing as npt
 import ufl
@@ -24,6 +25,11 @@ from rotfem.structures.clamp import TurningClamp
 from rotfem.theories import THEORIES
 
 Array = npt.NDArray[np.float64]
+
+
+def quadrature_points(domain: Any, number: int) -> Any:
+    """Return the points of the Gauss rule that has `number` of them in each direction, reference cell coordinates."""
+    return basix.make_quadrature(domain.basix_cell(), 2 * number - 1)[0]
 
 
 def integral_count(form: Any) -> int:
@@ -60,6 +66,7 @@ class Model:
         self.bodies = s.bodies(self.effects)
         self.applied = s.loads()
         self.terms = self._terms()
+        self._axial: list[Any] | None = None
 
     def _terms(self) -> dict[str, Any]:
         k = self.structure.k
@@ -72,6 +79,16 @@ class Model:
         if self.applied:
             terms["loads"] = load_work(self.applied, k)
         return {name: term for name, term in terms.items() if not isinstance(term, int)}
+
+    def inside_out(self) -> bool:
+        """Return whether the axis is anywhere compressed to less than nothing at the state in q: no real state is."""
+        if self._axial is None:
+            points = quadrature_points(self.structure.mesh, self.structure.V.element.basix_element.degree)
+            chosen = [s for s in self.strains if s.name in self.structure.prestressing]
+            self._axial = [fem.Expression(s.value, points) for s in chosen]
+        cells = np.arange(self.structure.mesh.topology.index_map(self.structure.mesh.topology.dim).size_local)
+        lowest = min((float(e.eval(self.structure.mesh, cells).min()) for e in self._axial if len(cells)), default=0.0)
+        return self.comm.allreduce(lowest, op=MPI.MIN) <= -1.0
 
     @property
     def residual(self) -> Any:

@@ -7,7 +7,8 @@ u', θ, θ' along t_i⁰,
 
     Γ = Λ_tᵀ r' − e_1 = Λ(φ)ᵀ (e_1 + p) − e_1,        K = axial(Λ_tᵀ Λ_t') − K⁰ = T(φ) κ,
 
-since Λ_tᵀ Λ_t' = t⁰ᵀ (Λᵀ Λ') t⁰ + t⁰ᵀ t⁰', whose last part, the twist rate K⁰, drops out exactly.
+since Λ_tᵀ Λ_t' = t⁰ᵀ (Λᵀ Λ') t⁰ + t⁰ᵀ t⁰', whose last part, the initial twist and curvature K⁰, drops out exactly. So
+it does not matter whether the axis is straight: sweep turns e about t_3⁰ by an angle that may vary, or jump, along X.
 """
 
 from __future__ import annotations
@@ -24,10 +25,12 @@ from mpi4py import MPI
 from rotfem.errors import ComputationError
 from rotfem.kinematics import AppliedLoad, Body, Strain
 from rotfem.quantities import evaluate
-from rotfem.rotations import FULL_TURN, material_rate, rotate, rotate_second_order, spatial_rate
+from rotfem.rotations import FULL_TURN
 from rotfem.scene import MomentLoad, Scene, SpatialBeamStructure
 from rotfem.structures.beam import Array, Beam
+from rotfem.structures.rigid import AppliedMoment, Director, OffsetMass, SectionTurn, rotation_part
 from rotfem.structures.spatial_section import SectionForms, euler_tensor
+from rotfem.structures.swept_axis import swept_axis
 from rotfem.theories import THEORIES
 
 
@@ -61,8 +64,9 @@ class SpatialBeam(Beam):
     def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD):
         self.data = s = cast(SpatialBeamStructure, scene.structure)
         knots = {x for x, _ in s.pretwist[1:-1]} if isinstance(s.pretwist, tuple) else set()
-        super().__init__(scene, s, comm, tuple(sorted(knots | set(s.section.breakpoints))))
-        self._rotate = rotate_second_order if THEORIES[scene.model.theory].linear else rotate
+        bends = {x for x, _ in s.sweep[1:-1]} if isinstance(s.sweep, tuple) else set()
+        super().__init__(scene, s, comm, tuple(sorted(knots | bends | set(s.section.breakpoints))))
+        self._turn = SectionTurn(rotation_part(self.k.q), exact=not THEORIES[scene.model.theory].linear)
         self._forms = SectionForms(self, s.section, scene.file)
         if s.hub_offset is None:
             self._root = ufl.as_vector((self.scalar("hub_radius", s.hub_radius), 0, 0))
@@ -79,6 +83,13 @@ class SpatialBeam(Beam):
         beta = self.scalar("precone", cone) if cone != 0.0 else 0
         c, s = (ufl.cos(beta), ufl.sin(beta)) if cone != 0.0 else (1, 0)
         e_1, e_2, e_3 = ufl.as_vector((c, 0, s)), ufl.as_vector((0, 1, 0)), ufl.as_vector((-s, 0, c))
+        X = ufl.SpatialCoordinate(self.mesh)[0]
+        self._axis = X * e_1
+        sweep = self.data.sweep
+        if sweep != 0.0:
+            chi, along, across = swept_axis(self, sweep)
+            self._axis = along * e_1 + across * e_2
+            e_1, e_2 = ufl.cos(chi) * e_1 + ufl.sin(chi) * e_2, ufl.cos(chi) * e_2 - ufl.sin(chi) * e_1
         if isinstance(twist, tuple) and any(angle != 0.0 for _, angle in twist):
             angle = fem.Function(fem.functionspace(self.mesh, ("Lagrange", 1)), name="pretwist")
             angle.interpolate(lambda x: evaluate(twist, x[0]))  # exact: the knots are nodes
@@ -106,71 +117,62 @@ class SpatialBeam(Beam):
 
     # --- kinematics ---------------------------------------------------------------------------------------------
 
-    def _rotation(self, q: Any) -> Any:
-        return ufl.as_vector([q[i] for i in (3, 4, 5)])
-
     def position(self, q: Any) -> Any:
-        """r = r_root + X e + u."""
-        X = ufl.SpatialCoordinate(self.mesh)[0]
-        return self._root + X * self._triad[0] + ufl.as_vector([q[i] for i in (0, 1, 2)])
+        """r = r_root + ∫ t_1⁰ dX + u, X e for a straight beam."""
+        return self._root + self._axis + ufl.as_vector([q[i] for i in (0, 1, 2)])
 
     def turned(self, q: Any, v: Any) -> Any:
         """Λ(θ) v."""
-        return self._rotate(self._rotation(q), v)
+        return SectionTurn(rotation_part(q), self._turn.exact).rotate(v)
 
     def strains(self, measures: Callable[..., tuple[Any, Any]]) -> list[Strain]:
         """Return the strains (Γ, K) of one theory's measures with the section's stiffness."""
         q = self.k.q
         dq = q.dx(0)
-        parts = (ufl.as_vector([dq[i] for i in (0, 1, 2)]), self._rotation(q), self._rotation(dq))
+        parts = (ufl.as_vector([dq[i] for i in (0, 1, 2)]), rotation_part(q), rotation_part(dq))
         Gamma, K = measures(*(self._along_triad(v) for v in parts))
         return self._forms.strains(Gamma, K, self.dx_elastic)
 
     def bodies(self, effects: tuple[str, ...]) -> list[Body]:
         """Return the bodies the effects call for: mass-centre line, section directors, tip body and its directors."""
-        q, forms = self.k.q, self._forms
-        bodies = [Body(self._offset(forms.mass_center), forms.mass, self.dx)]
+        forms = self._forms
+        bodies = [self._mass(forms.mass, forms.mass_center, self.dx)]
         if "rotary_inertia" in effects:
-            for axis, moment in forms.directors:
-                director = self.turned(q, self._from_triad(axis))
-                bodies.append(Body(director, moment, self.dx, is_position=False))
+            bodies += [self._director(axis, moment, self.dx) for axis, moment in forms.directors]
         return bodies + self._tip_bodies() if "tip_mass" in effects else bodies
 
-    def _offset(self, components: tuple[Any, ...]) -> Any:
-        """r + Λ c, a point fixed in the section; c has these components along t_i⁰."""
-        q = self.k.q
-        if all(isinstance(c, int) for c in components):
-            return self.position(q)
-        return self.position(q) + self.turned(q, self._from_triad(components))
+    def _mass(self, density: Any, center: tuple[Any, ...], measure: Any) -> Body:
+        """Mass at r + Λ c; c has these components along t_i⁰."""
+        r = self.position(self.k.q)
+        if all(isinstance(c, int) for c in center):
+            return Body(r, density, measure)
+        arm = self._from_triad(center)
+        return OffsetMass(r + self._turn.rotate(arm), density, measure, axis=r, arm=arm, turn=self._turn)
+
+    def _director(self, axis: tuple[Any, ...], density: Any, measure: Any) -> Body:
+        return Director(self._from_triad(axis), density, measure, turn=self._turn)
 
     def _tip_bodies(self) -> list[Body]:
-        s, q, out = self.data, self.k.q, []
+        s, out = self.data, []
         if s.tip_mass > 0:
             pairs = enumerate(s.tip_offset, start=1)
             center = tuple(self.scalar(f"tip_offset_{i}", c) if c != 0.0 else 0 for i, c in pairs)
-            out.append(Body(self._offset(center), self.scalar("tip_mass", s.tip_mass), self.ds_tip))
+            out.append(self._mass(self.scalar("tip_mass", s.tip_mass), center, self.ds_tip))
         for i, (moment, axis) in enumerate(euler_tensor(s.tip_inertia_matrix), start=1):
             if isinstance(s.tip_inertia, float):  # isotropic: each director has half of it
                 density = self.scalar("tip_inertia", s.tip_inertia) / 2
             else:
                 density = self.scalar(f"tip_director_inertia_{i}", moment)
-            director = self.turned(q, self._from_triad(axis))
-            out.append(Body(director, density, self.ds_tip, is_position=False))
+            out.append(self._director(tuple(axis), density, self.ds_tip))
         return out
 
     def loads(self) -> list[AppliedLoad]:
-        """Return the scene's non-zero loads.
-
-        Components are those of the frame; a follower has them in the undeformed state and turns with Λ. A moment M does
-        the work M·k(δθ), k the spatial rate of turning, so its conjugate on δθ is T(θ) M; that of a follower Λ M is
-        T(θ)ᵀ M. A dead moment has a potential, −M·θ, only as long as θ keeps to one axis (Argyris 1982).
-        """
+        """Return the scene's non-zero loads; dead ones keep their direction in the frame, followers turn with Λ."""
         moment, out = self.scene.loads.tip_moment, self.forces()
         if moment is not None and not moment.is_zero:
-            m, theta = self.add_load("tip_moment", 3, partial(_moment, moment)), self._rotation(self.k.q)
-            dead = moment.kind == "dead"
-            conjugate = material_rate(theta, m) if dead else spatial_rate(theta, m)
-            out.append(AppliedLoad("tip_moment", conjugate, theta, self.ds_tip, dead))
+            m, dead = self.add_load("tip_moment", 3, partial(_moment, moment)), moment.kind == "dead"
+            M = m if dead else self._turn.rotate(m)
+            out.append(AppliedMoment("tip_moment", M, self._turn.theta, self.ds_tip, dead, section=self._turn))
         return out
 
     def check_range(self, q: Array, time: float | None = None) -> None:

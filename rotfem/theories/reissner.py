@@ -6,7 +6,7 @@ from typing import Any
 
 import ufl
 
-from rotfem.rotations import material_rate, rotate_back
+from rotfem.rotations import Turn
 
 
 def planar_beam(q: Any) -> tuple[Any, Any, Any]:
@@ -22,5 +22,5 @@ def spatial_beam(du: Any, theta: Any, dtheta: Any) -> tuple[Any, Any]:
     Args:
         du, theta, dtheta: u', θ, θ' along the undeformed section axes t_i⁰.
     """
-    e_1 = ufl.as_vector((1, 0, 0))
-    return rotate_back(theta, e_1 + du) - e_1, material_rate(theta, dtheta)
+    e_1, turn = ufl.as_vector((1, 0, 0)), Turn(theta)
+    return turn.rotate_back(e_1 + du) - e_1, turn.material_rate(dtheta)

@@ -85,8 +85,8 @@ def test_monotone_gives_up_at_the_first_growth() -> None:
 def test_stops_at_round_off_and_says_so() -> None:
     """Increments that no longer shrink, small beside the unknown, are round-off; large ones are not."""
     newton = Newton(tolerance=1e-9)
-    values = iter((1e-2, 1e-5, 3e-8, 2e-8, 2e-8))
-    assert newton.solve(lambda: next(values), lambda: 1.0) == 4
+    values = iter((1e-2, 1e-5, 3e-8, 2e-8, 2e-8, 2e-8))
+    assert newton.solve(lambda: next(values), lambda: 1.0) == 6
     assert newton.roundoff == 2e-8
     stuck = iter([1e-2] * 30)
     with pytest.raises(ComputationError, match="did not converge"):
