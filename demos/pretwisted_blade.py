@@ -23,6 +23,7 @@ from pathlib import Path
 
 import numpy as np
 from _demo import FIRST_RANK, command_line, report, save, say
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import rotfem
@@ -37,10 +38,10 @@ Branches = dict[str, dict[str, np.ndarray]]
 def main(figure: Path | None = None) -> float:
     """Return the lowest frequency (rad/s) of the pretwisted blade at 12 rad/s."""
     scene = rotfem.load_scene(SCENE)
-    straight = rotfem.campbell(scene.replace({"structure.pretwist": 0.0}), "0:12:7", orders=1).branches()
+    straight = rotfem.campbell(scene.replace({"structure.pretwist": 0.0}), "0:12:25", orders=1).branches()
     for name, printed in zip(("flap 1", "flap 2", "flap 3"), WRIGHT, strict=True):
         say(f"without twist, {name} at 12 rad/s: {straight[name]['frequency'][-1]:.3f} rad/s, printed {printed:.3f}")
-    result = rotfem.campbell(scene, "0:12:7", orders=1)
+    result = rotfem.campbell(scene, "0:12:25", orders=1)
     twisted = result.branches()
     last = {row["label"]: row["mode"] for row in result.rows}
     for name, branch in twisted.items():
@@ -62,26 +63,32 @@ def main(figure: Path | None = None) -> float:
 
 def plot(straight: Branches, twisted: Branches, path: Path) -> None:
     """Draw the frequencies of both blades over the speed, and what flap 1 and lag 1 are made of."""
-    picture = Figure(figsize=(10, 5.5), layout="constrained")
-    left, right = picture.subplots(1, 2, width_ratios=(3, 2))
-    for i, (name, branch) in enumerate(twisted.items()):
-        left.plot(branch["speed"], branch["frequency"], lw=1.6, color=f"C{i}", label=name)
+    picture = Figure(figsize=(10, 6), layout="constrained")
+    grid = picture.add_gridspec(2, 2, width_ratios=(3, 2))
+    whole, close = picture.add_subplot(grid[:, 0]), picture.add_subplot(grid[0, 1])
+    shares = picture.add_subplot(grid[1, 1], sharex=close)
+    for i, name in enumerate(twisted):
+        draw(whole, twisted[name], "frequency", f"C{i}", name)
     for i, branch in enumerate(straight.values()):
-        name = "without twist" if i == 0 else None
-        left.plot(branch["speed"], branch["frequency"], "--", lw=1.0, color="0.45", label=name)
-    left.set(xlabel="speed Ω (rad/s)", ylabel="frequency in the rotating frame (rad/s)", xlim=(0, 12), ylim=(0, None))
-    left.legend(fontsize="small", loc="upper left", ncols=3)
-    left.set_ylim(0, 1.2 * left.get_ylim()[1])
-    left.set_title("Campbell diagram, 45° of pretwist")
-    for name, color in (("flap 1", "C0"), ("lag 1", "C1")):
-        right.plot(twisted[name]["speed"], twisted[name]["share_lag"], ".-", lw=1.6, color=color, label=name)
-        right.plot(straight[name]["speed"], straight[name]["share_lag"], "--", lw=1.0, color="0.45")
-    right.set(xlabel="speed Ω (rad/s)", ylabel="share of lag in the kinetic energy", xlim=(0, 12), ylim=(-0.03, 1.03))
-    right.legend(fontsize="small", loc="center left")
-    right.set_title("The branches exchange their character")
-    for axis in (left, right):
-        axis.grid(True, lw=0.4, alpha=0.6)
+        draw(whole, branch, "frequency", None, "without twist" if i == 0 else None)
+    for i, name in enumerate(("flap 1", "lag 1")):
+        for axis, column in ((close, "frequency"), (shares, "share_lag")):
+            draw(axis, straight[name], column, None, None)
+            draw(axis, twisted[name], column, f"C{i}", name)
+    whole.set(xlabel="speed Ω (rad/s)", ylabel="frequency in the rotating frame (rad/s)", xlim=(0, 12), ylim=(0, 108))
+    whole.legend(fontsize="small", loc="upper left", ncols=3)
+    whole.set_title("Campbell diagram, 45° of pretwist")
+    close.set(ylabel="frequency (rad/s)", xlim=(8, 12), ylim=(9, 13.5))
+    close.set_title("Flap 1 and lag 1 exchange their character")
+    shares.set(xlabel="speed Ω (rad/s)", ylabel="share of lag", ylim=(-0.03, 1.03))
     save(picture, path)
+
+
+def draw(axis: Axes, branch: dict[str, np.ndarray], column: str, color: str | None, label: str | None) -> None:
+    """Draw a column of a branch over the speed, dashed and grey without a colour."""
+    style = {"ls": "--", "lw": 1.0, "color": "0.45"} if color is None else {"lw": 1.6, "color": color}
+    axis.plot(branch["speed"], branch[column], label=label, **style)
+    axis.grid(True, lw=0.4, alpha=0.6)
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ from rotfem.errors import ComputationError
 from rotfem.integrators import Scheme, State, Stepper
 from rotfem.motion import Motion
 from rotfem.scene import TorqueMotion
-from rotfem.solvers import DirectSolver, Increment, Newton
+from rotfem.solvers import Increment, Newton
 from rotfem.system import System
 
 Array = npt.NDArray[np.float64]
@@ -257,9 +257,12 @@ class HubStepper(Stepper):
         s.set_time(t)
         zero = np.zeros_like(q)
         s.set_state(q, v, zero)
-        solver = DirectSolver(s.matrix(0.0, 0.0, 1.0, 1.0))
-        y = self._dx.solve(solver, s.residual()).copy()
-        z = self._dz.solve(solver, hub.column(0.0, 1.0))
+        solver, massless = self._mass_solver()
+        R, b = s.residual(), hub.column(0.0, 1.0)
+        R.array[massless] = 0.0
+        b.array[massless] = 0.0
+        y = self._dx.solve(solver, R).copy()
+        z = self._dz.solve(solver, b)
         c = hub.row((0.0, 0.0, 1.0))
         psi = self._eliminate(-hub.residual(t, after=True), hub.diagonal(0.0, 1.0), c, y, z)
         hub.values[2] = psi

@@ -27,6 +27,10 @@ from rotfem.system import System
 Array = npt.NDArray[np.float64]
 
 
+#: Part of K, relative to M in norm, that makes a singular M regular.
+TRACE = 1e-9
+
+
 @dataclass(frozen=True)
 class Scheme:
     """Parameters of one member of the family; second-order accurate when γ = ½ + α_f − α_m."""
@@ -114,17 +118,36 @@ class Stepper:
         state = State(t, q.copy(), v.copy(), np.zeros_like(q), np.zeros_like(q))
         self._prescribe(state)
         self._write(state)
-        M, b = s.matrix(0.0, 0.0, 1.0, 1.0), s.residual()
-        massless = M.getDiagonal()
-        massless.array[:] = massless.array == 0.0
-        if massless.norm() > 0.0:
-            K = s.matrix(1.0, 0.0, 0.0, 1.0)
-            K.diagonalScale(massless)
-            M.axpy(1.0, K, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-            b.array[massless.array > 0.0] = 0.0
-        state.a += self._dx.solve(DirectSolver(M), b)
+        solver, massless = self._mass_solver()
+        b = s.residual()
+        b.array[massless] = 0.0
+        state.a += self._dx.solve(solver, b)
         state.auxiliary[:] = state.a
         return state
+
+    def _mass_solver(self) -> tuple[DirectSolver, Array]:
+        """Return a solver with M, where it has to be completed with K, and which owned unknowns have no inertia.
+
+        A tip mass beside the axis can leave a rotation without inertia in a direction that is no unknown of its own;
+        then so little of K is added to all of M that no motion with inertia feels it.
+        """
+        s = self.system
+        M = s.matrix(0.0, 0.0, 1.0, 1.0)
+        without = M.getDiagonal()
+        without.array[:] = without.array == 0.0
+        massless = np.asarray(without.array > 0.0)
+        if without.norm() > 0.0:
+            K = s.matrix(1.0, 0.0, 0.0, 1.0)
+            K.diagonalScale(without)
+            M.axpy(1.0, K, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        solver = DirectSolver(M)
+        try:
+            self._dx.solve(solver, s.residual())
+        except ComputationError:
+            K = s.matrix(1.0, 0.0, 0.0, 1.0)
+            M.axpy(TRACE * M.norm() / K.norm(), K, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            solver = DirectSolver(M)
+        return solver, massless
 
     def step(self, state: State, h: float) -> State:
         """Return the state at state.t + h.

@@ -32,14 +32,14 @@ def factors(theta: Any) -> tuple[Any, Any, Any]:
     """Return A, B, C of a rotation vector; smooth at θ = 0, where the branch with 0/0 is not taken."""
     s = ufl.dot(theta, theta)
     size = ufl.sqrt(s)
-    closed = (ufl.sin(size) / size, (1 - ufl.cos(size)) / s, (size - ufl.sin(size)) / (size * s))
     small = ufl.lt(s, SERIES_UP_TO)
-    a, b, c = (ufl.conditional(small, _series(s, n), f) for n, f in enumerate(closed, start=1))
-    return a, b, c
+    b = ufl.conditional(small, _series(s, 2), (1 - ufl.cos(size)) / s)
+    c = ufl.conditional(small, _series(s, 3), (1 - ufl.sin(size) / size) / s)
+    return 1 - s * c, b, c
 
 
 def _series(s: Any, n: int) -> Any:
-    """Return Σ (−s)^k / (2k + n)!, k < TERMS, by Horner's rule: A, B, C for n = 1, 2, 3."""
+    """Return Σ (−s)^k / (2k + n)!, k < TERMS, by Horner's rule: B for n = 2, C for n = 3."""
     out: Any = 1 / factorial(2 * (TERMS - 1) + n)
     for k in range(TERMS - 2, -1, -1):
         out = 1 / factorial(2 * k + n) - s * out

@@ -229,7 +229,9 @@ class Simulation:
         raise ComputationError(
             f"the {theory} solution diverged (a displacement exceeds the length, or a rotation 1 rad; {why})",
             time=state.t,
-            advice='use model.theory = "consistent_linear" for small or "reissner" for any deflection',
+            advice='use model.theory = "reissner", which holds for any deflection'
+            if self.model.theory.prestressed is not None
+            else 'use model.theory = "consistent_linear" for small or "reissner" for any deflection',
         )
 
     def _record(self, state: State) -> None:

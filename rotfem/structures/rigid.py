@@ -1,8 +1,8 @@
 """Bodies and loads that turn with a section of q = (u, θ): directors, masses beside the axis, moments.
 
-What is fixed in a section turns with Λ(θ), at the rate ω = T(θ) θ̇ along the turned axes. A director is followed in these
-axes, where it stands still and Λᵀw takes the place of w: the same accelerations as for any vector, but made of first
-derivatives of T instead of second ones of Λ, which compile to much less code.
+What is fixed in a section turns with Λ(θ), at the rate ω = T(θ) θ̇ along the turned axes. A director is followed in
+these axes, where it stands still and Λᵀw takes the place of w: the same accelerations as for any vector, but made of
+first derivatives of T instead of second ones of Λ, which compile to much less code.
 """
 
 from __future__ import annotations

@@ -2,13 +2,13 @@
 
 The section axes are t_i = Λ(θ) t_i⁰ (Simo & Vu-Quoc 1986, Comput. Meth. Appl. Mech. Eng. 58, 79), θ the rotation vector
 relative to the undeformed triad t_i⁰, all in components of the rotating frame. t_1⁰ is the undeformed axis
-e = (cos β, 0, sin β), β the precone; t_2⁰ and t_3⁰ are turned about it by the pretwist. With p, φ, κ the components of
-u', θ, θ' along t_i⁰,
+e = (cos β, 0, sin β), β the precone; t_2⁰ and t_3⁰ are turned about it by the pretwist. The strains are the components
+along t_i⁰ of
 
-    Γ = Λ_tᵀ r' − e_1 = Λ(φ)ᵀ (e_1 + p) − e_1,        K = axial(Λ_tᵀ Λ_t') − K⁰ = T(φ) κ,
+    Γ = Λᵀ (e + u') − e,        K = T(θ) θ' = axial(Λᵀ Λ'),
 
-since Λ_tᵀ Λ_t' = t⁰ᵀ (Λᵀ Λ') t⁰ + t⁰ᵀ t⁰', whose last part, the initial twist and curvature K⁰, drops out exactly. So
-it does not matter whether the axis is straight: sweep turns e about t_3⁰ by an angle that may vary, or jump, along X.
+since t⁰ᵀ Λᵀ (Λ t⁰)' = t⁰ᵀ (Λᵀ Λ') t⁰ + t⁰ᵀ t⁰', whose last part, the initial twist and curvature K⁰, drops out. So it
+does not matter whether the axis is straight: sweep turns e about t_3⁰ by an angle that may vary, or jump, along X.
 """
 
 from __future__ import annotations
@@ -129,9 +129,9 @@ class SpatialBeam(Beam):
         """Return the strains (Γ, K) of one theory's measures with the section's stiffness."""
         q = self.k.q
         dq = q.dx(0)
-        parts = (ufl.as_vector([dq[i] for i in (0, 1, 2)]), rotation_part(q), rotation_part(dq))
-        Gamma, K = measures(*(self._along_triad(v) for v in parts))
-        return self._forms.strains(Gamma, K, self.dx_elastic)
+        du = ufl.as_vector([dq[i] for i in (0, 1, 2)])
+        Gamma, K = measures(du, rotation_part(q), rotation_part(dq), self._triad[0])
+        return self._forms.strains(self._along_triad(Gamma), self._along_triad(K), self.dx_elastic)
 
     def bodies(self, effects: tuple[str, ...]) -> list[Body]:
         """Return the bodies the effects call for: mass-centre line, section directors, tip body and its directors."""

@@ -14,10 +14,11 @@ def planar_beam(q: Any) -> tuple[Any, Any, Any]:
     return du1, du2 - alpha, dalpha
 
 
-def spatial_beam(du: Any, theta: Any, dtheta: Any) -> tuple[Any, Any]:
-    """Return (Gamma, K), vectors (3,): Γ = u' − θ×e_1 (1) and K = θ' (1/m).
+def spatial_beam(du: Any, theta: Any, dtheta: Any, e: Any) -> tuple[Any, Any]:
+    """Return (Gamma, K), vectors (3,): Γ = u' − θ×e (1) and K = θ' (1/m).
 
     Args:
-        du, theta, dtheta: u', θ, θ' along the undeformed section axes t_i⁰.
+        du, theta, dtheta: u', θ, θ' in frame components, as the result is.
+        e: unit tangent of the undeformed axis.
     """
-    return ufl.as_vector((du[0], du[1] - theta[2], du[2] + theta[1])), dtheta
+    return du - ufl.cross(theta, e), dtheta

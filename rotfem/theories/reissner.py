@@ -16,11 +16,12 @@ def planar_beam(q: Any) -> tuple[Any, Any, Any]:
     return (1 + du1) * c + du2 * s - 1, -(1 + du1) * s + du2 * c, dalpha
 
 
-def spatial_beam(du: Any, theta: Any, dtheta: Any) -> tuple[Any, Any]:
-    """Return (Gamma, K), vectors (3,): Γ = Λᵀ(e_1 + u') − e_1 (1) and K = axial(Λᵀ Λ') (1/m), Simo 1985.
+def spatial_beam(du: Any, theta: Any, dtheta: Any, e: Any) -> tuple[Any, Any]:
+    """Return (Gamma, K), vectors (3,): Γ = Λᵀ(e + u') − e (1) and K = axial(Λᵀ Λ') (1/m), Simo 1985.
 
     Args:
-        du, theta, dtheta: u', θ, θ' along the undeformed section axes t_i⁰.
+        du, theta, dtheta: u', θ, θ' in frame components, as the result is.
+        e: unit tangent of the undeformed axis.
     """
-    e_1, turn = ufl.as_vector((1, 0, 0)), Turn(theta)
-    return turn.rotate_back(e_1 + du) - e_1, turn.material_rate(dtheta)
+    turn = Turn(theta)
+    return turn.rotate_back(e + du) - e, turn.material_rate(dtheta)

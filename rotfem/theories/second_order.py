@@ -14,12 +14,12 @@ def planar_beam(q: Any) -> tuple[Any, Any, Any]:
     return du1 + alpha * du2 - alpha**2 / 2, du2 - alpha - alpha * du1, dalpha
 
 
-def spatial_beam(du: Any, theta: Any, dtheta: Any) -> tuple[Any, Any]:
-    """Return (Gamma, K), vectors (3,): Γ = u' − θ×(e_1 + u') + ½ θ×(θ×e_1) (1) and K = θ' − ½ θ×θ' (1/m).
+def spatial_beam(du: Any, theta: Any, dtheta: Any, e: Any) -> tuple[Any, Any]:
+    """Return (Gamma, K), vectors (3,): Γ = u' − θ×(e + u') + ½ θ×(θ×e) (1) and K = θ' − ½ θ×θ' (1/m).
 
     Args:
-        du, theta, dtheta: u', θ, θ' along the undeformed section axes t_i⁰.
+        du, theta, dtheta: u', θ, θ' in frame components, as the result is.
+        e: unit tangent of the undeformed axis.
     """
-    e_1 = ufl.as_vector((1, 0, 0))
-    Gamma = du - ufl.cross(theta, e_1 + du) + 0.5 * ufl.cross(theta, ufl.cross(theta, e_1))
+    Gamma = du - ufl.cross(theta, e + du) + 0.5 * ufl.cross(theta, ufl.cross(theta, e))
     return Gamma, dtheta - 0.5 * ufl.cross(theta, dtheta)

@@ -17,11 +17,12 @@ def planar_beam(q: Any) -> tuple[Any, Any, Any]:
     return ufl.sqrt((1 + du1) ** 2 + du2**2) - 1, du2 - alpha, dalpha
 
 
-def spatial_beam(du: Any, theta: Any, dtheta: Any) -> tuple[Any, Any]:
-    """Return (Gamma, K), vectors (3,): Γ_1 = |e_1 + u'| − 1, else of first order (1), and K = θ' (1/m).
+def spatial_beam(du: Any, theta: Any, dtheta: Any, e: Any) -> tuple[Any, Any]:
+    """Return (Gamma, K), vectors (3,): Γ·e = |e + u'| − 1, else of first order (1), and K = θ' (1/m).
 
     Args:
-        du, theta, dtheta: u', θ, θ' along the undeformed section axes t_i⁰.
+        du, theta, dtheta: u', θ, θ' in frame components, as the result is.
+        e: unit tangent of the undeformed axis.
     """
-    stretch = ufl.sqrt((1 + du[0]) ** 2 + du[1] ** 2 + du[2] ** 2)
-    return ufl.as_vector((stretch - 1, du[1] - theta[2], du[2] + theta[1])), dtheta
+    stretch = ufl.sqrt(ufl.dot(e + du, e + du))
+    return du - ufl.cross(theta, e) + (stretch - 1 - ufl.dot(e, du)) * e, dtheta
