@@ -79,7 +79,7 @@ def test_whole_beam_swept_is_a_beam_turned() -> None:
     }
     tables = {"motion": {"type": "constant", "speed": 3.0}, "mesh": {"elements": 6}, "modes": {"count": 5}}
     straight = rotfem.modes({"structure": blade, **tables}).rows
-    for sweep in (0.7, [[0.0, 0.7], [0.4, 0.7], [1.0, 0.7]]):
+    for sweep in (0.7, [[0.0, 0.7], [0.5, 0.7], [1.0, 0.7]]):
         turned = rotfem.modes({"structure": {**blade, "sweep": sweep}, **tables}).rows
         for a, b in zip(straight, turned, strict=True):
             assert b["frequency"] == pytest.approx(a["frequency"], rel=1e-7)  # as far as Newton goes
