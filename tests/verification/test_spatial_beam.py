@@ -25,6 +25,9 @@ from rotfem.theories import THEORIES
 
 Array = npt.NDArray[np.float64]
 
+#: A kernel of the exact theory with all couplings compiles for ten seconds and more, the first time.
+EXACT_SLOW = pytest.param("reissner", marks=pytest.mark.slow)
+
 AT_REST = {"type": "constant", "speed": 0.0}
 U, THETA = ("tip_u1", "tip_u2", "tip_u3"), ("tip_theta1", "tip_theta2", "tip_theta3")
 
@@ -489,7 +492,7 @@ def test_planar_modes_as_spatial(theory: str) -> None:
 # --- descriptions that must not matter ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
+@pytest.mark.parametrize("theory", ["consistent_linear", EXACT_SLOW])
 def test_precone_is_a_tilted_axis(theory: str) -> None:
     """Coning by β is the same as tilting the spin axis, hub, loads and base motion by −β: all vectors turn, no more."""
     beta, motion = 0.3, {"type": "spin_up", "speed": 2.0, "duration": 1.0}
@@ -514,7 +517,7 @@ def test_precone_is_a_tilted_axis(theory: str) -> None:
     np.testing.assert_allclose(coned["kinetic"], plain["kinetic"], rtol=1e-8)
 
 
-@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
+@pytest.mark.parametrize("theory", ["consistent_linear", EXACT_SLOW])
 def test_base_acceleration_is_minus_gravity(theory: str) -> None:
     """A base that falls freely, described in the turning frame, takes the weight away: ≤ 1e-8."""
     g, axis, speed = np.array([0.2, 0.3, -0.5]), np.array([0.6, 0.0, 0.8]), 2.0
@@ -531,7 +534,7 @@ def test_base_acceleration_is_minus_gravity(theory: str) -> None:
         np.testing.assert_allclose(falling[name], still[name], rtol=0, atol=1e-8)
 
 
-@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
+@pytest.mark.parametrize("theory", ["consistent_linear", EXACT_SLOW])
 def test_section_given_as_matrices(theory: str) -> None:
     """Centres or full 6×6 matrices: the same section, the same frequencies."""
     by_centers = scene(TWISTED, {"model.theory": theory, "structure.section.mass_center": [0.03, 0.02]})
@@ -550,7 +553,7 @@ def test_mass_matrix_that_is_none() -> None:
 # --- conservation, symmetry, tangents -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("theory", list(THEORIES))
+@pytest.mark.parametrize("theory", [*(t for t in THEORIES if t != "reissner"), EXACT_SLOW])
 def test_symmetries_about_a_deformed_steady_state(theory: str) -> None:
     with_rest = theory in ("reissner", "consistent_linear")
     s = scene(TWISTED, {"model.theory": theory} | (REST if with_rest else {}))
@@ -565,7 +568,7 @@ def test_symmetries_about_a_deformed_steady_state(theory: str) -> None:
     assert np.linalg.eigvalsh(M).min() > 0
 
 
-@pytest.mark.parametrize("theory", ["second_order", "reissner"])
+@pytest.mark.parametrize("theory", ["second_order", EXACT_SLOW])
 def test_jacobi_integral(theory: str) -> None:
     """The drift over a fixed time falls at least as h²: it belongs to the scheme, not to the equations."""
     drifts = []
@@ -594,7 +597,7 @@ EVERYTHING = {
 }
 
 
-@pytest.mark.parametrize("theory", ["consistent_linear", "second_order", "von_karman", "reissner"])
+@pytest.mark.parametrize("theory", ["consistent_linear", "second_order", "von_karman", EXACT_SLOW])
 def test_tangents_are_the_derivatives_of_the_residual(theory: str) -> None:
     """Central differences with steps of 1e-5; every effect, load and kind of damping on."""
     damping = {"structure.damping": {"kelvin_voigt": 0.01, "rayleigh": [0.3, 0.02]}, "model.theory": theory}
@@ -642,6 +645,7 @@ def test_large_rotations_have_exact_tangents() -> None:
         assert work == pytest.approx(slope, rel=1e-7, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_sensitivities() -> None:
     """dω/dp of the first two modes against central differences, for one parameter of every kind."""
     changes = {"structure.pretwist": 0.3, "structure.tip_mass": 0.2, "model.theory": "consistent_linear"}
