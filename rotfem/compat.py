@@ -26,3 +26,13 @@ def wrap(x: la.Vector) -> Any:
     import dolfinx.la.petsc
 
     return dolfinx.la.petsc.create_vector_wrap(x)
+
+
+def model_to_mesh(model: Any, comm: Any) -> tuple[Any, Any, Any]:
+    """Return (mesh in the plane, cell tags, edge tags) of a gmsh model that rank 0 holds."""
+    try:
+        from dolfinx.io import gmsh as gmshio
+    except ImportError:
+        from dolfinx.io import gmshio
+    out = gmshio.model_to_mesh(model, comm, 0, gdim=2)
+    return (out.mesh, out.cell_tags, out.facet_tags) if hasattr(out, "mesh") else out[:3]

@@ -32,9 +32,6 @@ Array = npt.NDArray[Any]
 #: Share of kinetic energy from which a mode belongs to one family; below it is named as mixed.
 PURE = 0.8
 
-#: Part of the largest amplitude below which a shape counts as zero when its nodes are counted.
-NODE_NOISE = 1e-3
-
 #: Part of the least eigenvalue a real part must exceed to count as growth.
 GROWTH = 1e-6
 
@@ -142,32 +139,23 @@ class ModalAnalysis:
         return shares if self.hub is None else {**shares, "hub": energy[-1] / total}
 
     def names(self, spinning: Spinning) -> list[str]:
-        """Return "family n" for every mode, n one more than the nodes of its shape; mixed ones name both families."""
-        shares = self.shares(spinning)
+        """Return "kind n" for every mode, as its structure counts them; mixed ones name both families."""
+        shares, structure = self.shares(spinning), self.model.structure
         families = [name for name in shares if name != "hub"]
         table = np.array([shares[name] for name in families])
         out = []
         for j in range(table.shape[1]):
             order = np.argsort(-table[:, j])
-            first = families[order[0]]
-            number = self.nodes(spinning.pairs.right[:, j], self.model.structure.families[first][1]) + 1
+            kind, number = structure.mode_name(families[order[0]], *self.shape(spinning.pairs.right[:, j]))
             mixed = len(order) > 1 and table[order[0], j] < PURE
-            out.append(f"{first}–{families[order[1]]} {number}" if mixed else f"{first} {number}")
+            out.append(f"{kind}–{families[order[1]]} {number}" if mixed else f"{kind} {number}")
         return out
 
-    def nodes(self, x: Array, component: int) -> int:
-        """Return the number of zeros of one component along the structure, its clamped end not counted."""
-        y = self.model.structure.oriented(self.shape(x)[1])[:, component]
-        y = np.real(y * np.exp(-1j * np.angle(y[np.argmax(np.abs(y))])))
-        y = y[np.abs(y) > NODE_NOISE * np.max(np.abs(y))]
-        return int(np.count_nonzero(np.diff(np.sign(y))))
-
-    def shape(self, x: Array) -> tuple[Array, Array]:
-        """Return (X, values): node positions (n,) in m and the complex components (n, bs) of a mode, on every rank."""
-        structure = self.model.structure
-        X, real = structure.nodes(x.real)
-        _, imaginary = structure.nodes(x.imag)
-        return X, real + 1j * imaginary
+    def shape(self, x: Array) -> tuple[dict[str, Array], Array]:
+        """Return (coordinates of the nodes, m; complex components (n, bs) of a mode), on every rank."""
+        coordinates, real = self.model.structure.nodes(x.real)
+        _, imaginary = self.model.structure.nodes(x.imag)
+        return coordinates, real + 1j * imaginary
 
 
 def modes(
@@ -337,10 +325,10 @@ def linearisation_error(analysis: ModalAnalysis, spinning: Spinning) -> float:
 
 def scaled_shape(analysis: ModalAnalysis, spinning: Spinning, i: int) -> dict[str, Array]:
     """Return a mode shape along the structure: x (m) and the real and imaginary part of each component, largest 1."""
-    X, values = analysis.shape(spinning.pairs.right[:, i])
+    coordinates, values = analysis.shape(spinning.pairs.right[:, i])
     peak = values.ravel()[np.argmax(np.abs(values))]
     values = values / peak
-    columns: dict[str, Array] = {"x": X}
+    columns: dict[str, Array] = dict(coordinates)
     for c, name in enumerate(analysis.model.structure.components):
         columns[name], columns[f"{name}_imag"] = values[:, c].real, values[:, c].imag
     return columns

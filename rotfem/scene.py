@@ -162,7 +162,8 @@ class Scene(SceneModel):
         """Tables of everything that was set and all defaults, fit for JSON and TOML; functions become their names."""
         tables: dict[str, Any] = _plain(self)
         if isinstance(self.structure, PlateStructure) and self.structure.mesh is not None:
-            tables["mesh"] = {key: tables["mesh"][key] for key in ("degree", "integration")}
+            without = {"elements", "cell"} | ({"degree"} - self.mesh.model_fields_set)
+            tables["mesh"] = {key: value for key, value in tables["mesh"].items() if key not in without}
         return tables
 
     def is_dead(self, load: str) -> bool:

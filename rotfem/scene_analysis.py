@@ -107,7 +107,7 @@ class PlateMesh(SceneModel):
 
     Attributes:
         elements: (nx, ny) of a rectangle; without meaning if the structure has a mesh file.
-        degree: Polynomial degree, 1 to 6.
+        degree: Polynomial degree, 1 to 6; if not given, 2 on quadrilaterals and 3 on triangles (see `degree_on`).
         cell: Cell shape of a rectangle; without meaning if the structure has a mesh file.
         integration: Quadrature of the membrane and shear terms; ``reduced`` avoids locking.
     """
@@ -116,6 +116,17 @@ class PlateMesh(SceneModel):
     degree: Degree = 2
     cell: Literal["quadrilateral", "triangle"] = "quadrilateral"
     integration: Integration = "reduced"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_degree(cls, data: Any) -> Any:
+        """Adds the degree that does not lock on triangles."""
+        triangles = isinstance(data, Mapping) and data.get("cell") == "triangle"
+        return {"degree": 3, **data} if triangles else data
+
+    def degree_on(self, cell: str) -> int:
+        """Polynomial degree on cells of a shape: as given, else 2 on quadrilaterals and 3 on triangles."""
+        return 3 if cell == "triangle" and "degree" not in self.model_fields_set else self.degree
 
 
 class Time(SceneModel):

@@ -6,7 +6,7 @@ from rotfem.quantities import problem
 from rotfem.scene_analysis import FRAME_EFFECTS, BeamMesh, Initial, Model, PlateMesh
 from rotfem.scene_loads import Loads
 from rotfem.scene_motion import ConstantMotion, Motion, TorqueMotion
-from rotfem.scene_plate import PlateStructure
+from rotfem.scene_plate import PlateStructure, locking
 from rotfem.scene_structure import PlanarBeamStructure, SpatialBeamStructure
 
 AnyStructure = PlanarBeamStructure | SpatialBeamStructure | PlateStructure
@@ -34,16 +34,18 @@ def check_loads(structure: AnyStructure, loads: Loads) -> None:
     moment = loads.tip_moment
     if moment is None:
         return
-    if isinstance(structure, PlateStructure):
-        raise problem("loads.tip_moment", None, "is allowed only for beams")
     if isinstance(structure, PlanarBeamStructure) and moment.components != 1 and moment.function is None:
         raise problem("loads.tip_moment", None, "must have one component, about axis 3, for a planar_beam")
-    if isinstance(structure, SpatialBeamStructure) and moment.components != 3:
-        raise problem("loads.tip_moment", None, "must have three components for a spatial_beam")
+    if not isinstance(structure, PlanarBeamStructure) and moment.components != 3:
+        raise problem("loads.tip_moment", None, f"must have three components for a {structure.type}")
 
 
 def check_mesh(structure: AnyStructure, mesh: BeamMesh | PlateMesh) -> None:
-    """Raises a problem if the mesh is given both as a file and by numbers of elements."""
+    """Raises a problem if the mesh is given both as a file and by numbers of elements, or of elements that lock."""
+    if isinstance(structure, PlateStructure) and isinstance(mesh, PlateMesh) and structure.mesh is None:
+        why = locking(mesh.cell, mesh.degree_on(mesh.cell), mesh.integration)
+        if why is not None:
+            raise problem("mesh.degree", mesh.degree_on(mesh.cell), why)
     if isinstance(structure, PlateStructure) and structure.mesh is not None:
         for key in ("elements", "cell"):
             if key in mesh.model_fields_set:

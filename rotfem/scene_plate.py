@@ -64,6 +64,35 @@ def _as_point_masses(value: Any) -> Matrix:
     return rows
 
 
+def _as_line_masses(value: Any) -> dict[str, float]:
+    if not isinstance(value, dict):
+        raise problem("", value, "must be a table edge = mass per length (kg/m)")
+    for edge, mass in value.items():
+        try:
+            Bounds(gt=0.0).number(mass)
+        except PydanticCustomError as error:
+            raise problem(str(edge), mass, error.message()) from None
+    return {str(edge): float(mass) for edge, mass in value.items()}
+
+
+def locking(cell: str, degree: int, integration: str) -> str | None:
+    """Returns why elements of a degree (with reduced or full integration) are refused; ``None`` if they are good.
+
+    Args:
+        cell: ``triangle`` or ``quadrilateral``.
+        degree: Polynomial degree.
+        integration: ``reduced`` or ``full`` membrane and shear integration.
+    """
+    least = {("quadrilateral", "reduced"): 2, ("quadrilateral", "full"): 3, ("triangle", "reduced"): 3}
+    needed = least.get((cell, integration), 4)
+    if degree >= needed:
+        return None
+    return (
+        f"{cell}s of degree {degree} with {integration} integration lock: thin plates come out far too stiff; must be at "
+        f"least {needed} here (defaults: quadrilaterals of degree 2, triangles of degree 3, reduced integration)"
+    )
+
+
 def _as_mesh_file(value: Any, info: ValidationInfo) -> str:
     return str(existing_file(value, info))
 
@@ -86,6 +115,7 @@ class PlateStructure(SceneModel):
         hub_radius: Distance of the clamped edge from the origin of the frame along direction 1 (m).
         hub_offset: Position of the plate's origin in the frame (m), instead of the hub radius; ``None`` if not given.
         point_masses: Rows (x, y, m) in m, m, kg.
+        line_masses: Named edge → mass per length (kg/m); a rectangle has clamped, tip, lower and upper.
         damping: Damping coefficients.
     """
 
@@ -118,6 +148,7 @@ class PlateStructure(SceneModel):
     hub_radius: NonNegative = 0.0
     hub_offset: Vector | None = None
     point_masses: Annotated[Matrix, PlainValidator(_as_point_masses)] = ()
+    line_masses: Annotated[dict[str, float], PlainValidator(_as_line_masses)] = Field(default_factory=dict)
     damping: Damping = Damping()
 
     @property
@@ -132,8 +163,8 @@ class PlateStructure(SceneModel):
 
     @property
     def has_tip_mass(self) -> bool:
-        """Whether there are point masses."""
-        return bool(self.point_masses)
+        """Whether there are point or line masses."""
+        return bool(self.point_masses or self.line_masses)
 
     @property
     def has_rotary_inertia(self) -> bool:

@@ -66,7 +66,7 @@ class Model:
         self.bodies = s.bodies(self.effects)
         self.applied = s.loads()
         self.terms = self._terms()
-        self._axial: list[Any] | None = None
+        self._stretch: Any = None
 
     def _terms(self) -> dict[str, Any]:
         k = self.structure.k
@@ -81,14 +81,14 @@ class Model:
         return {name: term for name, term in terms.items() if not isinstance(term, int)}
 
     def inside_out(self) -> bool:
-        """Return whether the axis is anywhere compressed to less than nothing at the state in q: no real state is."""
-        if self._axial is None:
-            points = quadrature_points(self.structure.mesh, self.structure.V.element.basix_element.degree)
-            chosen = [s for s in self.strains if s.name in self.structure.prestressing]
-            self._axial = [fem.Expression(s.value, points) for s in chosen]
-        cells = np.arange(self.structure.mesh.topology.index_map(self.structure.mesh.topology.dim).size_local)
-        lowest = min((float(e.eval(self.structure.mesh, cells).min()) for e in self._axial if len(cells)), default=0.0)
-        return self.comm.allreduce(lowest, op=MPI.MIN) <= -1.0
+        """Return whether the structure is anywhere compressed to less than nothing at the state in q: none real is."""
+        mesh = self.structure.mesh
+        if self._stretch is None:
+            points = quadrature_points(mesh, self.structure.V.element.basix_element.degree)
+            self._stretch = fem.Expression(self.structure.stretch(self.strains), points)
+        cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local)
+        lowest = float(self._stretch.eval(mesh, cells).min()) if len(cells) else 1.0
+        return self.comm.allreduce(lowest, op=MPI.MIN) <= 0.0
 
     @property
     def residual(self) -> Any:
@@ -239,11 +239,11 @@ class System:
         return here if self.model.comm.size == 1 else self.model.comm.allreduce(here, op=MPI.MAX)
 
     def shape(self) -> dict[str, Array]:
-        """Return the deflected structure at the state: position X (m), u1, u2 (m), alpha, … in the turning frame."""
-        X, q = self.structure.nodes(self.q.x.array)
+        """Return the deflected structure at the state: position x (m), u1, u2 (m), alpha, … in the turning frame."""
+        coordinates, q = self.structure.nodes(self.q.x.array)
         if self.clamp is not None:
-            q = self.clamp.relative(q, X, self.time)
-        return {"x": X, **{name: q[:, i] for i, name in enumerate(self.structure.components)}}
+            q = self.clamp.relative(q, coordinates["x"], self.time)
+        return {**coordinates, **{name: q[:, i] for i, name in enumerate(self.structure.components)}}
 
     def energies(self) -> dict[str, float]:
         """Return kinetic and strain energy and the Jacobi integral T2 − T0 + W + V, J.

@@ -7,22 +7,23 @@ from typing import Any
 
 from mpi4py import MPI
 
-from rotfem.errors import SceneError
 from rotfem.scene import Scene
-from rotfem.structures.beam import Beam
 from rotfem.structures.planar_beam import PlanarBeam
+from rotfem.structures.plate import Plate
 from rotfem.structures.spatial_beam import SpatialBeam
+from rotfem.structures.structure import Structure
 
-STRUCTURES: dict[str, Callable[..., Beam]] = {"planar_beam": PlanarBeam, "spatial_beam": SpatialBeam}
+STRUCTURES: dict[str, Callable[..., Structure]] = {
+    "planar_beam": PlanarBeam,
+    "spatial_beam": SpatialBeam,
+    "plate": Plate,
+}
 
 
 def build(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Any:
     """Return the discretised structure of a scene.
 
     Raises:
-        SceneError: the structure type has no implementation yet.
+        SceneError: a mesh or a section that cannot be computed with.
     """
-    kind = scene.structure.type
-    if kind not in STRUCTURES:
-        raise SceneError(scene.name, "structure.type", kind, f"can be computed so far: {', '.join(STRUCTURES)}")
-    return STRUCTURES[kind](scene, comm)
+    return STRUCTURES[scene.structure.type](scene, comm)

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 import ufl
-from basix.ufl import element
-from dolfinx import default_scalar_type, fem, mesh
+from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from rotfem.kinematics import AppliedLoad, Damping, Kinematics
-from rotfem.scene import BeamMesh, Load, PlanarBeamStructure, Scene, SpatialBeamStructure
+from rotfem.kinematics import Strain
+from rotfem.scene import BeamMesh, PlanarBeamStructure, Scene, SpatialBeamStructure
+from rotfem.structures.mode_shapes import in_phase, sign_changes
 from rotfem.structures.probe import Probe
-
-Array = npt.NDArray[np.float64]
+from rotfem.structures.structure import Array, Structure
 
 #: Polynomial degree that holds any section property of linearly tapered dimensions (I of a tube: fourth degree).
 TAPER_DEGREE = 4
@@ -38,11 +35,7 @@ def beam_nodes(length: float, elements: int, knots: tuple[float, ...]) -> Array:
     return np.concatenate([*pieces, [length]])
 
 
-def _first(load: Load, n: int, t: float) -> Array:
-    return load.at(t)[:n]
-
-
-class Beam:
+class Beam(Structure):
     """A discretised beam clamped at X = 0.
 
     The unknowns are blocked Lagrange functions of degree k; internal work is integrated with k Gauss points, which
@@ -55,14 +48,9 @@ class Beam:
         knots: places along the beam that must be nodes, m.
     """
 
-    type: ClassVar[str]
-    planar: ClassVar[bool]
-    #: Names of the unknowns.
-    components: ClassVar[tuple[str, ...]]
-    #: Components of a force.
-    dimension: ClassVar[int]
-    #: Strains whose force makes geometric stiffness in the prestressed linear theories.
     prestressing: ClassVar[tuple[str, ...]] = ("axial",)
+    #: Family ↦ the components whose kinetic energy counts, and the one whose nodes are counted.
+    families: ClassVar[dict[str, tuple[tuple[int, ...], int]]]
 
     def __init__(
         self,
@@ -73,50 +61,27 @@ class Beam:
     ):
         grid = scene.mesh
         assert isinstance(grid, BeamMesh)
-        self.scene, self.comm = scene, comm
-        self.length, self.hub_radius = structure.length, structure.hub_radius
-        self._section, self._damping = structure.section, structure.damping
+        super().__init__(scene, structure.damping, comm)
+        self.length, self.hub_radius, self._section = structure.length, structure.hub_radius, structure.section
         nodes = beam_nodes(self.length, grid.elements, knots)
-        self.mesh = mesh.create_interval(comm, len(nodes) - 1, [0.0, self.length])
-        self.elements = len(nodes) - 1
-        x = self.mesh.geometry.x
+        interval = mesh.create_interval(comm, len(nodes) - 1, [0.0, self.length])
+        x = interval.geometry.x
         x[:, 0] = np.interp(x[:, 0], np.linspace(0.0, self.length, len(nodes)), nodes)
-        k, self.size = grid.degree, len(self.components)
-        self.V = fem.functionspace(self.mesh, element("Lagrange", self.mesh.basix_cell(), k, shape=(self.size,)))
-        q, v, a = (fem.Function(self.V, name=name) for name in "qva")
-        self.k = Kinematics(q, v, a, ufl.TestFunction(self.V))
+        k = grid.degree
+        self.discretise(interval, k)
         reduced = 2 * k - 2 if grid.integration == "reduced" else 2 * k
         self.dx_elastic = ufl.dx(self.mesh, metadata={"quadrature_degree": reduced})
         self.dx = ufl.dx(self.mesh, metadata={"quadrature_degree": 2 * k})
         tip = mesh.locate_entities_boundary(self.mesh, 0, lambda p: np.isclose(p[0], self.length))
         tags = mesh.meshtags(self.mesh, 0, tip, np.full(len(tip), 1, dtype=np.int32))
-        self.ds_tip = ufl.ds(1, domain=self.mesh, subdomain_data=tags)
+        self.tip = ufl.ds(1, domain=self.mesh, subdomain_data=tags)
         root = mesh.locate_entities_boundary(self.mesh, 0, lambda p: np.isclose(p[0], 0.0))
         self.clamped = fem.locate_dofs_topological(self.V, 0, root)
-        #: Section properties by name: a constant each where the section is uniform, a field each where it is not.
-        self.section: dict[str, Any] = {}
-        #: Single numbers that the forms contain, by name.
-        self.scalars: dict[str, fem.Constant] = {}
-        self.load_constants: dict[str, tuple[fem.Constant, Callable[[float], Array]]] = {}
         self.probe = Probe(self.V, np.array([self.length, 0.0, 0.0]))
 
-    def position(self, q: Any) -> Any:
-        """Return the axis r(q), frame components (m)."""
-        raise NotImplementedError
-
-    def turned(self, q: Any, v: Any) -> Any:
-        """Return a vector that turns with the section, frame components; v is what it is at q = 0."""
-        raise NotImplementedError
-
-    # --- constants and fields -----------------------------------------------------------------------------------
-
-    def constant(self, value: npt.ArrayLike) -> fem.Constant:
-        """Return a constant on the mesh: its value can change without a new compilation."""
-        return fem.Constant(self.mesh, np.asarray(value, dtype=default_scalar_type))
-
-    def scalar(self, name: str, value: float) -> fem.Constant:
-        """Return the constant of a named number of the scene, one and the same at every call."""
-        return self.scalars.setdefault(name, self.constant(value))
+    def stretch(self, strains: list[Strain]) -> Any:
+        """1 + Γ₁, Γ₁ the axial strain."""
+        return 1 + next(s.value for s in strains if s.name == "axial")
 
     def profile(self, name: str, at: Callable[[Array], Array]) -> Any:
         """Return at(X) as a constant where the section is uniform, else as a field."""
@@ -126,63 +91,14 @@ class Beam:
         f.interpolate(lambda x: at(x[0]))
         return f
 
-    # --- damping and loads --------------------------------------------------------------------------------------
-
-    def damping(self) -> Damping:
-        """Return Kelvin–Voigt plus stiffness-proportional viscosity, and the mass-proportional rate."""
-        d = self._damping
-        eta, a0 = d.kelvin_voigt + d.rayleigh[1], d.rayleigh[0]
-        return Damping(self.constant(eta) if eta > 0 else None, self.constant(a0) if a0 > 0 else None)
-
-    def forces(self) -> list[AppliedLoad]:
-        """Return the scene's non-zero forces; dead ones keep their direction in the frame, followers turn."""
-        loads, q = self.scene.loads, self.k.q
-        out = []
-        for name, load, measure in (
-            ("tip_force", loads.tip_force, self.ds_tip),
-            ("distributed", loads.distributed, self.dx),
-        ):
-            if load is None or load.is_zero:
-                continue
-            f = self.add_load(name, self.dimension, partial(_first, load, self.dimension))
-            dead = load.kind == "dead"
-            vector = ufl.as_vector([f[i] if i < self.dimension else 0 for i in range(3)])
-            force = vector if dead else self.turned(q, vector)
-            out.append(AppliedLoad(name, force, self.position(q), measure, dead))
-        return out
-
-    def add_load(self, name: str, size: int, at: Callable[[float], Array]) -> fem.Constant:
-        """Return the amplitude constant (size,) of a load and remember at(t), its value at time t (s)."""
-        constant = self.constant(np.zeros(size))
-        self.load_constants[name] = (constant, at)
-        return constant
-
     # --- values -------------------------------------------------------------------------------------------------
 
-    def scales(self) -> Array:
-        """Return the natural size of every local unknown: length (m) for displacements, 1 for rotations."""
-        nodes = self.V.dofmap.index_map.size_local + self.V.dofmap.index_map.num_ghosts
-        return np.tile([self.length if name.startswith("u") else 1.0 for name in self.components], nodes)
+    def nodes(self, values: Array) -> tuple[dict[str, Array], Array]:
+        """Return ({"x": (n,) m, increasing}, q (n, components)) at all nodes, on every rank."""
+        x, q = self.gather(values)
+        order = np.argsort(x[:, 0])
+        return {"x": x[order, 0]}, q[order]
 
-    def nodes(self, values: Array) -> tuple[Array, Array]:
-        """Return (X, q): positions (n,) in m, increasing, and q (n, components) at all nodes, on every rank.
-
-        Args:
-            values: local dof array of q (or of the owned part of it).
-        """
-        owned = self.V.dofmap.index_map.size_local
-        X = np.concatenate(self.comm.allgather(self.V.tabulate_dof_coordinates()[:owned, 0]))
-        q = np.concatenate(self.comm.allgather(values[: self.size * owned].reshape(-1, self.size)))
-        order = np.argsort(X)
-        return X[order], q[order]
-
-    def oriented(self, values: Array) -> Array:
-        """Return the components along the undeformed beam of nodal values (n, components, …): modes are named by it."""
-        return values
-
-    def check_range(self, q: Array, time: float | None = None) -> None:
-        """Refuse a state (local dof array) outside the range of the unknowns; there is none here.
-
-        Raises:
-            ComputationError: never here; see the spatial beam.
-        """
+    def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> tuple[str, str]:
+        """Return the family of a mode shape (n, components) and its number: one more than its nodes."""
+        return family, str(sign_changes(in_phase(self.oriented(values)[:, self.families[family][1]])) + 1)

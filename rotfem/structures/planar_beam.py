@@ -74,9 +74,9 @@ class PlanarBeam(Beam):
         if "rotary_inertia" in effects:
             bodies.append(Body(director, self.section["rotary_inertia"], self.dx, is_position=False))
         if "tip_mass" in effects and s.tip_mass > 0:
-            bodies.append(Body(r, self.scalar("tip_mass", s.tip_mass), self.ds_tip))
+            bodies.append(Body(r, self.scalar("tip_mass", s.tip_mass), self.tip))
         if "tip_mass" in effects and s.tip_inertia > 0:
-            bodies.append(Body(director, self.scalar("tip_inertia", s.tip_inertia), self.ds_tip, is_position=False))
+            bodies.append(Body(director, self.scalar("tip_inertia", s.tip_inertia), self.tip, is_position=False))
         return bodies
 
     def loads(self) -> list[AppliedLoad]:
@@ -84,5 +84,5 @@ class PlanarBeam(Beam):
         moment, out = self.scene.loads.tip_moment, self.forces()
         if moment is not None and not moment.is_zero:
             m = self.add_load("tip_moment", 1, lambda t: np.ravel(moment.at(t))[-1:])
-            out.append(AppliedLoad("tip_moment", m[0], self.k.q[2], self.ds_tip))
+            out.append(AppliedLoad("tip_moment", m[0], self.k.q[2], self.tip))
         return out

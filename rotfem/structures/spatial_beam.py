@@ -157,13 +157,13 @@ class SpatialBeam(Beam):
         if s.tip_mass > 0:
             pairs = enumerate(s.tip_offset, start=1)
             center = tuple(self.scalar(f"tip_offset_{i}", c) if c != 0.0 else 0 for i, c in pairs)
-            out.append(self._mass(self.scalar("tip_mass", s.tip_mass), center, self.ds_tip))
+            out.append(self._mass(self.scalar("tip_mass", s.tip_mass), center, self.tip))
         for i, (moment, axis) in enumerate(euler_tensor(s.tip_inertia_matrix), start=1):
             if isinstance(s.tip_inertia, float):  # isotropic: each director has half of it
                 density = self.scalar("tip_inertia", s.tip_inertia) / 2
             else:
                 density = self.scalar(f"tip_director_inertia_{i}", moment)
-            out.append(self._director(tuple(axis), density, self.ds_tip))
+            out.append(self._director(tuple(axis), density, self.tip))
         return out
 
     def loads(self) -> list[AppliedLoad]:
@@ -172,7 +172,7 @@ class SpatialBeam(Beam):
         if moment is not None and not moment.is_zero:
             m, dead = self.add_load("tip_moment", 3, partial(_moment, moment)), moment.kind == "dead"
             M = m if dead else self._turn.rotate(m)
-            out.append(AppliedMoment("tip_moment", M, self._turn.theta, self.ds_tip, dead, section=self._turn))
+            out.append(AppliedMoment("tip_moment", M, self._turn.theta, self.tip, dead, section=self._turn))
         return out
 
     def check_range(self, q: Array, time: float | None = None) -> None:
@@ -181,12 +181,12 @@ class SpatialBeam(Beam):
         Raises:
             ComputationError: says where; rotation vectors stand for rotations one to one only up to there.
         """
-        X, values = self.nodes(q)
+        coordinates, values = self.nodes(q)
         turns = np.linalg.norm(values[:, 3:], axis=1)
         worst = int(np.argmax(turns))
         if turns[worst] > FULL_TURN:
             raise ComputationError(
-                f"the section at X = {X[worst]:.4g} m has turned by {turns[worst] / (2 * np.pi):.3g} turns relative to "
+                f"the section at X = {coordinates['x'][worst]:.4g} m has turned by {turns[worst] / (2 * np.pi):.3g} turns relative to "
                 "the frame; a spatial beam's rotations are limited to one",
                 time,
                 'a smaller load, or structure.type = "planar_beam" where the motion is in a plane',

@@ -6,6 +6,8 @@ from typing import Any
 
 import ufl
 
+from rotfem.plate_kinematics import PlateGradients
+
 
 def planar_beam(q: Any) -> tuple[Any, Any, Any]:
     """Return (Gamma_1, Gamma_2, kappa) of q = (u_1, u_2, alpha): axial, shear (both 1) and bending (1/m) strain."""
@@ -22,3 +24,12 @@ def spatial_beam(du: Any, theta: Any, dtheta: Any, e: Any) -> tuple[Any, Any]:
         e: unit tangent of the undeformed axis.
     """
     return du - ufl.cross(theta, e), dtheta
+
+
+def plate(q: Any) -> tuple[Any, Any, Any]:
+    """Return membrane strain (1), transverse shear (1) and curvature (1/m) of q = (u_1, u_2, u_3, alpha_1, alpha_2).
+
+    Mindlin's: u_(γ,β), u_3,β − alpha_β, alpha_(γ,β), shapes (2, 2), (2,), (2, 2).
+    """
+    p = PlateGradients(q)
+    return ufl.sym(p.du), p.dw - p.alpha, ufl.sym(p.dalpha)

@@ -6,6 +6,7 @@ from typing import Any
 
 import ufl
 
+from rotfem.plate_kinematics import PlateGradients, director
 from rotfem.rotations import Turn
 
 
@@ -25,3 +26,14 @@ def spatial_beam(du: Any, theta: Any, dtheta: Any, e: Any) -> tuple[Any, Any]:
     """
     turn = Turn(theta)
     return turn.rotate_back(e + du) - e, turn.material_rate(dtheta)
+
+
+def plate(q: Any) -> tuple[Any, Any, Any]:
+    """Return membrane strain (1), transverse shear (1) and curvature (1/m) of q = (u_1, u_2, u_3, alpha_1, alpha_2).
+
+    ½ (r,γ·r,β − δ_γβ), r,β·t and −½ (r,γ·t,β + r,β·t,γ) with the unit director t, shapes (2, 2), (2,), (2, 2): Simo &
+    Fox 1989, the fully nonlinear plate of Simo & Vu-Quoc 1986.
+    """
+    p = PlateGradients(q)
+    dr, t = p.dr, director(p.alpha)
+    return (ufl.dot(dr.T, dr) - ufl.Identity(2)) / 2, ufl.dot(t, dr), -ufl.sym(ufl.dot(dr.T, ufl.grad(t)))

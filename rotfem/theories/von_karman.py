@@ -9,6 +9,8 @@ from typing import Any
 
 import ufl
 
+from rotfem.plate_kinematics import PlateGradients
+
 
 def planar_beam(q: Any) -> tuple[Any, Any, Any]:
     """Return (Gamma_1, Gamma_2, kappa) of q = (u_1, u_2, alpha): axial, shear (both 1) and bending (1/m) strain."""
@@ -26,3 +28,12 @@ def spatial_beam(du: Any, theta: Any, dtheta: Any, e: Any) -> tuple[Any, Any]:
     """
     stretch = ufl.sqrt(ufl.dot(e + du, e + du))
     return du - ufl.cross(theta, e) + (stretch - 1 - ufl.dot(e, du)) * e, dtheta
+
+
+def plate(q: Any) -> tuple[Any, Any, Any]:
+    """Return membrane strain (1), transverse shear (1) and curvature (1/m) of q = (u_1, u_2, u_3, alpha_1, alpha_2).
+
+    Simo & Vu-Quoc 1986 eq. (27), shapes (2, 2), (2,), (2, 2): u_(γ,β) + ½ u_3,γ u_3,β, then as in the linear theory.
+    """
+    p = PlateGradients(q)
+    return ufl.sym(p.du) + ufl.outer(p.dw, p.dw) / 2, p.dw - p.alpha, ufl.sym(p.dalpha)

@@ -30,7 +30,7 @@ LEVELS: tuple[tuple[str, ...], ...] = (
     ),
     ("plots",),
     # FEniCSx from here on
-    ("compat", "kinematics", "motion", "rotations"),
+    ("compat", "kinematics", "motion", "plate_kinematics", "rotations"),
     ("solvers", "theories", "theories.*", "effects", "structures", "structures.*"),
     ("system", "affine"),
     ("equilibrium", "integrators", "pencil"),

@@ -355,7 +355,7 @@ TIME = {"end": 1.0, "step": 0.1}
         ("planar", {"loads__tip_force": {"value": [1, 1], "kind": "folower"}}, "loads.tip_force.kind", "follower"),
         ("planar", {"loads__tip_moment": [1, 0, 0]}, "loads.tip_moment", "one component"),
         ("spatial", {"loads__tip_moment": 1}, "loads.tip_moment", "three components"),
-        ("plate", {"loads__tip_moment": 1}, "loads.tip_moment", "only for beams"),
+        ("plate", {"loads__tip_moment": 1}, "loads.tip_moment", "three components"),
         ("planar", {"mesh__elements": 0}, "mesh.elements", "at least 1"),
         ("planar", {"mesh__elements": 2.0}, "mesh.elements", "integer"),
         ("planar", {"mesh__elements": True}, "mesh.elements", "integer"),

@@ -162,7 +162,8 @@ def test_linear_theory_superposes(hub_beam: Any) -> None:
     for offset in (None, 0.1, 0.2):
         changes = {"model.theory": "consistent_linear", "initial.tip_displacement": offset}
         u[offset] = run(hub_beam(changes, time=time)).history["tip_u2"]
-    np.testing.assert_allclose(u[0.2] - u[None], 2 * (u[0.1] - u[None]), rtol=0, atol=1e-9)
+    # Round-off of 1000 steps: up to 1.5e-9 m seen, different from one BLAS to another.
+    np.testing.assert_allclose(u[0.2] - u[None], 2 * (u[0.1] - u[None]), rtol=0, atol=1e-7)
     assert np.max(np.abs(u[0.1] - u[None])) > 0.05
 
 

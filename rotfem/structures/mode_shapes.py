@@ -1,0 +1,99 @@
+"""Complex mode shapes: turned to their largest real part, their nodes and nodal lines counted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+#: Part of the largest amplitude below which a shape counts as zero when its nodes are counted.
+NODE_NOISE = 1e-3
+
+
+def in_phase(y: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """Return the real part of y, turned by the phase of its largest entry."""
+    return np.asarray(np.real(y * np.exp(-1j * np.angle(y.flat[np.argmax(np.abs(y))]))))
+
+
+def sign_changes(y: npt.NDArray[np.float64], noise: float = NODE_NOISE) -> int:
+    """Return how often the values (n,) along a line change sign; those below the noise do not count."""
+    y = y[np.abs(y) > noise * np.max(np.abs(y))]
+    return int(np.count_nonzero(np.diff(np.sign(y))))
+
+
+#: Stations along a plate at which its cross lines are looked at, and highest polynomial across.
+STATIONS, ACROSS = 24, 4
+
+#: Stations around a disk, and gap in the angles of the clamp (rad) up to which the plate counts as a disk.
+AROUND, GAP = 64, 1.0
+
+
+def plate_mode_name(family: str, coordinates: dict[str, npt.NDArray[Any]], y: npt.NDArray[Any]) -> tuple[str, str]:
+    """Return the kind and number of a plate mode.
+
+    A plate clamped along an edge has "bending n" (n − 1 nodal lines across it, none along), "torsion n" (one line
+    along), "chordwise m.n" (m ≥ 2 lines along) and "in-plane n"; a disk clamped inside "diameters m.n": m nodal
+    diameters, n − 1 circles beside the clamp.
+
+    Args:
+        family: "bending" or "in-plane".
+        coordinates: x, y of the nodes and whether they are clamped ("clamped"), (n,) each.
+        y: the transverse (or, of in-plane modes, the in-plane) displacement at the nodes, complex, (n,).
+    """
+    real = in_phase(y)
+    x1, x2 = coordinates["x"], coordinates["y"]
+    centre = np.array([np.mean(x1), np.mean(x2)])
+    if _is_disk(x1 - centre[0], x2 - centre[1]):
+        diameters, circles = _polar_lines(x1 - centre[0], x2 - centre[1], real)
+        return ("diameters" if family == "bending" else "in-plane"), f"{diameters}.{circles + 1}"
+    along, across = _lines(x1, x2, real)
+    if family != "bending":
+        return family, str(across + 1)
+    if along > 1:
+        return "chordwise", f"{along}.{across + 1}"
+    return ("bending", "torsion")[along], str(across + 1)
+
+
+def _is_disk(x: npt.NDArray[Any], y: npt.NDArray[Any]) -> bool:
+    """Return whether nodes about their centre leave a round hole there and lie at all angles."""
+    r = np.hypot(x, y)
+    if r.min() < 1e-2 * r.max():
+        return False
+    inner = np.sort(np.arctan2(y, x)[r < 1.02 * r.min() + 1e-3 * r.max()])
+    outer = np.sort(np.arctan2(y, x)[r > 0.98 * r.max()])
+    gaps = [np.max(np.diff(np.append(a, a[0] + 2 * np.pi))) if len(a) > 5 else np.inf for a in (inner, outer)]
+    return max(gaps) < GAP
+
+
+def _lines(x: npt.NDArray[Any], y: npt.NDArray[Any], w: npt.NDArray[Any]) -> tuple[int, int]:
+    """Return (nodal lines along the plate, nodal lines across it): the largest Legendre part across, and its zeros."""
+    edges = np.linspace(x.min(), x.max(), STATIONS + 1)
+    station = np.clip(np.digitize(x, edges) - 1, 0, STATIONS - 1)
+    parts = np.zeros((STATIONS, ACROSS + 1))
+    for i in range(STATIONS):
+        here = station == i
+        half = np.ptp(y[here]) / 2 if np.any(here) else 0.0
+        if half == 0.0:
+            continue
+        s = (y[here] - y[here].min()) / half - 1
+        degree = min(ACROSS, len(np.unique(np.round(s, 6))) - 1)
+        parts[i, : degree + 1] = np.polynomial.legendre.legfit(s, w[here], degree)
+    weight = np.sum(parts**2, axis=0) / (2 * np.arange(ACROSS + 1) + 1)
+    along = int(np.argmax(weight))
+    return along, sign_changes(parts[:, along], 0.02)
+
+
+def _polar_lines(x: npt.NDArray[Any], y: npt.NDArray[Any], w: npt.NDArray[Any]) -> tuple[int, int]:
+    """Return (nodal diameters, nodal circles) of a shape on a disk about the origin."""
+    r, angle = np.hypot(x, y), np.arctan2(y, x)
+    edges = np.linspace(r.min(), r.max(), STATIONS // 2 + 1)
+    ring = np.clip(np.digitize(r, edges) - 1, 0, STATIONS // 2 - 1)
+    orders = np.arange(AROUND // 4)
+    parts = np.zeros((STATIONS // 2, len(orders)), dtype=complex)
+    for i in range(STATIONS // 2):
+        here = ring == i
+        if np.any(here):
+            parts[i] = np.mean(w[here] * np.exp(-1j * np.outer(orders, angle[here])), axis=1)
+    best = int(np.argmax(np.sum(np.abs(parts) ** 2, axis=0) * np.where(orders == 0, 1, 2)))
+    return best, sign_changes(in_phase(parts[:, best]), 0.05)

@@ -1,0 +1,287 @@
+"""The Mindlin plate q = (u_1, u_2, u_3, alpha_1, alpha_2) in the plane (a_1, a_2), clamped along an edge.
+
+Membrane force, shear force and moment are those of plane stress, N = h Q ε, V = k h G γ, M = (h³/12) Q κ. Membrane and
+shear energy are integrated with 2k − 1, bending and inertia fully: the elements then do not lock in the thin limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, ClassVar, cast
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from rotfem.errors import ComputationError, SceneError
+from rotfem.kinematics import AppliedLoad, Body, Strain
+from rotfem.plate_kinematics import PlateGradients, director, triad
+from rotfem.scene import MomentLoad, PlateMesh, PlateStructure, Scene
+from rotfem.scene_plate import locking
+from rotfem.structures.mode_shapes import plate_mode_name
+from rotfem.structures.plate_loads import EdgeMoment, point_measure
+from rotfem.structures.plate_mesh import PlateGrid, plate_grid
+from rotfem.structures.probe import Probe
+from rotfem.structures.structure import Array, Structure
+from rotfem.theories import THEORIES
+
+#: Largest |alpha_2|, rad: at π/2 the two angles of the director meet their pole.
+LARGEST_TILT = 1.5
+
+#: Nodes closer than this part of the plate's size share a coordinate when they are put in order.
+SAME_PLACE = 1e-7
+
+
+def _moment(load: MomentLoad, t: float) -> Array:
+    return np.ravel(load.at(t))
+
+
+def _voigt(tensor: Any) -> Any:
+    """(e_11, e_22, 2 e_12) of a symmetric tensor."""
+    return ufl.as_vector((tensor[0, 0], tensor[1, 1], 2 * tensor[0, 1]))
+
+
+class Plate(Structure):
+    """Discretised plate of a scene.
+
+    Args:
+        scene: a validated scene whose structure is a plate.
+        comm: communicator the mesh is distributed over.
+
+    Raises:
+        SceneError: a mesh file that is no mesh of a plate, elements that lock on it, masses beside it.
+    """
+
+    type = "plate"
+    components = ("u1", "u2", "u3", "alpha1", "alpha2")
+    prestressing: ClassVar = ("membrane",)
+    #: Conjugates of the tip's components: inputs of the state-space model.
+    tip_inputs = ("tip_force_1", "tip_force_2", "tip_force_3", "tip_moment_alpha1", "tip_moment_alpha2")
+    #: Mode families: the components whose kinetic energy counts, and the one whose shape is looked at.
+    families: ClassVar = {"bending": ((2, 3, 4), 2), "in-plane": ((0, 1), 1)}
+
+    def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD):
+        self.data = s = cast(PlateStructure, scene.structure)
+        super().__init__(scene, s.damping, comm)
+        settings = scene.mesh
+        assert isinstance(settings, PlateMesh)
+        self.grid: PlateGrid = plate_grid(scene, s, comm)
+        cell = self.grid.mesh.topology.cell_name()
+        k = settings.degree_on(cell)
+        if (why := locking(cell, k, settings.integration)) is not None:
+            raise SceneError(scene.file, "mesh.degree", k, why)
+        self.discretise(self.grid.mesh, k)
+        self.dx = ufl.dx(self.mesh, metadata={"quadrature_degree": 2 * k})
+        reduced = (2 * k - 1 if cell == "quadrilateral" else 2 * k - 2) if settings.integration == "reduced" else 2 * k
+        self.dx_elastic = ufl.dx(self.mesh, metadata={"quadrature_degree": reduced})
+        self.clamped = fem.locate_dofs_topological(self.V, 1, self.grid.edges("clamped"))
+        low, high = self._box()
+        self.length = float(np.max(high - low))
+        self._has_tip = "tip" in self.grid.curve_names
+        if self._has_tip:
+            self.tip = self.grid.along("tip")
+        self.probe = Probe(self.V, self._tip_point(low, high))
+        self._properties()
+
+    # --- mesh -------------------------------------------------------------------------------------------------------
+
+    def _box(self) -> tuple[Array, Array]:
+        """Return the least and the largest coordinates of the mesh, shape (2,) each."""
+        x = self.mesh.geometry.x[:, :2]
+        low = x.min(axis=0) if len(x) else np.full(2, np.inf)
+        high = x.max(axis=0) if len(x) else np.full(2, -np.inf)
+        return self.comm.allreduce(low, op=MPI.MIN), self.comm.allreduce(high, op=MPI.MAX)
+
+    def _tip_point(self, low: Array, high: Array) -> Array:
+        """Return the middle of the edge "tip"; without one, the point of the plate farthest from the clamp."""
+        if self.data.length is not None:
+            return np.array([self.data.length, 0.0, 0.0])
+        x = self.V.tabulate_dof_coordinates()
+        if self._has_tip:
+            here = x[fem.locate_dofs_topological(self.V, 1, self.grid.edges("tip"))]
+            return np.asarray(np.concatenate(self.comm.allgather(here)).mean(axis=0))
+        clamp = np.concatenate(self.comm.allgather(x[self.clamped]))
+        distance = np.full(len(x), np.inf)
+        for part in np.array_split(clamp, max(1, len(clamp) // 200)):
+            distance = np.minimum(distance, np.linalg.norm(x[:, None] - part[None], axis=2).min(axis=1))
+        best = int(np.argmax(distance)) if len(x) else 0
+        candidates = self.comm.allgather((float(distance[best]), *map(float, x[best])) if len(x) else (-1.0, 0, 0, 0))
+        return np.array(max(candidates)[1:])
+
+    # --- section ----------------------------------------------------------------------------------------------------
+
+    def _properties(self) -> None:
+        """Make the constants and fields of thickness and material, and of the hub."""
+        s = self.data
+        self.section["thickness"] = self._thickness()
+        names = ("E1", "E2", "nu12", "G12", "G13", "G23") if s.is_orthotropic else ("E", "nu")
+        values = {name: getattr(s, name) for name in names}
+        if s.is_orthotropic:
+            values = {**values, **{g: values[g] or values["G12"] for g in ("G13", "G23")}}
+        for name, value in {**values, "rho": s.rho, "shear_correction": s.shear_correction}.items():
+            self.section[name] = self.constant(value)
+        names_of = ("hub_radius", "hub_offset_2", "hub_offset_3")
+        root = zip(names_of, s.root_position, strict=True)
+        self._root = [self.scalar(name, c) if c != 0.0 or name == "hub_radius" else 0 for name, c in root]
+
+    def _thickness(self) -> Any:
+        s = self.data
+        if isinstance(s.thickness, float):
+            return self.constant(s.thickness)
+        if isinstance(s.thickness, dict):
+            h = fem.Function(fem.functionspace(self.mesh, ("DG", 0)), name="thickness")
+            for name, value in s.thickness.items():
+                h.x.array[self.grid.regions.find(self.grid.region_names[name])] = value
+            h.x.scatter_forward()
+            return h
+        h = fem.Function(fem.functionspace(self.mesh, ("DG", 1)), name="thickness")
+        h.interpolate(lambda x: s.thickness_at(x[0]))  # exact on a rectangle: the knots are mesh lines
+        return h
+
+    def plane_stress(self) -> Any:
+        """Return Q of σ = Q (ε_11, ε_22, 2ε_12), shape (3, 3), Pa."""
+        p = self.section
+        if not self.data.is_orthotropic:
+            E, nu = p["E"], p["nu"]
+            return E / (1 - nu**2) * ufl.as_matrix([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]])
+        E1, E2, nu12 = p["E1"], p["E2"], p["nu12"]
+        both = 1 - nu12**2 * E2 / E1
+        coupling = nu12 * E2 / both
+        return ufl.as_matrix([[E1 / both, coupling, 0], [coupling, E2 / both, 0], [0, 0, p["G12"]]])
+
+    def shear_moduli(self) -> Any:
+        """Return k G of the transverse shear stresses, shape (2, 2), Pa."""
+        p = self.section
+        if not self.data.is_orthotropic:
+            return p["shear_correction"] * p["E"] / (2 * (1 + p["nu"])) * ufl.Identity(2)
+        return p["shear_correction"] * ufl.as_matrix([[p["G13"], 0], [0, p["G23"]]])
+
+    # --- kinematics -------------------------------------------------------------------------------------------------
+
+    def position(self, q: Any) -> Any:
+        """r = r_0 + (x_γ + u_γ) a_γ + u_3 a_3, Simo & Vu-Quoc 1986 section 5."""
+        x = ufl.SpatialCoordinate(self.mesh)
+        return ufl.as_vector([self._root[i] + (x[i] if i < 2 else 0) + q[i] for i in range(3)])
+
+    def director(self, q: Any) -> Any:
+        """t, to second order in linear theories, exact in the others."""
+        return director(PlateGradients(q).alpha, exact=not THEORIES[self.scene.model.theory].linear)
+
+    def turned(self, q: Any, v: Any) -> Any:
+        """v_1 t_1 + v_2 t_2 + v_3 t."""
+        t = triad(PlateGradients(q).alpha)
+        return sum(v[i] * t[i] for i in range(3))
+
+    def stretch(self, strains: list[Strain]) -> Any:
+        """(r,1 × r,2)·t."""
+        p = PlateGradients(self.k.q)
+        return ufl.dot(ufl.cross(p.dr[:, 0], p.dr[:, 1]), triad(p.alpha)[2])
+
+    def strains(self, measures: Callable[..., tuple[Any, ...]]) -> list[Strain]:
+        """Return membrane strain, shear and curvature of one theory's measures with this plate's stiffnesses."""
+        membrane, shear, curvature = measures(self.k.q)
+        h, Q = self.section["thickness"], self.plane_stress()
+        return [
+            Strain("membrane", _voigt(membrane), h * Q, self.dx_elastic),
+            Strain("shear", shear, h * self.shear_moduli(), self.dx_elastic),
+            Strain("bending", _voigt(curvature), h**3 / 12 * Q, self.dx),
+        ]
+
+    def bodies(self, effects: tuple[str, ...]) -> list[Body]:
+        """Return the bodies the effects call for: mid-surface, director, point and line masses."""
+        h, rho, r = self.section["thickness"], self.section["rho"], self.position(self.k.q)
+        bodies = [Body(r, rho * h, self.dx)]
+        if "rotary_inertia" in effects:
+            bodies.append(Body(self.director(self.k.q), rho * h**3 / 12, self.dx, is_position=False))
+        if "tip_mass" in effects:
+            for i, (x, y, mass) in enumerate(self.data.point_masses, start=1):
+                bodies.append(Body(r, self.scalar(f"point_mass_{i}", mass), self._at_point(i, x, y)))
+            for name, mass in self.data.line_masses.items():
+                bodies.append(Body(r, self.scalar(f"line_mass_{name}", mass), self._on_curve(name)))
+        return bodies
+
+    def _at_point(self, i: int, x: float, y: float) -> Any:
+        measure = point_measure(self.mesh, (x, y))
+        if measure is None:
+            row = list(self.data.point_masses[i - 1])
+            raise SceneError(self.scene.file, "structure.point_masses", row, f"({x:g}, {y:g}) is not on the plate")
+        return measure
+
+    def _on_curve(self, name: str) -> Any:
+        key, known = "structure.line_masses", self.grid.curve_names
+        if name not in known:
+            raise SceneError(self.scene.file, key, name, f"is no named edge of the plate; there are {', '.join(known)}")
+        measure = self.grid.along(name)
+        self.mesh.topology.create_connectivity(1, 2)
+        edges = self.grid.edges(name)
+        cells = self.mesh.topology.connectivity(1, 2)
+        inner = sum(len(cells.links(e)) > 1 for e in edges)
+        if self.comm.allreduce(inner) > 0:
+            raise SceneError(self.scene.file, key, name, "must be an edge of the plate's boundary")
+        return measure
+
+    # --- loads ------------------------------------------------------------------------------------------------------
+
+    def loads(self) -> list[AppliedLoad]:
+        """Return the scene's non-zero loads: tip force and moment are spread evenly over the edge "tip"."""
+        loads = self.scene.loads
+        for name in ("tip_force", "tip_moment"):
+            load = getattr(loads, name)
+            if load is not None and not load.is_zero and not self._has_tip:
+                raise SceneError(
+                    self.scene.file,
+                    f"loads.{name}",
+                    None,
+                    'needs a physical curve "tip" in the mesh, which it works on',
+                )
+        moment, out = loads.tip_moment, self.forces()
+        if moment is not None and not moment.is_zero:
+            m, dead, q = self.add_load("tip_moment", 3, partial(_moment, moment)), moment.kind == "dead", self.k.q
+            M = m if dead else self.turned(q, m)
+            alpha = PlateGradients(q).alpha
+            about = ufl.as_vector((alpha[1], -alpha[0], 0))
+            density = self.spread("tip_moment", M)
+            out.append(EdgeMoment("tip_moment", density, about, self.tip, dead, director=self.director(q)))
+        return out
+
+    def spread(self, name: str, load: Any) -> Any:
+        """A load of the tip over the length of its edge."""
+        if name == "distributed":
+            return load
+        if "tip_length" not in self.scalars:
+            here = fem.assemble_scalar(fem.form(self.constant(1.0) * self.tip))
+            self.scalar("tip_length", self.comm.allreduce(float(here)))
+        return load / self.scalars["tip_length"]
+
+    # --- values -----------------------------------------------------------------------------------------------------
+
+    def nodes(self, values: Array) -> tuple[dict[str, Array], Array]:
+        """Return ({"x", "y": (n,) m, sorted by x, then y}, q (n, components)) at all nodes, on every rank."""
+        x, q = self.gather(values)
+        cell = SAME_PLACE * self.length
+        order = np.lexsort((np.round(x[:, 1] / cell), np.round(x[:, 0] / cell)))
+        return {"x": x[order, 0], "y": x[order, 1]}, q[order]
+
+    def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> tuple[str, str]:
+        """Return "bending", "torsion", … and how many nodal lines, circles or diameters (see `plate_mode_name`)."""
+        return plate_mode_name(family, coordinates, values[:, self.families[family][1]])
+
+    def check_range(self, q: Array, time: float | None = None) -> None:
+        """Refuse a state whose director has come to the pole of its angles.
+
+        Raises:
+            ComputationError: says where.
+        """
+        owned = self.V.dofmap.index_map.size_local
+        tilt = np.abs(q[: self.size * owned].reshape(-1, self.size)[:, 4])
+        here = float(tilt.max(initial=0.0))
+        worst = self.comm.allreduce(here, op=MPI.MAX)
+        if worst > LARGEST_TILT:
+            raise ComputationError(
+                f"the plate has turned about direction 1 by {worst:.3g} rad (largest: {LARGEST_TILT}); the director's "
+                "angles are limited there, not about direction 2",
+                time,
+                "a smaller load, or the plate laid so that it bends about direction 2",
+            )

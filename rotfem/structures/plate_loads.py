@@ -1,0 +1,77 @@
+"""What works on a plate at a point or along an edge: the measure of a point, a moment spread over an edge."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import geometry, mesh
+
+from rotfem.kinematics import AppliedLoad, Kinematics
+
+#: Distance from a cell, relative to the size of the mesh, at which a point still counts as in it.
+NEAR = 1e-9
+
+
+def point_measure(domain: Any, point: tuple[float, float]) -> Any:
+    """Return a measure whose integrals are values at a point (m); None if the point is not in the mesh.
+
+    One cell that holds the point gets a quadrature rule of one point with the weight 1 in place of the cell's area.
+    """
+    comm, tdim = domain.comm, domain.topology.dim
+    owned = domain.topology.index_map(tdim).size_local
+    x = np.array([[*point, 0.0]])
+    spread = NEAR * float(np.max(np.ptp(domain.geometry.x, axis=0), initial=0.0))
+    tree = geometry.bb_tree(domain, tdim, padding=spread)
+    candidates = geometry.compute_collisions_points(tree, x)
+    hits = geometry.compute_colliding_cells(domain, candidates, x).links(0)
+    mine = [int(c) for c in hits if c < owned]
+    first = comm.allreduce((not mine, comm.rank), op=_least)
+    if first[0]:
+        return None
+    cells, where = np.empty(0, dtype=np.int32), None
+    if comm.rank == first[1]:
+        cells = np.array(mine[:1], dtype=np.int32)
+        corners = domain.geometry.x[domain.geometry.dofmap[cells[0]]]
+        where = domain.geometry.cmap.pull_back(x[:, :tdim], corners[:, :tdim])
+    where = comm.bcast(where, root=first[1])
+    tags = mesh.meshtags(domain, tdim, cells, np.ones(len(cells), dtype=np.int32))
+    rule = {"quadrature_rule": "custom", "quadrature_points": where, "quadrature_weights": np.ones(1)}
+    measure = ufl.Measure("dx", domain=domain, subdomain_data=tags, subdomain_id=1, metadata=rule)
+    return _AtPoint(measure, 1 / abs(ufl.JacobianDeterminant(domain)))
+
+
+def _least(a: tuple[bool, int], b: tuple[bool, int]) -> tuple[bool, int]:
+    return min(a, b)
+
+
+@dataclass(frozen=True)
+class _AtPoint:
+    """A cell measure whose factor |det J| is taken out again."""
+
+    measure: Any
+    factor: Any
+
+    def __rmul__(self, integrand: Any) -> Any:
+        return (integrand * self.factor) * self.measure
+
+
+@dataclass(frozen=True, kw_only=True)
+class EdgeMoment(AppliedLoad):
+    """A moment per length on the directors of an edge (N, frame components): it works on t×δt.
+
+    Its part along t, about which a director has no rotation, does no work. With x = (alpha_2, −alpha_1, 0) the
+    potential −M·x, if it is dead, is right as long as the plate bends about one direction.
+    """
+
+    director: Any
+
+    def variation(self, k: Kinematics) -> Any:
+        """Return t×δt."""
+        return ufl.cross(self.director, k.variation(self.director))
+
+    def turn(self, e: Any) -> Any:
+        """Return the turn in a unit rigid turn about e, without its part along t."""
+        return e - ufl.dot(e, self.director) * self.director

@@ -1,0 +1,175 @@
+"""What all structures share: space and unknowns, constants and fields of the forms, damping, forces, scales."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from basix.ufl import element
+from dolfinx import default_scalar_type, fem
+from mpi4py import MPI
+
+from rotfem import scene_common
+from rotfem.kinematics import AppliedLoad, Damping, Kinematics, Strain
+from rotfem.scene import Load, Scene
+from rotfem.structures.probe import Probe
+
+Array = npt.NDArray[np.float64]
+
+
+def _first(load: Load, n: int, t: float) -> Array:
+    return load.at(t)[:n]
+
+
+class Structure:
+    """A discretised structure: blocked Lagrange functions on a mesh, clamped somewhere.
+
+    A subclass makes the mesh, calls `discretise`, and gives positions, strains, bodies and loads.
+
+    Args:
+        scene: a validated scene.
+        damping: [structure.damping] of the scene.
+        comm: communicator the mesh is distributed over.
+
+    Attributes:
+        mesh, V, k: mesh, space of the unknowns, and the unknowns with their rates.
+        dx, dx_elastic: measures of full integration, and of that which keeps locking away.
+        tip: measure of the end of the structure that tip forces work on; tip_size is its extent (m, or 1 of a point).
+        clamped: local numbers of the clamped nodes.
+        probe: reads the values at the tip.
+    """
+
+    type: ClassVar[str]
+    planar: ClassVar[bool] = False
+    #: Names of the unknowns.
+    components: ClassVar[tuple[str, ...]]
+    #: Components of a force.
+    dimension: ClassVar[int] = 3
+    #: Strains whose force makes geometric stiffness in the prestressed linear theories.
+    prestressing: ClassVar[tuple[str, ...]]
+
+    mesh: Any
+    V: fem.FunctionSpace
+    k: Kinematics
+    dx: Any
+    dx_elastic: Any
+    tip: Any
+    clamped: npt.NDArray[np.int32]
+    probe: Probe
+    length: float
+
+    def __init__(self, scene: Scene, damping: scene_common.Damping, comm: MPI.Comm):
+        self.scene, self.comm, self._damping = scene, comm, damping
+        self.size = len(self.components)
+        #: Section properties by name: a constant each where the section is uniform, a field each where it is not.
+        self.section: dict[str, Any] = {}
+        #: Single numbers that the forms contain, by name.
+        self.scalars: dict[str, fem.Constant] = {}
+        self.load_constants: dict[str, tuple[fem.Constant, Callable[[float], Array]]] = {}
+
+    def discretise(self, mesh: Any, degree: int) -> None:
+        """Make the space of blocked Lagrange functions of a degree, and the unknowns in it."""
+        self.mesh = mesh
+        self.V = fem.functionspace(mesh, element("Lagrange", mesh.basix_cell(), degree, shape=(self.size,)))
+        q, v, a = (fem.Function(self.V, name=name) for name in "qva")
+        self.k = Kinematics(q, v, a, ufl.TestFunction(self.V))
+
+    def position(self, q: Any) -> Any:
+        """Return the axis or mid-surface r(q), frame components (m)."""
+        raise NotImplementedError
+
+    def turned(self, q: Any, v: Any) -> Any:
+        """Return a vector that turns with the section, frame components; v is what it is at q = 0."""
+        raise NotImplementedError
+
+    def stretch(self, strains: list[Strain]) -> Any:
+        """Return an expression that is 1 where the structure is undeformed and at most 0 where it is inside out."""
+        raise NotImplementedError
+
+    # --- constants and fields -----------------------------------------------------------------------------------
+
+    def constant(self, value: npt.ArrayLike) -> fem.Constant:
+        """Return a constant on the mesh: its value can change without a new compilation."""
+        return fem.Constant(self.mesh, np.asarray(value, dtype=default_scalar_type))
+
+    def scalar(self, name: str, value: float) -> fem.Constant:
+        """Return the constant of a named number of the scene, one and the same at every call."""
+        return self.scalars.setdefault(name, self.constant(value))
+
+    # --- damping and loads --------------------------------------------------------------------------------------
+
+    def damping(self) -> Damping:
+        """Return Kelvin–Voigt plus stiffness-proportional viscosity, and the mass-proportional rate."""
+        d = self._damping
+        eta, a0 = d.kelvin_voigt + d.rayleigh[1], d.rayleigh[0]
+        return Damping(self.constant(eta) if eta > 0 else None, self.constant(a0) if a0 > 0 else None)
+
+    def forces(self) -> list[AppliedLoad]:
+        """Return the scene's non-zero forces; dead ones keep their direction in the frame, followers turn."""
+        loads, q = self.scene.loads, self.k.q
+        out = []
+        for name, load, measure in (
+            ("tip_force", loads.tip_force, self.tip),
+            ("distributed", loads.distributed, self.dx),
+        ):
+            if load is None or load.is_zero:
+                continue
+            f = self.add_load(name, self.dimension, partial(_first, load, self.dimension))
+            dead = load.kind == "dead"
+            vector = ufl.as_vector([f[i] if i < self.dimension else 0 for i in range(3)])
+            force = vector if dead else self.turned(q, vector)
+            out.append(AppliedLoad(name, self.spread(name, force), self.position(q), measure, dead))
+        return out
+
+    def spread(self, name: str, load: Any) -> Any:
+        """Return the density of a load on its measure: the load itself at a point and where it is a density already."""
+        return load
+
+    def add_load(self, name: str, size: int, at: Callable[[float], Array]) -> fem.Constant:
+        """Return the amplitude constant (size,) of a load and remember at(t), its value at time t (s)."""
+        constant = self.constant(np.zeros(size))
+        self.load_constants[name] = (constant, at)
+        return constant
+
+    # --- values -------------------------------------------------------------------------------------------------
+
+    def scales(self) -> Array:
+        """Return the natural size of every local unknown: length (m) for displacements, 1 for rotations."""
+        nodes = self.V.dofmap.index_map.size_local + self.V.dofmap.index_map.num_ghosts
+        return np.tile([self.length if name.startswith("u") else 1.0 for name in self.components], nodes)
+
+    def gather(self, values: Array) -> tuple[Array, Array]:
+        """Return (x, q): positions (n, 3) in m and values (n, components) at all nodes, on every rank.
+
+        Args:
+            values: local dof array of q (or of the owned part of it).
+        """
+        owned = self.V.dofmap.index_map.size_local
+        x = self.V.tabulate_dof_coordinates()[:owned]
+        q = values[: self.size * owned].reshape(-1, self.size)
+        if self.comm.size == 1:
+            return x, q
+        return np.concatenate(self.comm.allgather(x)), np.concatenate(self.comm.allgather(q))
+
+    def nodes(self, values: Array) -> tuple[dict[str, Array], Array]:
+        """Return (coordinates by name, (n,) each in m; values (n, components)) at all nodes, on every rank, in order."""
+        raise NotImplementedError
+
+    def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> tuple[str, str]:
+        """Return the kind and the number of a mode of a family, from its shape at the nodes (n, components), complex."""
+        raise NotImplementedError
+
+    def oriented(self, values: Array) -> Array:
+        """Return the components along the undeformed structure of nodal values (n, components, …), to name modes by."""
+        return values
+
+    def check_range(self, q: Array, time: float | None = None) -> None:
+        """Refuse a state (local dof array) outside the range of the unknowns; there is none here.
+
+        Raises:
+            ComputationError: never here; see the spatial beam and the plate.
+        """
