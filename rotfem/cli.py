@@ -77,6 +77,7 @@ def modes(
     ] = False,
     state_space: Annotated[bool, typer.Option("--state-space", help="write the modal model state_space.npz")] = False,
     matrices: Annotated[bool, typer.Option("--matrices", help="write M, C, K as Matrix Market and npz")] = False,
+    animate: Annotated[int | None, typer.Option("--animate", metavar="MODE", help="animate a mode of a plate")] = None,
     as_json: Json = False,
     no_plots: NoPlots = False,
     quiet: Quiet = False,
@@ -98,6 +99,8 @@ def modes(
             if matrices:
                 write_matrices(result.analysis, result.spinning, folder)
         session.write(result, folder, plots=not no_plots)
+        if animate is not None:
+            session.animate(result, animate, folder)
         session.say(modes_report(result.summary, folder))
 
 
@@ -190,7 +193,10 @@ class Session:
         return ProgressBar(title, self.first and not self.quiet and not self.as_json and sys.stderr.isatty())
 
     def write(self, result: Any, folder: Path, plots: bool) -> None:
-        """Write a result and its figures from rank 0, and print its summary where --json asks for it."""
+        """Write a result and its figures from rank 0, its fields from all; print its summary if --json asks for it."""
+        fields = getattr(result, "fields", None)
+        if fields is not None:
+            fields(folder)
         if not self.first:
             return
         result.write(folder)
@@ -205,6 +211,27 @@ class Session:
         for warning in result.summary["warnings"]:
             if not self.quiet:
                 print(f"warning: {warning}", file=sys.stderr)
+
+    def animate(self, result: Any, mode: int, folder: Path) -> None:
+        """Write the picture and the animation of a plate's mode from rank 0.
+
+        Raises:
+            SceneError: there is no such mode, or the structure is no plate.
+            OutputError: they cannot be written.
+        """
+        if result.triangles is None:
+            raise SceneError("command line", "--animate", mode, 'needs structure.type = "plate"')
+        from rotfem.plots_plate import animate
+
+        problem: Exception | None = None
+        if self.first:
+            try:
+                animate(result, mode, folder)
+            except (SceneError, OutputError) as error:
+                problem = error
+        problem = self.comm.bcast(problem)
+        if problem is not None:
+            raise problem
 
     def say(self, lines: list[str]) -> None:
         """Print what was done."""

@@ -19,6 +19,7 @@ from mpi4py import MPI
 from rotfem.affine import AffineSystem
 from rotfem.equilibrium import check_steady, newton_for, steady_state
 from rotfem.errors import SceneError
+from rotfem.fields import writer
 from rotfem.hub import Hub
 from rotfem.pencil import SAME, ZERO, Eigenpairs, Pencil
 from rotfem.results import ModesResult
@@ -208,7 +209,12 @@ def modes(
         "ranks": comm.size,
         "scene": scene.to_dict(),
     }
-    result = ModesResult(summary, rows, shapes, analysis=analysis, spinning=spinning)
+    structure, right = analysis.model.structure, spinning.pairs.right
+    result = ModesResult(summary, rows, shapes, triangles=structure.surface(), analysis=analysis, spinning=spinning)
+    if result.triangles is not None:
+        first = 1 + int(spinning.rigid)
+        states = [(float(first + i), scaled(comm, right[:, i])) for i in range(right.shape[1])]
+        result.fields = writer(analysis.system.V, "modes", states)
     if sensitivities:
         from rotfem.sensitivity import sensitivities as derivatives
 
@@ -321,6 +327,12 @@ def linearisation_error(analysis: ModalAnalysis, spinning: Spinning) -> float:
         worst = max(worst, float(np.sqrt(error / size)) if size > 0 else 0.0)
     system.set_state(spinning.q, zero, zero)
     return worst
+
+
+def scaled(comm: MPI.Comm, x: Array) -> Array:
+    """Return an eigenvector (owned unknowns) whose largest entry, over all ranks, is 1."""
+    largest = x[np.argmax(np.abs(x))] if x.size else 0.0
+    return np.asarray(x / max(comm.allgather(complex(largest)), key=abs))
 
 
 def scaled_shape(analysis: ModalAnalysis, spinning: Spinning, i: int) -> dict[str, Array]:

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from rotfem import plots_plate
 from rotfem.errors import OutputError
 from rotfem.results import CampbellResult, ModesResult, RunResult
 
@@ -22,6 +23,7 @@ LABELS = {
     "u3": "u₃ (m)",
     "alpha": "rotation α (rad)",
     **{f"theta{i}": f"rotation θ{sub} (rad)" for i, sub in zip((1, 2, 3), "₁₂₃", strict=True)},
+    **{f"alpha{i}": f"rotation α{sub} (rad)" for i, sub in zip((1, 2), "₁₂", strict=True)},
     "kinetic": "kinetic energy (J)",
     "strain": "strain energy (J)",
     "jacobi": "Jacobi integral (J)",
@@ -39,8 +41,13 @@ def plot(result: RunResult | ModesResult | CampbellResult, folder: Path) -> list
     if isinstance(result, RunResult):
         return plot_run(result, folder)
     if isinstance(result, ModesResult):
+        if result.triangles is not None:
+            return [save(plots_plate.modes_figure(result), folder / "modes.png")]
         return [save(shapes_figure(result), folder / "modes.png")]
-    return [save(campbell_figure(result), folder / "campbell.png")]
+    paths = [save(campbell_figure(result), folder / "campbell.png")]
+    if result.travelling_waves():
+        paths.append(save(travelling_waves_figure(result), folder / "travelling_waves.png"))
+    return paths
 
 
 def plot_run(result: RunResult, folder: Path) -> list[Path]:
@@ -51,7 +58,9 @@ def plot_run(result: RunResult, folder: Path) -> list[Path]:
     paths = []
     if len(result.history.get("t", ())) > 1:
         paths.append(save(history_figure(result, title), folder / "history.png"))
-    elif result.shape:
+    if result.shape and result.triangles is not None:
+        paths.append(save(plots_plate.shape_figure(result, title + ", final shape"), folder / "shape.png"))
+    elif result.shape and len(result.history.get("t", ())) <= 1:
         paths.append(save(shape_figure(result, title), folder / "shape.png"))
     return paths
 
@@ -122,6 +131,24 @@ def campbell_figure(result: CampbellResult) -> Figure:
     axis.set_xlabel(label("psi_dot"))
     axis.set_ylabel("frequency in the rotating frame (rad/s)")
     axis.set_title(f"{result.summary['name']}: {result.summary['theory']}")
+    axis.grid(True, lw=0.4, alpha=0.6)
+    return figure
+
+
+def travelling_waves_figure(result: CampbellResult) -> Figure:
+    """Return the forward and backward waves of a disk over speed, as seen from the fixed frame."""
+    figure = Figure(figsize=(9, 6.5))
+    axis = figure.add_subplot()
+    for i, (name, waves) in enumerate(result.travelling_waves().items()):
+        axis.plot(waves["speed"], waves["forward"], lw=1.4, color=f"C{i % 10}", label=name)
+        axis.plot(waves["speed"], waves["backward"], lw=1.4, ls="--", color=f"C{i % 10}")
+    axis.axhline(0.0, color="0.4", lw=0.7)
+    axis.set_xlabel(label("psi_dot"))
+    axis.set_ylabel("frequency in the fixed frame (rad/s)")
+    axis.set_title(
+        f"{result.summary['name']}: forward waves solid, backward dashed (standing still at a critical speed)"
+    )
+    axis.legend(fontsize=8)
     axis.grid(True, lw=0.4, alpha=0.6)
     return figure
 

@@ -7,7 +7,7 @@ import io
 import json
 import os
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -52,12 +52,16 @@ class RunResult:
         summary: scene, versions, effects, timings, sizes, figures of merit; JSON-able.
         history: column ↦ values over time (`t` s, `psi` rad, `psi_dot` rad/s, `tip_u1` m, `tip_u2` m, `tip_alpha` rad,
             `kinetic`, `strain`, `jacobi` J, …), frame components; one row for a steady state.
-        shape: column ↦ values along the structure at the end (`x` m, `u1` m, …, `N` N, `V` N, `M` N·m).
+        shape: column ↦ values along the structure at the end (`x` m, of a plate `y` m too, `u1` m, …).
+        triangles: of a plate, triangles between the nodes of `shape`, (m, 3).
+        fields: writes the fields for ParaView into a folder, on all ranks together; None of a beam.
     """
 
     summary: dict[str, Any]
     history: dict[str, Array] = field(default_factory=dict)
     shape: dict[str, Array] = field(default_factory=dict)
+    triangles: Any = field(default=None, repr=False)
+    fields: Callable[[Path], list[Path]] | None = field(default=None, repr=False)
 
     def write(self, folder: str | Path) -> list[Path]:
         """Write summary.json, history.csv and shape.csv, each whole or not at all; return their paths.
@@ -82,9 +86,11 @@ class ModesResult:
         summary: scene, speed, modes, self-checks, warnings, timings; JSON-able.
         rows: one dictionary a mode: `mode`, `label`, `frequency` (rad/s), `frequency_hz`, `damping` (ratio), `growth`
             (1/s), `stability`, `share_…` (of the kinetic energy), `residual` (backward error).
-        shapes: title ↦ columns along the structure: `x` (m), each component and its imaginary part, largest entry 1.
+        shapes: title ↦ columns along the structure: `x` (m), of a plate `y`, each component and its imaginary part,
+            largest entry 1.
         sensitivities: one dictionary a mode and parameter: `mode`, `parameter`, `value`, `dfrequency` (rad/s per unit),
             `dgrowth` (1/s per unit), `relative` (p/ω dω/dp); empty if not asked for.
+        triangles, fields: as of a run.
         analysis, spinning: the compiled scene and its eigenpairs, for further work in Python.
     """
 
@@ -92,6 +98,8 @@ class ModesResult:
     rows: list[dict[str, Any]]
     shapes: dict[str, dict[str, Array]] = field(default_factory=dict)
     sensitivities: list[dict[str, Any]] = field(default_factory=list)
+    triangles: Any = field(default=None, repr=False)
+    fields: Callable[[Path], list[Path]] | None = field(default=None, repr=False)
     analysis: Any = field(default=None, repr=False)
     spinning: Any = field(default=None, repr=False)
 
@@ -104,7 +112,7 @@ class ModesResult:
         folder = Path(folder)
         shapes: dict[str, Array] = {}
         for i, columns in enumerate(self.shapes.values(), start=1):
-            shapes |= {name if name == "x" else f"{name}_{i}": values for name, values in columns.items()}
+            shapes |= {name if name in ("x", "y") else f"{name}_{i}": values for name, values in columns.items()}
         written = []
         if self.sensitivities:
             written.append(write_text(folder / "sensitivities.csv", rows_text(self.sensitivities)))
@@ -138,6 +146,23 @@ class CampbellResult:
             mine = [row for row in self.rows if row["label"] == label]
             numbers = [k for k, v in mine[0].items() if isinstance(v, int | float)]
             out[label] = {k: np.array([row[k] for row in mine], dtype=np.float64) for k in numbers}
+        return out
+
+    def travelling_waves(self) -> dict[str, dict[str, Array]]:
+        """Return label ↦ `speed`, `forward`, `backward` (rad/s) of a disk's modes with nodal diameters, fixed frame.
+
+        A pair of modes with m nodal diameters makes waves that travel against and with the disk: ω + mΩ and ω − mΩ. A
+        backward wave stands still where ω = mΩ, a critical speed. The second branch of a pair is left out.
+        """
+        out: dict[str, dict[str, Array]] = {}
+        for label, b in self.branches().items():
+            kind, _, number = label.partition(" ")
+            diameters = int(number.split(".")[0]) if kind == "diameters" else 0
+            if diameters == 0 or label[-1] in "bcdefgh":
+                continue
+            wave = diameters * np.abs(b["speed"])
+            name = label.removesuffix("a")
+            out[name] = {"speed": b["speed"], "forward": b["frequency"] + wave, "backward": b["frequency"] - wave}
         return out
 
     def write(self, folder: str | Path) -> list[Path]:

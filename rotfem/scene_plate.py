@@ -88,8 +88,8 @@ def locking(cell: str, degree: int, integration: str) -> str | None:
     if degree >= needed:
         return None
     return (
-        f"{cell}s of degree {degree} with {integration} integration lock: thin plates come out far too stiff; must be at "
-        f"least {needed} here (defaults: quadrilaterals of degree 2, triangles of degree 3, reduced integration)"
+        f"{cell}s of degree {degree} with {integration} integration lock: thin plates come out far too stiff; must be "
+        f"at least {needed} here (defaults: quadrilaterals of degree 2, triangles of degree 3, reduced integration)"
     )
 
 

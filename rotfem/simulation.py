@@ -16,6 +16,7 @@ from mpi4py import MPI
 from rotfem.affine import AffineSystem
 from rotfem.equilibrium import check_steady, critical_speed, newton_for, static_tip_shape, steady_state
 from rotfem.errors import ComputationError
+from rotfem.fields import Snapshots, writer
 from rotfem.hub import Hub, HubStepper
 from rotfem.integrators import Scheme, State, Stepper
 from rotfem.results import RunResult, Table
@@ -89,6 +90,7 @@ class Simulation:
         names = tuple(f"tip_{c}" for c in self.model.structure.components)
         free = ("torque", "hub_kinetic", "angular_momentum", "impulse", "work") if self.hub is not None else ()
         self.history = Table(("t", "psi", "psi_dot", *names, "kinetic", "strain", "jacobi", *free))
+        self.snapshots = Snapshots() if scene.structure.type == "plate" else None
         self.newton = newton_for(scene)
         self.stepper: Stepper | None = None
         self.steps = self.rejected = 0
@@ -252,6 +254,8 @@ class Simulation:
             hub = self.hub
             row += [hub.torque.at(t, after=True), hub.kinetic(), hub.angular_momentum(), state.hub[5], state.hub[4]]
         self.history.append(row)
+        if self.snapshots is not None:
+            self.snapshots.add(t, state.q)
 
     # --- summary ------------------------------------------------------------------------------------------------------
 
@@ -301,7 +305,11 @@ class Simulation:
             summary["figures"]["critical_speed"] = self.critical
         if failure is not None:
             summary["failure"] = {"what": failure.what, "time": failure.time, "advice": failure.advice}
-        return RunResult(summary, history, shape)
+        structure = self.model.structure
+        out = RunResult(summary, history, shape, triangles=structure.surface())
+        if self.snapshots is not None:
+            out.fields = writer(self.system.V, "fields", self.snapshots.kept)
+        return out
 
     def _timings(self) -> dict[str, float]:
         total = perf_counter() - self.started

@@ -7,13 +7,15 @@ shear energy are integrated with 2k − 1, bending and inertia fully: the elemen
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, ClassVar, cast
 
 import numpy as np
+import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
+from scipy.spatial import Delaunay
 
 from rotfem.errors import ComputationError, SceneError
 from rotfem.kinematics import AppliedLoad, Body, Strain
@@ -92,7 +94,7 @@ class Plate(Structure):
         x = self.mesh.geometry.x[:, :2]
         low = x.min(axis=0) if len(x) else np.full(2, np.inf)
         high = x.max(axis=0) if len(x) else np.full(2, -np.inf)
-        return self.comm.allreduce(low, op=MPI.MIN), self.comm.allreduce(high, op=MPI.MAX)
+        return np.min(self.comm.allgather(low), axis=0), np.max(self.comm.allgather(high), axis=0)
 
     def _tip_point(self, low: Array, high: Array) -> Array:
         """Return the middle of the edge "tip"; without one, the point of the plate farthest from the clamp."""
@@ -260,9 +262,28 @@ class Plate(Structure):
     def nodes(self, values: Array) -> tuple[dict[str, Array], Array]:
         """Return ({"x", "y": (n,) m, sorted by x, then y}, q (n, components)) at all nodes, on every rank."""
         x, q = self.gather(values)
-        cell = SAME_PLACE * self.length
-        order = np.lexsort((np.round(x[:, 1] / cell), np.round(x[:, 0] / cell)))
+        _, order = self._order
         return {"x": x[order, 0], "y": x[order, 1]}, q[order]
+
+    def surface(self) -> npt.NDArray[np.int64]:
+        """Return triangles between the nodes in the order of `nodes`, shape (m, 3), on every rank."""
+        dofmap, tdim = self.V.dofmap, self.mesh.topology.dim
+        cells = dofmap.list[: self.mesh.topology.index_map(tdim).size_local]
+        pattern = Delaunay(self.V.element.basix_element.points).simplices  # of one cell, between its nodes
+        here = dofmap.index_map.local_to_global(cells[:, pattern].reshape(-1).astype(np.int32)).reshape(-1, 3)
+        # The nodes that `gather` returns are in the order of their global numbers.
+        triangles = np.concatenate(self.comm.allgather(here))
+        place = np.empty(dofmap.index_map.size_global, dtype=np.int64)
+        place[self._order[1]] = np.arange(len(place))
+        return place[triangles]
+
+    @cached_property
+    def _order(self) -> tuple[Array, npt.NDArray[np.int64]]:
+        """Return (x, order): all nodes, and the permutation that sorts them by x, then y."""
+        owned = self.V.dofmap.index_map.size_local
+        x = np.concatenate(self.comm.allgather(self.V.tabulate_dof_coordinates()[:owned]))
+        cell = SAME_PLACE * self.length
+        return x, np.lexsort((np.round(x[:, 1] / cell), np.round(x[:, 0] / cell)))
 
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> tuple[str, str]:
         """Return "bending", "torsion", … and how many nodal lines, circles or diameters (see `plate_mode_name`)."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import ufl
 from dolfinx import geometry, mesh
 
@@ -31,7 +32,8 @@ def point_measure(domain: Any, point: tuple[float, float]) -> Any:
     first = comm.allreduce((not mine, comm.rank), op=_least)
     if first[0]:
         return None
-    cells, where = np.empty(0, dtype=np.int32), None
+    cells: npt.NDArray[np.int32] = np.empty(0, dtype=np.int32)
+    where: npt.NDArray[np.float64] | None = None
     if comm.rank == first[1]:
         cells = np.array(mine[:1], dtype=np.int32)
         corners = domain.geometry.x[domain.geometry.dofmap[cells[0]]]

@@ -182,11 +182,12 @@ class SpatialBeam(Beam):
             ComputationError: says where; rotation vectors stand for rotations one to one only up to there.
         """
         coordinates, values = self.nodes(q)
+        X = coordinates["x"]
         turns = np.linalg.norm(values[:, 3:], axis=1)
         worst = int(np.argmax(turns))
         if turns[worst] > FULL_TURN:
             raise ComputationError(
-                f"the section at X = {coordinates['x'][worst]:.4g} m has turned by {turns[worst] / (2 * np.pi):.3g} turns relative to "
+                f"the section at X = {X[worst]:.4g} m has turned by {turns[worst] / (2 * np.pi):.3g} turns relative to "
                 "the frame; a spatial beam's rotations are limited to one",
                 time,
                 'a smaller load, or structure.type = "planar_beam" where the motion is in a plane',

@@ -156,11 +156,15 @@ class Structure:
         return np.concatenate(self.comm.allgather(x)), np.concatenate(self.comm.allgather(q))
 
     def nodes(self, values: Array) -> tuple[dict[str, Array], Array]:
-        """Return (coordinates by name, (n,) each in m; values (n, components)) at all nodes, on every rank, in order."""
+        """Return (coordinates by name, (n,) each in m; values (n, components)) at all nodes, in order."""
         raise NotImplementedError
 
+    def surface(self) -> npt.NDArray[np.int64] | None:
+        """Return triangles between the nodes in their order, shape (m, 3), on every rank; None of a line."""
+        return None
+
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> tuple[str, str]:
-        """Return the kind and the number of a mode of a family, from its shape at the nodes (n, components), complex."""
+        """Return kind and number of a mode of a family, from its complex shape at the nodes (n, components)."""
         raise NotImplementedError
 
     def oriented(self, values: Array) -> Array:

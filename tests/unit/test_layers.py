@@ -28,10 +28,10 @@ LEVELS: tuple[tuple[str, ...], ...] = (
         "scene_structure",
         "results",
     ),
-    ("plots",),
+    ("plots", "plots_plate"),
     # FEniCSx from here on
     ("compat", "kinematics", "motion", "plate_kinematics", "rotations"),
-    ("solvers", "theories", "theories.*", "effects", "structures", "structures.*"),
+    ("fields", "solvers", "theories", "theories.*", "effects", "structures", "structures.*"),
     ("system", "affine"),
     ("equilibrium", "integrators", "pencil"),
     ("hub",),

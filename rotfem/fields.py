@@ -1,0 +1,91 @@
+"""Displacement fields of plates in files for ParaView, written by all ranks together."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from basix.ufl import element
+from dolfinx import fem, io
+
+from rotfem.errors import OutputError
+
+Array = npt.NDArray[Any]
+
+#: Most snapshots of a history that are kept.
+MOST = 200
+
+
+class Snapshots:
+    """States of a history at ever wider intervals, so that there are never more than MOST."""
+
+    def __init__(self) -> None:
+        self.kept: list[tuple[float, Array]] = []
+        self._every, self._count = 1, 0
+
+    def add(self, t: float, q: Array) -> None:
+        """Keep a copy of the local dof array q at time t (s), or pass it by."""
+        if self._count % self._every == 0:
+            self.kept.append((t, q.copy()))
+            if len(self.kept) > MOST:
+                self.kept, self._every = self.kept[::2], 2 * self._every
+        self._count += 1
+
+
+def writer(V: fem.FunctionSpace, name: str, states: Iterable[tuple[float, Array]]) -> Any:
+    """Return the function that writes displacement fields into a folder (see `write`)."""
+    return partial(write, V, name, list(states))
+
+
+def write(V: fem.FunctionSpace, name: str, states: list[tuple[float, Array]], folder: Path) -> list[Path]:
+    """Write the displacements of local dof arrays as name.bp (VTX), or as name.xdmf where ADIOS2 is missing.
+
+    Args:
+        V: space of the plate's five unknowns.
+        name: of the file, without ending.
+        states: (time in s or number of the mode, dof array); a complex one gives the fields of both its parts.
+        folder: where the file goes.
+
+    Returns:
+        The path.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    mesh, degree, vtx = V.mesh, V.element.basix_element.degree, hasattr(io, "VTXWriter")
+    W = fem.functionspace(mesh, element("Lagrange", mesh.basix_cell(), degree if vtx else 1, shape=(3,)))
+    full = fem.functionspace(mesh, element("Lagrange", mesh.basix_cell(), degree, shape=(3,)))
+    size = V.dofmap.index_map.size_local * V.dofmap.index_map_bs
+    parts = [np.real, np.imag] if any(np.iscomplexobj(q) for _, q in states) else [np.real]
+    names = ["displacement", "displacement_imag"][: len(parts)]
+    out = [fem.Function(W, name=n) for n in names]
+    whole = fem.Function(full)
+    path = folder / f"{name}.{'bp' if vtx else 'xdmf'}"
+    try:
+        if vtx:
+            if mesh.comm.rank == 0 and path.exists():
+                shutil.rmtree(path, ignore_errors=True)
+            mesh.comm.barrier()
+            file = io.VTXWriter(mesh.comm, path, out)
+        else:
+            file = io.XDMFFile(mesh.comm, path, "w")
+            file.write_mesh(mesh)
+        with file:
+            for t, q in states:
+                for f, part in zip(out, parts, strict=True):
+                    own = part(q[:size]).reshape(-1, V.dofmap.index_map_bs)[:, :3].ravel()
+                    whole.x.array[: len(own)] = own
+                    whole.x.scatter_forward()
+                    f.interpolate(whole)
+                    if not vtx:
+                        file.write_function(f, t)
+                if vtx:
+                    file.write(t)
+    except (OSError, RuntimeError) as error:
+        raise OutputError(path, str(error).splitlines()[0]) from None
+    return [path]
