@@ -5,6 +5,7 @@ The pieces are the derivatives of the residual at the undeformed state, assemble
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -87,7 +88,9 @@ class AffineSystem(System):
         _, name, power = ACCELERATIONS.get(term, (None, None, 0))
         if name is None:
             return [()]
-        n = range(self.model.frame.constants[name].value.size)
+        n: Iterable[int] = range(self.model.frame.constants[name].value.size)
+        if name in ("w", "dw"):  # the axis is fixed in the frame: a component it has not is never there
+            n = np.flatnonzero(self._axis).tolist()
         if power == 1:
             return [((name, i),) for i in n]
         return [((name, i), (name, j)) for i in n for j in n if i <= j]
@@ -144,7 +147,7 @@ class AffineSystem(System):
         """Add the geometric stiffness of the axial force that each load piece causes in the linear structure."""
         s, q0 = self.structure, fem.Function(self.V)
         material = next(p.operator for p in self.pieces if p.kind == "K" and p.key == ())
-        solver, x = DirectSolver(material), compat.wrap(q0.x)
+        solver, x = DirectSolver(material, symmetric=True), compat.wrap(q0.x)
         second = s.strains(self.model.theory.prestress_measures(s.type))
         form: Any = 0
         for first, higher in zip(self.model.strains, second, strict=True):
@@ -161,6 +164,11 @@ class AffineSystem(System):
             K = self._assemble(compiled, "K")
             if K.norm() > 0.0:
                 self.pieces.append(Piece("K", piece.key, K))
+
+    @property
+    def _axis(self) -> Array:
+        """Components of the spin axis that w and dw have."""
+        return self.motion.axis[2:] if self.structure.planar else self.motion.axis
 
     # --- operators at a time ---------------------------------------------------------------------------------------
 
@@ -204,7 +212,7 @@ class AffineSystem(System):
 
     def spin_derivative(self, c_v: float, c_m: float, out: Any) -> None:
         """Write c_v ∂F/∂Omega + c_m ∂F/∂Omega' of the state into a PETSc vector: the speed along the axis varies."""
-        axis = self.motion.axis[2:] if self.structure.planar else self.motion.axis
+        axis = self._axis
         values = {name: constant.value.ravel() for name, constant in self._constants().items()}
         states = dict(zip("KCM", self._qva, strict=True))
         out.zeroEntries()
@@ -233,7 +241,7 @@ class AffineSystem(System):
 
     def stiffness_pieces(self) -> tuple[Any, Any]:
         """Return (K_1, K_2) of K = K_1 + Omega² K_2 without base acceleration and loads; clamped rows 1 and 0."""
-        axis = self.motion.axis[2:] if self.structure.planar else self.motion.axis
+        axis = self._axis
         parts = (self.A.duplicate(), self.A.duplicate())
         for part, size in zip(parts, (0, 2), strict=True):
             chosen = [p for p in self.pieces if p.kind == "K" and len(p.key) == size]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from petsc4py import PETSc
 from slepc4py import SLEPc
 
 from rotfem.affine import AffineSystem
@@ -171,7 +172,8 @@ def critical_speed(system: AffineSystem) -> float | None:
     eps.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_REAL)
     eps.setDimensions(1, min(K_1.getSize()[0], 100))
     eps.setTolerances(1e-12, 2000)
-    use_direct_solver(eps.getST().getKSP(), K_1.getSize()[0])
+    K_1.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    use_direct_solver(eps.getST().getKSP(), K_1.getSize()[0], symmetric=True)
     eps.solve()
     if eps.getConverged() == 0:
         raise ComputationError("the eigenproblem of the critical speed did not converge")

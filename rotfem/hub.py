@@ -248,6 +248,7 @@ class HubStepper(Stepper):
     def __init__(self, system: System, hub: Hub, scheme: Scheme, newton: Newton):
         super().__init__(system, scheme, newton)
         self.hub = hub
+        self._keeps = False  # the border changes with the speed
         self._dz = Increment(system.V)
 
     def start(self, t: float, q: Array, v: Array) -> State:

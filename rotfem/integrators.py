@@ -21,11 +21,14 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.scene import Scene
-from rotfem.solvers import DirectSolver, Increment, Newton
+from rotfem.solvers import SMALL, DirectSolver, Increment, Newton
 from rotfem.system import System
 
 Array = npt.NDArray[np.float64]
 
+
+#: Iterations with an old factor after which the next step gets a new one.
+LONG = 5
 
 #: Part of K, relative to M in norm, that makes a singular M regular.
 TRACE = 1e-9
@@ -101,6 +104,9 @@ class Stepper:
         self.substeps = 0
         self._hub_increment = 0.0
         self.clamp = system.clamp
+        #: Whether a factor is kept for the steps that follow, where factorising is dear.
+        self._keeps = not system.linear and system.A.getSize()[0] > SMALL
+        self._held: tuple[float, float, float] | None = None
 
     @property
     def factorisations(self) -> int:
@@ -155,6 +161,15 @@ class Stepper:
         Raises:
             ComputationError: Newton failed; the given state is untouched.
         """
+        if self._keeps and self._held == self.scheme.shifts(h):
+            try:
+                return self._step(state, h, chord=True)
+            except ComputationError:
+                self._held = None  # the old factor does not serve here
+        return self._step(state, h)
+
+    def _step(self, state: State, h: float, chord: bool = False) -> State:
+        """One step, by Newton's method, or with the factor of an earlier step throughout."""
         s, p = self.system, self.scheme
         c_q, c_v, c_m = p.shifts(h)
         new = self._predict(state, h)
@@ -163,7 +178,7 @@ class Stepper:
 
         def increment() -> float:
             self._write(new)
-            dq = self._correction(new, (c_q, c_v, c_m), h)
+            dq = self._chord(new) if chord else self._correction(new, (c_q, c_v, c_m), h)
             new.q += dq
             new.v += c_v * dq
             new.a += c_m * dq
@@ -176,10 +191,22 @@ class Stepper:
                 if not np.isfinite(increment()):
                     raise ComputationError("the solution is not finite")
             else:
-                self.newton.solve(increment, lambda: s.size(new.q))
+                iterations = self.newton.solve(increment, lambda: s.size(new.q), chord)
+                self._held = p.shifts(h) if self._keeps and not (chord and iterations > LONG) else None
         except ComputationError as error:
             raise ComputationError(error.what, time=new.t, advice=error.advice) from None
         return new
+
+    def _chord(self, new: State) -> Array:
+        """Return the correction of q at the state written into the system, with the factor at hand."""
+        started = perf_counter()
+        b = self.system.residual()
+        assembled = perf_counter()
+        assert self._solver is not None
+        dq = self._dx.solve(self._solver, b)
+        self.seconds["assemble"] += assembled - started
+        self.seconds["solve"] += perf_counter() - assembled
+        return dq
 
     def _correction(self, new: State, shifts: tuple[float, float, float], h: float) -> Array:
         """Return the Newton correction of q at the state written into the system (a local array, reused)."""

@@ -173,7 +173,10 @@ class Pencil:
         pep.setTolerances(1e-11, 300)
         st = pep.getST()
         st.setType(SLEPc.ST.Type.SINVERT)
-        use_direct_solver(st.getKSP(), n)
+        symmetric = target == 0.0 and self.conservative
+        if symmetric:
+            K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        use_direct_solver(st.getKSP(), n, symmetric)
         try:
             pep.solve()
         except Exception as error:

@@ -117,7 +117,7 @@ def animate(result: ModesResult, mode: int, folder: Path) -> list[Path]:
     plotter.add_mesh(mesh.copy(), style="wireframe", color="lightgray", opacity=0.3)
     moving, peak = mesh.copy(), float(np.max(np.abs(columns[name])))
     moving[name] = z[:, ["u1", "u2", "u3"].index(name)].real
-    plotter.add_mesh(moving, scalars=name, cmap="RdBu_r", clim=(-peak, peak), smooth_shading=True, scalar_bar_args=bar)
+    plotter.add_mesh(moving, scalars=name, cmap="RdBu_r", clim=(-peak, peak), scalar_bar_args=bar)
     plotter.add_text(title, font_size=10)
     plotter.show_bounds(grid="back", xtitle="x (m)", ytitle="y (m)", ztitle="", font_size=9, show_zlabels=False)
     moving.points = rest + scale * z.real
@@ -132,6 +132,7 @@ def animate(result: ModesResult, mode: int, folder: Path) -> list[Path]:
             now = np.real(z * np.exp(1j * turn))
             moving.points = rest + scale * now
             moving[name] = now[:, ["u1", "u2", "u3"].index(name)]
+            plotter.render()
             frames.append(Image.fromarray(plotter.screenshot(return_img=True)).quantize(64))
         frames[0].save(paths[1], save_all=True, append_images=frames[1:], duration=1000 // RATE, loop=0)
     except OSError as error:

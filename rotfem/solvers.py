@@ -28,15 +28,21 @@ def combine(target: Any, matrices: list[Any], weights: Array) -> None:
             target.axpy(weight, A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
 
 
-def use_direct_solver(ksp: Any, size: int) -> None:
-    """Make a KSP apply one LU factorisation: PETSc's own up to SMALL unknowns, MUMPS above."""
+def use_direct_solver(ksp: Any, size: int, symmetric: bool = False) -> None:
+    """Make a KSP apply one factorisation: PETSc's own LU up to SMALL unknowns, MUMPS above.
+
+    Args:
+        ksp: PETSc KSP.
+        size: number of unknowns.
+        symmetric: whether the matrix is (it may be indefinite); MUMPS then needs half the memory.
+    """
     ksp.setType(PETSc.KSP.Type.PREONLY)
     pc = ksp.getPC()
     if ksp.comm.size > 1 and size <= SMALL:
         # Every process factors the whole small matrix: far quicker than sharing it out.
         pc.setType(PETSc.PC.Type.REDUNDANT)
         return
-    pc.setType(PETSc.PC.Type.LU)
+    pc.setType(PETSc.PC.Type.CHOLESKY if symmetric and size > SMALL else PETSc.PC.Type.LU)
     if size > SMALL:
         pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
 
@@ -46,12 +52,15 @@ class DirectSolver:
 
     Args:
         A: assembled PETSc matrix.
+        symmetric: whether it is symmetric.
     """
 
-    def __init__(self, A: Any):
+    def __init__(self, A: Any, symmetric: bool = False):
         self.A, self.factorisations = A, 0
         self._ksp = PETSc.KSP().create(A.comm)
-        use_direct_solver(self._ksp, A.getSize()[0])
+        if symmetric:
+            A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        use_direct_solver(self._ksp, A.getSize()[0], symmetric)
         self._ksp.setErrorIfNotConverged(False)
         self._stale = True
 
@@ -118,12 +127,14 @@ class Newton:
     roundoff: float = 0.0
     _kappa: float = field(default=np.inf, repr=False)
 
-    def solve(self, increment: Callable[[], float], size: Callable[[], float]) -> int:
+    def solve(self, increment: Callable[[], float], size: Callable[[], float], chord: bool = False) -> int:
         """Repeat `increment` (solve, apply, return the scaled increment) until it is small; return the iterations.
 
         Args:
             increment: one linear solve; applies it and returns its scaled maximum norm.
             size: scaled maximum norm of the unknown, against which round-off is judged.
+            chord: whether the factor is an old one: increments then shrink by a constant rate, and what is left after
+                the last one is rate/(1 − rate) of it.
 
         Raises:
             ComputationError: not finite, growing, or too many iterations; says which.
@@ -136,9 +147,11 @@ class Newton:
                 raise ComputationError(f"Newton iteration {k} gave an increment that is not finite")
             if k == 1:
                 first = d
-            if k == 2 and first > 0:
+            if k == 2 and first > 0 and not chord:
                 self._kappa = max(0.5 * self._kappa if np.isfinite(self._kappa) else 0.0, d / first**2)
-            if d <= self.tolerance or (k == 1 and 4 * self._kappa * d**2 <= self.tolerance):
+            if d <= self.tolerance or (k == 1 and not chord and 4 * self._kappa * d**2 <= self.tolerance):
+                return k
+            if chord and k > 1 and d < 0.5 * previous and d * d / (previous - d) <= 0.5 * self.tolerance:
                 return k
             stalled = stalled + 1 if d > 0.3 * previous else 0
             if stalled >= 3 and d <= 1e-4 * max(size(), self.tolerance):
