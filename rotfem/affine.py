@@ -90,7 +90,7 @@ class AffineSystem(System):
             return [()]
         n: Iterable[int] = range(self.model.frame.constants[name].value.size)
         if name in ("w", "dw"):  # the axis is fixed in the frame: a component it has not is never there
-            n = np.flatnonzero(self._axis).tolist()
+            n = [i for i, c in enumerate(self._axis) if c != 0.0]
         if power == 1:
             return [((name, i),) for i in n]
         return [((name, i), (name, j)) for i in n for j in n if i <= j]
@@ -176,7 +176,7 @@ class AffineSystem(System):
         """Set the constants of time t (s) and form M, C, K and f there if their coefficients have changed."""
         super().set_time(t, motion, load_factor)
         values = {name: constant.value.ravel() for name, constant in self._constants().items()}
-        c = np.array([np.prod([values[name][i] for name, i in p.key]) if p.key else 1.0 for p in self.pieces])
+        c = _products(self.pieces, values)
         old = self._coefficients
         self._coefficients = c
         if old is not None and np.array_equal(old, c):
@@ -190,6 +190,11 @@ class AffineSystem(System):
         for p, value in zip(self.pieces, c, strict=True):
             if p.kind == "f" and value != 0.0:
                 self._load.axpy(value, p.operator)
+
+    def coefficients(self, pieces: list[Piece], motion: Motion) -> Array:
+        """Return the factor of each piece at the start of another motion, shape (n,); nothing is set."""
+        values = {**self.model.frame.values(motion, 0.0), **self.load_values(0.0, motion)}
+        return _products(pieces, {name: np.ravel(value) for name, value in values.items()})
 
     def residual(self) -> Any:
         """Return −(M a + C v + K q + f), zero at clamped unknowns."""
@@ -273,3 +278,8 @@ class AffineSystem(System):
             self._rest_inertia = self.model.comm.allreduce(float(fem.assemble_scalar(self._energies["T0"])))
             self.q.x.array[:], spin.value[...] = state, w
         return self._rest_inertia * float(np.dot(spin.value, spin.value))
+
+
+def _products(pieces: list[Piece], values: dict[str, Array]) -> Array:
+    """Return the product of constants that multiplies each piece, shape (n,)."""
+    return np.array([np.prod([values[name][i] for name, i in p.key]) if p.key else 1.0 for p in pieces])

@@ -23,6 +23,7 @@ from rotfem.equilibrium import check_steady
 from rotfem.errors import ComputationError, SceneError
 from rotfem.modes import GROWTH, ModalAnalysis, Spinning, advice, instabilities, mode_rows, self_checks, stability
 from rotfem.pencil import SAME
+from rotfem.reduced import ReducedAnalysis, worth_while
 from rotfem.results import CampbellResult
 from rotfem.scene import Scene
 from rotfem.simulation import Progress, as_scene, versions
@@ -300,6 +301,9 @@ def campbell(
             scene.replace({"motion": {"type": "constant", "speed": values[-1]}}) if any(scene.loads.gravity) else scene
         )
     analysis = ModalAnalysis(scene, comm, sweep=True)
+    if worth_while(analysis, values):
+        analysis = ReducedAnalysis(analysis)
+        analysis.prepare(values[0], values[-1], scene.modes.count + SPARE)
     sweep = Sweep(analysis, scene.modes.count)
     sweep.run(values, progress or (lambda share: None))
     count = min(scene.modes.count, len(sweep.nodes[0].order))
@@ -344,6 +348,7 @@ def campbell(
         "speeds": len(values),
         "speeds_solved": sweep.solves,
         "checks": self_checks(analysis, last),
+        **(analysis.report() if isinstance(analysis, ReducedAnalysis) else {}),
         "lowest_frequency": lowest,
         "warnings": warnings,
         "timings": {**analysis.seconds, "other": total - sum(analysis.seconds.values()), "total": total},

@@ -121,12 +121,19 @@ class ModalAnalysis:
             return zero
         return steady_state(s, speed, self.newton, start)
 
+    def right(self, spinning: Spinning) -> Array:
+        """Return the eigenvectors of the locally owned unknowns, one column each."""
+        return spinning.pairs.right
+
+    def mass_times(self, spinning: Spinning) -> Array:
+        """Return M times the eigenvectors."""
+        return spinning.pencil.apply(spinning.pencil.M, spinning.pairs.right)
+
     # --- names ------------------------------------------------------------------------------------------------------
 
     def shares(self, spinning: Spinning) -> dict[str, Array]:
         """Return family ↦ share of the kinetic energy x^H M x in its components, shape (m,)."""
-        X = spinning.pairs.right
-        MX = spinning.pencil.apply(spinning.pencil.M, X)
+        X, MX = self.right(spinning), self.mass_times(spinning)
         bs = self.system.V.dofmap.index_map_bs
         owned = self.system.V.dofmap.index_map.size_local * bs
         along = [self.model.structure.oriented(Y[:owned].reshape(-1, bs, X.shape[1])) for Y in (X, MX)]
@@ -143,11 +150,11 @@ class ModalAnalysis:
         """Return "kind n" for every mode, as its structure counts them; mixed ones name both families."""
         shares, structure = self.shares(spinning), self.model.structure
         families = [name for name in shares if name != "hub"]
-        table = np.array([shares[name] for name in families])
+        table, right = np.array([shares[name] for name in families]), self.right(spinning)
         out = []
         for j in range(table.shape[1]):
             order = np.argsort(-table[:, j])
-            kind, number = structure.mode_name(families[order[0]], *self.shape(spinning.pairs.right[:, j]))
+            kind, number = structure.mode_name(families[order[0]], *self.shape(right[:, j]))
             mixed = len(order) > 1 and table[order[0], j] < PURE
             out.append(f"{kind}–{families[order[1]]} {number}" if mixed else f"{kind} {number}")
         return out

@@ -37,6 +37,7 @@ LEVELS: tuple[tuple[str, ...], ...] = (
     ("hub",),
     ("simulation",),
     ("modes", "sensitivity", "state_space"),
+    ("reduced",),
     ("campbell",),
     ("cli", "", "__main__"),
 )
