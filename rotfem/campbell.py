@@ -21,7 +21,17 @@ from scipy.optimize import brentq, linear_sum_assignment
 
 from rotfem.equilibrium import check_steady
 from rotfem.errors import ComputationError, SceneError
-from rotfem.modes import GROWTH, ModalAnalysis, Spinning, advice, instabilities, mode_rows, self_checks, stability
+from rotfem.modes import (
+    GROWTH,
+    ModalAnalysis,
+    Spinning,
+    advice,
+    instabilities,
+    mode_rows,
+    self_checks,
+    stability,
+    unstiffened,
+)
 from rotfem.pencil import SAME
 from rotfem.reduced import ReducedAnalysis, worth_while
 from rotfem.results import CampbellResult
@@ -318,7 +328,8 @@ def campbell(
     for crossing in crossings:
         crossing["label"] = labels[crossing["branch"] - 1]
     lost = [labels[b] for b in range(count) if sweep.nodes[-1].order[b] < 0]
-    warnings = [*advice(analysis, fastest)]
+    ends = mode_rows(analysis, sweep.nodes[-1].spinning)[:count]
+    warnings = [*advice(analysis, fastest), *unstiffened(analysis, fastest, ends)]
     warnings += [f"{name} left the computed modes before the last speed; more modes.count keeps it" for name in lost]
     warnings += [
         f"ambiguous: {labels[int(a['branch']) - 1]} at {a['speed']:.6g} rad/s, correlation {a['confidence']:.2f}"
@@ -330,7 +341,7 @@ def campbell(
         for onset in onsets
     ]
     last = sweep.nodes[-1].spinning
-    warnings += [f"at {last.speed:g} rad/s, {text}" for text in instabilities(mode_rows(analysis, last)[:count])]
+    warnings += [f"at {last.speed:g} rad/s, {text}" for text in instabilities(ends)]
     total = perf_counter() - started
     summary: dict[str, Any] = {
         "command": "campbell",

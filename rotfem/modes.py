@@ -193,7 +193,7 @@ def modes(
     spinning.pairs = spinning.pairs.select(np.arange(min(flexible, len(spinning.pairs.values))))
     rows = mode_rows(analysis, spinning)
     checks = self_checks(analysis, spinning)
-    warnings = [*advice(analysis, speed), *instabilities(rows)]
+    warnings = [*advice(analysis, speed), *unstiffened(analysis, speed, rows), *instabilities(rows)]
     rows = [{**row, "mode": row["mode"] + spinning.rigid} for row in rows]
     shapes = {f"mode {row['mode']}: {row['label']}": scaled_shape(analysis, spinning, i) for i, row in enumerate(rows)}
     if spinning.rigid:
@@ -289,6 +289,18 @@ def advice(analysis: ModalAnalysis, speed: float) -> list[str]:
             "come out negative"
         ]
     return []
+
+
+def unstiffened(analysis: ModalAnalysis, speed: float, rows: list[dict[str, Any]]) -> list[str]:
+    """Return a warning if modes are among the rows whose stiffening by the spin the theory does not hold."""
+    families, theory = analysis.model.structure.unstiffened, analysis.scene.model.theory
+    found = sorted({row["label"] for row in rows for f in families if row.get(f"share_{f}", 0.0) > PURE})
+    if speed == 0.0 or theory == "reissner" or not found:
+        return []
+    return [
+        f"{', '.join(found)}: the strains of {theory} for this structure leave out the stiffening of such modes by the "
+        'spin, so their frequencies are too low; model.theory = "reissner" has it'
+    ]
 
 
 def self_checks(analysis: ModalAnalysis, spinning: Spinning) -> dict[str, float]:

@@ -59,6 +59,7 @@ class Plate(Structure):
     type = "plate"
     components = ("u1", "u2", "u3", "alpha1", "alpha2")
     prestressing: ClassVar = ("membrane",)
+    unstiffened: ClassVar = ("in-plane",)
     #: Conjugates of the tip's components: inputs of the state-space model.
     tip_inputs = ("tip_force_1", "tip_force_2", "tip_force_3", "tip_moment_alpha1", "tip_moment_alpha2")
     #: Mode families: the components whose kinetic energy counts, and the one whose shape is looked at.
@@ -82,8 +83,7 @@ class Plate(Structure):
         low, high = self._box()
         self.length = float(np.max(high - low))
         self._has_tip = "tip" in self.grid.curve_names
-        if self._has_tip:
-            self.tip = self.grid.along("tip")
+        self.tip = self.grid.along("tip") if self._has_tip else None
         self.probe = Probe(self.V, self._tip_point(low, high))
         self._properties()
 

@@ -52,6 +52,9 @@ class Structure:
     #: Strains whose force makes geometric stiffness in the prestressed linear theories.
     prestressing: ClassVar[tuple[str, ...]]
 
+    #: Mode families that the force of the spinning structure stiffens in the exact theory only.
+    unstiffened: ClassVar[tuple[str, ...]] = ()
+
     mesh: Any
     V: fem.FunctionSpace
     k: Kinematics
