@@ -30,7 +30,9 @@ def make(path: Path, inner: float, outer: float, size: float, triangles: bool = 
         for spoke in spokes:
             gm.geo.mesh.setTransfiniteCurve(spoke, across + 1)
         gm.geo.synchronize()
-        finish(path, {"clamped": (1, arcs[0]), "rim": (1, arcs[1]), "plate": (2, surfaces)}, triangles, free=False, order=2)
+        finish(
+            path, {"clamped": (1, arcs[0]), "rim": (1, arcs[1]), "plate": (2, surfaces)}, triangles, free=False, order=2
+        )
 
 
 if __name__ == "__main__":

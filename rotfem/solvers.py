@@ -133,8 +133,8 @@ class Newton:
         Args:
             increment: one linear solve; applies it and returns its scaled maximum norm.
             size: scaled maximum norm of the unknown, against which round-off is judged.
-            chord: whether the factor is an old one: increments then shrink by a constant rate, and what is left after
-                the last one is rate/(1 − rate) of it.
+            chord: whether the factor is an old one; increments then shrink by a constant rate only, and nothing is
+                predicted from the first.
 
         Raises:
             ComputationError: not finite, growing, or too many iterations; says which.
@@ -151,9 +151,9 @@ class Newton:
                 self._kappa = max(0.5 * self._kappa if np.isfinite(self._kappa) else 0.0, d / first**2)
             if d <= self.tolerance or (k == 1 and not chord and 4 * self._kappa * d**2 <= self.tolerance):
                 return k
-            if chord and k > 1 and d < 0.5 * previous and d * d / (previous - d) <= 0.5 * self.tolerance:
-                return k
             stalled = stalled + 1 if d > 0.3 * previous else 0
+            if chord and stalled >= 2:
+                raise ComputationError(f"the old factor gives increments that stay at {d:.1e} (scaled)")
             if stalled >= 3 and d <= 1e-4 * max(size(), self.tolerance):
                 self.roundoff = max(self.roundoff, d)
                 return k

@@ -23,7 +23,7 @@ from rotfem.plate_kinematics import PlateGradients, director, triad
 from rotfem.scene import MomentLoad, PlateMesh, PlateStructure, Scene
 from rotfem.scene_plate import locking
 from rotfem.structures.mode_shapes import plate_mode_name
-from rotfem.structures.plate_loads import EdgeMoment, point_measure
+from rotfem.structures.plate_loads import EdgeMoment, PointPlace, locate, point_measure
 from rotfem.structures.plate_mesh import PlateGrid, plate_grid
 from rotfem.structures.probe import Probe
 from rotfem.structures.structure import Array, Structure
@@ -76,9 +76,11 @@ class Plate(Structure):
         if (why := locking(cell, k, settings.integration)) is not None:
             raise SceneError(scene.file, "mesh.degree", k, why)
         self.discretise(self.grid.mesh, k)
-        self.dx = ufl.dx(self.mesh, metadata={"quadrature_degree": 2 * k})
+        self._places = [self._place(row) for row in s.point_masses]
+        self._subdomains = [(i, place.cells) for i, place in enumerate(self._places, start=1)] or None
+        self.dx = ufl.dx(self.mesh, subdomain_data=self._subdomains, metadata={"quadrature_degree": 2 * k})
         reduced = (2 * k - 1 if cell == "quadrilateral" else 2 * k - 2) if settings.integration == "reduced" else 2 * k
-        self.dx_elastic = ufl.dx(self.mesh, metadata={"quadrature_degree": reduced})
+        self.dx_elastic = ufl.dx(self.mesh, subdomain_data=self._subdomains, metadata={"quadrature_degree": reduced})
         self.clamped = fem.locate_dofs_topological(self.V, 1, self.grid.edges("clamped"))
         low, high = self._box()
         self.length = float(np.max(high - low))
@@ -198,18 +200,19 @@ class Plate(Structure):
         if "rotary_inertia" in effects:
             bodies.append(Body(self.director(self.k.q), rho * h**3 / 12, self.dx, is_position=False))
         if "tip_mass" in effects:
-            for i, (x, y, mass) in enumerate(self.data.point_masses, start=1):
-                bodies.append(Body(r, self.scalar(f"point_mass_{i}", mass), self._at_point(i, x, y)))
+            for i, ((_, _, mass), place) in enumerate(zip(self.data.point_masses, self._places, strict=True), start=1):
+                at = point_measure(self.mesh, self._subdomains, i, place)
+                bodies.append(Body(r, self.scalar(f"point_mass_{i}", mass), at))
             for name, mass in self.data.line_masses.items():
                 bodies.append(Body(r, self.scalar(f"line_mass_{name}", mass), self._on_curve(name)))
         return bodies
 
-    def _at_point(self, i: int, x: float, y: float) -> Any:
-        measure = point_measure(self.mesh, (x, y))
-        if measure is None:
-            row = list(self.data.point_masses[i - 1])
-            raise SceneError(self.scene.file, "structure.point_masses", row, f"({x:g}, {y:g}) is not on the plate")
-        return measure
+    def _place(self, row: tuple[float, ...]) -> PointPlace:
+        place = locate(self.mesh, (row[0], row[1]))
+        if place is None:
+            why = f"({row[0]:g}, {row[1]:g}) is not on the plate"
+            raise SceneError(self.scene.file, "structure.point_masses", list(row), why)
+        return place
 
     def _on_curve(self, name: str) -> Any:
         key, known = "structure.line_masses", self.grid.curve_names

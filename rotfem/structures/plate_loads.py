@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import ufl
-from dolfinx import geometry, mesh
+from dolfinx import geometry
 
 from rotfem.kinematics import AppliedLoad, Kinematics
 
@@ -16,11 +16,16 @@ from rotfem.kinematics import AppliedLoad, Kinematics
 NEAR = 1e-9
 
 
-def point_measure(domain: Any, point: tuple[float, float]) -> Any:
-    """Return a measure whose integrals are values at a point (m); None if the point is not in the mesh.
+@dataclass(frozen=True)
+class PointPlace:
+    """Where a point lies: the cell that holds it (on one rank, none on the others), and its reference coordinates."""
 
-    One cell that holds the point gets a quadrature rule of one point with the weight 1 in place of the cell's area.
-    """
+    cells: npt.NDArray[np.int32]
+    reference: npt.NDArray[np.float64]
+
+
+def locate(domain: Any, point: tuple[float, float]) -> PointPlace | None:
+    """Return the place of a point (m) in a mesh; None if it is not in it."""
     comm, tdim = domain.comm, domain.topology.dim
     owned = domain.topology.index_map(tdim).size_local
     x = np.array([[*point, 0.0]])
@@ -39,9 +44,27 @@ def point_measure(domain: Any, point: tuple[float, float]) -> Any:
         corners = domain.geometry.x[domain.geometry.dofmap[cells[0]]]
         where = domain.geometry.cmap.pull_back(x[:, :tdim], corners[:, :tdim])
     where = comm.bcast(where, root=first[1])
-    tags = mesh.meshtags(domain, tdim, cells, np.ones(len(cells), dtype=np.int32))
-    rule = {"quadrature_rule": "custom", "quadrature_points": where, "quadrature_weights": np.ones(1)}
-    measure = ufl.Measure("dx", domain=domain, subdomain_data=tags, subdomain_id=1, metadata=rule)
+    return PointPlace(cells, where)
+
+
+def point_measure(domain: Any, subdomains: Any, tag: int, place: PointPlace) -> Any:
+    """Return a measure whose integrals are values at a point.
+
+    The cell that holds it gets a quadrature rule of one point with the weight 1 in place of the cell's area.
+
+    Args:
+        domain: the mesh.
+        subdomains: list of (tag, cells), the same for all measures of a form.
+        tag: the point's tag there.
+        place: its place.
+    """
+    rule = {
+        "quadrature_rule": "custom",
+        "quadrature_points": place.reference,
+        "quadrature_weights": np.ones(1),
+        "digits": repr(place.reference.tolist()),  # forms are told apart by text, which cuts an array short
+    }
+    measure = ufl.Measure("dx", domain=domain, subdomain_data=subdomains, subdomain_id=tag, metadata=rule)
     return _AtPoint(measure, 1 / abs(ufl.JacobianDeterminant(domain)))
 
 

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
-import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rotfem.results import read_csv
-
-ROOT = Path(__file__).resolve().parents[2]
-MPIRUN = shutil.which("mpirun")
+from tests.launch import MPIRUN, rotfem
 
 pytestmark = [pytest.mark.mpi, pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")]
 
@@ -47,17 +42,7 @@ step = 0.01
 
 def run(folder: Path, ranks: int, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Run `rotfem run beam.toml -o r<ranks> …` in a folder on that many processes."""
-    start = [str(MPIRUN), "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
-    environment = os.environ | {
-        "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
-        "OMPI_ALLOW_RUN_AS_ROOT": "1",
-        "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-        "OMPI_MCA_mpi_yield_when_idle": "1",  # where there are fewer cores than processes
-        "OMP_NUM_THREADS": "1",
-        "OPENBLAS_NUM_THREADS": "1",
-    }
-    command = [*start, sys.executable, "-m", "rotfem", "run", "beam.toml", "--no-plots", "-o", f"r{ranks}", *arguments]
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    return rotfem(folder, ranks, "run", "beam.toml", "--no-plots", "-o", f"r{ranks}", *arguments)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,493 @@
+"""Plates: thin and thick squares against spectral values, strips against beams, large deflection, theorems."""
+
+from __future__ import annotations
+
+import csv
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import iv, jv, kv, yv
+
+import rotfem
+from rotfem.affine import AffineSystem
+from rotfem.errors import SceneError
+from rotfem.modes import ModalAnalysis
+from rotfem.scene import Scene
+from rotfem.system import Model, System, compile_system
+from tests.plate_mesh_files import grid, write_msh
+
+REFERENCE = Path(__file__).resolve().parents[2].parent / "shared" / "reference"
+THEORIES = ("linear", "consistent_linear", "von_karman_linear", "second_order", "von_karman", "reissner")
+E, NU, RHO = 70e9, 0.3, 2700.0
+
+
+def square(h: float, **changes: Any) -> Scene:
+    """Return the cantilever square a = b = 1 m of thickness h, default mesh, with dotted keys changed (__ for .)."""
+    tables = {
+        "structure": {"type": "plate", "length": 1.0, "width": 1.0, "thickness": h, "E": E, "nu": NU, "rho": RHO},
+        "motion": {"type": "constant", "speed": 0.0},
+        "model": {"theory": "von_karman_linear"},
+        "modes": {"count": 8},
+    }
+    return Scene.from_dict(tables).replace({key.replace("__", "."): value for key, value in changes.items()})
+
+
+def unit(h: float) -> float:
+    """Return √(D/ρh)/a², the unit of λ and γ, rad/s."""
+    return float(np.sqrt(E * h**2 / (12 * (1 - NU**2) * RHO)))
+
+
+def transverse(scene: Scene) -> np.ndarray:
+    """Return the frequencies (rad/s) of the modes with most of their energy across the plate."""
+    return np.array([row["frequency"] for row in rotfem.modes(scene).rows if row["share_bending"] > 0.5])
+
+
+# --- thin and thick squares ------------------------------------------------------------------------------------------
+
+#: Leissa's problem, Kirchhoff's plate at rest: spectral values, five digits; the tolerance is the acceptance's.
+THIN = np.array([3.4710, 8.5065, 21.285, 27.199, 30.956])
+
+
+@pytest.mark.parametrize("t", [1e-3, 1e-4])
+@pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
+def test_thin_square_at_rest(t: float, cell: str) -> None:
+    """8×8 cells, quadrilaterals of degree 2 or twice as many triangles of degree 3."""
+    found = transverse(square(t, mesh__cell=cell))[:5] / unit(t)
+    np.testing.assert_allclose(found, THIN, rtol=1e-3)
+
+
+@pytest.mark.parametrize("t", [1e-3, 1e-4])
+def test_thin_square_on_a_distorted_mesh(tmp_path: Path, t: float) -> None:
+    """Inner nodes of the 8×8 mesh moved by up to 0.2 of a cell each way, from a mesh file."""
+    points, groups = grid(8, 8)
+    inner = (points[:, 0] > 0) & (points[:, 0] < 1) & (np.abs(points[:, 1]) < 0.5)
+    points[inner] += np.random.default_rng(3).uniform(-0.2, 0.2, (inner.sum(), 2)) / 8
+    mesh = write_msh(tmp_path / "distorted.msh", points, groups)
+    scene = square(t, structure__length=None, structure__width=None, structure__mesh=str(mesh))
+    found = transverse(scene)[:5] / unit(t)
+    np.testing.assert_allclose(found, THIN, rtol=2e-3)  # the fifth is 1.2e-3 off
+
+
+def reference(name: str, value: int | str) -> dict[tuple[float, str, float, float], dict[int, float]]:
+    """Return (h/a, spin, δ, γ) ↦ mode ↦ λ of a table of ../shared/reference, geometric stiffness of von Kármán."""
+    out: dict[tuple[float, str, float, float], dict[int, float]] = defaultdict(dict)
+    with open(REFERENCE / name, encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            if row.get("geo", "vk") == "vk":
+                key = (float(row["h/a"]), row["spin"], float(row["delta"]), float(row["gamma"]))
+                column = list(row)[value] if isinstance(value, int) else value
+                out[key][int(row["mode"])] = float(row[column])
+    return out
+
+
+SPINNING = {
+    (*key, coriolis): values
+    for coriolis, tables in (
+        (False, [reference(f"plate_mindlin_h{h}.csv", "extrapolated") for h in ("0.01", "0.1")]),
+        (True, [reference("plate_mindlin_coriolis.csv", -1)]),
+    )
+    for table in tables
+    for key, values in table.items()
+}
+
+
+def spinning(case: tuple[float, str, float, float, bool], **changes: Any) -> np.ndarray:
+    h, spin, delta, gamma, coriolis = case
+    effects = ["centrifugal", "rotary_inertia"] + ["coriolis"] * coriolis
+    axis = {"e3": [0, 0, 1], "e2": [0, 1, 0]}[spin]
+    motion = {"type": "constant", "speed": gamma * unit(h), "axis": axis}
+    scene = square(h, motion=motion, structure__hub_radius=delta, model__effects=effects, **changes)
+    return transverse(scene) / unit(h)
+
+
+@pytest.mark.parametrize("case", list(SPINNING), ids=str)
+def test_spinning_square(case: tuple[float, str, float, float, bool]) -> None:
+    """Spectral values of Mindlin's plate, ../shared/reference; default mesh, tolerance of the acceptance."""
+    wanted = SPINNING[case]
+    found = spinning(case)
+    for mode, value in wanted.items():
+        if mode <= 5:
+            assert found[mode - 1] == pytest.approx(value, rel=1e-3), f"mode {mode}"
+
+
+def test_spinning_square_converges() -> None:
+    """Fast from 4×4 to 8×8 cells (theory: fourth order), then held by the singular corners of the clamp."""
+    case = (0.1, "e3", 0.0, 10.0, True)
+    wanted = np.array([SPINNING[case][i] for i in range(1, 6)])
+    errors = [np.max(np.abs(spinning(case, mesh__elements=[n, n])[:5] / wanted - 1)) for n in (4, 8, 16)]
+    assert errors[0] / errors[1] > 8
+    assert errors[2] < 6e-5
+
+
+@pytest.mark.parametrize(
+    ("cell", "degree", "integration"), [("quadrilateral", 1, "reduced"), ("triangle", 2, "reduced")]
+)
+def test_elements_that_lock_are_refused(cell: str, degree: int, integration: str) -> None:
+    with pytest.raises(SceneError, match="lock"):
+        square(0.01, mesh__cell=cell, mesh__degree=degree, mesh__integration=integration)
+    with pytest.raises(SceneError, match="lock"):
+        square(0.01, mesh__degree=2, mesh__integration="full")
+
+
+# --- strips are beams ------------------------------------------------------------------------------------------------
+
+#: The spin-up beam of Kane, Ryan & Banerjee as a strip 1 m wide with ν = 0.
+EA, GA, EI, MASS = 2.8e7, 1.0e7, 1.4e4, 1.2
+DEPTH = float(np.sqrt(12 * EI / EA))
+
+
+def strip(**changes: Any) -> Scene:
+    """Return that beam as a plate that bends in the plane (1, 3), turning about −a_2."""
+    structure = {"type": "plate", "length": 10.0, "width": 1.0, "thickness": DEPTH, "E": EA / DEPTH, "nu": 0.0}
+    tables = {
+        "structure": structure | {"rho": MASS / DEPTH, "shear_correction": 2 * GA / EA},
+        "motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0, "axis": [0, -1, 0]},
+        "mesh": {"elements": [12, 1]},
+    }
+    return Scene.from_dict(tables).replace({key.replace("__", "."): value for key, value in changes.items()})
+
+
+@pytest.mark.parametrize(
+    ("theory", "history", "frequency"),
+    [
+        # Plate and beam have the same equations but for strains of second order: von Kármán's ½ u_3'² against the
+        # stretch of the axis, Green's strain against Reissner's. Frequencies: mesh of the strip.
+        ("linear", 1e-5, 1e-3),
+        ("consistent_linear", 1e-5, 1e-3),
+        ("von_karman_linear", 1e-5, 1e-3),
+        ("second_order", 1e-5, 1e-3),
+        ("von_karman", 3e-3, 1e-3),
+        ("reissner", 1e-4, 1e-3),
+    ],
+)
+def test_strip_is_a_beam(spin_up: Any, theory: str, history: float, frequency: float) -> None:
+    time = {"end": 7.0, "step": 0.01, "output_every": 10}
+    beam = rotfem.run(spin_up({"model.theory": theory}, time=time)).history
+    plate = rotfem.run(strip(model__theory=theory, time=time)).history
+    scale = float(np.max(np.abs(beam["tip_u2"])))
+    assert scale > 0.3
+    np.testing.assert_allclose(plate["tip_u3"], beam["tip_u2"], rtol=0, atol=history * scale)
+    np.testing.assert_allclose(plate["tip_alpha1"], beam["tip_alpha"], rtol=0, atol=3 * history * scale)
+    if theory == "linear":
+        return
+    for speed in (3.0, 12.0):
+        turning = {"type": "constant", "speed": speed}
+        rows = rotfem.modes(spin_up({"model.theory": theory}, motion=turning)).rows
+        lag = [row["frequency"] for row in rows if row["label"].startswith("lag")]
+        scene = strip(model__theory=theory, motion={**turning, "axis": [0, -1, 0]}, modes__count=8)
+        bending = [row["frequency"] for row in rotfem.modes(scene).rows if row["label"].startswith("bending")]
+        np.testing.assert_allclose(bending[:3], lag[:3], rtol=frequency)
+
+
+def test_strip_with_line_mass_and_free_hub(spin_up: Any) -> None:
+    """A mass along the end edge is the tip mass of the beam, and a free hub feels the strip as it feels the beam."""
+    torque = {"type": "torque", "hub_inertia": 200.0, "pulses": [[0, 0.5, 50.0], [0.5, 1.0, -50.0]]}
+    time = {"end": 1.5, "step": 0.01}
+    beam = rotfem.run(spin_up({"structure.tip_mass": 3.0}, motion=torque, time=time)).history
+    plate = rotfem.run(
+        strip(structure__line_masses={"tip": 3.0}, motion={**torque, "axis": [0, -1, 0]}, time=time)
+    ).history
+    for name, other in (("tip_u3", "tip_u2"), ("psi_dot", "psi_dot")):
+        scale = float(np.max(np.abs(beam[other])))
+        np.testing.assert_allclose(plate[name], beam[other], rtol=0, atol=2e-4 * scale)
+
+
+def test_tapered_strip(spin_up: Any) -> None:
+    """Thickness 1.5 → 0.5 along the strip against the beam with EA ~ h, EI ~ h³: the same first three frequencies."""
+    x = np.linspace(0, 10, 41)
+    h = DEPTH * (1.5 - x / 10)
+    section = {
+        "EA": [[a, EA * b / DEPTH] for a, b in zip(x, h, strict=True)],
+        "GA": [[a, GA * b / DEPTH] for a, b in zip(x, h, strict=True)],
+        "EI": [[a, EI * (b / DEPTH) ** 3] for a, b in zip(x, h, strict=True)],
+        "mass_per_length": [[a, MASS * b / DEPTH] for a, b in zip(x, h, strict=True)],
+        "rotary_inertia": [[a, 6e-4 * (b / DEPTH) ** 3] for a, b in zip(x, h, strict=True)],
+    }
+    turning = {"type": "constant", "speed": 4.0}
+    scene = spin_up({"structure.section": section, "model.theory": "von_karman_linear"}, motion=turning)
+    lag = [row["frequency"] for row in rotfem.modes(scene).rows if row["label"].startswith("lag")]
+    plate = strip(
+        structure__thickness=[[0, 1.5 * DEPTH], [10, 0.5 * DEPTH]],
+        model__theory="von_karman_linear",
+        motion={**turning, "axis": [0, -1, 0]},
+        modes__count=8,
+    )
+    bending = [row["frequency"] for row in rotfem.modes(plate).rows if row["label"].startswith("bending")]
+    np.testing.assert_allclose(bending[:3], lag[:3], rtol=2e-3)  # EI is linear between 41 points, h³ is not
+
+
+def test_isotropic_given_as_orthotropic() -> None:
+    G = E / (2 * (1 + NU))
+    tables = square(0.02, motion__speed=50.0).to_dict()
+    tables["structure"] = {k: v for k, v in tables["structure"].items() if k not in ("E", "nu")}
+    tables["structure"] |= {"E1": E, "E2": E, "nu12": NU, "G12": G}
+    found = transverse(Scene.from_dict(tables))
+    np.testing.assert_allclose(found, transverse(square(0.02, motion__speed=50.0)), rtol=1e-8)
+    tables["structure"]["E2"] = E / 10  # softer across: chordwise modes fall, the first bending mode hardly
+    softer = transverse(Scene.from_dict(tables))
+    assert softer[0] == pytest.approx(found[0], rel=0.03)
+    assert softer[3] < 0.9 * found[3]
+
+
+def test_point_mass_is_all_there() -> None:
+    """Translation of the whole plate: e·M e is its mass, with a point mass at no node more by just that."""
+    masses = []
+    for points in ([], [[0.37, 0.211, 5.0], [1.0, -0.5, 2.0]]):
+        system = compile_system(Model(square(0.01, structure__point_masses=points)))
+        assert isinstance(system, AffineSystem)
+        system.set_time(0.0)
+        x, y = system.A.createVecs()
+        x.array[2::5] = 1.0
+        system.matrix(0, 0, 1, 0.0).mult(x, y)
+        masses.append(y.dot(x))
+    assert masses[1] - masses[0] == pytest.approx(7.0, rel=1e-12)
+
+
+def test_point_mass_beside_the_plate() -> None:
+    with pytest.raises(SceneError, match="is not on the plate"):
+        rotfem.modes(square(0.01, structure__point_masses=[[0.5, 0.7, 1.0]]))
+
+
+# --- large deflection ------------------------------------------------------------------------------------------------
+
+
+def cantilever(**changes: Any) -> Scene:
+    """Return the strip of Sze, Liu & Lo (Finite Elem. Anal. Des. 40, 2004, section 3.1): 10 × 1 × 0.1."""
+    tables = {
+        "structure": {
+            "type": "plate",
+            "length": 10.0,
+            "width": 1.0,
+            "thickness": 0.1,
+            "E": 1.2e6,
+            "nu": 0.0,
+            "rho": 1.0,
+        },
+        "motion": {"type": "constant", "speed": 0.0},
+        "mesh": {"elements": [16, 1]},
+    }
+    return Scene.from_dict(tables).replace({key.replace("__", "."): value for key, value in changes.items()})
+
+
+def test_end_shear() -> None:
+    """Sze et al.: −U = 3.286, W = 6.698 at P = 4 (shells; 0.15 %), and the exact planar beam (strain², 1e-4)."""
+    tip = rotfem.run(cantilever(loads__tip_force=[0, 0, 4.0])).history
+    assert -tip["tip_u1"][-1] == pytest.approx(3.286, rel=1.5e-3)
+    assert tip["tip_u3"][-1] == pytest.approx(6.698, rel=1.5e-3)
+    section = {"EA": 1.2e5, "GA": 5e4, "EI": 100.0, "mass_per_length": 0.1}
+    tables = {
+        "structure": {"type": "planar_beam", "length": 10.0, "section": section},
+        "motion": {"type": "constant", "speed": 0.0},
+        "loads": {"tip_force": [0.0, 4.0]},
+    }
+    beam = rotfem.run(tables).history
+    assert tip["tip_u1"][-1] == pytest.approx(beam["tip_u1"][-1], rel=1e-4)
+    assert tip["tip_u3"][-1] == pytest.approx(beam["tip_u2"][-1], rel=1e-4)
+
+
+def test_roll_up() -> None:
+    """M = 2π EI/L makes a full circle; the tip ends at the clamp within (hκ)²/3 of the length and angle."""
+    moment = 2 * np.pi * 100.0 / 10
+    tip = rotfem.run(cantilever(loads__tip_moment=[0, -moment, 0])).history
+    bound = (0.1 * 2 * np.pi / 10) ** 2 / 3
+    assert tip["tip_u1"][-1] == pytest.approx(-10.0, rel=bound)
+    assert abs(tip["tip_u3"][-1]) < 10 * bound
+    assert tip["tip_alpha1"][-1] == pytest.approx(2 * np.pi, rel=bound)
+
+
+# --- theorems --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "second_order", "von_karman", "reissner"])
+def test_jacobi_integral(theory: str) -> None:
+    """Constant spin about a skew axis, ρ∞ = 1: T2 − T0 + W is kept to the error of the steps, which falls with h²."""
+    drift = []
+    for step in (2e-3, 1e-3):
+        scene = square(
+            0.02,
+            model__theory=theory,
+            motion={"type": "constant", "speed": 20.0, "axis": [0.2, 0.5, 1.0]},
+            mesh__elements=[3, 2],
+            loads__tip_force={"value": [0, 0, 200.0]},
+            time={"end": 0.2, "step": step, "spectral_radius": 1.0},
+        )
+        h = rotfem.run(scene).history
+        drift.append(np.max(np.abs(h["jacobi"] - h["jacobi"][0])) / np.max(h["strain"]))
+    assert drift[1] < 2e-2
+    assert drift[1] < 0.5 * drift[0] or drift[0] < 1e-8
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "von_karman", "reissner"])
+def test_symmetries_and_tangents(theory: str) -> None:
+    """M and K symmetric, C skew about the steady state, tangents against differences of the residual."""
+    motion = {"type": "constant", "speed": 40.0, "axis": [0.3, -0.4, 1.0]}
+    scene = square(
+        0.02, model__theory=theory, motion=motion, mesh__elements=[3, 3], structure__hub_offset=[0.5, 0.1, 0.2]
+    )
+    checks = rotfem.modes(scene).summary["checks"]
+    assert max(checks[f"asymmetry_{name}"] for name in "MCK") < 1e-12
+    assert checks["spectrum"] < 1e-8
+    assert checks["linearisation"] < 1e-5  # round-off of the differences: 3e-6 seen
+
+
+def test_exact_theory_contains_the_linear_one() -> None:
+    """At rest, where there is no prestress, all theories have the same tangent at the undeformed state."""
+    found = [transverse(square(0.02, model__theory=theory, mesh__elements=[4, 4])) for theory in THEORIES]
+    for other in found[1:]:
+        np.testing.assert_allclose(other[:5], found[0][:5], rtol=1e-9)
+
+
+def test_gravity_is_an_upward_acceleration_of_the_hub() -> None:
+    fields = {}
+    for key, value in (("loads__gravity", [0, 0, -9.81]), ("motion__base_acceleration", [0, 0, 9.81])):
+        fields[key] = rotfem.run(square(0.01, model__theory="reissner", mesh__elements=[3, 3], **{key: value})).history
+    a, b = fields.values()
+    assert a["tip_u3"][-1] < -1e-4
+    assert a["tip_u3"][-1] == pytest.approx(b["tip_u3"][-1], rel=1e-10)
+
+
+def test_a_factor_kept_over_steps_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Steps with an old factor (large plates) against Newton's own: the same history to its tolerance."""
+    import rotfem.integrators
+
+    scene = square(
+        0.01,
+        model__theory="reissner",
+        mesh__elements=[4, 4],
+        motion={"type": "spin_up", "speed": 30.0, "duration": 0.2, "axis": [0, 1, 0]},
+        time={"end": 0.2, "step": 1e-3},
+        solver__increment_tolerance=1e-12,
+    )
+    newton = rotfem.run(scene)
+    monkeypatch.setattr(rotfem.integrators, "SMALL", 0)
+    chord = rotfem.run(scene)
+    scale = np.max(np.abs(newton.history["tip_u3"]))
+    np.testing.assert_allclose(chord.history["tip_u3"], newton.history["tip_u3"], rtol=0, atol=1e-9 * scale)
+    assert chord.summary["factorisations"] < 0.9 * newton.summary["factorisations"]
+
+
+def test_reduced_basis(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A Campbell diagram in a basis of modes against full solutions at every speed."""
+    from importlib import import_module
+
+    reduced = import_module("rotfem.reduced")
+    scene = square(
+        0.05, motion={"type": "constant", "speed": 0.0, "axis": [0, 1, 0]}, mesh__elements=[5, 5], modes__count=5
+    )
+    speeds = list(np.linspace(0, 8 * unit(0.05), 6))
+    full = rotfem.campbell(scene, speeds)
+    monkeypatch.setattr(reduced, "LARGE", 0)
+    quick = rotfem.campbell(scene, speeds)
+    assert quick.summary["reduced_basis"]["checks"][-1]["difference"] < 1e-6
+    wanted = {(row["branch"], row["speed"]): row["frequency"] for row in full.rows if not row["refined"]}
+    found = {(row["branch"], row["speed"]): row["frequency"] for row in quick.rows if not row["refined"]}
+    assert list(found) == list(wanted)
+    np.testing.assert_allclose(list(found.values()), list(wanted.values()), rtol=1e-6)
+    assert max(row["residual"] for row in quick.rows) < 1e-6
+
+
+def test_in_plane_stiffening_is_missed_and_said() -> None:
+    """Only reissner stiffens in-plane modes: the first one rises with the spin there, and falls in the others."""
+    spin = {"type": "constant", "speed": 10 * unit(0.1)}
+    in_plane = {}
+    for theory in ("von_karman_linear", "reissner"):
+        result = rotfem.modes(square(0.1, motion=spin, model__theory=theory, mesh__elements=[4, 4]))
+        in_plane[theory] = next(row["frequency"] for row in result.rows if row["label"] == "in-plane 1")
+        assert any("stiffening" in text for text in result.summary["warnings"]) == (theory != "reissner")
+    assert in_plane["reissner"] > 1.1 * in_plane["von_karman_linear"]
+
+
+def test_analysis_keeps_its_space() -> None:
+    analysis = ModalAnalysis(square(0.01, mesh__elements=[2, 2]))
+    assert isinstance(analysis.system, System)
+    assert analysis.system.V.dofmap.index_map_bs == 5
+
+
+# --- a disk ----------------------------------------------------------------------------------------------------------
+
+
+def disk_mesh(path: Path, inner: float, outer: float, around: int, across: int) -> Path:
+    """Write an annulus of quadrilaterals clamped at its inner edge."""
+    r = np.linspace(inner, outer, across + 1)
+    angle = 2 * np.pi * np.arange(around) / around
+    points = np.array([[a * np.cos(p), a * np.sin(p)] for a in r for p in angle])
+
+    def node(i: int, j: int) -> int:
+        return i * around + j % around
+
+    cells = [
+        [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)] for i in range(across) for j in range(around)
+    ]
+    edge = [[node(0, j), node(0, j + 1)] for j in range(around)]
+    return write_msh(path, points, {"plate": cells, "clamped": edge})
+
+
+def annulus(m: int, ratio: float) -> float:
+    """Return k·outer of the first mode with m diameters, clamped inside, free outside, Kirchhoff's plate (Leissa 1969).
+
+    w = A J + B Y + C I + D K of order m at k r: w = w' = 0 inside, moment and Kirchhoff shear 0 outside.
+    """
+
+    def column(f: Any, sign: float, k: float) -> list[float]:
+        step = 1e-3
+
+        def derivatives(r: float) -> tuple[float, float, float, float]:
+            x = [f(m, k * (r + i * step)) for i in range(-3, 4)]
+            first = (x[6] - 9 * x[5] + 45 * x[4] - 45 * x[2] + 9 * x[1] - x[0]) / (60 * step)
+            return x[3], first, sign, 0.0
+
+        w_in, d_in = derivatives(ratio)[:2]
+        w, d = derivatives(1.0)[:2]
+        laplacian = sign * k**2 * w  # ∇²w
+        d_laplacian = sign * k**2 * d
+        second = laplacian - d + m**2 * w  # w'' at r = 1
+        moment = second + NU * (d - m**2 * w)
+        shear = d_laplacian - (1 - NU) * m**2 * (d - w)
+        return [w_in, d_in, moment, shear]
+
+    def determinant(k: float) -> float:
+        columns = [column(f, s, k) for f, s in ((jv, -1.0), (yv, -1.0), (iv, 1.0), (kv, 1.0))]
+        return float(np.linalg.det(np.array([np.array(c) / np.max(np.abs(c)) for c in columns]).T))
+
+    k = np.linspace(1.0, 6.0, 251)
+    values = [determinant(x) for x in k]
+    i = next(i for i in range(len(k) - 1) if values[i] * values[i + 1] < 0)
+    return float(brentq(determinant, k[i], k[i + 1]))
+
+
+def test_annular_disk(tmp_path: Path) -> None:
+    """Frequencies of 0 to 3 nodal diameters against Bessel functions, pairs, and their names; 1e-2 (straight edges)."""
+    h, inner, outer = 1e-3, 0.1, 0.3
+    mesh = disk_mesh(tmp_path / "disk.msh", inner, outer, 48, 6)
+    scene = square(h, structure__length=None, structure__width=None, structure__mesh=str(mesh), modes__count=7)
+    rows = rotfem.modes(scene).rows
+    found = defaultdict(list)
+    for row in rows:
+        found[row["label"]].append(row["frequency"] / unit(h) * outer**2)
+    for m in range(4):
+        pair = found[f"diameters {m}.1"]
+        assert len(pair) == (1 if m == 0 else 2)
+        np.testing.assert_allclose(pair, annulus(m, inner / outer) ** 2, rtol=1e-2)
+        assert max(pair) / min(pair) - 1 < 1e-6
+
+
+def test_travelling_waves(tmp_path: Path) -> None:
+    """Waves with and against the spin differ by 2mΩ in the fixed frame."""
+    mesh = disk_mesh(tmp_path / "disk.msh", 0.1, 0.3, 24, 3)
+    scene = square(
+        1e-3,
+        structure__length=None,
+        structure__width=None,
+        structure__mesh=str(mesh),
+        modes__count=5,
+        model__theory="consistent_linear",
+    )
+    waves = rotfem.campbell(scene, [0.0, 40.0, 80.0]).travelling_waves()
+    assert set(waves) == {"diameters 1.1", "diameters 2.1"}
+    for name, w in waves.items():
+        m = int(name.split()[1][0])
+        np.testing.assert_allclose(w["forward"] - w["backward"], 2 * m * w["speed"], rtol=1e-12)
