@@ -1,7 +1,7 @@
 """rotfem: rotating beams and plates with FEniCSx.
 
-One noun, the scene (`Scene`, `load_scene`), and verbs on it (`run`, `modes`, `campbell`, `cost`). The verbs load FEniCSx when
-first used.
+One noun, the scene (`Scene`, `load_scene`), and verbs on it (`run`, `modes`, `campbell`, `cost`). The verbs load
+FEniCSx when first used.
 """
 
 from __future__ import annotations

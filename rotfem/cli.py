@@ -16,6 +16,9 @@ import typer
 from rotfem.errors import ComputationError, OutputError, SceneError
 from rotfem.scene import load_scene
 
+#: Rows of a table that is printed in full.
+LONGEST_TABLE = 40
+
 app = typer.Typer(
     name="rotfem",
     help="Rotating beams and plates with FEniCSx. A scene is a TOML file; docs/scene.md lists its keys.",
@@ -30,6 +33,7 @@ Output = Annotated[Path | None, typer.Option("-o", "--output", help="result fold
 Overrides = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="change a scene key, repeatable")]
 Json = Annotated[bool, typer.Option("--json", help="print the summary as JSON, and nothing else, on stdout")]
 NoPlots = Annotated[bool, typer.Option("--no-plots", help="write no figures")]
+NoAdvice = Annotated[bool, typer.Option("--no-advice", help="give no hints at the start")]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")]
 Debug = Annotated[bool, typer.Option("--debug", help="show the traceback of an error")]
 
@@ -46,6 +50,7 @@ def run(
     overrides: Overrides = [],  # noqa: B006 (typer reads the default)
     as_json: Json = False,
     no_plots: NoPlots = False,
+    no_advice: NoAdvice = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -57,7 +62,7 @@ def run(
 
         try:
             with session.progress(f"{loaded.name}: {loaded.model.theory}") as progress:
-                result = simulate(loaded, progress=progress)
+                result = simulate(loaded, progress=progress, hint=session.hint(no_advice))
         except (ComputationError, KeyboardInterrupt) as error:
             partial = getattr(error, "result", None)
             if partial is not None:
@@ -79,6 +84,7 @@ def modes(
     matrices: Annotated[bool, typer.Option("--matrices", help="write M, C, K as Matrix Market and npz")] = False,
     as_json: Json = False,
     no_plots: NoPlots = False,
+    no_advice: NoAdvice = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -88,7 +94,7 @@ def modes(
         folder = session.folder(output or Path("results") / loaded.name)
         from rotfem.modes import modes as analyse
 
-        result = analyse(loaded, sensitivities=sensitivities)
+        result = analyse(loaded, sensitivities=sensitivities, hint=session.hint(no_advice))
         if state_space or matrices:
             from rotfem.state_space import state_space as reduce
             from rotfem.state_space import write_matrices
@@ -110,6 +116,7 @@ def campbell(
     overrides: Overrides = [],  # noqa: B006
     as_json: Json = False,
     no_plots: NoPlots = False,
+    no_advice: NoAdvice = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -120,9 +127,74 @@ def campbell(
         from rotfem.campbell import campbell as sweep
 
         with session.progress(f"{loaded.name}: {loaded.model.theory}") as progress:
-            result = sweep(loaded, speeds, orders=per_rev, progress=progress)
+            result = sweep(loaded, speeds, orders=per_rev, progress=progress, hint=session.hint(no_advice))
         session.write(result, folder, plots=not no_plots)
         session.say(campbell_report(result.summary, folder))
+
+
+@app.command()
+def cost(
+    scene: ScenePath,
+    quick: Annotated[bool, typer.Option("--quick", help="a small grid")] = False,
+    accuracy: Annotated[float, typer.Option("--accuracy", help="relative error wanted, the model's included")] = 1e-4,
+    write: Annotated[Path | None, typer.Option("--write", metavar="FILE", help="write the tuned scene there")] = None,
+    of: Annotated[str | None, typer.Option("--of", metavar="OUTPUT", help="tip or frequencies")] = None,
+    theories: Annotated[str | None, typer.Option("--theories", metavar="A,B,…", help="theories to try")] = None,
+    elements: Annotated[str | None, typer.Option("--elements", metavar="N,…", help="numbers of elements")] = None,
+    degrees: Annotated[str | None, typer.Option("--degrees", metavar="K,…", help="polynomial degrees")] = None,
+    steps: Annotated[str | None, typer.Option("--steps", metavar="H,…", help="time steps (s)")] = None,
+    schemes: Annotated[str | None, typer.Option("--schemes", metavar="A,B,…", help="time-stepping schemes")] = None,
+    repeat: Annotated[int, typer.Option("--repeat", min=1, help="repetitions; times are medians")] = 3,
+    resume: Annotated[bool, typer.Option("--resume/--fresh", help="go on with what is in the result folder")] = True,
+    output: Output = None,
+    overrides: Overrides = [],  # noqa: B006
+    as_json: Json = False,
+    no_plots: NoPlots = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Measure what accuracy costs: error and time of SCENE over theory, mesh, degree, step and scheme."""
+    with Session(as_json, quiet, debug) as session:
+        loaded = load_scene(scene, overrides)
+        folder = session.folder(output or Path("results") / loaded.name)
+        from rotfem.cost import cost as study
+
+        with session.progress(f"{loaded.name}: cost") as progress:
+            result = study(
+                loaded,
+                quick=quick,
+                accuracy=accuracy,
+                output=of,
+                repeat=repeat,
+                folder=folder,
+                resume=resume,
+                theories=listed("--theories", theories, str),
+                elements=listed("--elements", elements, int),
+                degrees=listed("--degrees", degrees, int),
+                steps=listed("--steps", steps, float),
+                schemes=listed("--schemes", schemes, str),
+                progress=progress,
+            )
+        session.write(result, folder, plots=not no_plots)
+        session.say(cost_report(result.summary, result.rows, folder))
+        if write is not None and session.first:
+            result.write_tuned(write)
+            session.say([f"tuned scene in {write}"])
+
+
+def listed(option: str, text: str | None, kind: Callable[[str], Any]) -> list[Any] | None:
+    """Return the values of an option such as "2,3"; None where it is not given.
+
+    Raises:
+        SceneError: they are not of the kind.
+    """
+    if text is None:
+        return None
+    try:
+        return [kind(part.strip()) for part in text.split(",")]
+    except ValueError:
+        what = "integers" if kind is int else "numbers"
+        raise SceneError("command line", option, text, f"must be {what} separated by commas") from None
 
 
 class Session:
@@ -189,15 +261,26 @@ class Session:
         """Return the progress bar: on a terminal only, and only where the command may speak."""
         return ProgressBar(title, self.first and not self.quiet and not self.as_json and sys.stderr.isatty())
 
+    def hint(self, unwanted: bool) -> Callable[[str], None] | None:
+        """Return what prints advice on stderr, rank 0 only; None where it is not wanted."""
+        if unwanted or self.quiet:
+            return None
+        return lambda line: print(f"hint: {line}", file=sys.stderr) if self.first else None
+
     def write(self, result: Any, folder: Path, plots: bool) -> None:
         """Write a result and its figures from rank 0, and print its summary where --json asks for it."""
         if not self.first:
             return
         result.write(folder)
         if plots:
-            from rotfem.plots import plot
+            if result.summary["command"] == "cost":
+                from rotfem.plots_cost import plot_cost
 
-            plot(result, folder)
+                plot_cost(result, folder)
+            else:
+                from rotfem.plots import plot
+
+                plot(result, folder)
         if self.as_json:
             from rotfem.results import json_text
 
@@ -296,6 +379,49 @@ def campbell_report(summary: dict[str, Any], folder: Path) -> list[str]:
     for c in summary["critical_speeds"]:
         lines.append(f"critical speed {c['speed']:.6f} rad/s: {c['label']} meets {c['per_rev']}Ω")
     return [*lines, f"results in {folder}"]
+
+
+def cost_report(summary: dict[str, Any], rows: list[dict[str, Any]], folder: Path) -> list[str]:
+    """Return the lines `cost` prints: the table (of a large study its Pareto front), floors, what is recommended."""
+    from rotfem.cost_front import describe, judged
+
+    lines = [
+        f"{summary['name']}: error of {summary['output']}, {summary['settings']} settings ({summary['failed']} failed, "
+        f"{summary['resumed']} results from before) in {summary['timings']['total']:.1f} s",
+        f"{'theory':<18}{'elements':>9}{'P':>3}{'scheme':>19}{'step (s)':>11}{'dofs':>7}"
+        f"{'time (s)':>10}{'error':>9}{'total':>9}",
+    ]
+    shown = rows if len(rows) <= LONGEST_TABLE else [row for row in rows if row["pareto"]]
+    for row in sorted(shown, key=lambda r: (r["status"] == "failed", r["time"])):
+        n, step = row["elements"], row["step"]
+        mesh = "–" if n is None else "×".join(map(str, n if isinstance(n, list) else [n]))
+        way = "–" if row["scheme"] is None else f"{step:.5g}" if step is not None else f"tol {row['tolerance']:.3g}"
+        lines.append(
+            f"{row['theory']:<18}{mesh:>9}{row['degree']:>3}{row['scheme'] or '–':>19}{way:>11}{row['dofs'] or '–':>7}"
+            f"{row['time']:>10.4f}"
+            + (f"{_short(row['error'])}{_short(row['total_error'])}" if judged(row) is not None else f"{'failed':>18}")
+            + (" *" if row["pareto"] else "")
+        )
+    if len(shown) < len(rows):
+        lines.append("only the Pareto front is shown; all settings are in cost.csv")
+    for theory, floor in summary["model_errors"].items():
+        uncertain = summary["references"][theory]["uncertainty"]
+        lines.append(f"{theory}: error of the model {floor:.1e}, reference known to {uncertain:.0e}")
+    for theory, reason in summary["reference_failures"].items():
+        lines.append(f"{theory}: failed, {reason}")
+    row = summary["recommended"]
+    if row is None:
+        lines.append(f"no setting is within {summary['accuracy']:g}")
+    else:
+        lines.append(
+            f"for {summary['accuracy']:g}: {describe(row)}: error {judged(row):.1e}, {row['time']:.3g} s "
+            f"and {row['setup']:.2g} s of set-up"
+        )
+    return [*lines, f"results in {folder}"]
+
+
+def _short(value: float | None) -> str:
+    return f"{'–':>9}" if value is None else f"{value:>9.1e}"
 
 
 def _interrupt(signum: int, frame: object) -> NoReturn:

@@ -1,7 +1,7 @@
 """`rotfem cost`: what accuracy costs in time, over theory, mesh, degree, step and scheme.
 
 The error of a setting is its distance to the converged output of the same theory, found by refinement with an
-uncertainty of its own; what the theory itself misses is the distance of its converged output from that of the exact one.
+uncertainty of its own; what the theory itself misses is the distance of its converged output from the exact one's.
 """
 
 from __future__ import annotations
@@ -208,7 +208,8 @@ class Study:
         if RICHEST not in references:
             reason = failures.get(RICHEST, "")
             warnings.append(f"no reference of {RICHEST} ({reason}): errors do not include that of the model")
-        uncertainty = max((r.uncertainty for t, r in references.items() if t == RICHEST or RICHEST in failures), default=0)
+        judges = [r for t, r in references.items() if t == RICHEST or RICHEST not in references]
+        uncertainty = max((r.uncertainty for r in judges), default=0.0)
         for theory, r in references.items():
             mine = [row["error"] for row in rows if row["theory"] == theory and row["error"]]
             if mine and r.uncertainty > 0.5 * min(mine):
@@ -232,7 +233,7 @@ class Study:
             "reference_failures": failures,
             "model_errors": model_errors(references, self.each),
             "recommended": best[accuracy],
-            "recommendations": [{"accuracy": a, "setting": row and describe(row), "row": row} for a, row in best.items()],
+            "recommendations": [{"accuracy": a, "setting": r and describe(r), "row": r} for a, r in best.items()],
             "settings": len(rows),
             "failed": sum(row["status"] == "failed" for row in rows),
             "measured": self.new,

@@ -14,7 +14,7 @@ Row = dict[str, Any]
 
 
 def model_errors(references: Mapping[str, Reference], each: bool) -> dict[str, float]:
-    """Return theory ↦ relative difference of its reference from that of the richest theory; empty without the latter."""
+    """Return theory ↦ relative difference of its reference from the richest theory's; empty where that has none."""
     if RICHEST not in references:
         return {}
     truth = references[RICHEST].samples

@@ -24,6 +24,9 @@ STEPS_FULL, STEPS_QUICK, LONGEST = (0.45, 10.5), (1.9, 10.5), 1 / 20
 #: Tolerances of adaptive steps tried, as multiples of the scene's own.
 TOLERANCES_FULL, TOLERANCES_QUICK = (1000.0, 100.0, 10.0, 1.0, 0.1), (100.0, 10.0, 1.0)
 
+#: Numbers of elements tried, as multiples of the scene's own.
+MESHES_FULL, MESHES_QUICK = (0.25, 0.5, 1.0, 2.0), (0.5, 1.0)
+
 #: Theories of a quick study, besides the scene's own.
 QUICK = ("linear", "consistent_linear", RICHEST)
 
@@ -87,6 +90,11 @@ class Setting:
         return new
 
 
+def cells(elements: Elements) -> int:
+    """Return the number of cells."""
+    return elements[0] * elements[1] if isinstance(elements, tuple) else elements or 0
+
+
 def scaled(elements: Elements, factor: float) -> Elements:
     """Return a number of elements times a factor, at least 1 in each direction."""
     if isinstance(elements, tuple):
@@ -110,8 +118,8 @@ def default_output(scene: Scene) -> str:
     """Return "tip" for a history or a steady state that the scene asks for, "frequencies" otherwise."""
     if scene.time is not None:
         return "tip"
-    moves = scene.motion.is_spinning or bool(scene.loads.model_fields_set)
-    return "tip" if isinstance(scene.motion, ConstantMotion) and moves and not scene.modes.model_fields_set else OUTPUTS[1]
+    steady = isinstance(scene.motion, ConstantMotion) and not scene.modes.model_fields_set
+    return "tip" if steady and (scene.motion.is_spinning or scene.loads.model_fields_set) else "frequencies"
 
 
 def grid(
@@ -132,11 +140,10 @@ def grid(
     own = own_setting(scene)
     check_choice(scene, chosen)
     theories = list(chosen.get("theories") or default_theories(scene, quick))
-    meshes = list(chosen.get("elements") or unique([scaled(own.elements, 0.5), own.elements]))
-    degrees = list(chosen.get("degrees") or [own.degree])
-    if not quick:
-        meshes = list(chosen.get("elements") or unique([*meshes, scaled(own.elements, 2.0)]))
-        degrees = list(chosen.get("degrees") or unique([max(1, own.degree - 1), own.degree]))
+    factors = MESHES_QUICK if quick else MESHES_FULL
+    meshes = list(chosen.get("elements") or unique([scaled(own.elements, factor) for factor in factors]))
+    lower = [] if quick or own.degree == 1 else [own.degree - 1]
+    degrees = list(chosen.get("degrees") or [*lower, own.degree])
     ways = [(None, None, None, 1)] if output != "tip" or scene.time is None else _ways(scene, quick, base_step, chosen)
     out = []
     for theory in theories:
@@ -195,13 +202,8 @@ def reference_settings(settings: Sequence[Setting], own: Setting, theory: str, i
     The finest mesh and step of the grid halved 0, 1 and 2 times in what converges slowest: in time for a history, whose
     mesh is then halved once at the longest of these steps; in space otherwise.
     """
-    first = Setting(
-        theory,
-        max((s.elements for s in settings), key=lambda n: n if n is None or isinstance(n, int) else n[0] * n[1])
-        if own.elements is not None
-        else None,
-        max(s.degree for s in settings),
-    )
+    finest = max((s.elements for s in settings), key=cells)
+    first = Setting(theory, finest, max(s.degree for s in settings))
     steps = [s.step for s in settings if s.step is not None]
     if interval is None:
         return [first.refined(mesh=i) for i in range(3)]
@@ -229,9 +231,10 @@ def check_choice(scene: Scene, chosen: Mapping[str, Sequence[Any] | None]) -> No
                 raise SceneError(scene.file, f"cost {name}", value, f"must be {what}")
     if scene.time is None and (chosen.get("steps") or chosen.get("schemes")):
         raise SceneError(scene.file, "time", None, "missing; steps and schemes have a meaning only with [time]")
-    too_long = [h for h in chosen.get("steps") or () if scene.time is not None and h > scene.time.end]
+    end = scene.time.end if scene.time is not None else 0.0
+    too_long = [h for h in chosen.get("steps") or () if h > end]
     if too_long:
-        raise SceneError(scene.file, "cost steps", too_long[0], f"must be at most time.end = {scene.time.end:g}")
+        raise SceneError(scene.file, "cost steps", too_long[0], f"must be at most time.end = {end:g}")
 
 
 def unique(values: Sequence[Any]) -> list[Any]:

@@ -116,7 +116,9 @@ def test_light_modules_import_no_fenicsx(module: str) -> None:
     assert {name.split(".")[0] for name in imports(module, everywhere=True)} & FENICSX == set()
 
 
-@pytest.mark.parametrize("module", ["rotfem", "rotfem.scene", "rotfem.results", "rotfem.plots", "rotfem.plots_cost", "rotfem.cli"])
+@pytest.mark.parametrize(
+    "module", ["rotfem", "rotfem.scene", "rotfem.results", "rotfem.plots", "rotfem.plots_cost", "rotfem.cli"]
+)
 def test_nothing_of_fenicsx_is_loaded(module: str) -> None:
     """As above, but with all that the module pulls in: a bad scene is refused before FEniCSx is loaded."""
     code = f"import sys, {module}; print(*sorted({FENICSX!r} & set(sys.modules)))"
