@@ -37,6 +37,9 @@ from rotfem.simulation import Progress, as_scene, versions
 #: Name of the file that keeps what has been measured.
 RECORD = "cost.jsonl"
 
+#: Uncertainties below this are not worth a warning.
+ROUND_OFF = 1e-9
+
 #: Accuracies a setting is recommended for besides the wanted one.
 DECADES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
@@ -160,7 +163,7 @@ class Study:
         if not self.each and RICHEST in references and not np.any(references[RICHEST].samples.values):
             raise SceneError(self.scene.file, "cost output", "tip", 'the tip does not move; try output "frequencies"')
         rows = rows_of(measured, references, self.each)
-        return CostResult(self._summary(rows, references, failures, accuracy, quick), rows, self.scene)
+        return CostResult(self._summary(rows, references, failures, accuracy, quick), rows, self.scene, references)
 
     def base_step(self) -> float | None:
         """Return the fixed step (s) around which steps are tried: the scene's own, or the mean of its adaptive ones.
@@ -212,7 +215,7 @@ class Study:
         uncertainty = max((r.uncertainty for r in judges), default=0.0)
         for theory, r in references.items():
             mine = [row["error"] for row in rows if row["theory"] == theory and row["error"]]
-            if mine and r.uncertainty > 0.5 * min(mine):
+            if mine and r.uncertainty > max(ROUND_OFF, 0.5 * min(mine)):
                 warnings.append(
                     f"the reference of {theory} is uncertain by {r.uncertainty:.1e}, the best setting off by "
                     f"{min(mine):.1e}: errors near that are not resolved"

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rotfem.cost_front import Row, describe, recommend, setting_of
+from rotfem.cost_reference import Reference
 from rotfem.cost_tuned import write_tuned
 from rotfem.errors import ComputationError
 from rotfem.results import json_text, rows_text, write_text
@@ -23,11 +24,13 @@ class CostResult:
             `error`, `model_error`, `total_error`, `uncertainty` (relative), `time`, `time_min`, `time_max`, `cpu_time`,
             `setup` (s; medians of `repeats`), `dofs`, `steps`, `iterations`, `pareto`, `reason`.
         scene: the scene studied.
+        references: theory ↦ its converged output.
     """
 
     summary: dict[str, Any]
     rows: list[Row]
     scene: Scene = field(repr=False)
+    references: dict[str, Reference] = field(default_factory=dict, repr=False)
 
     def recommend(self, accuracy: float) -> Row | None:
         """Return the fastest row within a relative accuracy, uncertainty included; None if there is none."""
