@@ -8,9 +8,9 @@ the equations, so that fewer integrals are assembled:
     Euler             100 %: nothing else bends this beam
     rotary inertia    2e-5: the beam is slender
 
-None of them saves much: a step here is mostly Python and a solve of 93 unknowns. What matters is another question in
-another scene: of a thick beam at high speed (slenderness 30, 12 in units of √(EI/A_ρL⁴)) the first frequency in the plane
-is 12.7 % too high without the Coriolis force. That is the number of this demo.
+None of them saves much: a step here is mostly Python and a solve of 93 unknowns. What is small in one scene is not in
+another: of a thick beam at high speed (slenderness 30, 12 in units of √(EI/A_ρL⁴)) the first frequency in the plane is
+12.7 % too high without the Coriolis force. That is the number of this demo.
 
 The picture in the README is this demo's, saved with --figure docs/figures/dropped_effects.png.
 """
