@@ -11,8 +11,8 @@ from scipy.interpolate import CubicSpline
 
 Array = npt.NDArray[np.float64]
 
-#: Observed orders below this are noise or no convergence at all: nothing is extrapolated.
-LEAST_ORDER = 1.0
+#: Observed orders below this are noise, or of levels not yet fine enough: nothing is extrapolated.
+LEAST_ORDER = 1.5
 
 #: Samples closer than this part of the interval are taken to be at the same time.
 SAME_TIME = 1e-9
@@ -115,9 +115,9 @@ def reference(levels: list[Samples], each: bool, finer_mesh: Samples | None = No
     """Return the reference that three levels of refinement give, and its uncertainty.
 
     Where the differences shrink with an order p, the two finest levels are extrapolated; the uncertainty is the
-    difference to what the two coarsest ones give. Otherwise it is the finest level, and the difference to the last but
-    one. The change that a mesh of half the size makes at the coarsest step is added to the value, and in full to the
-    uncertainty.
+    difference to what the two coarsest ones give. Otherwise it is the finest level, and the larger of the differences
+    between levels. The change that a mesh of half the size makes at the coarsest step is added to the value, and in full
+    to the uncertainty.
 
     Args:
         levels: the output for h, h/2, h/4, sampled at the same times.
@@ -126,10 +126,12 @@ def reference(levels: list[Samples], each: bool, finer_mesh: Samples | None = No
     """
     order = observed_order(levels[0], levels[1], levels[2], each)
     if order is None:
-        best, other = levels[2], levels[1]
+        best = levels[2]
+        uncertain = max(distance(levels[0], levels[1], each), distance(levels[1], best, each))
     else:
-        best, other = extrapolated(levels[1], levels[2], order), extrapolated(levels[0], levels[1], order)
-    parts = {"time" if finer_mesh is not None else "mesh": distance(other, best, each)}
+        best = extrapolated(levels[1], levels[2], order)
+        uncertain = distance(extrapolated(levels[0], levels[1], order), best, each)
+    parts = {"time" if finer_mesh is not None else "mesh": uncertain}
     if finer_mesh is not None:
         parts["mesh"] = distance(levels[0], finer_mesh, each)
         best = Samples(best.values + (finer_mesh.values - levels[0].values), best.times)

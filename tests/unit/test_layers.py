@@ -30,7 +30,7 @@ LEVELS: tuple[tuple[str, ...], ...] = (
     ),
     ("plots", "cost_grid", "cost_reference", "cost_tuned", "advice"),
     ("cost_record", "cost_front"),
-    ("cost_result",),
+    ("cost_result", "cost_report"),
     ("plots_cost",),
     # FEniCSx from here on
     ("compat", "kinematics", "motion", "rotations"),
