@@ -116,7 +116,7 @@ def reference(levels: list[Samples], each: bool, finer_mesh: Samples | None = No
 
     Where the differences shrink with an order p, the two finest levels are extrapolated; the uncertainty is the
     difference to what the two coarsest ones give. Otherwise it is the finest level, and the larger of the differences
-    between levels. The change that a mesh of half the size makes at the coarsest step is added to the value, and in full
+    between levels. The change that half the element size makes at the coarsest step is added to the value, and in full
     to the uncertainty.
 
     Args:
