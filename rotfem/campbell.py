@@ -19,6 +19,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 from scipy.optimize import brentq, linear_sum_assignment
 
+from rotfem.advice import Hint, silent
 from rotfem.equilibrium import check_steady
 from rotfem.errors import ComputationError, SceneError
 from rotfem.modes import (
@@ -289,6 +290,7 @@ def campbell(
     comm: MPI.Comm = MPI.COMM_WORLD,
     orders: int | None = None,
     progress: Progress | None = None,
+    hint: Hint | None = silent,
 ) -> CampbellResult:
     """Return the modes of a scene followed over speed.
 
@@ -298,6 +300,7 @@ def campbell(
         comm: MPI communicator.
         orders: per-rev lines 1Ω … orders·Ω to cross; by default as many as meet a branch in the range, at most 4.
         progress: called with the share of the speeds done, between 0 and 1.
+        hint: called with every line of advice before the computation starts; None asks for none.
 
     Raises:
         SceneError: the scene or the speeds are not valid.
@@ -311,6 +314,7 @@ def campbell(
             scene.replace({"motion": {"type": "constant", "speed": values[-1]}}) if any(scene.loads.gravity) else scene
         )
     analysis = ModalAnalysis(scene, comm, sweep=True)
+    hints = analysis.advise("campbell", hint, max(map(abs, values)))
     if worth_while(analysis, values):
         analysis = ReducedAnalysis(analysis)
         analysis.prepare(values[0], values[-1], scene.modes.count + SPARE)
@@ -362,6 +366,7 @@ def campbell(
         **(analysis.report() if isinstance(analysis, ReducedAnalysis) else {}),
         "lowest_frequency": lowest,
         "warnings": warnings,
+        "advice": hints,
         "timings": {**analysis.seconds, "other": total - sum(analysis.seconds.values()), "total": total},
         "versions": versions(),
         "ranks": comm.size,

@@ -30,6 +30,7 @@ Output = Annotated[Path | None, typer.Option("-o", "--output", help="result fold
 Overrides = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="change a scene key, repeatable")]
 Json = Annotated[bool, typer.Option("--json", help="print the summary as JSON, and nothing else, on stdout")]
 NoPlots = Annotated[bool, typer.Option("--no-plots", help="write no figures")]
+NoAdvice = Annotated[bool, typer.Option("--no-advice", help="give no hints at the start")]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")]
 Debug = Annotated[bool, typer.Option("--debug", help="show the traceback of an error")]
 
@@ -46,6 +47,7 @@ def run(
     overrides: Overrides = [],  # noqa: B006 (typer reads the default)
     as_json: Json = False,
     no_plots: NoPlots = False,
+    no_advice: NoAdvice = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -57,7 +59,7 @@ def run(
 
         try:
             with session.progress(f"{loaded.name}: {loaded.model.theory}") as progress:
-                result = simulate(loaded, progress=progress)
+                result = simulate(loaded, progress=progress, hint=session.hint(no_advice))
         except (ComputationError, KeyboardInterrupt) as error:
             partial = getattr(error, "result", None)
             if partial is not None:
@@ -80,6 +82,7 @@ def modes(
     animate: Annotated[int | None, typer.Option("--animate", metavar="MODE", help="animate a mode of a plate")] = None,
     as_json: Json = False,
     no_plots: NoPlots = False,
+    no_advice: NoAdvice = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -89,7 +92,7 @@ def modes(
         folder = session.folder(output or Path("results") / loaded.name)
         from rotfem.modes import modes as analyse
 
-        result = analyse(loaded, sensitivities=sensitivities)
+        result = analyse(loaded, sensitivities=sensitivities, hint=session.hint(no_advice))
         if state_space or matrices:
             from rotfem.state_space import state_space as reduce
             from rotfem.state_space import write_matrices
@@ -113,6 +116,7 @@ def campbell(
     overrides: Overrides = [],  # noqa: B006
     as_json: Json = False,
     no_plots: NoPlots = False,
+    no_advice: NoAdvice = False,
     quiet: Quiet = False,
     debug: Debug = False,
 ) -> None:
@@ -123,9 +127,75 @@ def campbell(
         from rotfem.campbell import campbell as sweep
 
         with session.progress(f"{loaded.name}: {loaded.model.theory}") as progress:
-            result = sweep(loaded, speeds, orders=per_rev, progress=progress)
+            result = sweep(loaded, speeds, orders=per_rev, progress=progress, hint=session.hint(no_advice))
         session.write(result, folder, plots=not no_plots)
         session.say(campbell_report(result.summary, folder))
+
+
+@app.command()
+def cost(
+    scene: ScenePath,
+    quick: Annotated[bool, typer.Option("--quick", help="a small grid")] = False,
+    accuracy: Annotated[float, typer.Option("--accuracy", help="relative error wanted, the model's included")] = 1e-4,
+    write: Annotated[Path | None, typer.Option("--write", metavar="FILE", help="write the tuned scene there")] = None,
+    of: Annotated[str | None, typer.Option("--of", metavar="OUTPUT", help="tip or frequencies")] = None,
+    theories: Annotated[str | None, typer.Option("--theories", metavar="A,B,…", help="theories to try")] = None,
+    elements: Annotated[str | None, typer.Option("--elements", metavar="N,…", help="numbers of elements")] = None,
+    degrees: Annotated[str | None, typer.Option("--degrees", metavar="K,…", help="polynomial degrees")] = None,
+    steps: Annotated[str | None, typer.Option("--steps", metavar="H,…", help="time steps (s)")] = None,
+    schemes: Annotated[str | None, typer.Option("--schemes", metavar="A,B,…", help="time-stepping schemes")] = None,
+    repeat: Annotated[int, typer.Option("--repeat", min=1, help="repetitions; times are medians")] = 3,
+    resume: Annotated[bool, typer.Option("--resume/--fresh", help="go on with what is in the result folder")] = True,
+    output: Output = None,
+    overrides: Overrides = [],  # noqa: B006
+    as_json: Json = False,
+    no_plots: NoPlots = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Measure what accuracy costs: error and time of SCENE over theory, mesh, degree, step and scheme."""
+    with Session(as_json, quiet, debug) as session:
+        loaded = load_scene(scene, overrides)
+        folder = session.folder(output or Path("results") / loaded.name)
+        from rotfem.cost import cost as study
+        from rotfem.cost_report import cost_report
+
+        with session.progress(f"{loaded.name}: cost") as progress:
+            result = study(
+                loaded,
+                quick=quick,
+                accuracy=accuracy,
+                output=of,
+                repeat=repeat,
+                folder=folder,
+                resume=resume,
+                theories=listed("--theories", theories, str),
+                elements=listed("--elements", elements, int),
+                degrees=listed("--degrees", degrees, int),
+                steps=listed("--steps", steps, float),
+                schemes=listed("--schemes", schemes, str),
+                progress=progress,
+            )
+        session.write(result, folder, plots=not no_plots)
+        session.say(cost_report(result.summary, result.rows, folder))
+        if write is not None and session.first:
+            result.write_tuned(write)
+            session.say([f"tuned scene in {write}"])
+
+
+def listed(option: str, text: str | None, kind: Callable[[str], Any]) -> list[Any] | None:
+    """Return the values of an option such as "2,3"; None where it is not given.
+
+    Raises:
+        SceneError: they are not of the kind.
+    """
+    if text is None:
+        return None
+    try:
+        return [kind(part.strip()) for part in text.split(",")]
+    except ValueError:
+        what = "integers" if kind is int else "numbers"
+        raise SceneError("command line", option, text, f"must be {what} separated by commas") from None
 
 
 class Session:
@@ -192,6 +262,12 @@ class Session:
         """Return the progress bar: on a terminal only, and only where the command may speak."""
         return ProgressBar(title, self.first and not self.quiet and not self.as_json and sys.stderr.isatty())
 
+    def hint(self, unwanted: bool) -> Callable[[str], None] | None:
+        """Return what prints advice on stderr, rank 0 only; None where it is not wanted."""
+        if unwanted or self.quiet:
+            return None
+        return lambda line: print(f"hint: {line}", file=sys.stderr) if self.first else None
+
     def write(self, result: Any, folder: Path, plots: bool) -> None:
         """Write a result and its figures from rank 0, its fields from all; print its summary if --json asks for it."""
         fields = getattr(result, "fields", None)
@@ -201,9 +277,14 @@ class Session:
             return
         result.write(folder)
         if plots:
-            from rotfem.plots import plot
+            if result.summary["command"] == "cost":
+                from rotfem.plots_cost import plot_cost
 
-            plot(result, folder)
+                plot_cost(result, folder)
+            else:
+                from rotfem.plots import plot
+
+                plot(result, folder)
         if self.as_json:
             from rotfem.results import json_text
 

@@ -16,8 +16,9 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from rotfem.advice import Hint, advise, silent
 from rotfem.affine import AffineSystem
-from rotfem.equilibrium import check_steady, newton_for, steady_state
+from rotfem.equilibrium import check_steady, critical_speed, newton_for, steady_state
 from rotfem.errors import SceneError
 from rotfem.fields import writer
 from rotfem.hub import Hub
@@ -77,6 +78,13 @@ class ModalAnalysis:
         self.hub = Hub(self.system, motion, coupled) if isinstance(motion, TorqueMotion) else None
         self.newton: Newton = newton_for(rotating)
         self.seconds = {"compile": perf_counter() - started, "equilibrium": 0.0, "assemble": 0.0, "eigen": 0.0}
+
+    def advise(self, command: str, hint: Hint | None, speed: float) -> list[str]:
+        """Return hints about the computation ahead, up to a speed (rad/s), and hand them on."""
+        critical = None
+        if hint is not None and isinstance(self.system, AffineSystem) and self.scene.model.theory == "linear":
+            critical = critical_speed(self.system)
+        return advise(self.scene, command, hint, speed, critical)
 
     def at(self, speed: float, count: int, start: Array | None = None) -> Spinning:
         """Return equilibrium and eigenpairs at a speed (rad/s); start is an equilibrium nearby, to continue from.
@@ -170,6 +178,7 @@ def modes(
     scene: Scene | str | Path | Mapping[str, Any],
     comm: MPI.Comm = MPI.COMM_WORLD,
     sensitivities: bool = False,
+    hint: Hint | None = silent,
 ) -> ModesResult:
     """Return the modes of a scene at its final speed: that of a spin-up, at the end of [time], or the constant one.
 
@@ -177,6 +186,7 @@ def modes(
         scene: scene, path of a scene file, or nested tables.
         comm: MPI communicator; every rank gets the whole result.
         sensitivities: also compute the derivatives of all eigenvalues to the scene's parameters.
+        hint: called with every line of advice before the computation starts; None asks for none.
 
     Raises:
         SceneError: the scene is not valid, or has no steady state.
@@ -188,6 +198,7 @@ def modes(
         check_steady(scene)
     analysis = ModalAnalysis(scene, comm)
     speed = final_speed(analysis)
+    hints = analysis.advise("modes", hint, speed)
     spinning = analysis.at(speed, scene.modes.count)
     flexible = scene.modes.count - int(spinning.rigid)
     spinning.pairs = spinning.pairs.select(np.arange(min(flexible, len(spinning.pairs.values))))
@@ -211,6 +222,7 @@ def modes(
         "modes": rows,
         "checks": checks,
         "warnings": warnings,
+        "advice": hints,
         "timings": {**analysis.seconds, "other": total - sum(analysis.seconds.values()), "total": total},
         "versions": versions(),
         "ranks": comm.size,

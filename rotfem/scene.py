@@ -141,6 +141,16 @@ class Scene(SceneModel):
         """Name of the file as errors show it."""
         return self._file
 
+    @property
+    def directory(self) -> str:
+        """Folder where relative paths in the scene start."""
+        return self._directory
+
+    @property
+    def tables(self) -> dict[str, Any]:
+        """Nested tables of what was set, without defaults; not to be changed."""
+        return self._tables
+
     def replace(self, changes: Mapping[str, Any]) -> Self:
         """Makes a variant of the scene.
 

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from rotfem.advice import Hint, advise, silent
 from rotfem.affine import AffineSystem
 from rotfem.equilibrium import check_steady, critical_speed, newton_for, static_tip_shape, steady_state
 from rotfem.errors import ComputationError
@@ -46,6 +47,7 @@ def run(
     scene: Scene | str | Path | Mapping[str, Any],
     comm: MPI.Comm = MPI.COMM_WORLD,
     progress: Progress | None = None,
+    hint: Hint | None = silent,
 ) -> RunResult:
     """Return the time history of a scene, or its steady state where the spin is constant and [time] absent.
 
@@ -53,6 +55,7 @@ def run(
         scene: scene, path of a scene file, or nested tables.
         comm: communicator the structure is distributed over; every rank gets the whole result.
         progress: called with the share of the work done, between 0 and 1.
+        hint: called with every line of advice before the computation starts; None asks for none.
 
     Raises:
         SceneError: the scene is not valid or cannot be run.
@@ -62,7 +65,9 @@ def run(
     scene.check_run()
     if scene.time is None or scene.initial.state == "steady":
         check_steady(scene)
-    return Simulation(scene, comm).run(progress)
+    simulation = Simulation(scene, comm)
+    simulation.advice = advise(simulation.scene, "run", hint, critical=simulation.critical)
+    return simulation.run(progress)
 
 
 class Simulation:
@@ -77,6 +82,7 @@ class Simulation:
         self.started = perf_counter()
         self.scene, self.comm = scene, comm
         self.warnings: list[str] = []
+        self.advice: list[str] = []
         if scene.time is None and scene.model.frame == "inertial":
             self.scene = scene = scene.replace({"model.frame": "rotating"})
             self.warnings.append("a steady state is one only in the rotating frame, where it was computed")
@@ -295,6 +301,7 @@ class Simulation:
             "timings": self._timings(),
             "figures": figures(history),
             "warnings": self.warnings,
+            "advice": self.advice,
             "versions": versions(),
             "ranks": self.comm.size,
             "scene": self.scene.to_dict(),

@@ -78,13 +78,14 @@ def test_modes_prints_a_table_and_writes_files(folder: Path, rotfem: Callable[..
 
 
 def test_modes_json_is_alone_on_stdout(folder: Path, rotfem: Callable[..., Done]) -> None:
-    """A warning (an unstable mode, here) goes to stderr."""
+    """A hint and a warning (an unstable mode, here) go to stderr."""
     options = ("--set", "model.theory=linear", "--set", "motion.speed=5", "--no-plots", "-o", "out")
     done = rotfem("modes", "beam.toml", "--json", *options)
     assert done.status == 0
     summary = json.loads(done.out)
     assert summary["modes"][0]["stability"] == "static instability"
-    assert done.err.startswith("warning: static instability")
+    hint, warning = done.err.splitlines()
+    assert hint.startswith('hint: model.theory = "linear"') and warning.startswith("warning: static instability")
     assert written(folder / "out") == {"modes.csv", "modes.json", "mode_shapes.csv", "summary.json"}
     quiet = rotfem("modes", "beam.toml", "-q", *options)
     assert quiet == (0, "", "")

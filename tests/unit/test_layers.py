@@ -28,7 +28,10 @@ LEVELS: tuple[tuple[str, ...], ...] = (
         "scene_structure",
         "results",
     ),
-    ("plots", "plots_plate"),
+    ("plots", "plots_plate", "cost_grid", "cost_reference", "cost_tuned", "advice"),
+    ("cost_record", "cost_front"),
+    ("cost_result", "cost_report"),
+    ("plots_cost",),
     # FEniCSx from here on
     ("compat", "kinematics", "motion", "plate_kinematics", "rotations"),
     ("fields", "solvers", "theories", "theories.*", "effects", "structures", "structures.*"),
@@ -38,11 +41,12 @@ LEVELS: tuple[tuple[str, ...], ...] = (
     ("simulation",),
     ("modes", "sensitivity", "state_space"),
     ("reduced",),
-    ("campbell",),
+    ("campbell", "cost_measure"),
+    ("cost",),
     ("cli", "", "__main__"),
 )
 #: Number of levels that hold no FEniCSx.
-LIGHT = 4
+LIGHT = 7
 FENICSX = {"dolfinx", "ufl", "basix", "ffcx", "petsc4py", "slepc4py"}
 
 MODULES = {
@@ -113,7 +117,9 @@ def test_light_modules_import_no_fenicsx(module: str) -> None:
     assert {name.split(".")[0] for name in imports(module, everywhere=True)} & FENICSX == set()
 
 
-@pytest.mark.parametrize("module", ["rotfem", "rotfem.scene", "rotfem.results", "rotfem.plots", "rotfem.cli"])
+@pytest.mark.parametrize(
+    "module", ["rotfem", "rotfem.scene", "rotfem.results", "rotfem.plots", "rotfem.plots_cost", "rotfem.cli"]
+)
 def test_nothing_of_fenicsx_is_loaded(module: str) -> None:
     """As above, but with all that the module pulls in: a bad scene is refused before FEniCSx is loaded."""
     code = f"import sys, {module}; print(*sorted({FENICSX!r} & set(sys.modules)))"

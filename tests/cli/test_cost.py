@@ -1,0 +1,151 @@
+"""`rotfem cost` as a user calls it, and the advice that the other commands give."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from rotfem.cli import app
+from rotfem.scene import load_scene
+
+ROOT = Path(__file__).resolve().parents[2]
+
+SCENE = """\
+[structure]
+type = "planar_beam"
+length = 10.0
+[structure.section]
+EA = 2.8e7
+GA = 1.0e7
+EI = 1.4e4
+mass_per_length = 1.2
+rotary_inertia = 6.0e-4
+[motion]
+type = "spin_up"
+speed = 6.0
+duration = 15.0
+[mesh]
+elements = 4
+degree = 2
+[time]
+end = 1.0
+step = 0.01
+"""
+SMALL = ("--theories", "reissner", "--steps", "0.04,0.02", "--elements", "2,4", "--degrees", "2", "--repeat", "1")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the working directory, with the scene in it."""
+    (tmp_path / "beam.toml").write_text(SCENE)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+class Done(NamedTuple):
+    status: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def rotfem(folder: Path, capsys: pytest.CaptureFixture[str]) -> Callable[..., Done]:
+    """Return a function that runs `rotfem …` there, in this process."""
+
+    def run(*arguments: str) -> Done:
+        with pytest.raises(SystemExit) as end:
+            app(list(arguments))
+        return Done(int(end.value.code or 0), *capsys.readouterr())
+
+    return run
+
+
+def test_cost_writes_table_figure_and_tuned_scene(rotfem: Callable[..., Done], folder: Path) -> None:
+    done = rotfem("cost", "beam.toml", *SMALL, "--accuracy", "0.02", "--write", "tuned.toml")
+    assert done.status == 0 and done.err == ""
+    assert "tuned scene in tuned.toml" in done.out and "for 0.02: reissner, " in done.out
+    results = folder / "results" / "beam"
+    assert {"cost.csv", "cost.json", "cost.jsonl", "cost.png", "summary.json"} <= set(os.listdir(results))
+    summary = json.loads((results / "summary.json").read_text())
+    row = summary["recommended"]
+    tuned = load_scene("tuned.toml")
+    assert (tuned.mesh.elements, tuned.mesh.degree) == (row["elements"], row["degree"])
+    assert len((results / "cost.csv").read_text().splitlines()) == 1 + summary["settings"]
+    assert rotfem("run", "tuned.toml", "--no-plots").status == 0
+
+
+def test_second_start_and_fresh(rotfem: Callable[..., Done]) -> None:
+    first = json.loads(rotfem("cost", "beam.toml", *SMALL, "--json", "--no-plots").out)
+    second = json.loads(rotfem("cost", "beam.toml", *SMALL, "--json", "--no-plots").out)
+    fresh = json.loads(rotfem("cost", "beam.toml", *SMALL, "--json", "--no-plots", "--fresh").out)
+    assert first["measured"] == fresh["measured"] > 0 == second["measured"]
+    assert first["references"] == second["references"] == fresh["references"]
+
+
+def test_an_accuracy_out_of_reach(rotfem: Callable[..., Done], folder: Path) -> None:
+    done = rotfem("cost", "beam.toml", *SMALL, "--accuracy", "1e-12", "--write", "tuned.toml")
+    assert done.status == 3 and "no setting tried is within 1e-12" in done.err
+    assert (folder / "results" / "beam" / "cost.csv").exists() and not (folder / "tuned.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("--elements", "two"), '--elements = "two": must be integers separated by commas'),
+        (("--theories", "reisner"), 'did you mean "reissner"'),
+        (("--of", "tipp"), "allowed: tip, frequencies"),
+        (("--accuracy", "0"), "must be a number greater than 0"),
+    ],
+)
+def test_bad_options(rotfem: Callable[..., Done], arguments: tuple[str, ...], says: str) -> None:
+    done = rotfem("cost", "beam.toml", *arguments)
+    assert done.status == 2 and says in done.err and "Traceback" not in done.err
+
+
+def test_interrupt_keeps_what_is_finished(folder: Path) -> None:
+    environment = os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
+    command = [sys.executable, "-m", "rotfem", "cost", "beam.toml", "--set", "time.end=20.0", "--no-plots"]
+    process = subprocess.Popen(
+        command,
+        env=environment,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    record = folder / "results" / "beam" / "cost.jsonl"
+    limit = time.monotonic() + 60
+    while time.monotonic() < limit and not (record.exists() and record.stat().st_size > 0):
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130 and err == "rotfem: interrupted\n"
+    assert all(json.loads(line)["measurement"]["status"] for line in record.read_text().splitlines())
+
+
+def test_hint_at_the_start_of_a_run(rotfem: Callable[..., Done], folder: Path) -> None:
+    coarse = ("run", "beam.toml", "--set", "time.step=0.2", "--no-plots")
+    done = rotfem(*coarse)
+    assert done.status == 0 and done.err.startswith("hint: time.step = 0.2 s") and done.err.count("\n") == 1
+    summary = folder / "results" / "beam" / "summary.json"
+    assert json.loads(summary.read_text())["advice"] == [done.err.removeprefix("hint: ").rstrip("\n")]
+    assert rotfem(*coarse, "-q").err == ""
+    assert rotfem(*coarse, "--no-advice").err == ""
+    assert json.loads(summary.read_text())["advice"] == []
+    assert rotfem("run", "beam.toml", "--no-plots").err == ""
+
+
+def test_hints_of_modes_and_campbell(rotfem: Callable[..., Done]) -> None:
+    many = ("--set", "modes.count=6", "--set", "mesh.elements=3", "--no-plots")
+    assert rotfem("modes", "beam.toml", *many).err.startswith("hint: mesh.elements = 3")
+    fast = ("campbell", "beam.toml", "--speeds", "0,5", "--set", "model.theory=linear", "--set", "modes.count=1")
+    assert 'hint: model.theory = "linear" loses its stiffness at 3.8 rad/s' in rotfem(*fast, "--no-plots").err
+    assert "hint" not in rotfem(*fast, "--no-plots", "--no-advice").err

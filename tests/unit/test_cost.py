@@ -1,0 +1,242 @@
+"""Parts of a work–precision study: references, front, recommendation, record, tuned scenes, advice."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rotfem.advice import advise, estimates
+from rotfem.cost_front import Row, pareto, recommend
+from rotfem.cost_grid import Setting, grid, ladder, own_setting, reference_settings
+from rotfem.cost_record import Measurement, Record, fingerprint
+from rotfem.cost_reference import Samples, distance, observed_order, reference
+from rotfem.cost_tuned import write_tuned
+from rotfem.errors import SceneError
+from rotfem.scene import Scene, load_scene
+
+BEAM: dict[str, Any] = {
+    "structure": {
+        "type": "planar_beam",
+        "length": 10.0,
+        "section": {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4},
+    },
+    "motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0},
+    "mesh": {"elements": 10, "degree": 3},
+    "time": {"end": 20.0, "step": 0.004, "output_every": 5},
+}
+TIMES = np.linspace(0.0, 2.0, 101)
+
+
+def wave(h: float, order: float, noise: float = 0.0) -> Samples:
+    """Return sin t with an error of an order in h, and the next one."""
+    error = 0.3 * h**order * np.cos(TIMES) + 0.1 * h ** (order + 1) * TIMES
+    return Samples((np.sin(TIMES) + error + noise * np.cos(999 * TIMES))[:, None], TIMES)
+
+
+@pytest.mark.parametrize("order", [2.0, 3.0, 6.0])
+def test_reference_finds_order_and_bounds_its_own_error(order: float) -> None:
+    levels = [wave(h, order) for h in (0.1, 0.05, 0.025)]
+    found = reference(levels, each=False)
+    assert found.order == pytest.approx(order, abs=0.1)
+    exact = Samples(np.sin(TIMES)[:, None], TIMES)
+    true = distance(found.samples, exact, each=False)
+    assert true < 0.2 * distance(levels[2], exact, each=False)
+    assert true <= found.uncertainty < distance(levels[0], exact, each=False)
+
+
+def test_reference_without_an_order_is_the_finest_level() -> None:
+    levels = [wave(0.0, 2.0, noise) for noise in (1e-12, -2e-12, 3e-12)]
+    found = reference(levels, each=False)
+    assert found.order is None
+    np.testing.assert_array_equal(found.samples.values, levels[2].values)
+    assert found.uncertainty == pytest.approx(distance(levels[1], levels[2], each=False))
+    assert observed_order(levels[0], levels[0], levels[0], each=False) is None
+
+
+def test_reference_counts_the_mesh_too() -> None:
+    levels = [wave(h, 2.0) for h in (0.1, 0.05, 0.025)]
+    shifted = Samples(levels[0].values + 1e-3, TIMES)
+    found, without = reference(levels, False, shifted), reference(levels, False)
+    np.testing.assert_allclose(found.samples.values, without.samples.values + 1e-3, atol=1e-15)
+    assert found.parts["mesh"] == pytest.approx(1e-3, rel=1e-2)
+    assert found.uncertainty == pytest.approx(sum(found.parts.values()))
+
+
+def test_samples_at_other_times_are_interpolated() -> None:
+    exact = Samples(np.sin(TIMES)[:, None], TIMES)
+    odd = np.sort(np.append(np.linspace(0.0, 2.0, 67), 0.777))
+    off = Samples(np.sin(odd)[:, None] + 1e-4, odd)
+    assert distance(off, exact, each=False) == pytest.approx(1e-4, rel=1e-2)
+    coarse = Samples(exact.values[::5] + 1e-4, TIMES[::5])
+    assert distance(coarse, exact, each=False) == pytest.approx(1e-4 / np.max(exact.values), rel=1e-9)
+
+
+def test_eigenvalues_are_each_relative_to_itself() -> None:
+    none = np.empty(0)
+    truth, off = Samples(np.array([[1.0, 0.0], [100.0, 0.0]]), none), Samples(np.array([[1.1, 0], [100.5, 0]]), none)
+    assert distance(off, truth, each=True) == pytest.approx(0.1)
+    assert distance(off, truth, each=False) == pytest.approx(0.005)
+    assert np.isnan(distance(Samples(np.ones((1, 2)), none), truth, each=True))
+
+
+def rows(number: int) -> list[Row]:
+    """Return rows with random times and errors, some failed."""
+    rng = np.random.default_rng(7)
+    return [
+        {"time": float(t), "total_error": float(e), "error": float(e), "status": "failed" if i % 9 == 0 else "done"}
+        for i, (t, e) in enumerate(10.0 ** rng.uniform(-3, 0, (number, 2)))
+    ]
+
+
+def test_front_is_what_no_setting_beats() -> None:
+    table = rows(60)
+    front = pareto(table)
+    done = [row for row in table if row["status"] == "done"]
+    better = [
+        row
+        for row in done
+        if not any(o["time"] <= row["time"] and o["total_error"] <= row["total_error"] and o is not row for o in done)
+    ]
+    assert sorted(map(id, front)) == sorted(map(id, better))
+    assert 1 < len(front) < len(done)
+    assert all(a["time"] < b["time"] and a["total_error"] > b["total_error"] for a, b in itertools.pairwise(front))
+
+
+def test_recommendation_is_the_fastest_that_is_good_enough() -> None:
+    table = rows(60)
+    good = [row for row in table if row["status"] == "done" and row["total_error"] + 1e-3 <= 0.03]
+    assert recommend(table, 0.03, 1e-3) is min(good, key=lambda row: row["time"])
+    assert recommend(table, 1e-9) is None
+
+
+def test_grid_holds_the_scene_itself_and_samples_coincide() -> None:
+    scene = Scene.from_dict(BEAM)
+    for quick in (True, False):
+        settings = grid(scene, "tip", quick, 0.004, {})
+        assert own_setting(scene) in settings
+        assert len(settings) == len(set(settings))
+        for s in settings:
+            assert s.step is not None
+            interval = s.step * s.every
+            assert interval / 0.02 == pytest.approx(round(interval / 0.02))
+    assert len(grid(scene, "tip", True, 0.004, {})) < 30
+    levels = reference_settings(settings, own_setting(scene), "reissner", 0.02)
+    assert len({round(level.step * level.every, 9) for level in levels if level.step}) == 1
+    assert levels[3].elements == 2 * levels[0].elements == 40
+
+
+def test_ladder_is_one_of_powers_of_two() -> None:
+    steps = ladder(0.004, 0.02, 20.0, 0.4, 11.0)
+    assert steps == pytest.approx([0.04, 0.02, 0.01, 0.005, 0.004, 0.0025])
+    assert max(ladder(0.4, 0.4, 4.0, 0.4, 11.0)) == 0.4
+
+
+@pytest.mark.parametrize(
+    ("choice", "says"),
+    [
+        ({"theories": ["reisner"]}, 'did you mean "reissner"'),
+        ({"schemes": ["euler"]}, "allowed: generalised_alpha, newmark"),
+        ({"elements": [0]}, "integers greater than 0"),
+        ({"steps": [-0.1]}, "numbers greater than 0"),
+        ({"steps": [21.0]}, "at most time.end = 20"),
+    ],
+)
+def test_a_bad_choice_is_refused(choice: dict[str, Any], says: str) -> None:
+    with pytest.raises(SceneError, match=says):
+        grid(Scene.from_dict(BEAM), "tip", True, 0.004, choice)
+
+
+def test_record_is_read_back_but_for_other_studies_and_torn_lines(tmp_path: Path) -> None:
+    path = tmp_path / "cost.jsonl"
+    a, b, c = (Setting("reissner", n, 3) for n in (1, 2, 3))
+    done = Measurement(samples=wave(0.1, 2.0), wall=[0.1, 0.3, 0.2], cpu=[0.1] * 3, setup=[0.05] * 3, dofs=9)
+    Record(path, "one").put(a, done)
+    Record(path, "two").put(b, done)
+    with path.open("a") as file:
+        file.write('{"study": "one", "setting": {"the')
+    record = Record(path, "one")
+    assert record.resumed == 1
+    found = record.get(a, 3)
+    assert found is not None and found.samples is not None and found.median("wall") == 0.2
+    np.testing.assert_array_equal(found.samples.values, done.samples.values if done.samples else None)
+    assert record.get(a, 4) is None and record.get(b, 1) is None
+    record.put(c, Measurement(status="failed", reason="why"))
+    again = Record(path, "one")
+    failed = again.get(c, 3)
+    assert again.resumed == 2 and failed is not None and failed.reason == "why"
+    assert Record(path, "one", fresh=True).resumed == 0
+
+
+def test_fingerprint_tells_studies_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Scene.from_dict(BEAM)
+    one = fingerprint(scene, "tip", 1)
+    assert one == fingerprint(Scene.from_dict(BEAM), "tip", 1)
+    others = {fingerprint(scene.replace({"motion.speed": 5.0}), "tip", 1), fingerprint(scene, "frequencies", 1)}
+    monkeypatch.setattr("rotfem.cost_record.__version__", "0.0.0")
+    assert one not in others | {fingerprint(scene, "tip", 1)}
+
+
+def test_tuned_scene_keeps_keys_and_finds_its_files(tmp_path: Path) -> None:
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes" / "speed.csv").write_text("0, 0\n10, 3\n30, 6\n")
+    text = (
+        '[structure]\ntype = "planar_beam"\nlength = 10.0\nhub_radius = 0.5\n'
+        "[structure.section]\nEA = 2.8e7\nGA = 1.0e7\nEI = 1.4e4\nmass_per_length = 1.2\nrotary_inertia = 6e-4\n"
+        '[motion]\ntype = "table"\ntable = "speed.csv"\n[time]\nend = 20.0\nstep = 0.004\noutput_every = 5\n'
+    )
+    (tmp_path / "scenes" / "beam.toml").write_text(text)
+    scene = load_scene(tmp_path / "scenes" / "beam.toml", ["structure.tip_mass=0.25"])
+    (tmp_path / "out").mkdir()
+    setting = Setting("second_order", 5, 2, "newmark", step=0.01, every=7)
+    tuned = load_scene(write_tuned(scene, setting, tmp_path / "out" / "tuned.toml", "two\nlines"))
+    assert tuned.motion == scene.motion and tuned.structure == scene.structure
+    assert (tuned.model.theory, tuned.mesh.elements, tuned.mesh.degree) == ("second_order", 5, 2)
+    assert tuned.time is not None and (tuned.time.scheme, tuned.time.spectral_radius) == ("newmark", None)
+    assert tuned.time.step == 0.01 and tuned.time.output_every == 2  # a row every 0.02 s, as before
+
+
+def test_a_function_cannot_be_written(tmp_path: Path) -> None:
+    scene = Scene.from_dict(BEAM | {"motion": {"type": "callable", "speed": lambda t: 1.0}})
+    with pytest.raises(SceneError, match="Python function"):
+        write_tuned(scene, own_setting(scene), tmp_path / "t.toml", "")
+
+
+def said(changes: dict[str, Any], command: str = "run", **more: float) -> list[str]:
+    """Return the advice for the beam with changes, as it is handed on."""
+    lines: list[str] = []
+    assert advise(Scene.from_dict(BEAM).replace(changes), command, lines.append, **more) == lines
+    return lines
+
+
+def test_advice_is_given_where_it_is_due() -> None:
+    assert said({}) == []
+    (step,) = said({"time.step": 0.2})
+    assert "time.step = 0.2 s" in step and "mode 1" in step
+    (fourth,) = said({"modes.count": 4})
+    assert "mode 4" in fourth
+    (mesh,) = said({"mesh.elements": 3, "modes.count": 8}, "modes")
+    assert "9 nodes" in mesh and "lag 8" in mesh
+    assert said({"mesh.elements": 12, "modes.count": 8}, "modes") == []
+    (theory,) = said({"model.theory": "linear"}, critical=3.8)
+    assert "3.8 rad/s" in theory
+    assert said({"model.theory": "linear", "motion.speed": 3.0}, critical=3.8) == []
+    assert advise(Scene.from_dict(BEAM).replace({"time.step": 0.2}), "run", None) == []
+
+
+def test_estimates_are_close_to_the_modes() -> None:
+    """Lag 1 … 4 of the spun-up beam, rad/s, as `rotfem modes` has them."""
+    computed = (4.511443, 27.625833, 70.980526, 135.143912)
+    found = [mode.frequency for mode in estimates(Scene.from_dict(BEAM), 6.0, 4)]
+    np.testing.assert_allclose(found, computed, rtol=0.05)
+
+
+def test_record_lines_are_json(tmp_path: Path) -> None:
+    path = tmp_path / "cost.jsonl"
+    Record(path, "x").put(Setting("reissner", (2, 3), 2), Measurement(status="failed", reason="no"))
+    entry = json.loads(path.read_text())
+    assert entry["setting"]["elements"] == [2, 3] and entry["measurement"]["status"] == "failed"

@@ -1,0 +1,202 @@
+"""Work–precision studies against what is known: true errors, orders, failures; and that they can be gone on with."""
+
+from __future__ import annotations
+
+import copy
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import rotfem
+from rotfem.cost import RECORD
+from rotfem.cost_front import setting_of
+from rotfem.cost_grid import Setting
+from rotfem.cost_measure import Bench
+from rotfem.cost_record import Measurement
+from rotfem.cost_reference import Samples, distance
+from rotfem.cost_result import CostResult
+
+from .conftest import REFERENCE, SPIN_UP
+
+SCENE = {**SPIN_UP, "time": {"end": 20.0, "step": 0.01, "output_every": 2}}
+SHORT = {**SPIN_UP, "mesh": {"elements": 4, "degree": 2}, "time": {"end": 1.0, "step": 0.02}}
+
+
+def truth(theory: str) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Return times (s) and tip (u1, u2) (m) of the spectral solution, without t = 1 … where it gives too few digits."""
+    table = np.array(json.loads((REFERENCE / "spin_up.json").read_text())[theory]["table t,u1,u2,alpha"])
+    return table[:, 0], table[:, 1:3]
+
+
+@pytest.fixture(scope="module")
+def spin_up() -> CostResult:
+    """Return a study of the whole spin-up with few settings."""
+    return rotfem.cost(
+        SCENE,
+        theories=["consistent_linear", "reissner"],
+        steps=[0.04, 0.02],
+        elements=[5, 10],
+        repeat=1,
+        degrees=[3],
+        schemes=["generalised_alpha"],
+    )
+
+
+@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
+def test_reference_is_as_near_to_the_truth_as_it_claims(spin_up: CostResult, theory: str) -> None:
+    times, tip = truth(theory)
+    r = spin_up.references[theory]
+    samples = Samples(r.samples.values[np.searchsorted(r.samples.times, times - 1e-6)], times)
+    off = distance(samples, Samples(tip, times), each=False)
+    assert 0.0 < off <= r.uncertainty < 1e-4
+    assert r.order == pytest.approx(2.0, abs=0.05)  # of generalised-α
+
+
+def test_error_of_a_point_is_its_true_error(spin_up: CostResult) -> None:
+    """Each setting is run again and compared with the spectral solution at the times that this has."""
+    times, tip = truth("reissner")
+    scene = rotfem.Scene.from_dict(SCENE)
+    r = spin_up.references["reissner"]
+    at = np.searchsorted(r.samples.times, times - 1e-6)
+    known = Samples(r.samples.values[at], times)
+    for row in (row for row in spin_up.rows if row["theory"] == "reissner"):
+        history = rotfem.run(scene.replace(setting_of(row).changes(scene))).history
+        mine = np.searchsorted(history["t"], times - 1e-6)
+        run = Samples(np.column_stack([history["tip_u1"], history["tip_u2"]])[mine], times)
+        true, claimed = (distance(run, s, each=False, scale=0.574) for s in (Samples(tip, times), known))
+        assert abs(true - claimed) <= 1.01 * r.uncertainty < 0.05 * true
+        # The table's error is the largest over all samples, not only those that the spectral solution is given at.
+        assert true - r.uncertainty <= row["error"] * 1.001 < 2.0 * true
+
+
+def test_errors_fall_with_the_square_of_the_step(spin_up: CostResult) -> None:
+    error = {(row["theory"], row["elements"], row["step"]): row["error"] for row in spin_up.rows}
+    for theory in ("reissner", "consistent_linear"):
+        assert error[theory, 10, 0.04] / error[theory, 10, 0.02] == pytest.approx(4.0, rel=0.05)
+
+
+def test_error_of_the_model_is_that_of_the_spectral_solutions(spin_up: CostResult) -> None:
+    (times, exact), (_, linear) = truth("reissner"), truth("consistent_linear")
+    there = distance(Samples(linear, times), Samples(exact, times), each=False)
+    floor = spin_up.summary["model_errors"]["consistent_linear"]
+    assert there * 0.99 < floor < there * 1.1  # all times, not only the tabulated ones
+    assert spin_up.summary["model_errors"]["reissner"] == 0.0
+    for row in spin_up.rows:
+        if row["theory"] == "consistent_linear":
+            assert row["total_error"] == pytest.approx(floor, rel=0.1) and row["error"] < floor
+
+
+def test_recommended_setting_keeps_its_promise(spin_up: CostResult, tmp_path: Path) -> None:
+    row = spin_up.recommend(5e-4)
+    assert row is not None and row["total_error"] < 5e-4
+    assert spin_up.recommend(1e-9) is None
+    tuned = rotfem.load_scene(spin_up.write_tuned(tmp_path / "tuned.toml", 5e-4))
+    history = rotfem.run(tuned).history
+    again = Samples(np.column_stack([history["tip_u1"], history["tip_u2"]]), history["t"])
+    assert distance(again, spin_up.references["reissner"].samples, each=False) == pytest.approx(row["error"], rel=1e-6)
+    with pytest.raises(rotfem.ComputationError, match="no setting tried is within 1e-09"):
+        spin_up.write_tuned(tmp_path / "none.toml", 1e-9)
+
+
+def test_frequencies_converge_with_twice_the_degree() -> None:
+    scene = copy.deepcopy(SPIN_UP) | {"motion": {"type": "constant", "speed": 6.0}, "modes": {"count": 3}}
+    result = rotfem.cost(scene, theories=["reissner"], elements=[8, 16], degrees=[2], repeat=1)
+    assert result.summary["output"] == "frequencies"
+    coarse, fine = (row["error"] for row in result.rows)
+    assert np.log2(coarse / fine) == pytest.approx(4.0, abs=0.3)
+    assert result.references["reissner"].order == pytest.approx(4.0, abs=0.3)
+    assert result.references["reissner"].uncertainty < 0.1 * fine
+
+
+def test_steady_state() -> None:
+    """The stretched rod: u₁(L) = sin(kL)/(k cos kL) − L with k = Ω √(A_ρ/EA)."""
+    scene = copy.deepcopy(SPIN_UP) | {"motion": {"type": "constant", "speed": 100.0}}
+    result = rotfem.cost(scene, theories=["reissner"], elements=[2, 4], degrees=[1, 2], repeat=1)
+    k = 100.0 * np.sqrt(1.2 / 2.8e7)
+    exact = np.sin(10 * k) / (k * np.cos(10 * k)) - 10
+    assert result.summary["output"] == "tip"
+    values = result.references["reissner"].samples.values[0]
+    assert abs(values[0] / exact - 1) <= result.references["reissner"].uncertainty + 1e-12  # rounding
+    assert result.references["reissner"].order == pytest.approx(4.0, abs=0.1)
+    for row in result.rows:
+        changed = {"mesh.elements": row["elements"], "mesh.degree": row["degree"]}
+        tip = rotfem.run(rotfem.Scene.from_dict(scene).replace(changed)).history["tip_u1"][0]
+        assert row["error"] == pytest.approx(abs(tip / exact - 1), rel=1e-6, abs=1e-12)
+
+
+def test_a_theory_that_diverges_is_a_failed_point() -> None:
+    scene = SPIN_UP | {"mesh": {"elements": 4, "degree": 2}, "time": {"end": 12.0, "step": 0.05}}
+    choice: dict[str, Any] = {"elements": [4], "steps": [0.05], "degrees": [2], "schemes": ["newmark"]}
+    result = rotfem.cost(scene, theories=["linear", "reissner"], repeat=1, **choice)
+    linear, reissner = result.rows
+    assert (linear["status"], linear["error"], linear["pareto"]) == ("failed", None, False)
+    assert "diverged" in linear["reason"] and linear["time"] > 0.0
+    assert (reissner["status"], reissner["pareto"]) == ("done", True)
+    assert "diverged" in result.summary["reference_failures"]["linear"]
+    assert result.summary["failed"] == 1
+
+
+def test_nothing_to_compute_is_an_error() -> None:
+    scene = SPIN_UP | {"mesh": {"elements": 4, "degree": 2}, "time": {"end": 12.0, "step": 0.05}}
+    with pytest.raises(rotfem.ComputationError, match="no setting could be computed.*diverged"):
+        rotfem.cost(scene, theories=["linear"], elements=[4], steps=[0.05], degrees=[2], repeat=1)
+
+
+def study(folder: Path | None, **more: Any) -> CostResult:
+    """Return a small study, kept in a folder if there is one."""
+    chosen: dict[str, Any] = {"theories": ["reissner"], "steps": [0.04, 0.02], "elements": [2, 4], "degrees": [2]}
+    return rotfem.cost(SHORT, folder=folder, repeat=1, **(chosen | more))
+
+
+def test_second_start_computes_only_what_is_new(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = study(tmp_path)
+    assert first.summary["measured"] > 0 and first.summary["resumed"] < first.summary["measured"]
+    again = study(tmp_path)
+    assert again.summary["measured"] == 0
+    assert again.rows == first.rows
+    more = study(tmp_path, theories=["consistent_linear", "reissner"])
+    assert more.summary["measured"] == first.summary["measured"]  # as many of the other theory
+    assert [row["time"] for row in more.rows if row["theory"] == "reissner"] == [row["time"] for row in first.rows]
+    monkeypatch.setattr("rotfem.cost_record.__version__", "0.0.0")
+    assert study(tmp_path).summary["measured"] == first.summary["measured"]
+
+
+def test_an_interrupted_study_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    measure, calls = Bench.measure, 0
+
+    def interrupted(self: Bench, setting: Setting, repeat: int) -> Measurement:
+        nonlocal calls
+        calls += 1
+        if calls == 3:
+            raise KeyboardInterrupt
+        return measure(self, setting, repeat)
+
+    monkeypatch.setattr(Bench, "measure", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        study(tmp_path)
+    assert len((tmp_path / RECORD).read_text().splitlines()) == 2
+    monkeypatch.setattr(Bench, "measure", measure)
+    there, afresh = study(tmp_path).summary, study(None).summary
+    assert there["measured"] == afresh["measured"] - 2 > 0
+
+
+def test_adaptive_scene_is_studied_over_tolerances_too() -> None:
+    scene = SHORT | {"time": {"end": 1.0, "tolerance": 1e-3}}
+    result = rotfem.cost(scene, quick=True, theories=["reissner"], elements=[4], repeat=1)
+    error = {row["tolerance"]: row["error"] for row in result.rows if row["tolerance"] is not None}
+    assert sorted(error) == pytest.approx([1e-3, 1e-2, 1e-1])
+    assert error[1e-3] < min(error[t] for t in error if t > 5e-3)
+    assert any(row["step"] is not None for row in result.rows)
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [({"accuracy": -1.0}, "greater than 0"), ({"repeat": 0}, "at least 1"), ({"output": "tipp"}, "tip, frequencies")],
+)
+def test_bad_arguments_are_refused(more: dict[str, Any], says: str) -> None:
+    with pytest.raises(rotfem.SceneError, match=says):
+        rotfem.cost(SHORT, **more)
