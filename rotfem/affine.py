@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -106,12 +107,14 @@ class AffineSystem(System):
             if expand_derivatives(form).empty():
                 continue
             compiled = fem.form(form)
+            started = perf_counter()
             self.integrals["J"] += 0 if kind == "f" else len(expand_derivatives(form).integrals())
             for key in self._keys(name):
                 first = kind == "K" and name == "internal"
                 operator = self._polarised(compiled, key, kind, 1.0 if first else 0.0)
                 if operator.norm() > 0.0:
                     self.pieces.append(Piece(kind, key, operator))
+            self.assembled += perf_counter() - started
 
     def _polarised(self, form: Any, key: Key, kind: str, diagonal: float) -> Any:
         """Assemble the part of a form that belongs to the product `key` (a quadratic one by polarisation)."""
@@ -157,6 +160,7 @@ class AffineSystem(System):
                 form += ufl.inner(force, curvature) * higher.measure
         compiled = fem.form(form)
         self.integrals["J"] += len(expand_derivatives(form).integrals())
+        started = perf_counter()
         for piece in [p for p in self.pieces if p.kind == "f"]:
             solver.solve(piece.operator, x)
             x.scale(-1.0)
@@ -164,6 +168,7 @@ class AffineSystem(System):
             K = self._assemble(compiled, "K")
             if K.norm() > 0.0:
                 self.pieces.append(Piece("K", piece.key, K))
+        self.assembled += perf_counter() - started
 
     @property
     def _axis(self) -> Array:
@@ -243,6 +248,12 @@ class AffineSystem(System):
         d.array[self.clamped] = diagonal
         A.setDiagonal(d)
         return A
+
+    def mass_damping_stiffness(self, keep: bool = True) -> tuple[Any, Any, Any]:
+        """Return (M, C, K) (see `System`); without keeping, these are the system's own matrices, no copies."""
+        if keep:
+            return super().mass_damping_stiffness()
+        return self._operators["M"], self._operators["C"], self._operators["K"]
 
     def stiffness_pieces(self) -> tuple[Any, Any]:
         """Return (K_1, K_2) of K = K_1 + Omega² K_2 without base acceleration and loads; clamped rows 1 and 0."""

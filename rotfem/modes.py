@@ -77,7 +77,9 @@ class ModalAnalysis:
         coupled = "hub_coupling" in self.model.effects
         self.hub = Hub(self.system, motion, coupled) if isinstance(motion, TorqueMotion) else None
         self.newton: Newton = newton_for(rotating)
-        self.seconds = {"compile": perf_counter() - started, "equilibrium": 0.0, "assemble": 0.0, "eigen": 0.0}
+        assembled = self.system.assembled
+        self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
+        self.seconds |= {"equilibrium": 0.0, "factor": 0.0, "eigen": 0.0}
 
     def advise(self, command: str, hint: Hint | None, speed: float) -> list[str]:
         """Return hints about the computation ahead, up to a speed (rad/s), and hand them on."""
@@ -86,8 +88,14 @@ class ModalAnalysis:
             critical = critical_speed(self.system)
         return advise(self.scene, command, hint, speed, critical)
 
-    def at(self, speed: float, count: int, start: Array | None = None) -> Spinning:
-        """Return equilibrium and eigenpairs at a speed (rad/s); start is an equilibrium nearby, to continue from.
+    def at(self, speed: float, count: int, start: Array | None = None, keep: bool = True) -> Spinning:
+        """Return equilibrium and eigenpairs at a speed (rad/s).
+
+        Args:
+            speed: Ω, rad/s.
+            count: number of pairs, at least.
+            start: an equilibrium nearby, to continue from.
+            keep: whether the pencil must outlast another call; large systems save memory without.
 
         Raises:
             ComputationError: no equilibrium, or eigenpairs not to be trusted.
@@ -95,13 +103,15 @@ class ModalAnalysis:
         t0 = perf_counter()
         q = self.equilibrium(speed, start)
         t1 = perf_counter()
-        matrices = self.system.mass_damping_stiffness()
+        matrices = self.system.mass_damping_stiffness(keep)
         clamped = Pencil(*matrices)
         pencil = clamped if self.hub is None else Pencil(*self.hub.bordered(*matrices))
         t2 = perf_counter()
         pairs = pencil.solve(count, clamped.scale() if self.hub is not None else 0.0)
         t3 = perf_counter()
-        for name, span in (("equilibrium", t1 - t0), ("assemble", t2 - t1), ("eigen", t3 - t2)):
+        factored = pencil.factored
+        spans = {"equilibrium": t1 - t0, "assemble": t2 - t1, "factor": factored, "eigen": t3 - t2 - factored}
+        for name, span in spans.items():
             self.seconds[name] += span
         # A PETSc matrix must not outlive the mesh it was made on: their communicator goes with the mesh.
         clamped.owner = pencil.owner = self
@@ -199,7 +209,7 @@ def modes(
     analysis = ModalAnalysis(scene, comm)
     speed = final_speed(analysis)
     hints = analysis.advise("modes", hint, speed)
-    spinning = analysis.at(speed, scene.modes.count)
+    spinning = analysis.at(speed, scene.modes.count, keep=False)
     flexible = scene.modes.count - int(spinning.rigid)
     spinning.pairs = spinning.pairs.select(np.arange(min(flexible, len(spinning.pairs.values))))
     rows = mode_rows(analysis, spinning)

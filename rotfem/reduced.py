@@ -80,7 +80,7 @@ class ReducedAnalysis(ModalAnalysis):
         return {"reduced_basis": {"columns": self.V.shape[1], "checks": self.checks}}
 
     def _solve(self, speed: float, count: int) -> Eigenpairs:
-        return self.full.at(speed, count).pairs
+        return self.full.at(speed, count, keep=False).pairs
 
     def _difference(self, speed: float, exact: Eigenpairs, count: int) -> float:
         reduced = self.at(speed, count).pairs.values
@@ -123,7 +123,7 @@ class ReducedAnalysis(ModalAnalysis):
             out[:, j] = y.array
         return out
 
-    def at(self, speed: float, count: int, start: Array | None = None) -> Spinning:
+    def at(self, speed: float, count: int, start: Array | None = None, keep: bool = True) -> Spinning:
         """Return the eigenpairs of the basis at a speed (see `ModalAnalysis.at`), with errors in the full system."""
         system = self.system
         assert isinstance(system, AffineSystem)

@@ -141,6 +141,8 @@ class System:
         self._state = tuple(x.x.array for x in (self.q, self.v, self.a))
         self.scale = self.structure.scales()
         self.time = 0.0
+        #: Time spent on assembly while compiling, s.
+        self.assembled = 0.0
         self.bcs = [fem.dirichletbc(fem.Function(self.V), self.structure.clamped)]
         owned = self.V.dofmap.index_map.size_local
         nodes = self.structure.clamped[self.structure.clamped < owned]
@@ -229,8 +231,12 @@ class System:
         A.assemble()
         return A
 
-    def mass_damping_stiffness(self) -> tuple[Any, Any, Any]:
-        """Return (M, C, K) at the state and time set; clamped unknowns have 1 in K, 0 in M and C."""
+    def mass_damping_stiffness(self, keep: bool = True) -> tuple[Any, Any, Any]:
+        """Return (M, C, K) at the state and time set; clamped unknowns have 1 in K, 0 in M and C.
+
+        Args:
+            keep: whether they must outlast the next state or time that is set.
+        """
         return self.matrix(0, 0, 1, 0.0), self.matrix(0, 1, 0, 0.0), self.matrix(1, 0, 0, 1.0)
 
     def size(self, x: Array) -> float:
