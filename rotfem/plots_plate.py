@@ -36,7 +36,7 @@ def map_of(figure: Figure, axis: Any, mesh: Triangulation, values: Array, title:
     drawn = axis.tripcolor(mesh, values, shading="gouraud", cmap="RdBu_r", norm=Normalize(-peak, peak))
     if np.min(values) < -1e-9 * peak and np.max(values) > 1e-9 * peak:
         axis.tricontour(mesh, values, levels=[0.0], colors="0.2", linewidths=0.8)
-    axis.set_aspect("equal")
+    axis.set(xlim=(mesh.x.min(), mesh.x.max()), ylim=(mesh.y.min(), mesh.y.max()), aspect="equal")
     axis.set_title(title, fontsize=9)
     axis.set_xlabel("x (m)", fontsize=8)
     axis.set_ylabel("y (m)", fontsize=8)
