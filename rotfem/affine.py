@@ -5,6 +5,7 @@ The pieces are the derivatives of the residual at the undeformed state, assemble
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,11 +30,15 @@ Key = tuple[tuple[str, int], ...]
 
 @dataclass
 class Piece:
-    """One operator (PETSc matrix, or vector for "f") and the constants whose product multiplies it."""
+    """One operator (PETSc matrix, or vector for "f"), the constants whose product multiplies it, and its term.
+
+    A term's name may say which body it is of: "coriolis@tip_mass".
+    """
 
     kind: str
     key: Key
     operator: Any
+    term: str
 
 
 class AffineSystem(System):
@@ -66,9 +71,16 @@ class AffineSystem(System):
         self._work = compat.create_vector(self.V)
         self._qva = [compat.wrap(x.x) for x in (self.q, self.v, self.a)]
         self._rest_inertia: float | None = None
+        self._weights = np.ones(len(self.pieces))
         self._coefficients: Array | None = None
         self._shift: tuple[float, float, float] | None = None
         self._changed = True
+
+    def leave_out(self, effects: Collection[str]) -> None:
+        """Take the pieces of some effects (and bodies) out of the equations, and put all others back in."""
+        left_out = set(effects)
+        self._weights = np.array([0.0 if left_out & set(p.term.split("@")) else 1.0 for p in self.pieces])
+        self._coefficients = None
 
     # --- pieces -------------------------------------------------------------------------------------------------
 
@@ -84,7 +96,7 @@ class AffineSystem(System):
         """Return the products of constants a term consists of: its effect says which constant, to which power."""
         if term == "loads":
             return [((name, i),) for name, (c, _) in self.structure.load_constants.items() for i in range(c.value.size)]
-        _, name, power = ACCELERATIONS.get(term, (None, None, 0))
+        _, name, power = ACCELERATIONS.get(term.split("@")[0], (None, None, 0))
         if name is None:
             return [()]
         n = range(self.model.frame.constants[name].value.size)
@@ -108,7 +120,7 @@ class AffineSystem(System):
                 first = kind == "K" and name == "internal"
                 operator = self._polarised(compiled, key, kind, 1.0 if first else 0.0)
                 if operator.norm() > 0.0:
-                    self.pieces.append(Piece(kind, key, operator))
+                    self.pieces.append(Piece(kind, key, operator, name))
 
     def _polarised(self, form: Any, key: Key, kind: str, diagonal: float) -> Any:
         """Assemble the part of a form that belongs to the product `key` (a quadratic one by polarisation)."""
@@ -160,7 +172,7 @@ class AffineSystem(System):
             q0.x.scatter_forward()
             K = self._assemble(compiled, "K")
             if K.norm() > 0.0:
-                self.pieces.append(Piece("K", piece.key, K))
+                self.pieces.append(Piece("K", piece.key, K, piece.term))
 
     # --- operators at a time ---------------------------------------------------------------------------------------
 
@@ -169,6 +181,7 @@ class AffineSystem(System):
         super().set_time(t, motion, load_factor)
         values = {name: constant.value.ravel() for name, constant in self._constants().items()}
         c = np.array([np.prod([values[name][i] for name, i in p.key]) if p.key else 1.0 for p in self.pieces])
+        c = c * self._weights
         old = self._coefficients
         self._coefficients = c
         if old is not None and np.array_equal(old, c):
@@ -208,12 +221,12 @@ class AffineSystem(System):
         values = {name: constant.value.ravel() for name, constant in self._constants().items()}
         states = dict(zip("KCM", self._qva, strict=True))
         out.zeroEntries()
-        for p in self.pieces:
+        for p, weight in zip(self.pieces, self._weights, strict=True):
             slope = 0.0
             for i, (name, component) in enumerate(p.key):
                 if name in ("w", "dw"):
                     others = np.prod([values[n][c] for j, (n, c) in enumerate(p.key) if j != i])
-                    slope += (c_v if name == "w" else c_m) * axis[component] * float(others)
+                    slope += (c_v if name == "w" else c_m) * axis[component] * float(others) * weight
             if slope == 0.0:
                 continue
             if p.kind == "f":
