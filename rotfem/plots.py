@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from rotfem.errors import OutputError
-from rotfem.results import CampbellResult, ModesResult, RunResult
+from rotfem.results import CampbellResult, ExplainResult, ModesResult, RunResult
 
 #: Label and unit of every column that is plotted.
 LABELS = {
@@ -34,8 +34,10 @@ def label(column: str) -> str:
     return ("tip " if column.startswith("tip_") else "") + LABELS.get(name, name)
 
 
-def plot(result: RunResult | ModesResult | CampbellResult, folder: Path) -> list[Path]:
+def plot(result: RunResult | ModesResult | CampbellResult | ExplainResult, folder: Path) -> list[Path]:
     """Write the figures of a result into a folder; return their paths."""
+    if isinstance(result, ExplainResult):
+        return [save(explain_figure(result), folder / "explain.png")]
     if isinstance(result, RunResult):
         return plot_run(result, folder)
     if isinstance(result, ModesResult):
@@ -123,6 +125,39 @@ def campbell_figure(result: CampbellResult) -> Figure:
     axis.set_ylabel("frequency in the rotating frame (rad/s)")
     axis.set_title(f"{result.summary['name']}: {result.summary['theory']}")
     axis.grid(True, lw=0.4, alpha=0.6)
+    return figure
+
+
+def explain_figure(result: ExplainResult) -> Figure:
+    """Return a bar for every effect and theory: relative change of each output, truth as a mark beside the estimate."""
+    rows, outputs = result.rows, result.summary["outputs"]
+    figure = Figure(figsize=(8, 0.45 * len(rows) + 1.4))
+    axis = figure.add_subplot()
+    finite = [v for row in rows for v in row["estimate"].values() if 0.0 < v < np.inf]
+    left, right = 10 ** np.floor(np.log10(min([*finite, 1e-2]))) / 3, 3 * max([*finite, 1.0])
+    height = 0.8 / max(len(outputs), 1)
+    for j, output in enumerate(outputs):
+        for i, row in enumerate(rows):
+            value, at = row["estimate"].get(output, 0.0), i + (j - (len(outputs) - 1) / 2) * height
+            shown = float(np.clip(value, left, right))
+            axis.barh(at, shown - left, height, left=left, color=f"C{j}", label=output if i == 0 else None)
+            if not np.isfinite(value):
+                axis.annotate("fails", (right, at), (-3, -3), textcoords="offset points", fontsize=8, ha="right")
+            if output in row.get("truth", {}) and np.isfinite(row["truth"][output]):
+                truth = max(row["truth"][output], left)
+                axis.plot(truth, at, "k|", ms=9, mew=2, label="both models run" if i == j == 0 else None)
+    axis.axvline(1e-2, color="0.4", lw=0.8, ls="--")
+    axis.set_xscale("log")
+    axis.set_xlim(left, right)
+    names = [f"{'without' if row['included'] else 'with'} {row['name']}" for row in rows]
+    names = [n if row["kind"] == "effect" else row["name"] for n, row in zip(names, rows, strict=True)]
+    axis.set_yticks(range(len(rows)), names)
+    axis.invert_yaxis()
+    axis.set_xlabel("relative change of the output (–)")
+    axis.set_title(f"{result.summary['name']}: what leaving out and other theories change", fontsize=10)
+    axis.grid(True, axis="x", lw=0.4, alpha=0.6)
+    axis.legend(fontsize=8, loc="lower right")
+    figure.subplots_adjust(left=0.27, right=0.97, top=1 - 0.35 / figure.get_figheight(), bottom=0.19 if len(rows) < 6 else 0.1)
     return figure
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib import metadata
 from pathlib import Path
 from time import perf_counter
@@ -18,6 +18,7 @@ from rotfem.equilibrium import check_steady, critical_speed, newton_for, static_
 from rotfem.errors import ComputationError
 from rotfem.hub import Hub, HubStepper
 from rotfem.integrators import Scheme, State, Stepper
+from rotfem.marching import LARGEST_LINEAR_DEFLECTION, fixed_steps
 from rotfem.results import RunResult, Table
 from rotfem.scene import Scene, TorqueMotion, load_scene
 from rotfem.solvers import Newton
@@ -26,9 +27,6 @@ from rotfem.version import __version__
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[float], None]
-
-#: A linear theory has lost its meaning when a displacement exceeds the structure's own length.
-LARGEST_LINEAR_DEFLECTION = 1.0
 
 #: Adaptive steps: safety factor, bounds of a change, changes not worth a new factorisation, smallest relative scale.
 SAFETY, SHRINK, GROW, KEEP, FLOOR = 0.9, 0.2, 2.0, (0.95, 1.3), 1e-6
@@ -150,20 +148,10 @@ class Simulation:
             return self.system.clamp.rigid(q, 0.0)
         return q, np.zeros_like(q)
 
-    def _fixed_steps(self, state: State) -> Any:
+    def _fixed_steps(self, state: State) -> Iterator[State]:
         time, stepper = self.scene.time, self.stepper
         assert time is not None and time.step is not None and stepper is not None
-        n = int(np.ceil(time.end / time.step - 1e-9))
-        jumps = [] if self.hub is None else [t for t in self.hub.torque.jumps if 0.0 < t < time.end]
-        for i in range(1, n + 1):
-            t = time.end if i == n else i * time.step
-            close = 1e-9 * time.step
-            for stop in [*(j for j in jumps if state.t + close < j < t - close), t]:
-                state = stepper.advance(state, stop - state.t)
-                state.t = stop
-                if isinstance(stepper, HubStepper) and any(abs(stop - j) <= close for j in jumps):
-                    state = stepper.restart(state)
-            yield state
+        return fixed_steps(stepper, state, time.end, time.step)
 
     def _adaptive_steps(self, state: State) -> Any:
         """Yield states whose local errors add up to the tolerance, relative to the largest displacement so far."""

@@ -35,9 +35,15 @@ LEVELS: tuple[tuple[str, ...], ...] = (
     ("system", "affine"),
     ("equilibrium", "integrators", "pencil"),
     ("hub",),
+    ("marching", "switches"),
+    ("trial",),
+    ("estimate",),
+    ("choice",),
     ("simulation",),
     ("modes", "sensitivity", "state_space"),
     ("campbell",),
+    ("groups",),
+    ("explain",),
     ("cli", "", "__main__"),
 )
 #: Number of levels that hold no FEniCSx.
