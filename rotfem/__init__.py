@@ -1,7 +1,7 @@
 """rotfem: rotating beams and plates with FEniCSx.
 
-One noun, the scene (`Scene`, `load_scene`), and verbs on it (`run`, `modes`, `campbell`). The verbs load FEniCSx when
-first used.
+One noun, the scene (`Scene`, `load_scene`), and verbs on it (`run`, `modes`, `campbell`, `explain`). The verbs load
+FEniCSx when first used.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from rotfem.version import __version__
 
 if TYPE_CHECKING:
     from rotfem.campbell import campbell
+    from rotfem.explain import explain
     from rotfem.modes import modes
     from rotfem.simulation import run
 
@@ -27,6 +28,7 @@ __all__ = [
     "SceneError",
     "__version__",
     "campbell",
+    "explain",
     "load_scene",
     "modes",
     "run",
@@ -52,6 +54,7 @@ class _Package(ModuleType):
     run = _verb("run", "rotfem.simulation")
     modes = _verb("modes", "rotfem.modes")
     campbell = _verb("campbell", "rotfem.campbell")
+    explain = _verb("explain", "rotfem.explain")
 
 
 sys.modules[__name__].__class__ = _Package

@@ -71,7 +71,8 @@ class AffineSystem(System):
         self._work = compat.create_vector(self.V)
         self._qva = [compat.wrap(x.x) for x in (self.q, self.v, self.a)]
         self._rest_inertia: float | None = None
-        self._weights = np.ones(len(self.pieces))
+        self._weights: Array = np.ones(len(self.pieces))
+        self._factors = self._factor_indices()
         self._coefficients: Array | None = None
         self._shift: tuple[float, float, float] | None = None
         self._changed = True
@@ -91,6 +92,15 @@ class AffineSystem(System):
     def _zero_constants(self) -> None:
         for constant in self._constants().values():
             constant.value[...] = 0.0
+
+    def _factor_indices(self) -> npt.NDArray[np.int64]:
+        """Return for every piece the two places of its factors in (1, all constants one after the other)."""
+        places: dict[tuple[str, int], int] = {}
+        for name, constant in self._constants().items():
+            for i in range(constant.value.size):
+                places[name, i] = 1 + len(places)
+        pairs = [[places[entry] for entry in p.key] for p in self.pieces]
+        return np.array([(*pair, 0, 0)[:2] for pair in pairs], dtype=np.int64).reshape(-1, 2)
 
     def _keys(self, term: str) -> list[Key]:
         """Return the products of constants a term consists of: its effect says which constant, to which power."""
@@ -179,9 +189,8 @@ class AffineSystem(System):
     def set_time(self, t: float, motion: Motion | None = None, load_factor: float = 1.0) -> None:
         """Set the constants of time t (s) and form M, C, K and f there if their coefficients have changed."""
         super().set_time(t, motion, load_factor)
-        values = {name: constant.value.ravel() for name, constant in self._constants().items()}
-        c = np.array([np.prod([values[name][i] for name, i in p.key]) if p.key else 1.0 for p in self.pieces])
-        c = c * self._weights
+        values = np.concatenate([np.ones(1), *(constant.value.ravel() for constant in self._constants().values())])
+        c = self._weights * np.prod(values[self._factors], axis=1)
         old = self._coefficients
         self._coefficients = c
         if old is not None and np.array_equal(old, c):

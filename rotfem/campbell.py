@@ -19,6 +19,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 from scipy.optimize import brentq, linear_sum_assignment
 
+from rotfem.choice import choose
 from rotfem.equilibrium import check_steady
 from rotfem.errors import ComputationError, SceneError
 from rotfem.modes import GROWTH, ModalAnalysis, Spinning, advice, instabilities, mode_rows, self_checks, stability
@@ -26,6 +27,7 @@ from rotfem.pencil import SAME
 from rotfem.results import CampbellResult
 from rotfem.scene import Scene
 from rotfem.simulation import Progress, as_scene, versions
+from rotfem.trial import MODES
 
 Array = npt.NDArray[Any]
 
@@ -299,6 +301,11 @@ def campbell(
         check_steady(
             scene.replace({"motion": {"type": "constant", "speed": values[-1]}}) if any(scene.loads.gravity) else scene
         )
+    asked, choice = scene, None
+    if scene.model.tolerance is not None:
+        spinning = scene if scene.motion.is_spinning else scene.replace({"motion.speed": values[-1] or values[0]})
+        choice = choose(spinning, (MODES,), (values[0], 0.5 * (values[0] + values[-1]), values[-1]), comm)
+        scene = choice.apply(scene)
     analysis = ModalAnalysis(scene, comm, sweep=True)
     sweep = Sweep(analysis, scene.modes.count)
     sweep.run(values, progress or (lambda share: None))
@@ -314,7 +321,7 @@ def campbell(
     for crossing in crossings:
         crossing["label"] = labels[crossing["branch"] - 1]
     lost = [labels[b] for b in range(count) if sweep.nodes[-1].order[b] < 0]
-    warnings = [*advice(analysis, fastest)]
+    warnings = [] if choice is not None else [*advice(analysis, fastest)]
     warnings += [f"{name} left the computed modes before the last speed; more modes.count keeps it" for name in lost]
     warnings += [
         f"ambiguous: {labels[int(a['branch']) - 1]} at {a['speed']:.6g} rad/s, correlation {a['confidence']:.2f}"
@@ -349,8 +356,10 @@ def campbell(
         "timings": {**analysis.seconds, "other": total - sum(analysis.seconds.values()), "total": total},
         "versions": versions(),
         "ranks": comm.size,
-        "scene": scene.to_dict(),
+        "scene": asked.to_dict(),
     }
+    if choice is not None:
+        summary["choice"] = choice.summary()
     return CampbellResult(summary, rows)
 
 

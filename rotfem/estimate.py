@@ -53,7 +53,7 @@ class Change:
 
     @property
     def verdict(self) -> str:
-        """"negligible", "noticeable" or "large"; only what stays below 1 % with the safety factor is negligible."""
+        """ "negligible", "noticeable" or "large"; only what stays below 1 % with the safety factor is negligible."""
         if self.worst >= LARGE:
             return "large"
         return "negligible" if SAFETY * self.worst < NOTICEABLE else "noticeable"

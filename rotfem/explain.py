@@ -33,6 +33,10 @@ REASONS = {
 }
 
 
+#: What the notes of a check are marked with.
+FULL = " of the full model"
+
+
 def explain(
     scene: Scene | str | Path | Mapping[str, Any],
     check: bool = False,
@@ -91,7 +95,7 @@ def explain(
 
 def why(item: Change, scene: Scene) -> str:
     """Return in a few words why an effect or theory is in the scene's model or not, and whether it has to be."""
-    failed = "".join(f"; {name}: {text}" for name, text in item.notes.items())
+    failed = "".join(f"; {name}: {text}" for name, text in item.notes.items() if FULL not in name)
     if item.kind == "effect":
         reason = REASONS[item.name][0]
         if not item.included:
@@ -127,7 +131,7 @@ def check_changes(
             other = scene.replace({"model.theory": item.name, "model.effects": list(effects)})
         there = full_outputs(other, trial.wanted, comm)
         item.truth = change(own, there, trial.wanted)
-        item.notes |= {f"{name} of the full model": text for name, text in notes(there).items()}
+        item.notes |= {f"{name}{FULL}": text for name, text in notes(there).items()}
         progress(i / len(changes))
 
 

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.affine import AffineSystem
+from rotfem.choice import choose
 from rotfem.equilibrium import check_steady, newton_for, steady_state
 from rotfem.errors import SceneError
 from rotfem.hub import Hub
@@ -26,6 +27,7 @@ from rotfem.scene import Scene, TorqueMotion
 from rotfem.simulation import as_scene, versions
 from rotfem.solvers import Newton
 from rotfem.system import Model, System, compile_system
+from rotfem.trial import MODES
 
 Array = npt.NDArray[Any]
 
@@ -190,6 +192,10 @@ def modes(
     scene = as_scene(scene)
     if scene.modes.about == "steady":
         check_steady(scene)
+    asked, choice = scene, None
+    if scene.model.tolerance is not None:
+        choice = choose(scene, (MODES,), comm=comm)
+        scene = choice.apply(scene)
     analysis = ModalAnalysis(scene, comm)
     speed = final_speed(analysis)
     spinning = analysis.at(speed, scene.modes.count)
@@ -197,7 +203,7 @@ def modes(
     spinning.pairs = spinning.pairs.select(np.arange(min(flexible, len(spinning.pairs.values))))
     rows = mode_rows(analysis, spinning)
     checks = self_checks(analysis, spinning)
-    warnings = [*advice(analysis, speed), *instabilities(rows)]
+    warnings = [*([] if choice is not None else advice(analysis, speed)), *instabilities(rows)]
     rows = [{**row, "mode": row["mode"] + spinning.rigid} for row in rows]
     shapes = {f"mode {row['mode']}: {row['label']}": scaled_shape(analysis, spinning, i) for i, row in enumerate(rows)}
     if spinning.rigid:
@@ -218,8 +224,10 @@ def modes(
         "timings": {**analysis.seconds, "other": total - sum(analysis.seconds.values()), "total": total},
         "versions": versions(),
         "ranks": comm.size,
-        "scene": scene.to_dict(),
+        "scene": asked.to_dict(),
     }
+    if choice is not None:
+        summary["choice"] = choice.summary()
     result = ModesResult(summary, rows, shapes, analysis=analysis, spinning=spinning)
     if sensitivities:
         from rotfem.sensitivity import sensitivities as derivatives

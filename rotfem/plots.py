@@ -157,7 +157,9 @@ def explain_figure(result: ExplainResult) -> Figure:
     axis.set_title(f"{result.summary['name']}: what leaving out and other theories change", fontsize=10)
     axis.grid(True, axis="x", lw=0.4, alpha=0.6)
     axis.legend(fontsize=8, loc="lower right")
-    figure.subplots_adjust(left=0.27, right=0.97, top=1 - 0.35 / figure.get_figheight(), bottom=0.19 if len(rows) < 6 else 0.1)
+    figure.subplots_adjust(
+        left=0.27, right=0.97, top=1 - 0.35 / figure.get_figheight(), bottom=0.19 if len(rows) < 6 else 0.1
+    )
     return figure
 
 

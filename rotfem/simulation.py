@@ -14,6 +14,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.affine import AffineSystem
+from rotfem.choice import Choice, RangeExceeded, choose
 from rotfem.equilibrium import check_steady, critical_speed, newton_for, static_tip_shape, steady_state
 from rotfem.errors import ComputationError
 from rotfem.hub import Hub, HubStepper
@@ -23,6 +24,7 @@ from rotfem.results import RunResult, Table
 from rotfem.scene import Scene, TorqueMotion, load_scene
 from rotfem.solvers import Newton
 from rotfem.system import Model, System, compile_system
+from rotfem.trial import HISTORY, STEADY
 from rotfem.version import __version__
 
 Array = npt.NDArray[np.float64]
@@ -59,26 +61,54 @@ def run(
     scene.check_run()
     if scene.time is None or scene.initial.state == "steady":
         check_steady(scene)
-    return Simulation(scene, comm).run(progress)
+    if scene.model.tolerance is None:
+        return Simulation(scene, comm).run(progress)
+    return run_chosen(scene, comm, progress)
+
+
+def run_chosen(scene: Scene, comm: MPI.Comm, progress: Progress | None) -> RunResult:
+    """Return the result of the cheapest model within model.tolerance, and of richer ones where it does not hold.
+
+    Raises:
+        ComputationError: the full model failed, or one of them with on_exceed = "stop" or "warn".
+    """
+    choice = choose(scene, (HISTORY, STEADY), comm=comm)
+    while True:
+        try:
+            return Simulation(choice.apply(scene), comm, choice, scene).run(progress)
+        except ComputationError as error:
+            if choice.full or scene.model.on_exceed != "upgrade":
+                raise
+            # Any other failure of a poorer model is one that the richer one may not have: it is taken as far out.
+            size = error.size if isinstance(error, RangeExceeded) else np.inf
+            choice = choice.richer(size, error.time, error.what)
 
 
 class Simulation:
     """One run: the compiled system, the record of what happened, and the summary made of it.
 
     Args:
-        scene: validated scene.
+        scene: validated scene, with the model it is run with.
         comm: MPI communicator.
+        choice: how this model was chosen, if it was.
+        asked: the scene it was chosen for.
     """
 
-    def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD):
+    def __init__(
+        self,
+        scene: Scene,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+        choice: Choice | None = None,
+        asked: Scene | None = None,
+    ):
         self.started = perf_counter()
         self.scene, self.comm = scene, comm
-        self.warnings: list[str] = []
+        self.choice, self.asked = choice, asked or scene
+        self.warnings: list[str] = [] if choice is None else upgrade_warnings(choice)
+        self.exceeded = ""
         if scene.time is None and scene.model.frame == "inertial":
             self.scene = scene = scene.replace({"model.frame": "rotating"})
             self.warnings.append("a steady state is one only in the rotating frame, where it was computed")
-        if scene.model.tolerance is not None:
-            self.warnings.append("model.tolerance has no effect on a run: theory and effects are as the scene says")
         self.model = Model(scene, comm)
         self.system: System = compile_system(self.model)
         self.compiled = perf_counter() - self.started
@@ -222,6 +252,22 @@ class Simulation:
             else 'use model.theory = "consistent_linear" for small or "reissner" for any deflection',
         )
 
+    def _watch(self, state: State) -> None:
+        """See whether a state is in the range its model was chosen for.
+
+        Raises:
+            RangeExceeded: it is not, and the scene does not want a mere warning.
+        """
+        if self.choice is None or self.exceeded:
+            return
+        size = self.system.size(state.q)
+        self.exceeded = self.choice.check(size)
+        if not self.exceeded:
+            return
+        if self.asked.model.on_exceed != "warn":
+            raise RangeExceeded(self.exceeded, state.t if self.scene.time is not None else None, size)
+        self.warnings.append(f"{self.exceeded}, at t = {state.t:.6g} s")
+
     def _record(self, state: State) -> None:
         system, t = self.system, state.t
         if not system.linear:
@@ -240,6 +286,7 @@ class Simulation:
             hub = self.hub
             row += [hub.torque.at(t, after=True), hub.kinetic(), hub.angular_momentum(), state.hub[5], state.hub[4]]
         self.history.append(row)
+        self._watch(state)
 
     # --- summary ------------------------------------------------------------------------------------------------------
 
@@ -281,8 +328,10 @@ class Simulation:
             "warnings": self.warnings,
             "versions": versions(),
             "ranks": self.comm.size,
-            "scene": self.scene.to_dict(),
+            "scene": self.asked.to_dict(),
         }
+        if self.choice is not None:
+            summary["choice"] = self.choice.summary()
         if self.rejected:
             summary["rejected_steps"] = self.rejected
         if self.critical is not None:
@@ -292,9 +341,19 @@ class Simulation:
         return RunResult(summary, history, shape)
 
     def _timings(self) -> dict[str, float]:
-        total = perf_counter() - self.started
-        parts = {"compile": self.compiled, **(self.stepper.seconds if self.stepper else {})}
+        chosen = {} if self.choice is None else {"choice": self.choice.seconds}
+        total = perf_counter() - self.started + sum(chosen.values())
+        parts = {**chosen, "compile": self.compiled, **(self.stepper.seconds if self.stepper else {})}
         return {**parts, "other": total - sum(parts.values()), "total": total}
+
+
+def upgrade_warnings(choice: Choice) -> list[str]:
+    """Return what a run says of the models it has given up."""
+    return [
+        f"{note['why']}{'' if note['time'] is None else ' at t = {:.6g} s'.format(note['time'])}; "
+        f"started again with {note['to']} and all effects"
+        for note in choice.upgrades
+    ]
 
 
 def figures(history: dict[str, Array]) -> dict[str, float]:

@@ -1,8 +1,8 @@
 """Equations of motion whose effects can be switched off and on without a new compilation.
 
 To try out a model without one of its effects, its term is multiplied by a constant that is 1 or 0 (in the linear
-theories: its affine pieces are weighed so). A model that is only tried out need not be quick; one that has been chosen is
-compiled without what it leaves out.
+theories: its affine pieces are weighed so). A model that is only tried out need not be quick; one that has been chosen
+is compiled without what it leaves out.
 """
 
 from __future__ import annotations

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,9 @@ NODES_A_MODE, FEWEST_NODES = 3, 12
 #: Steps in a period of the first and of the second eigenfrequency, and the fewest and most of a history.
 STEPS_A_PERIOD, FEWEST_STEPS, MOST_STEPS = (40, 16), 200, 1500
 
+#: Steps between two samples of a history, tried one after the other.
+FINER = (1, 4, 16)
+
 #: Newton stops here: small differences of two solutions are wanted.
 INCREMENT = 1e-12
 
@@ -54,6 +58,27 @@ class Outputs:
     values: Array = field(default_factory=lambda: np.empty(0))
     size: float = 0.0
     failed: dict[str, str] = field(default_factory=dict)
+
+
+class Beyond(ComputationError):
+    """A history is farther from another one than was asked for."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """The history of another model, and how far from it (relative to its largest displacement) one may be."""
+
+    of: Outputs
+    allowed: float
+
+    @cached_property
+    def radius(self) -> float:
+        """How far, m."""
+        return self.allowed * float(np.linalg.norm(self.of.tip, axis=1).max())
+
+    def passed(self, i: int, u: Array) -> bool:
+        """Return whether the displacement u of sample i is farther off."""
+        return bool(np.linalg.norm(u - self.of.tip[i]) > self.radius)
 
 
 def coarse(scene: Scene) -> Scene:
@@ -102,6 +127,7 @@ class Trial:
         self._systems: dict[str, SwitchedSystem] = {}
         self._done: dict[tuple[str, frozenset[str]], Outputs] = {}
         self._released: dict[str, Array] = {}
+        self._bound: Bound | None = None
         self.effects = self.scene.effective_effects()
         self.absent = self._absent()
         named = outputs if outputs is not None else (HISTORY, STEADY, MODES)
@@ -115,10 +141,17 @@ class Trial:
         """Return the theories that this kind of structure has."""
         return tuple(name for name, theory in THEORIES.items() if hasattr(theory.strains, self.scene.structure.type))
 
-    def outputs(self, theory: str, without: Collection[str] = ()) -> Outputs:
-        """Return what the scene gives in a theory without some effects; computed once."""
+    def outputs(self, theory: str, without: Collection[str] = (), bound: Bound | None = None) -> Outputs:
+        """Return what the scene gives in a theory without some effects; computed once.
+
+        Args:
+            theory: its name.
+            without: effects left out.
+            bound: what not to go beyond; a history that does is given up and counts as failed.
+        """
         key = theory, frozenset(without)
         if key not in self._done:
+            self._bound = bound
             self._done[key] = self._compute(theory, key[1])
         return self._done[key]
 
@@ -179,7 +212,7 @@ class Trial:
                 elif name == STEADY:
                     self._steady(switched, out)
                 else:
-                    self._march(switched, theory, out)
+                    self._march(switched, theory, without, out)
             except ComputationError as error:
                 out.failed[name] = error.what
         return out
@@ -190,7 +223,19 @@ class Trial:
         self._sample(switched, [self._tip(switched, q)], out)
         out.size = system.size(q)
 
-    def _march(self, switched: SwitchedSystem, theory: str, out: Outputs) -> None:
+    def _march(self, switched: SwitchedSystem, theory: str, without: frozenset[str], out: Outputs) -> None:
+        """Compute a history, with shorter steps between the samples where a nonlinear model asks for them."""
+        for finer in FINER:
+            switched.leave_out(without)
+            try:
+                return self._march_once(switched, theory, out, finer)
+            except Beyond:
+                raise
+            except ComputationError:
+                if switched.system.linear or finer == FINER[-1]:
+                    raise
+
+    def _march_once(self, switched: SwitchedSystem, theory: str, out: Outputs, finer: int) -> None:
         assert self.scene.time is not None
         system, scheme = switched.system, Scheme.of(self.scene)
         newton = newton_for(self.scene, monotone=True)
@@ -199,12 +244,18 @@ class Trial:
         stepper = Stepper(system, scheme, newton) if hub is None else HubStepper(system, hub, scheme, newton)
         state = stepper.start(0.0, q, np.zeros_like(q))
         tips, out.size = [self._tip(switched, q)], system.size(q)
+        moved, bound = self._moved(switched), self._bound
         try:
-            for state in fixed_steps(stepper, state, self.scene.time.end, self.step):
-                tips.append(self._tip(switched, state.q))
-                out.size = max(out.size, system.size(state.q))
+            steps = fixed_steps(stepper, state, self.scene.time.end, self.step / finer)
+            for i, new in enumerate(steps, start=1):
+                if i % finer:
+                    continue
+                tips.append(self._tip(switched, new.q))
+                out.size = max(out.size, system.size(new.q))
+                if bound is not None and bound.passed(len(tips) - 1, tips[-1][moved]):
+                    raise Beyond(f"it is beyond the bound from t = {new.t:.4g} s on")
                 if system.linear and not out.size <= LARGEST_LINEAR_DEFLECTION:
-                    raise ComputationError(f"it diverges at t = {state.t:.4g} s")
+                    raise ComputationError(f"it diverges at t = {new.t:.4g} s")
         finally:
             self._sample(switched, tips, out)
 
@@ -222,8 +273,10 @@ class Trial:
         return np.asarray(switched.model.structure.probe(q))
 
     def _sample(self, switched: SwitchedSystem, tips: list[Array], out: Outputs) -> None:
-        moved = [i for i, name in enumerate(switched.model.structure.components) if name.startswith("u")]
-        out.tip = np.array(tips)[:, moved]
+        out.tip = np.array(tips)[:, self._moved(switched)]
+
+    def _moved(self, switched: SwitchedSystem) -> list[int]:
+        return [i for i, name in enumerate(switched.model.structure.components) if name.startswith("u")]
 
     def _eigenvalues(self, switched: SwitchedSystem, speed: float) -> Array:
         """Return λ of the wanted modes at a speed, without that of a rigid body."""
