@@ -5,8 +5,8 @@
     python3 benchmarks/explain_accuracy.py effects [SCENE …]       integrals, compile and step time without an effect
     python3 benchmarks/explain_accuracy.py exceeded                runs that leave the range of their model
 
-The truth is the difference of two full runs, each on the scene's own mesh with its own steps. Times are medians of three
-runs with compiled forms, unless they are of the compilation.
+The truth is the difference of two full runs, each on the scene's own mesh with its own steps. Times are medians of
+three runs with compiled forms, unless they are of the compilation.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ def effects(names: list[str]) -> None:
                 done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
             seconds, in_f, in_j = done.stdout.split()
             kept = [e for e in scene(name).effective_effects() if e != left_out]
-            result, _ = timed(lambda name=name, kept=kept: run_with(scene(name), kept), 1)  # type: ignore[misc]
+            run_with(scene(name), kept)  # compiles
             step = median(step_time(run_with(scene(name), kept).summary) for _ in range(3))
             numbers = f"{in_f:>4}{in_j:>4}{float(seconds):>11.2f}{1e3 * step:>11.4f}"
             print(f"{name:<20}{left_out:<16}{numbers}", flush=True)

@@ -19,7 +19,7 @@ from mpi4py import MPI
 from rotfem.errors import ComputationError
 from rotfem.estimate import SAFETY, change
 from rotfem.scene import EFFECTS, Scene
-from rotfem.trial import HISTORY, Bound, Outputs, Trial
+from rotfem.trial import HISTORY, Bound, Trial
 
 #: Richest allowed theory ↦ those to choose from, cheapest first. Nonlinear theories of moderate rotation cost what the
 #: exact one costs, so they are not among its cheaper neighbours.
@@ -102,8 +102,8 @@ class Choice:
             return ""
         return (
             f"the run has left the range of its model: {self.theory} with {', '.join(self.effects) or 'no effects'} "
-            f"was chosen for displacements up to {self.size:.3g} L (or rad), its estimated error passes model.tolerance "
-            f"= {self.tolerance:g} from {self.limit:.3g} on, and {size:.3g} was met"
+            f"was chosen for displacements up to {self.size:.3g} L (or rad), its estimated error passes the tolerance "
+            f"{self.tolerance:g} from {self.limit:.3g} on, and {size:.3g} was met"
         )
 
     def richer(self, size: float, time: float | None, why: str) -> Choice:
@@ -167,24 +167,27 @@ def choose(
     assert tolerance is not None
     trial = Trial(scene, outputs, speeds, comm)
     allowed = tolerance / SAFETY
-    reference = trial.outputs(richest)
 
-    def error(of: Outputs, theory: str, without: Collection[str] = ()) -> float:
+    def error(base: str, theory: str, without: Collection[str] = ()) -> float:
+        """Return the change from a theory with all effects to a model."""
+        of = trial.outputs(base)
         bound = None if HISTORY in of.failed else Bound(of, allowed)
-        return max(change(of, trial.outputs(theory, without, bound), trial.wanted).values(), default=np.inf)
+        other = trial.outputs(theory, without, bound)
+        # Where the other needed shorter steps, the first one is computed again with them.
+        return max(change(trial.outputs(base), other, trial.wanted).values(), default=np.inf)
 
-    errors = {theory: error(reference, theory) for theory in LADDERS[richest]}
+    errors = {theory: error(richest, theory) for theory in LADDERS[richest]}
     theory = next(name for name in LADDERS[richest] if errors[name] <= allowed or name == richest)
     spent = errors[theory]
     dropped = [theory_step(richest, theory, spent)] if theory != richest else []
-    costs = sorted((error(trial.outputs(theory), theory, {name}), name) for name in trial.effects)
+    costs = sorted((error(theory, theory, {name}), name) for name in trial.effects)
     left_out: list[tuple[float, str]] = []
     for cost, name in costs:
         if spent + sum(c for c, _ in left_out) + cost <= allowed:
             left_out.append((cost, name))
     together = 0.0
     while left_out:
-        together = error(reference, theory, {name for _, name in left_out})
+        together = error(richest, theory, {name for _, name in left_out})
         if together <= allowed:
             break
         left_out.pop()  # the effects leave more out together than one by one

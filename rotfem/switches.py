@@ -43,18 +43,23 @@ class SwitchedModel(Model):
         groups = self._groups()
         self.bodies = [body for name, bodies in groups.items() for body in self._switched(name, bodies)]
         terms = {"internal": sum(ufl.derivative(s.energy, k.q, k.dq) for s in self.strains)}
+
+        def add(name: str, group: str, work: Any) -> None:
+            if not isinstance(work, int):
+                terms[name + group] = self._switch(name) * work
+
         for group, all_bodies in groups.items():
             # Linear theories weigh their pieces, so no switch is wanted in the forms.
             bodies = all_bodies if self.theory.linear else self._switched(group, all_bodies)
             for name in ("inertia", *self.effects):
                 if name in ACCELERATIONS:
-                    terms[name + group] = self._switch(name) * virtual_work(name, bodies, k, self.frame)
+                    add(name, group, virtual_work(name, bodies, k, self.frame))
             if "damping" in self.effects:
                 strains = [] if group else self.strains
-                terms["damping" + group] = self._switch("damping") * damping(strains, bodies, k, s.damping())
+                add("damping", group, damping(strains, bodies, k, s.damping()))
         if self.applied:
             terms["loads"] = load_work(self.applied, k)
-        return {name: term for name, term in terms.items() if not isinstance(term, int) and not term.empty()}
+        return terms
 
     def _groups(self) -> dict[str, list[Body]]:
         """Return bodies by the effect that brings them: "" those always there, "@tip_mass", …"""

@@ -36,6 +36,9 @@ STEPS_A_PERIOD, FEWEST_STEPS, MOST_STEPS = (40, 16), 200, 1500
 #: Steps between two samples of a history, tried one after the other.
 FINER = (1, 4, 16)
 
+#: Share of halved steps from which on steps are too long to be trusted.
+HALVED = 0.01
+
 #: Newton stops here: small differences of two solutions are wanted.
 INCREMENT = 1e-12
 
@@ -113,6 +116,7 @@ class Trial:
         wanted: outputs that are computed.
         absent: output ↦ why the scene has none.
         step: distance of the samples of a history, s.
+        finer: steps between two samples.
     """
 
     def __init__(
@@ -128,6 +132,7 @@ class Trial:
         self._done: dict[tuple[str, frozenset[str]], Outputs] = {}
         self._released: dict[str, Array] = {}
         self._bound: Bound | None = None
+        self.finer = FINER[0]
         self.effects = self.scene.effective_effects()
         self.absent = self._absent()
         named = outputs if outputs is not None else (HISTORY, STEADY, MODES)
@@ -224,18 +229,28 @@ class Trial:
         out.size = system.size(q)
 
     def _march(self, switched: SwitchedSystem, theory: str, without: frozenset[str], out: Outputs) -> None:
-        """Compute a history, with shorter steps between the samples where a nonlinear model asks for them."""
-        for finer in FINER:
+        """Compute a history, with shorter steps between the samples where a nonlinear model asks for them.
+
+        What one model needs all get from then on, since only histories solved alike can be compared.
+        """
+        for finer in FINER[FINER.index(self.finer) :]:
             switched.leave_out(without)
             try:
-                return self._march_once(switched, theory, out, finer)
+                halved = self._march_once(switched, theory, out, finer)
             except Beyond:
                 raise
             except ComputationError:
                 if switched.system.linear or finer == FINER[-1]:
                     raise
+                continue
+            if halved <= HALVED or finer == FINER[-1]:
+                break
+        if finer != self.finer:
+            self.finer = finer
+            self._done.clear()
 
-    def _march_once(self, switched: SwitchedSystem, theory: str, out: Outputs, finer: int) -> None:
+    def _march_once(self, switched: SwitchedSystem, theory: str, out: Outputs, finer: int) -> float:
+        """Compute a history; return the share of the steps that had to be halved."""
         assert self.scene.time is not None
         system, scheme = switched.system, Scheme.of(self.scene)
         newton = newton_for(self.scene, monotone=True)
@@ -258,6 +273,7 @@ class Trial:
                     raise ComputationError(f"it diverges at t = {new.t:.4g} s")
         finally:
             self._sample(switched, tips, out)
+        return stepper.substeps / (finer * len(tips))
 
     def _start(self, switched: SwitchedSystem, theory: str) -> Array:
         initial, system = self.scene.initial, switched.system
