@@ -274,6 +274,7 @@ def run_report(summary: dict[str, Any], folder: Path) -> list[str]:
         f"effects: {', '.join(summary['effects']) or 'none'} "
         f"({summary['integrals']['F']} integrals in F, {summary['integrals']['J']} in J)",
     ]
+    lines += choice_report(summary)
     if summary["kind"] == "history":
         lines.append(
             f"{summary['steps']} steps, {summary['newton_iterations']} iterations in {time['total']:.2f} s "
@@ -296,6 +297,7 @@ def modes_report(summary: dict[str, Any], folder: Path) -> list[str]:
         f"{summary['name']}: {summary['theory']} about the {summary['about']} state at {summary['speed']:g} rad/s, "
         f"{summary['dofs']} dofs, in {summary['timings']['total']:.2f} s",
         f"effects: {', '.join(summary['effects']) or 'none'}",
+        *choice_report(summary),
         f"{'mode':>4}  {'label':<16}{'rad/s':>14}{'Hz':>12}{'damping':>12}{'error':>10}",
     ]
     for row in summary["modes"]:
@@ -311,6 +313,7 @@ def campbell_report(summary: dict[str, Any], folder: Path) -> list[str]:
     lines = [
         f"{summary['name']}: {summary['theory']}, {summary['speeds']} speeds ({summary['speeds_solved']} solved), "
         f"{summary['dofs']} dofs, in {summary['timings']['total']:.2f} s",
+        *choice_report(summary),
         f"{'branch':>6}  {'label':<16}{'first rad/s':>14}{'last rad/s':>14}{'confidence':>12}",
     ]
     for b in summary["branches"]:
@@ -319,6 +322,16 @@ def campbell_report(summary: dict[str, Any], folder: Path) -> list[str]:
     for c in summary["critical_speeds"]:
         lines.append(f"critical speed {c['speed']:.6f} rad/s: {c['label']} meets {c['per_rev']}Ω")
     return [*lines, f"results in {folder}"]
+
+
+def choice_report(summary: dict[str, Any]) -> list[str]:
+    """Return the line that says which model was chosen, if one was."""
+    choice = summary.get("choice")
+    if choice is None:
+        return []
+    dropped = ", ".join(row["name"] for row in choice["dropped"]) or "nothing"
+    error = f"estimated error {choice['estimated_error']:.1e} of {choice['tolerance']:g} allowed"
+    return [f"chosen in {choice['seconds']:.2f} s: {choice['theory']}; left out: {dropped}; {error}"]
 
 
 def explain_report(summary: dict[str, Any], folder: Path) -> list[str]:
