@@ -27,12 +27,15 @@ Array = npt.NDArray[np.float64]
 #: A piece belongs to the product of these entries (constant name, component): () is 1, (("w", 0), ("w", 0)) is Omega².
 Key = tuple[tuple[str, int], ...]
 
+#: What the pieces of the geometric stiffness are marked with; without them a prestressed theory is the linear one.
+PRESTRESS = "prestress"
+
 
 @dataclass
 class Piece:
     """One operator (PETSc matrix, or vector for "f"), the constants whose product multiplies it, and its term.
 
-    A term's name may say which body it is of: "coriolis@tip_mass".
+    A term's name may say which body it is of, and that it is geometric stiffness: "centrifugal@tip_mass@prestress".
     """
 
     kind: str
@@ -78,7 +81,7 @@ class AffineSystem(System):
         self._changed = True
 
     def leave_out(self, effects: Collection[str]) -> None:
-        """Take the pieces of some effects (and bodies) out of the equations, and put all others back in."""
+        """Take the pieces of some effects, bodies or the PRESTRESS out of the equations, and put all others back in."""
         left_out = set(effects)
         self._weights = np.array([0.0 if left_out & set(p.term.split("@")) else 1.0 for p in self.pieces])
         self._coefficients = None
@@ -182,7 +185,7 @@ class AffineSystem(System):
             q0.x.scatter_forward()
             K = self._assemble(compiled, "K")
             if K.norm() > 0.0:
-                self.pieces.append(Piece("K", piece.key, K, piece.term))
+                self.pieces.append(Piece("K", piece.key, K, f"{piece.term}@{PRESTRESS}"))
 
     # --- operators at a time ---------------------------------------------------------------------------------------
 
