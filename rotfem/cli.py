@@ -349,6 +349,7 @@ def explain_report(summary: dict[str, Any], folder: Path) -> list[str]:
         kinds = ("estimate", "truth") if checked else ("estimate",)
         cells = "".join(f"{row[kind][name]:>10.1e}" for name in outputs for kind in kinds)
         lines.append(f"{what + row['name']:<26}{cells}  {row['verdict']}: {row['why']}")
+    lines += choice_report(summary)
     lines += [f"no {name}: {text}" for name, text in summary["absent_effects"].items()]
     return [*lines, f"results in {folder}"]
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from rotfem.choice import choose
 from rotfem.errors import ComputationError
 from rotfem.estimate import LADDER, Change, Estimates, change, notes, outputs_of
 from rotfem.groups import MEANING, groups
@@ -32,6 +33,11 @@ REASONS = {
     "hub_coupling": ("the hub is free and coupled", "the hub does not feel the structure"),
 }
 
+
+#: What follows from the size of a change: for an effect, for a poorer theory and for a richer one.
+NEEDED = {"negligible": "not needed", "noticeable": "needed where {:.1%} matters", "large": "needed"}
+ENOUGH = {"negligible": "good enough", "noticeable": "good to {:.1%}", "large": "not good enough"}
+RICHER = {"negligible": "not needed", "noticeable": "needed where {:.1%} matters", "large": "needed"}
 
 #: What the notes of a check are marked with.
 FULL = " of the full model"
@@ -90,6 +96,8 @@ def explain(
         "ranks": comm.size,
         "scene": scene.to_dict(),
     }
+    if scene.model.tolerance is not None:
+        summary["choice"] = choose(scene, trial.wanted, comm=comm).summary()
     return ExplainResult(summary, rows)
 
 
@@ -99,13 +107,10 @@ def why(item: Change, scene: Scene) -> str:
     if item.kind == "effect":
         reason = REASONS[item.name][0]
         if not item.included:
-            return f"{reason}, but it is not in model.effects{failed}"
-        needed = "it could be left out" if item.verdict == "negligible" else "it is needed"
-        return f"{reason}; {needed}{failed}"
+            reason += ", but it is not in model.effects"
+        return f"{reason}; {NEEDED[item.verdict].format(item.worst)}{failed}"
     poorer = LADDER.index(item.name) < LADDER.index(scene.model.theory)
-    if poorer:
-        return ("it would do" if item.verdict == "negligible" else "not enough") + failed
-    return ("no richer theory is needed" if item.verdict == "negligible" else "it says otherwise") + failed
+    return (ENOUGH if poorer else RICHER)[item.verdict].format(item.worst) + failed
 
 
 # --- the truth ------------------------------------------------------------------------------------------------------

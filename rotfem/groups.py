@@ -50,7 +50,7 @@ def groups(scene: Scene, trial: Trial, own: Outputs) -> dict[str, float]:
     hub = getattr(structure, "hub_offset", None)
     out["hub_ratio"] = float(np.linalg.norm(hub) if hub is not None else structure.hub_radius) / length
     out["spin_rate_change"] = _largest(scene, switched, "rate") / first**2
-    if len(own.values):
+    if len(own.values) and not structure.damping.is_zero:
         out["damping"] = float(-own.values[0].real / abs(own.values[0]))
     if structure.has_tip_mass:
         out["tip_mass_ratio"] = getattr(structure, "tip_mass", 0.0) / _mass(switched)

@@ -28,6 +28,10 @@ LABELS = {
 }
 
 
+#: Relative changes below it are not drawn.
+ROUND_OFF = 1e-9
+
+
 def label(column: str) -> str:
     """Return the axis label of a column, with its unit."""
     name = column.removeprefix("tip_")
@@ -133,14 +137,20 @@ def explain_figure(result: ExplainResult) -> Figure:
     rows, outputs = result.rows, result.summary["outputs"]
     figure = Figure(figsize=(8, 0.45 * len(rows) + 1.4))
     axis = figure.add_subplot()
-    finite = [v for row in rows for v in row["estimate"].values() if 0.0 < v < np.inf]
-    left, right = 10 ** np.floor(np.log10(min([*finite, 1e-2]))) / 3, 3 * max([*finite, 1.0])
+    shown = [v for row in rows for v in row["estimate"].values() if ROUND_OFF < v < np.inf]
+    left, right = 10 ** np.floor(np.log10(min([*shown, 1e-2]))) / 3, 3 * max([*shown, 1.0])
     height = 0.8 / max(len(outputs), 1)
     for j, output in enumerate(outputs):
         for i, row in enumerate(rows):
             value, at = row["estimate"].get(output, 0.0), i + (j - (len(outputs) - 1) / 2) * height
-            shown = float(np.clip(value, left, right))
-            axis.barh(at, shown - left, height, left=left, color=f"C{j}", label=output if i == 0 else None)
+            axis.barh(
+                at,
+                float(np.clip(value, left, right)) - left,
+                height,
+                left=left,
+                color=f"C{j}",
+                label=output if i == 0 else None,
+            )
             if not np.isfinite(value):
                 axis.annotate("fails", (right, at), (-3, -3), textcoords="offset points", fontsize=8, ha="right")
             if output in row.get("truth", {}) and np.isfinite(row["truth"][output]):
@@ -154,12 +164,11 @@ def explain_figure(result: ExplainResult) -> Figure:
     axis.set_yticks(range(len(rows)), names)
     axis.invert_yaxis()
     axis.set_xlabel("relative change of the output (–)")
-    axis.set_title(f"{result.summary['name']}: what leaving out and other theories change", fontsize=10)
+    figure.suptitle(f"{result.summary['name']}: what each effect and other theories change", fontsize=10)
     axis.grid(True, axis="x", lw=0.4, alpha=0.6)
-    axis.legend(fontsize=8, loc="lower right")
-    figure.subplots_adjust(
-        left=0.27, right=0.97, top=1 - 0.35 / figure.get_figheight(), bottom=0.19 if len(rows) < 6 else 0.1
-    )
+    tall = figure.get_figheight()
+    figure.subplots_adjust(left=0.27, right=0.97, top=1 - 0.65 / tall, bottom=0.55 / tall)
+    figure.legend(fontsize=8, loc="upper right", ncols=4, bbox_to_anchor=(0.98, 1 - 0.28 / tall), frameon=False)
     return figure
 
 

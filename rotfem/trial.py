@@ -112,6 +112,9 @@ class Trial:
         speeds: speeds of the modes (rad/s); by default the final one of the scene's motion.
         comm: MPI communicator.
 
+    Raises:
+        SceneError: the scene has none of the outputs.
+
     Attributes:
         effects: all effects the scene has data for.
         wanted: outputs that are computed.
@@ -138,6 +141,9 @@ class Trial:
         self.absent = self._absent()
         named = outputs if outputs is not None else (HISTORY, STEADY, MODES)
         self.wanted = tuple(name for name in named if name not in self.absent)
+        if not self.wanted:
+            scene.check_run()
+            check_steady(scene)
         first = self.system("consistent_linear")
         self.speeds = tuple(speeds) if speeds is not None else (self._final_speed(first),)
         self.at_rest = self._steppable(first)
@@ -183,8 +189,9 @@ class Trial:
             out[STEADY] = "the scene asks for a history"
         try:
             check_steady(scene)
-        except SceneError:
+        except SceneError as error:
             out[MODES] = "gravity turns in the rotating frame, so there is no steady state to vibrate about"
+            out.setdefault(STEADY, str(error))
         return out
 
     def _final_speed(self, switched: SwitchedSystem) -> float:

@@ -209,6 +209,12 @@ def test_groups_of_the_spin_up() -> None:
     assert more["hub_ratio"] == 0.2
 
 
+def test_a_scene_without_any_output_is_refused() -> None:
+    """Gravity turns in the rotating frame, and there is no [time]."""
+    with pytest.raises(SceneError, match="loads.gravity"):
+        rotfem.explain(scene(ALL, {"time": None, "motion": {"type": "constant", "speed": 1.0}}))
+
+
 # --- choice ---------------------------------------------------------------------------------------------------------
 
 
