@@ -6,14 +6,17 @@
     python3 benchmarks/explain_accuracy.py exceeded                runs that leave the range of their model
 
 The truth is the difference of two full runs, each on the scene's own mesh with its own steps. Times are medians of
-three runs with compiled forms, unless they are of the compilation.
+five runs with compiled forms, in turn, and of three compilations.
 """
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from statistics import median
 from time import perf_counter
@@ -74,14 +77,16 @@ def estimates(names: list[str]) -> None:
     print(f"within a factor 3: {100 * inside.mean():.1f} %; above 1 % but called negligible: {missed or 'none'}")
 
 
-def timed(compute: Callable[[], Any], times: int = 3) -> tuple[Any, float]:
-    """Return the result, and the median time after a first call that compiles."""
-    result, spans = compute(), []
+def alternated(variants: list[Callable[[], Any]], times: int = 5) -> tuple[list[Any], list[float]]:
+    """Return the results, and the median times of calls in turn, so that all meet the same state of the machine."""
+    results = [compute() for compute in variants]  # compiles
+    spans: list[list[float]] = [[] for _ in variants]
     for _ in range(times):
-        started = perf_counter()
-        compute()
-        spans.append(perf_counter() - started)
-    return result, median(spans)
+        for compute, mine in zip(variants, spans, strict=True):
+            started = perf_counter()
+            compute()
+            mine.append(perf_counter() - started)
+    return results, [median(mine) for mine in spans]
 
 
 def tip(result: Any) -> Any:
@@ -91,23 +96,27 @@ def tip(result: Any) -> Any:
 
 def tolerance(names: list[str]) -> None:
     """Print true error and time against the full model for every tolerance."""
-    met, total = 0, 0
+    met, total, saving = 0, 0, []
     print(f"{'scene':<20}{'tolerance':>10}{'error/tol':>10}{'choose s':>9}{'run s':>8}{'full s':>8}{'saved':>7}  model")
     for name in names:
-        full, full_time = timed(lambda name=name: rotfem.run(scene(name)))  # type: ignore[misc]
         for allowed in TOLERANCES:
-            chosen = scene(name).replace({"model.tolerance": allowed})
-            result, _ = timed(lambda chosen=chosen: rotfem.run(chosen), 1)  # type: ignore[misc]
+            asked = scene(name).replace({"model.tolerance": allowed})
+            rotfem.run(asked)  # compiles
+            result = rotfem.run(asked)
             choice = result.summary["choice"]
             model = {"model.theory": choice["theory"], "model.effects": choice["effects"]}
-            _, own = timed(lambda model=model, name=name: rotfem.run(scene(name).replace(model)))  # type: ignore[misc]
+            runs = [partial(rotfem.run, scene(name)), partial(rotfem.run, scene(name).replace(model))]
+            (full, _), (full_time, own) = alternated(runs)
             error = tip_change(tip(full), tip(result)) / allowed
             met, total = met + (error <= 1.0), total + 1
-            saved = 1 - own / full_time
-            row = f"{allowed:>10.0e}{error:>10.1e}{choice['seconds']:>9.2f}{own:>8.2f}{full_time:>8.2f}{saved:>7.0%}"
+            saving.append(1 - own / full_time)
+            row = (
+                f"{allowed:>10.0e}{error:>10.1e}{choice['seconds']:>9.2f}{own:>8.2f}{full_time:>8.2f}{saving[-1]:>7.0%}"
+            )
             upgrades = f", {len(choice['upgrades'])} upgrades" if "upgrades" in choice else ""
             print(f"{name:<20}{row}  {choice['theory']}, {' '.join(choice['effects'])}{upgrades}", flush=True)
-    print(f"within the tolerance: {met} of {total}")
+    print(f"within the tolerance: {met} of {total}; saved, without choosing: median {median(saving):.0%}", end=", ")
+    print(f"{min(saving):.0%} … {max(saving):.0%}")
 
 
 COLD = """
@@ -128,22 +137,29 @@ print(perf_counter() - started, system.integrals["F"], system.integrals["J"])
 
 def effects(names: list[str]) -> None:
     """Print integrals, compile time with an empty cache and time a step with all effects and without each."""
-    import os
-    import subprocess
-
     print(f"{'scene':<20}{'without':<16}{'F':>4}{'J':>4}{'compile s':>11}{'ms a step':>11}")
     for name in names:
-        for left_out in ("nothing", *scene(name).effective_effects()):
-            with tempfile.TemporaryDirectory() as cache:
-                command = [sys.executable, "-c", COLD, str(Path(__file__).parent), name, left_out]
-                environment = os.environ | {"XDG_CACHE_HOME": cache}
-                done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-            seconds, in_f, in_j = done.stdout.split()
-            kept = [e for e in scene(name).effective_effects() if e != left_out]
-            run_with(scene(name), kept)  # compiles
-            step = median(step_time(run_with(scene(name), kept).summary) for _ in range(3))
-            numbers = f"{in_f:>4}{in_j:>4}{float(seconds):>11.2f}{1e3 * step:>11.4f}"
+        present = scene(name).effective_effects()
+        variants = {left_out: [e for e in present if e != left_out] for left_out in ("nothing", *present)}
+        steps: dict[str, list[float]] = {left_out: [] for left_out in variants}
+        for i in range(6):
+            for left_out, kept in variants.items():
+                seconds = step_time(run_with(scene(name), kept).summary)
+                steps[left_out] += [seconds] if i > 0 else []  # the first one compiles
+        for left_out in variants:
+            built = [cold(name, left_out) for _ in range(3)]
+            seconds, in_f, in_j = median(float(words[0]) for words in built), *built[0][1:]
+            numbers = f"{in_f:>4}{in_j:>4}{seconds:>11.2f}{1e3 * median(steps[left_out]):>11.4f}"
             print(f"{name:<20}{left_out:<16}{numbers}", flush=True)
+
+
+def cold(name: str, left_out: str) -> list[str]:
+    """Return seconds of compilation with an empty cache, in a new process, and the integrals of F and J."""
+    with tempfile.TemporaryDirectory() as cache:
+        command = [sys.executable, "-c", COLD, str(Path(__file__).parent), name, left_out]
+        environment = os.environ | {"XDG_CACHE_HOME": cache}
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    return done.stdout.split()
 
 
 def run_with(of: Scene, kept: list[str]) -> Any:

@@ -30,6 +30,8 @@ Key = tuple[tuple[str, int], ...]
 #: What the pieces of the geometric stiffness are marked with; without them a prestressed theory is the linear one.
 PRESTRESS = "prestress"
 
+ONE = np.ones(1)
+
 
 @dataclass
 class Piece:
@@ -76,6 +78,9 @@ class AffineSystem(System):
         self._rest_inertia: float | None = None
         self._weights: Array = np.ones(len(self.pieces))
         self._factors = self._factor_indices()
+        self._all_constants = list(self._constants().values())
+        chosen = {kind: [i for i, p in enumerate(self.pieces) if p.kind == kind] for kind in "MCKf"}
+        self._by_kind = {kind: (index, [self.pieces[i].operator for i in index]) for kind, index in chosen.items()}
         self._coefficients: Array | None = None
         self._shift: tuple[float, float, float] | None = None
         self._changed = True
@@ -192,21 +197,22 @@ class AffineSystem(System):
     def set_time(self, t: float, motion: Motion | None = None, load_factor: float = 1.0) -> None:
         """Set the constants of time t (s) and form M, C, K and f there if their coefficients have changed."""
         super().set_time(t, motion, load_factor)
-        values = np.concatenate([np.ones(1), *(constant.value.ravel() for constant in self._constants().values())])
-        c = self._weights * np.prod(values[self._factors], axis=1)
+        values = np.concatenate([ONE, *(constant.value.ravel() for constant in self._all_constants)])
+        c = self._weights * values[self._factors[:, 0]] * values[self._factors[:, 1]]
         old = self._coefficients
         self._coefficients = c
         if old is not None and np.array_equal(old, c):
             return
         for kind, operator in self._operators.items():
-            selected = [i for i, p in enumerate(self.pieces) if p.kind == kind]
+            selected, operators = self._by_kind[kind]
             if old is None or not np.array_equal(old[selected], c[selected]):
-                combine(operator, [self.pieces[i].operator for i in selected], c[selected])
+                combine(operator, operators, c[selected])
                 self._changed = True
         self._load.zeroEntries()
-        for p, value in zip(self.pieces, c, strict=True):
-            if p.kind == "f" and value != 0.0:
-                self._load.axpy(value, p.operator)
+        selected, operators = self._by_kind["f"]
+        for operator, value in zip(operators, c[selected], strict=True):
+            if value != 0.0:
+                self._load.axpy(value, operator)
 
     def residual(self) -> Any:
         """Return −(M a + C v + K q + f), zero at clamped unknowns."""
