@@ -26,7 +26,8 @@ import numpy as np
 from explain_scenes import SCENES, scene
 
 import rotfem
-from rotfem.estimate import NOTICEABLE, tip_change
+from rotfem.estimate import NOTICEABLE
+from rotfem.outputs import tip_change
 from rotfem.scene import Scene
 
 #: Below it a change is not compared: round-off of two Newton solutions.

@@ -23,11 +23,11 @@ from rotfem.choice import choose
 from rotfem.equilibrium import check_steady
 from rotfem.errors import ComputationError, SceneError
 from rotfem.modes import GROWTH, ModalAnalysis, Spinning, advice, instabilities, mode_rows, self_checks, stability
+from rotfem.outputs import MODES
 from rotfem.pencil import SAME
 from rotfem.results import CampbellResult
 from rotfem.scene import Scene
 from rotfem.simulation import Progress, as_scene, versions
-from rotfem.trial import MODES
 
 Array = npt.NDArray[Any]
 

@@ -17,9 +17,10 @@ import numpy as np
 from mpi4py import MPI
 
 from rotfem.errors import ComputationError
-from rotfem.estimate import SAFETY, change
+from rotfem.estimate import SAFETY
+from rotfem.outputs import HISTORY, Bound, change
 from rotfem.scene import EFFECTS, Scene
-from rotfem.trial import HISTORY, Bound, Trial
+from rotfem.trial import Trial
 
 #: Richest allowed theory ↦ those to choose from, cheapest first. Nonlinear theories of moderate rotation cost what the
 #: exact one costs, so they are not among its cheaper neighbours.

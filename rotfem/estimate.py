@@ -1,20 +1,16 @@
 """How much a model's outputs change when an effect is left out or the theory replaced.
 
-    history, steady   max_t |Δu_tip| / max_t |u_tip|        displacement of the tip
-    modes             max_i |Δλ_i| / |λ_i|                  eigenvalues, so frequency and damping, sorted by size
-
 Both models are solved on the same coarse mesh with the same few steps (see `rotfem.trial`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
-from rotfem.trial import HISTORY, MODES, STEADY, Outputs, Trial
+from rotfem.outputs import Outputs, change, notes
+from rotfem.trial import Trial
 
 #: From the cheapest to the richest theory.
 LADDER = ("linear", "consistent_linear", "von_karman_linear", "second_order", "von_karman", "reissner")
@@ -65,41 +61,6 @@ class Change:
         return row | ({"notes": self.notes} if self.notes else {}) | ({"truth": self.truth} if self.truth else {})
 
 
-def change(of: Outputs, to: Outputs, wanted: Collection[str]) -> dict[str, float]:
-    """Return output ↦ relative change from one model's outputs to another's; infinite where one has none."""
-    out = {}
-    for name in wanted:
-        if name in of.failed or name in to.failed:
-            out[name] = np.inf
-        elif name == MODES:
-            out[name] = modes_change(of.values, to.values)
-        else:
-            out[name] = tip_change(of.tip, to.tip)
-    return out
-
-
-def tip_change(of: Any, to: Any) -> float:
-    """Return max |Δu| / max |u| of displacements, shape (times, components)."""
-    return _relative(np.linalg.norm(to - of, axis=1).max(), np.linalg.norm(of, axis=1).max())
-
-
-def modes_change(of: Any, to: Any) -> float:
-    """Return max |Δλ| / |λ| of eigenvalues sorted by size."""
-    n = min(len(of), len(to))
-    return max((_relative(abs(b - a), abs(a)) for a, b in zip(of[:n], to[:n], strict=True)), default=0.0)
-
-
-def _relative(difference: float, size: float) -> float:
-    if size > 0.0:
-        return float(difference / size)
-    return 0.0 if difference == 0.0 else np.inf
-
-
-def notes(*models: Outputs) -> dict[str, str]:
-    """Return output ↦ why one of the models has none."""
-    return {name: why for model in models for name, why in model.failed.items()}
-
-
 class Estimates:
     """The changes that steps from one model make.
 
@@ -135,13 +96,3 @@ class Estimates:
     def _change(self, kind: str, name: str, included: bool, other: Outputs) -> Change:
         estimate = change(self.own, other, self.trial.wanted)
         return Change(kind, name, included, estimate, notes(self.own, other))
-
-
-def outputs_of(wanted: Collection[str], history: Mapping[str, Any], rows: list[Mapping[str, Any]]) -> Outputs:
-    """Return the outputs of full results: columns of a history (or its one steady row) and rows of modes."""
-    out = Outputs()
-    if HISTORY in wanted or STEADY in wanted:
-        out.tip = np.stack([values for name, values in history.items() if name.startswith("tip_u")], axis=1)
-    if MODES in wanted:
-        out.values = np.array([complex(row["growth"], row["frequency"]) for row in rows])
-    return out

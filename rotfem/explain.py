@@ -12,13 +12,14 @@ from mpi4py import MPI
 
 from rotfem.choice import choose
 from rotfem.errors import ComputationError
-from rotfem.estimate import LADDER, Change, Estimates, change, notes, outputs_of
+from rotfem.estimate import LADDER, Change, Estimates
 from rotfem.groups import MEANING, groups
 from rotfem.modes import modes
+from rotfem.outputs import HISTORY, MODES, STEADY, Outputs, change, notes, outputs_of
 from rotfem.results import ExplainResult
 from rotfem.scene import EFFECTS, Scene
 from rotfem.simulation import Progress, as_scene, run, versions
-from rotfem.trial import HISTORY, INCREMENT, MODES, STEADY, Outputs, Trial
+from rotfem.trial import INCREMENT, Trial
 
 #: Why an effect is in the full model; the scene reference has the same list.
 REASONS = {

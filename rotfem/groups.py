@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 
+from rotfem.outputs import Outputs
 from rotfem.scene import Scene, TorqueMotion
 from rotfem.switches import SwitchedSystem
-from rotfem.trial import Outputs, Trial
+from rotfem.trial import Trial
 
 #: What each number is, in words and symbols.
 MEANING = {

@@ -21,13 +21,13 @@ from rotfem.choice import choose
 from rotfem.equilibrium import check_steady, newton_for, steady_state
 from rotfem.errors import SceneError
 from rotfem.hub import Hub
+from rotfem.outputs import MODES
 from rotfem.pencil import SAME, ZERO, Eigenpairs, Pencil
 from rotfem.results import ModesResult
 from rotfem.scene import Scene, TorqueMotion
 from rotfem.simulation import as_scene, versions
 from rotfem.solvers import Newton
 from rotfem.system import Model, System, compile_system
-from rotfem.trial import MODES
 
 Array = npt.NDArray[Any]
 

@@ -20,11 +20,11 @@ from rotfem.errors import ComputationError
 from rotfem.hub import Hub, HubStepper
 from rotfem.integrators import Scheme, State, Stepper
 from rotfem.marching import LARGEST_LINEAR_DEFLECTION, fixed_steps
+from rotfem.outputs import HISTORY, STEADY
 from rotfem.results import RunResult, Table
 from rotfem.scene import Scene, TorqueMotion, load_scene
 from rotfem.solvers import Newton
 from rotfem.system import Model, System, compile_system
-from rotfem.trial import HISTORY, STEADY
 from rotfem.version import __version__
 
 Array = npt.NDArray[np.float64]

@@ -7,8 +7,6 @@ discretisation is in both. Effects are switched, so each theory is compiled once
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,6 +19,7 @@ from rotfem.errors import ComputationError, SceneError
 from rotfem.hub import HubStepper
 from rotfem.integrators import Scheme, Stepper
 from rotfem.marching import LARGEST_LINEAR_DEFLECTION, fixed_steps
+from rotfem.outputs import HISTORY, MODES, STEADY, Beyond, Bound, Outputs
 from rotfem.pencil import ZERO, Pencil
 from rotfem.scene import PlateMesh, PlateStructure, Scene
 from rotfem.switches import SwitchedSystem
@@ -42,47 +41,6 @@ HALVED = 0.01
 
 #: Newton stops here: small differences of two solutions are wanted.
 INCREMENT = 1e-12
-
-#: Names of the outputs that models are compared by.
-HISTORY, STEADY, MODES = "history", "steady", "modes"
-
-
-@dataclass
-class Outputs:
-    """What one model gives.
-
-    Attributes:
-        tip: displacement of the tip over time, shape (steps + 1, components), or (1, components) if steady; m.
-        values: eigenvalues λ at the final speed, 1/s, sorted by size; one of each conjugate pair.
-        size: largest displacement over L, or rotation in rad.
-        failed: output ↦ why there is none of it.
-    """
-
-    tip: Array = field(default_factory=lambda: np.empty((0, 0)))
-    values: Array = field(default_factory=lambda: np.empty(0))
-    size: float = 0.0
-    failed: dict[str, str] = field(default_factory=dict)
-
-
-class Beyond(ComputationError):
-    """A history is farther from another one than was asked for."""
-
-
-@dataclass(frozen=True)
-class Bound:
-    """The history of another model, and how far from it (relative to its largest displacement) one may be."""
-
-    of: Outputs
-    allowed: float
-
-    @cached_property
-    def radius(self) -> float:
-        """How far, m."""
-        return self.allowed * float(np.linalg.norm(self.of.tip, axis=1).max())
-
-    def passed(self, i: int, u: Array) -> bool:
-        """Return whether the displacement u of sample i is farther off."""
-        return bool(np.linalg.norm(u - self.of.tip[i]) > self.radius)
 
 
 def coarse(scene: Scene) -> Scene:

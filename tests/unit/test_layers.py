@@ -35,7 +35,7 @@ LEVELS: tuple[tuple[str, ...], ...] = (
     ("system", "affine"),
     ("equilibrium", "integrators", "pencil"),
     ("hub",),
-    ("marching", "switches"),
+    ("marching", "outputs", "switches"),
     ("trial",),
     ("estimate",),
     ("choice",),

@@ -11,12 +11,13 @@ import pytest
 import rotfem
 from rotfem.choice import Choice, choose
 from rotfem.errors import ComputationError, SceneError
-from rotfem.estimate import NOTICEABLE, Estimates, tip_change
+from rotfem.estimate import NOTICEABLE, Estimates
 from rotfem.hub import Hub
+from rotfem.outputs import HISTORY, MODES, STEADY, tip_change
 from rotfem.scene import Scene
 from rotfem.switches import SwitchedSystem
 from rotfem.system import Model, compile_system
-from rotfem.trial import HISTORY, MODES, STEADY, Trial
+from rotfem.trial import Trial
 
 SPIN_UP: dict[str, Any] = {
     "structure": {
@@ -92,6 +93,32 @@ def test_an_effect_switched_off_is_one_that_is_not_there(theory: str) -> None:
         assert np.abs(found - whole).max() > 1e-9 * size  # the effect is felt in this state
     switched.leave_out(())
     assert np.array_equal(state_of(switched.system, 1.3), whole)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+def test_bodies_beside_the_axis_are_switched_too(theory: str) -> None:
+    """A spatial beam with a tip mass off its axis; each new form takes ten seconds and more to compile."""
+    section = {"EA": 400.0, "GA2": 130.0, "GA3": 130.0, "GJ": 0.8, "EI2": 1.0, "EI3": 2.0, "mass_per_length": 1.0}
+    inertia = {"rotary_inertia2": 2e-3, "rotary_inertia3": 4e-3}
+    tables = {
+        "structure": {
+            **{"type": "spatial_beam", "length": 1.0, "hub_radius": 0.2, "section": section | inertia},
+            **{"tip_mass": 0.3, "tip_inertia": 0.01, "tip_offset": [0.1, 0.05, -0.05]},
+        },
+        "motion": {"type": "spin_up", "speed": 1.5, "duration": 3.0},
+        "model": {"theory": theory},
+        "mesh": {"elements": 2},
+        "time": {"end": 4.0, "step": 0.01},
+    }
+    full = scene(tables)
+    switched = SwitchedSystem(full)
+    for name in ("tip_mass", "rotary_inertia"):
+        rest = tuple(e for e in switched.effects if e != name)
+        expected = state_of(compile_system(Model(full, effects=rest)), 1.3)
+        switched.leave_out({name})
+        size = np.abs(expected).max()
+        assert np.abs(state_of(switched.system, 1.3) - expected).max() < 1e-12 * size  # rounding
 
 
 def test_switches_reach_the_hub() -> None:
