@@ -33,6 +33,9 @@ from rotfem.scene import Scene
 #: Below it a change is not compared: round-off of two Newton solutions.
 SMALLEST = 1e-8
 
+#: Compilations from nothing whose median is taken.
+COMPILATIONS = 3
+
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)
 
 
@@ -148,7 +151,7 @@ def effects(names: list[str]) -> None:
                 seconds = step_time(run_with(scene(name), kept).summary)
                 steps[left_out] += [seconds] if i > 0 else []  # the first one compiles
         for left_out in variants:
-            built = [cold(name, left_out) for _ in range(3)]
+            built = [cold(name, left_out) for _ in range(COMPILATIONS)]
             seconds, in_f, in_j = median(float(words[0]) for words in built), *built[0][1:]
             numbers = f"{in_f:>4}{in_j:>4}{seconds:>11.2f}{1e3 * median(steps[left_out]):>11.4f}"
             print(f"{name:<20}{left_out:<16}{numbers}", flush=True)
