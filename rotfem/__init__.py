@@ -1,7 +1,7 @@
 """rotfem: rotating beams and plates with FEniCSx.
 
-One noun, the scene (`Scene`, `load_scene`), and verbs on it (`run`, `modes`, `campbell`, `cost`). The verbs load
-FEniCSx when first used.
+One noun, the scene (`Scene`, `load_scene`), and verbs on it (`run`, `modes`, `campbell`, `explain`, `cost`). The verbs
+load FEniCSx when first used.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from rotfem.version import __version__
 if TYPE_CHECKING:
     from rotfem.campbell import campbell
     from rotfem.cost import cost
+    from rotfem.explain import explain
     from rotfem.modes import modes
     from rotfem.simulation import run
 
@@ -29,6 +30,7 @@ __all__ = [
     "__version__",
     "campbell",
     "cost",
+    "explain",
     "load_scene",
     "modes",
     "run",
@@ -55,6 +57,7 @@ class _Package(ModuleType):
     modes = _verb("modes", "rotfem.modes")
     campbell = _verb("campbell", "rotfem.campbell")
     cost = _verb("cost", "rotfem.cost")
+    explain = _verb("explain", "rotfem.explain")
 
 
 sys.modules[__name__].__class__ = _Package

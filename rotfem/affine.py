@@ -5,7 +5,7 @@ The pieces are the derivatives of the residual at the undeformed state, assemble
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -28,14 +28,23 @@ Array = npt.NDArray[np.float64]
 #: A piece belongs to the product of these entries (constant name, component): () is 1, (("w", 0), ("w", 0)) is Omega².
 Key = tuple[tuple[str, int], ...]
 
+#: What the pieces of the geometric stiffness are marked with; without them a prestressed theory is the linear one.
+PRESTRESS = "prestress"
+
+ONE = np.ones(1)
+
 
 @dataclass
 class Piece:
-    """One operator (PETSc matrix, or vector for "f") and the constants whose product multiplies it."""
+    """One operator (PETSc matrix, or vector for "f"), the constants whose product multiplies it, and its term.
+
+    A term's name may say which body it is of, and that it is geometric stiffness: "centrifugal@tip_mass@prestress".
+    """
 
     kind: str
     key: Key
     operator: Any
+    term: str
 
 
 class AffineSystem(System):
@@ -68,9 +77,20 @@ class AffineSystem(System):
         self._work = compat.create_vector(self.V)
         self._qva = [compat.wrap(x.x) for x in (self.q, self.v, self.a)]
         self._rest_inertia: float | None = None
+        self._weights: Array = np.ones(len(self.pieces))
+        self._factors = self._factor_indices()
+        self._all_constants = list(self._constants().values())
+        chosen = {kind: [i for i, p in enumerate(self.pieces) if p.kind == kind] for kind in "MCKf"}
+        self._by_kind = {kind: (index, [self.pieces[i].operator for i in index]) for kind, index in chosen.items()}
         self._coefficients: Array | None = None
         self._shift: tuple[float, float, float] | None = None
         self._changed = True
+
+    def leave_out(self, effects: Collection[str]) -> None:
+        """Take the pieces of some effects, bodies or the PRESTRESS out of the equations, and put all others back in."""
+        left_out = set(effects)
+        self._weights = np.array([0.0 if left_out & set(p.term.split("@")) else 1.0 for p in self.pieces])
+        self._coefficients = None
 
     # --- pieces -------------------------------------------------------------------------------------------------
 
@@ -82,11 +102,20 @@ class AffineSystem(System):
         for constant in self._constants().values():
             constant.value[...] = 0.0
 
+    def _factor_indices(self) -> npt.NDArray[np.int64]:
+        """Return for every piece the two places of its factors in (1, all constants one after the other)."""
+        places: dict[tuple[str, int], int] = {}
+        for name, constant in self._constants().items():
+            for i in range(constant.value.size):
+                places[name, i] = 1 + len(places)
+        pairs = [[places[entry] for entry in p.key] for p in self.pieces]
+        return np.array([(*pair, 0, 0)[:2] for pair in pairs], dtype=np.int64).reshape(-1, 2)
+
     def _keys(self, term: str) -> list[Key]:
         """Return the products of constants a term consists of: its effect says which constant, to which power."""
         if term == "loads":
             return [((name, i),) for name, (c, _) in self.structure.load_constants.items() for i in range(c.value.size)]
-        _, name, power = ACCELERATIONS.get(term, (None, None, 0))
+        _, name, power = ACCELERATIONS.get(term.split("@")[0], (None, None, 0))
         if name is None:
             return [()]
         n: Iterable[int] = range(self.model.frame.constants[name].value.size)
@@ -113,7 +142,7 @@ class AffineSystem(System):
                 first = kind == "K" and name == "internal"
                 operator = self._polarised(compiled, key, kind, 1.0 if first else 0.0)
                 if operator.norm() > 0.0:
-                    self.pieces.append(Piece(kind, key, operator))
+                    self.pieces.append(Piece(kind, key, operator, name))
             self.assembled += perf_counter() - started
 
     def _polarised(self, form: Any, key: Key, kind: str, diagonal: float) -> Any:
@@ -167,7 +196,7 @@ class AffineSystem(System):
             q0.x.scatter_forward()
             K = self._assemble(compiled, "K")
             if K.norm() > 0.0:
-                self.pieces.append(Piece("K", piece.key, K))
+                self.pieces.append(Piece("K", piece.key, K, f"{piece.term}@{PRESTRESS}"))
         self.assembled += perf_counter() - started
 
     @property
@@ -180,26 +209,31 @@ class AffineSystem(System):
     def set_time(self, t: float, motion: Motion | None = None, load_factor: float = 1.0) -> None:
         """Set the constants of time t (s) and form M, C, K and f there if their coefficients have changed."""
         super().set_time(t, motion, load_factor)
-        values = {name: constant.value.ravel() for name, constant in self._constants().items()}
-        c = _products(self.pieces, values)
+        c = self._products([constant.value.ravel() for constant in self._all_constants])
         old = self._coefficients
         self._coefficients = c
         if old is not None and np.array_equal(old, c):
             return
         for kind, operator in self._operators.items():
-            selected = [i for i, p in enumerate(self.pieces) if p.kind == kind]
+            selected, operators = self._by_kind[kind]
             if old is None or not np.array_equal(old[selected], c[selected]):
-                combine(operator, [self.pieces[i].operator for i in selected], c[selected])
+                combine(operator, operators, c[selected])
                 self._changed = True
         self._load.zeroEntries()
-        for p, value in zip(self.pieces, c, strict=True):
-            if p.kind == "f" and value != 0.0:
-                self._load.axpy(value, p.operator)
+        selected, operators = self._by_kind["f"]
+        for operator, value in zip(operators, c[selected], strict=True):
+            if value != 0.0:
+                self._load.axpy(value, operator)
 
-    def coefficients(self, pieces: list[Piece], motion: Motion) -> Array:
-        """Return the factor of each piece at the start of another motion, shape (n,); nothing is set."""
+    def coefficients(self, motion: Motion) -> Array:
+        """Return the factor of every piece at the start of another motion, shape (n,); nothing is set."""
         values = {**self.model.frame.values(motion, 0.0), **self.load_values(0.0, motion)}
-        return _products(pieces, {name: np.ravel(value) for name, value in values.items()})
+        return self._products([np.ravel(values[name]) for name in self._constants()])
+
+    def _products(self, values: list[Array]) -> Array:
+        """Return the product that multiplies each piece, from the values of all constants in their order."""
+        flat = np.concatenate([ONE, *values])
+        return np.asarray(self._weights * flat[self._factors[:, 0]] * flat[self._factors[:, 1]])
 
     def residual(self) -> Any:
         """Return −(M a + C v + K q + f), zero at clamped unknowns."""
@@ -226,12 +260,12 @@ class AffineSystem(System):
         values = {name: constant.value.ravel() for name, constant in self._constants().items()}
         states = dict(zip("KCM", self._qva, strict=True))
         out.zeroEntries()
-        for p in self.pieces:
+        for p, weight in zip(self.pieces, self._weights, strict=True):
             slope = 0.0
             for i, (name, component) in enumerate(p.key):
                 if name in ("w", "dw"):
                     others = np.prod([values[n][c] for j, (n, c) in enumerate(p.key) if j != i])
-                    slope += (c_v if name == "w" else c_m) * axis[component] * float(others)
+                    slope += (c_v if name == "w" else c_m) * axis[component] * float(others) * weight
             if slope == 0.0:
                 continue
             if p.kind == "f":
@@ -289,8 +323,3 @@ class AffineSystem(System):
             self._rest_inertia = self.model.comm.allreduce(float(fem.assemble_scalar(self._energies["T0"])))
             self.q.x.array[:], spin.value[...] = state, w
         return self._rest_inertia * float(np.dot(spin.value, spin.value))
-
-
-def _products(pieces: list[Piece], values: dict[str, Array]) -> Array:
-    """Return the product of constants that multiplies each piece, shape (n,)."""
-    return np.array([np.prod([values[name][i] for name, i in p.key]) if p.key else 1.0 for p in pieces])

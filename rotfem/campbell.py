@@ -20,6 +20,7 @@ from mpi4py import MPI
 from scipy.optimize import brentq, linear_sum_assignment
 
 from rotfem.advice import Hint, silent
+from rotfem.choice import choose
 from rotfem.equilibrium import check_steady
 from rotfem.errors import ComputationError, SceneError
 from rotfem.modes import (
@@ -33,6 +34,7 @@ from rotfem.modes import (
     stability,
     unstiffened,
 )
+from rotfem.outputs import MODES
 from rotfem.pencil import SAME
 from rotfem.reduced import ReducedAnalysis, worth_while
 from rotfem.results import CampbellResult
@@ -313,6 +315,11 @@ def campbell(
         check_steady(
             scene.replace({"motion": {"type": "constant", "speed": values[-1]}}) if any(scene.loads.gravity) else scene
         )
+    asked, choice = scene, None
+    if scene.model.tolerance is not None:
+        spinning = scene if scene.motion.is_spinning else scene.replace({"motion.speed": values[-1] or values[0]})
+        choice = choose(spinning, (MODES,), (values[0], 0.5 * (values[0] + values[-1]), values[-1]), comm)
+        scene = choice.apply(scene)
     analysis = ModalAnalysis(scene, comm, sweep=True)
     hints = analysis.advise("campbell", hint, max(map(abs, values)))
     if worth_while(analysis, values):
@@ -333,7 +340,8 @@ def campbell(
         crossing["label"] = labels[crossing["branch"] - 1]
     lost = [labels[b] for b in range(count) if sweep.nodes[-1].order[b] < 0]
     ends = mode_rows(analysis, sweep.nodes[-1].spinning)[:count]
-    warnings = [*advice(analysis, fastest), *unstiffened(analysis, fastest, ends)]
+    warnings = [] if choice is not None else [*advice(analysis, fastest)]
+    warnings += unstiffened(analysis, fastest, ends)
     warnings += [f"{name} left the computed modes before the last speed; more modes.count keeps it" for name in lost]
     warnings += [
         f"ambiguous: {labels[int(a['branch']) - 1]} at {a['speed']:.6g} rad/s, correlation {a['confidence']:.2f}"
@@ -370,8 +378,10 @@ def campbell(
         "timings": {**analysis.seconds, "other": total - sum(analysis.seconds.values()), "total": total},
         "versions": versions(),
         "ranks": comm.size,
-        "scene": scene.to_dict(),
+        "scene": asked.to_dict(),
     }
+    if choice is not None:
+        summary["choice"] = choice.summary()
     return CampbellResult(summary, rows)
 
 

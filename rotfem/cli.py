@@ -133,6 +133,29 @@ def campbell(
 
 
 @app.command()
+def explain(
+    scene: ScenePath,
+    output: Output = None,
+    overrides: Overrides = [],  # noqa: B006
+    check: Annotated[bool, typer.Option("--check", help="run the full models too: truth beside the estimates")] = False,
+    as_json: Json = False,
+    no_plots: NoPlots = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Say which effects and which theory SCENE calls for, and what each of them changes."""
+    with Session(as_json, quiet, debug) as session:
+        loaded = load_scene(scene, overrides)
+        folder = session.folder(output or Path("results") / loaded.name)
+        from rotfem.explain import explain as estimate
+
+        with session.progress(f"{loaded.name}: {loaded.model.theory}") as progress:
+            result = estimate(loaded, check, progress=progress)
+        session.write(result, folder, plots=not no_plots)
+        session.say(explain_report(result.summary, folder))
+
+
+@app.command()
 def cost(
     scene: ScenePath,
     quick: Annotated[bool, typer.Option("--quick", help="a small grid")] = False,
@@ -359,6 +382,7 @@ def run_report(summary: dict[str, Any], folder: Path) -> list[str]:
         f"effects: {', '.join(summary['effects']) or 'none'} "
         f"({summary['integrals']['F']} integrals in F, {summary['integrals']['J']} in J)",
     ]
+    lines += choice_report(summary)
     if summary["kind"] == "history":
         lines.append(
             f"{summary['steps']} steps, {summary['newton_iterations']} iterations in {time['total']:.2f} s "
@@ -381,6 +405,7 @@ def modes_report(summary: dict[str, Any], folder: Path) -> list[str]:
         f"{summary['name']}: {summary['theory']} about the {summary['about']} state at {summary['speed']:g} rad/s, "
         f"{summary['dofs']} dofs, in {summary['timings']['total']:.2f} s",
         f"effects: {', '.join(summary['effects']) or 'none'}",
+        *choice_report(summary),
         f"{'mode':>4}  {'label':<16}{'rad/s':>14}{'Hz':>12}{'damping':>12}{'error':>10}",
     ]
     for row in summary["modes"]:
@@ -396,6 +421,7 @@ def campbell_report(summary: dict[str, Any], folder: Path) -> list[str]:
     lines = [
         f"{summary['name']}: {summary['theory']}, {summary['speeds']} speeds ({summary['speeds_solved']} solved), "
         f"{summary['dofs']} dofs, in {summary['timings']['total']:.2f} s",
+        *choice_report(summary),
         f"{'branch':>6}  {'label':<16}{'first rad/s':>14}{'last rad/s':>14}{'confidence':>12}",
     ]
     for b in summary["branches"]:
@@ -403,6 +429,36 @@ def campbell_report(summary: dict[str, Any], folder: Path) -> list[str]:
         lines.append(f"{b['branch']:>6}  {b['label']:<16}{first:>14}{last:>14}{b['confidence']:>12.3f}")
     for c in summary["critical_speeds"]:
         lines.append(f"critical speed {c['speed']:.6f} rad/s: {c['label']} meets {c['per_rev']}Ω")
+    return [*lines, f"results in {folder}"]
+
+
+def choice_report(summary: dict[str, Any]) -> list[str]:
+    """Return the line that says which model was chosen, if one was."""
+    choice = summary.get("choice")
+    if choice is None:
+        return []
+    dropped = ", ".join(row["name"] for row in choice["dropped"]) or "nothing"
+    error = f"estimated error {choice['estimated_error']:.1e} of {choice['tolerance']:g} allowed"
+    return [f"chosen in {choice['seconds']:.2f} s: {choice['theory']}; left out: {dropped}; {error}"]
+
+
+def explain_report(summary: dict[str, Any], folder: Path) -> list[str]:
+    """Return the lines `explain` prints: dimensionless groups, then a row an effect and a theory."""
+    outputs, rows = summary["outputs"], summary["rows"]
+    checked = any("truth" in row for row in rows)
+    lines = [
+        f"{summary['name']}: {summary['theory']} with {', '.join(summary['effects']) or 'no effects'}, "
+        f"in {summary['timings']['total']:.2f} s",
+        *(f"{value:>12.4g}  {summary['meaning'][name]}" for name, value in summary["groups"].items()),
+        f"{'relative change of':<26}" + "".join(f"{n:>10}{'true':>10}" if checked else f"{n:>10}" for n in outputs),
+    ]
+    for row in rows:
+        what = {True: "without ", False: "with "}[row["included"]] if row["kind"] == "effect" else "theory "
+        kinds = ("estimate", "truth") if checked else ("estimate",)
+        cells = "".join(f"{row[kind][name]:>10.1e}" for name in outputs for kind in kinds)
+        lines.append(f"{what + row['name']:<26}{cells}  {row['verdict']}: {row['why']}")
+    lines += choice_report(summary)
+    lines += [f"no {name}: {text}" for name, text in summary["absent_effects"].items()]
     return [*lines, f"results in {folder}"]
 
 

@@ -85,6 +85,8 @@ def cost(
         OutputError: the folder cannot be written.
     """
     scene = as_scene(scene)
+    if scene.model.tolerance is not None:  # the study chooses by itself, over all theories
+        scene = scene.replace({"model.tolerance": None})
     if not (np.isfinite(accuracy) and accuracy > 0):
         raise SceneError(scene.file, "cost accuracy", accuracy, "must be a number greater than 0")
     if repeat < 1:

@@ -120,7 +120,12 @@ class Hub:
             for body in model.bodies:
                 a = ACCELERATIONS[name][0](body, k, frame)
                 if a is not None:
-                    h += body.density * ufl.inner(a, ufl.cross(body.resolve(e), body.x)) * body.measure
+                    h += (
+                        model.switches.get(name, 1)
+                        * body.density
+                        * ufl.inner(a, ufl.cross(body.resolve(e), body.x))
+                        * body.measure
+                    )
         for load in model.applied:
             turn = load.turn(e)
             h -= ufl.inner(load.force, turn) * load.measure

@@ -18,10 +18,12 @@ from mpi4py import MPI
 
 from rotfem.advice import Hint, advise, silent
 from rotfem.affine import AffineSystem
+from rotfem.choice import choose
 from rotfem.equilibrium import check_steady, critical_speed, newton_for, steady_state
 from rotfem.errors import SceneError
 from rotfem.fields import writer
 from rotfem.hub import Hub
+from rotfem.outputs import MODES
 from rotfem.pencil import SAME, ZERO, Eigenpairs, Pencil
 from rotfem.results import ModesResult
 from rotfem.scene import Scene, TorqueMotion
@@ -206,6 +208,10 @@ def modes(
     scene = as_scene(scene)
     if scene.modes.about == "steady":
         check_steady(scene)
+    asked, choice = scene, None
+    if scene.model.tolerance is not None:
+        choice = choose(scene, (MODES,), comm=comm)
+        scene = choice.apply(scene)
     analysis = ModalAnalysis(scene, comm)
     speed = final_speed(analysis)
     hints = analysis.advise("modes", hint, speed)
@@ -214,7 +220,8 @@ def modes(
     spinning.pairs = spinning.pairs.select(np.arange(min(flexible, len(spinning.pairs.values))))
     rows = mode_rows(analysis, spinning)
     checks = self_checks(analysis, spinning)
-    warnings = [*advice(analysis, speed), *unstiffened(analysis, speed, rows), *instabilities(rows)]
+    warnings = [] if choice is not None else advice(analysis, speed)
+    warnings += [*unstiffened(analysis, speed, rows), *instabilities(rows)]
     rows = [{**row, "mode": row["mode"] + spinning.rigid} for row in rows]
     shapes = {f"mode {row['mode']}: {row['label']}": scaled_shape(analysis, spinning, i) for i, row in enumerate(rows)}
     if spinning.rigid:
@@ -236,8 +243,10 @@ def modes(
         "timings": {**analysis.seconds, "other": total - sum(analysis.seconds.values()), "total": total},
         "versions": versions(),
         "ranks": comm.size,
-        "scene": scene.to_dict(),
+        "scene": asked.to_dict(),
     }
+    if choice is not None:
+        summary["choice"] = choice.summary()
     structure, right = analysis.model.structure, spinning.pairs.right
     result = ModesResult(summary, rows, shapes, triangles=structure.surface(), analysis=analysis, spinning=spinning)
     if result.triangles is not None:

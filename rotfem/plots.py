@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from rotfem import plots_plate
+from rotfem import plots_explain, plots_plate
 from rotfem.errors import OutputError
-from rotfem.results import CampbellResult, ModesResult, RunResult
+from rotfem.results import CampbellResult, ExplainResult, ModesResult, RunResult
 
 #: Label and unit of every column that is plotted.
 LABELS = {
@@ -36,8 +36,10 @@ def label(column: str) -> str:
     return ("tip " if column.startswith("tip_") else "") + LABELS.get(name, name)
 
 
-def plot(result: RunResult | ModesResult | CampbellResult, folder: Path) -> list[Path]:
+def plot(result: RunResult | ModesResult | CampbellResult | ExplainResult, folder: Path) -> list[Path]:
     """Write the figures of a result into a folder; return their paths."""
+    if isinstance(result, ExplainResult):
+        return [save(plots_explain.explain_figure(result), folder / "explain.png")]
     if isinstance(result, RunResult):
         return plot_run(result, folder)
     if isinstance(result, ModesResult):

@@ -96,7 +96,8 @@ class ReducedAnalysis(ModalAnalysis):
         system = self.system
         assert isinstance(system, AffineSystem)
         V = np.array([c / max(np.sqrt(self._sum(c @ c)), 1e-300) for c in self._columns]).T
-        pieces = [p for p in system.pieces if p.kind in "MCK"]
+        self._index = [i for i, p in enumerate(system.pieces) if p.kind in "MCK"]
+        pieces = [system.pieces[i] for i in self._index]
         for _ in range(2):  # once more, as what is left of nearly equal columns is orthogonal only roughly
             mass = sum(self._times(p.operator, V) for p in pieces if p.kind == "M")
             gram = self._sum(V.T @ mass)
@@ -128,7 +129,7 @@ class ReducedAnalysis(ModalAnalysis):
         system = self.system
         assert isinstance(system, AffineSystem)
         zero = np.zeros_like(system.q.x.array)
-        c = system.coefficients([p for p, _ in self._pieces], system.motion.at_speed(speed))
+        c = system.coefficients(system.motion.at_speed(speed))[self._index]
         small = {kind: np.zeros((self.V.shape[1],) * 2) for kind in "MCK"}
         for ci, (p, matrix) in zip(c, self._pieces, strict=True):
             small[p.kind] += ci * matrix

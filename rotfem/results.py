@@ -181,6 +181,33 @@ class CampbellResult:
         ]
 
 
+@dataclass
+class ExplainResult:
+    """Outcome of `rotfem explain`.
+
+    Attributes:
+        summary: scene, dimensionless groups, changes, warnings, timings; JSON-able.
+        rows: one dictionary an effect and a theory: `kind`, `name`, `included`, `why`, `estimate` (output ↦ relative
+            change), `worst`, `verdict`; with a check `truth` (output ↦ relative change of the full models).
+    """
+
+    summary: dict[str, Any]
+    rows: list[dict[str, Any]]
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write explain.json and summary.json, each whole or not at all; return their paths.
+
+        Raises:
+            OutputError: the folder cannot be written.
+        """
+        folder = Path(folder)
+        explained = {"groups": self.summary["groups"], "outputs": self.summary["outputs"], "rows": self.rows}
+        return [
+            write_text(folder / "explain.json", json_text(explained)),
+            write_text(folder / "summary.json", json_text(self.summary)),
+        ]
+
+
 def prepare_folder(folder: str | Path) -> Path:
     """Make the result folder and see that it can be written, before anything is computed.
 

@@ -61,13 +61,25 @@ class Model(SceneModel):
         theory: Order of the strain measure.
         effects: ``"auto"``, or the names of the effects to include.
         frame: Frame to which displacements refer.
-        tolerance: Relative model error that is acceptable, or ``None``.
+        tolerance: Relative model error up to which effects are left out and the theory may be poorer, or ``None``.
+        on_exceed: What a run does that leaves the range its model was chosen for.
     """
 
     theory: Theory = "reissner"
     effects: Annotated[str | tuple[str, ...], PlainValidator(_as_effects)] = "auto"
     frame: Literal["rotating", "inertial"] = "rotating"
     tolerance: Positive | None = None
+    on_exceed: Literal["upgrade", "stop", "warn"] = "upgrade"
+
+    @model_validator(mode="after")
+    def _check_choice(self) -> Self:
+        if self.tolerance is not None and self.effects != "auto":
+            reason = 'needs effects = "auto": it says which effects may be left out'
+            raise problem("tolerance", self.tolerance, reason)
+        if self.tolerance is not None and self.frame == "inertial":
+            reason = 'needs frame = "rotating": only there can effects be left out one by one'
+            raise problem("tolerance", self.tolerance, reason)
+        return self
 
 
 class Initial(SceneModel):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib import metadata
 from pathlib import Path
 from time import perf_counter
@@ -15,11 +15,14 @@ from mpi4py import MPI
 
 from rotfem.advice import Hint, advise, silent
 from rotfem.affine import AffineSystem
+from rotfem.choice import Choice, RangeExceeded, choose
 from rotfem.equilibrium import check_steady, critical_speed, newton_for, static_tip_shape, steady_state
 from rotfem.errors import ComputationError
 from rotfem.fields import Snapshots, writer
 from rotfem.hub import Hub, HubStepper
 from rotfem.integrators import Scheme, State, Stepper
+from rotfem.marching import LARGEST_LINEAR_DEFLECTION, fixed_steps
+from rotfem.outputs import HISTORY, STEADY
 from rotfem.results import RunResult, Table
 from rotfem.scene import Scene, TorqueMotion, load_scene
 from rotfem.solvers import Newton
@@ -28,9 +31,6 @@ from rotfem.version import __version__
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[float], None]
-
-#: A linear theory has lost its meaning when a displacement exceeds the structure's own length.
-LARGEST_LINEAR_DEFLECTION = 1.0
 
 #: Adaptive steps: safety factor, bounds of a change, changes not worth a new factorisation, smallest relative scale.
 SAFETY, SHRINK, GROW, KEEP, FLOOR = 0.9, 0.2, 2.0, (0.95, 1.3), 1e-6
@@ -65,29 +65,61 @@ def run(
     scene.check_run()
     if scene.time is None or scene.initial.state == "steady":
         check_steady(scene)
-    simulation = Simulation(scene, comm)
+    if scene.model.tolerance is not None:
+        return run_chosen(scene, comm, progress, hint)
+    return hinted(Simulation(scene, comm), hint).run(progress)
+
+
+def hinted(simulation: Simulation, hint: Hint | None) -> Simulation:
+    """Return a simulation after its hints are told."""
     simulation.advice = advise(simulation.scene, "run", hint, critical=simulation.critical)
-    return simulation.run(progress)
+    return simulation
+
+
+def run_chosen(scene: Scene, comm: MPI.Comm, progress: Progress | None, hint: Hint | None) -> RunResult:
+    """Return the result of the cheapest model within model.tolerance, and of richer ones where it does not hold.
+
+    Raises:
+        ComputationError: the full model failed, or one of them with on_exceed = "stop" or "warn".
+    """
+    choice = choose(scene, (HISTORY, STEADY), comm=comm)
+    while True:
+        try:
+            return hinted(Simulation(choice.apply(scene), comm, choice, scene), hint).run(progress)
+        except ComputationError as error:
+            if choice.full or scene.model.on_exceed != "upgrade":
+                raise
+            # Any other failure of a poorer model is one that the richer one may not have: it is taken as far out.
+            size = error.size if isinstance(error, RangeExceeded) else np.inf
+            choice = choice.richer(size, error.time, error.what)
 
 
 class Simulation:
     """One run: the compiled system, the record of what happened, and the summary made of it.
 
     Args:
-        scene: validated scene.
+        scene: validated scene, with the model it is run with.
         comm: MPI communicator.
+        choice: how this model was chosen, if it was.
+        asked: the scene it was chosen for.
     """
 
-    def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD):
+    def __init__(
+        self,
+        scene: Scene,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+        choice: Choice | None = None,
+        asked: Scene | None = None,
+    ):
         self.started = perf_counter()
         self.scene, self.comm = scene, comm
-        self.warnings: list[str] = []
+        self.choice, self.asked = choice, asked or scene
+        self.warnings: list[str] = [] if choice is None else upgrade_warnings(choice)
+        self.exceeded = ""
         self.advice: list[str] = []
         if scene.time is None and scene.model.frame == "inertial":
             self.scene = scene = scene.replace({"model.frame": "rotating"})
             self.warnings.append("a steady state is one only in the rotating frame, where it was computed")
-        if scene.model.tolerance is not None:
-            self.warnings.append("model.tolerance has no effect on a run: theory and effects are as the scene says")
         self.model = Model(scene, comm)
         self.system: System = compile_system(self.model)
         self.compiled = perf_counter() - self.started
@@ -158,20 +190,10 @@ class Simulation:
             return self.system.clamp.rigid(q, 0.0)
         return q, np.zeros_like(q)
 
-    def _fixed_steps(self, state: State) -> Any:
+    def _fixed_steps(self, state: State) -> Iterator[State]:
         time, stepper = self.scene.time, self.stepper
         assert time is not None and time.step is not None and stepper is not None
-        n = int(np.ceil(time.end / time.step - 1e-9))
-        jumps = [] if self.hub is None else [t for t in self.hub.torque.jumps if 0.0 < t < time.end]
-        for i in range(1, n + 1):
-            t = time.end if i == n else i * time.step
-            close = 1e-9 * time.step
-            for stop in [*(j for j in jumps if state.t + close < j < t - close), t]:
-                state = stepper.advance(state, stop - state.t)
-                state.t = stop
-                if isinstance(stepper, HubStepper) and any(abs(stop - j) <= close for j in jumps):
-                    state = stepper.restart(state)
-            yield state
+        return fixed_steps(stepper, state, time.end, time.step)
 
     def _adaptive_steps(self, state: State) -> Any:
         """Yield states whose local errors add up to the tolerance, relative to the largest displacement so far."""
@@ -242,6 +264,22 @@ class Simulation:
             else 'use model.theory = "consistent_linear" for small or "reissner" for any deflection',
         )
 
+    def _watch(self, state: State) -> None:
+        """See whether a state is in the range its model was chosen for.
+
+        Raises:
+            RangeExceeded: it is not, and the scene does not want a mere warning.
+        """
+        if self.choice is None or self.exceeded:
+            return
+        size = self.system.size(state.q)
+        self.exceeded = self.choice.check(size)
+        if not self.exceeded:
+            return
+        if self.asked.model.on_exceed != "warn":
+            raise RangeExceeded(self.exceeded, state.t if self.scene.time is not None else None, size)
+        self.warnings.append(f"{self.exceeded}, at t = {state.t:.6g} s")
+
     def _record(self, state: State) -> None:
         system, t = self.system, state.t
         if not system.linear:
@@ -262,6 +300,7 @@ class Simulation:
         self.history.append(row)
         if self.snapshots is not None:
             self.snapshots.add(t, state.q)
+        self._watch(state)
 
     # --- summary ------------------------------------------------------------------------------------------------------
 
@@ -304,8 +343,10 @@ class Simulation:
             "advice": self.advice,
             "versions": versions(),
             "ranks": self.comm.size,
-            "scene": self.scene.to_dict(),
+            "scene": self.asked.to_dict(),
         }
+        if self.choice is not None:
+            summary["choice"] = self.choice.summary()
         if self.rejected:
             summary["rejected_steps"] = self.rejected
         if self.critical is not None:
@@ -319,9 +360,19 @@ class Simulation:
         return out
 
     def _timings(self) -> dict[str, float]:
-        total = perf_counter() - self.started
-        parts = {"compile": self.compiled, **(self.stepper.seconds if self.stepper else {})}
+        chosen = {} if self.choice is None else {"choice": self.choice.seconds}
+        total = perf_counter() - self.started + sum(chosen.values())
+        parts = {**chosen, "compile": self.compiled, **(self.stepper.seconds if self.stepper else {})}
         return {**parts, "other": total - sum(parts.values()), "total": total}
+
+
+def upgrade_warnings(choice: Choice) -> list[str]:
+    """Return what a run says of the models it has given up."""
+    return [
+        f"{note['why']}{'' if note['time'] is None else ' at t = {:.6g} s'.format(note['time'])}; "
+        f"started again with {note['to']} and all effects"
+        for note in choice.upgrades
+    ]
 
 
 def figures(history: dict[str, Array]) -> dict[str, float]:

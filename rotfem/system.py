@@ -52,6 +52,7 @@ class Model:
         motion: prescribed motion.
         strains: strain measures that make the stored energy.
         terms: name ↦ virtual work, a UFL form.
+        switches: effect ↦ constant factor of its terms, where they can be switched without a new compilation.
     """
 
     def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD, effects: tuple[str, ...] | None = None):
@@ -65,6 +66,7 @@ class Model:
         self.strains = s.strains(self.theory.measures(s.type))
         self.bodies = s.bodies(self.effects)
         self.applied = s.loads()
+        self.switches: dict[str, fem.Constant] = {}
         self.terms = self._terms()
         self._stretch: Any = None
 

@@ -40,9 +40,9 @@ step = 0.01
 """
 
 
-def run(folder: Path, ranks: int, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run `rotfem run beam.toml -o r<ranks> …` in a folder on that many processes."""
-    return rotfem(folder, ranks, "run", "beam.toml", "--no-plots", "-o", f"r{ranks}", *arguments)
+def run(folder: Path, ranks: int, *arguments: str, verb: str = "run") -> subprocess.CompletedProcess[str]:
+    """Run `rotfem run beam.toml -o r<ranks> …`, or another verb, in a folder on that many processes."""
+    return rotfem(folder, ranks, verb, "beam.toml", "--no-plots", "-o", f"r{ranks}", *arguments)
 
 
 @pytest.mark.parametrize(
@@ -75,3 +75,18 @@ def test_errors_are_told_once(tmp_path: Path) -> None:
     assert failed.returncode == 3
     assert failed.stderr.count("diverged") == 1
     assert json.loads((tmp_path / "r2" / "summary.json").read_text())["status"] == "failed"
+
+
+def test_estimates_are_those_of_one_process(tmp_path: Path) -> None:
+    """To 1e-6 of the answer: where Newton stops, and the order of sums, differ a little."""
+    (tmp_path / "beam.toml").write_text(SCENE)
+    one, two = (run(tmp_path, ranks, "--json", verb="explain") for ranks in (1, 2))
+    assert one.returncode == 0, one.stderr
+    assert two.returncode == 0, two.stderr
+    for serial, parallel in zip(*(json.loads(done.stdout)["rows"] for done in (one, two)), strict=True):
+        assert parallel["verdict"] == serial["verdict"]
+        for output, value in serial["estimate"].items():
+            assert parallel["estimate"][output] == pytest.approx(value, rel=1e-3, abs=1e-6)
+    chosen = run(tmp_path, 2, "--json", "--set", "model.tolerance=0.1")
+    assert chosen.returncode == 0, chosen.stderr
+    assert json.loads(chosen.stdout)["choice"]["theory"] == "linear"

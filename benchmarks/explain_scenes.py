@@ -1,0 +1,115 @@
+"""Scenes of different character on which estimates are held against the truth: slow and fast, thin and thick, …"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rotfem.scene import Scene
+
+#: Kane, Ryan & Banerjee (1987) as in Simo & Vu-Quoc (1986).
+THIN = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
+#: L/r = 20.
+THICK = {"EA": 400.0, "GA": 130.0, "EI": 1.0, "mass_per_length": 1.0, "rotary_inertia": 1 / 400}
+#: Yigit, Scott & Ulsoy (1988).
+ARM = {"EA": 5.0e5, "GA": 1.6e5, "EI": 5.5, "mass_per_length": 0.0858, "rotary_inertia": 9.4e-7}
+#: ICCIA (2017).
+HUB_BEAM = {"E": 6.8952e10, "nu": 0.3, "rho": 2766.0, "area": 7.2986e-5, "second_moment": 8.2189e-9}
+#: A blade that is softer in flap than in lag.
+BLADE = {
+    **{"EA": 2.0e7, "GA2": 6.0e6, "GA3": 6.0e6, "GJ": 8.0e3, "EI2": 1.0e4, "EI3": 4.0e4},
+    **{"mass_per_length": 1.5, "rotary_inertia2": 7.5e-4, "rotary_inertia3": 3.0e-3},
+}
+
+
+def _beam(length: float, section: dict[str, float], **more: Any) -> dict[str, Any]:
+    return {"type": "planar_beam", "length": length, "section": section, **more}
+
+
+def _spin_up(speed: float, duration: float) -> dict[str, Any]:
+    return {"type": "spin_up", "speed": speed, "duration": duration}
+
+
+SCENES: dict[str, dict[str, Any]] = {
+    "spin-up": {
+        "structure": _beam(10.0, THIN),
+        "motion": _spin_up(6.0, 15.0),
+        "time": {"end": 20.0, "step": 0.01},
+    },
+    "slow": {
+        "structure": _beam(10.0, THIN),
+        "motion": _spin_up(0.5, 20.0),
+        "time": {"end": 25.0, "step": 0.02},
+    },
+    "fast": {
+        "structure": _beam(10.0, THIN, hub_radius=2.0),
+        "motion": _spin_up(30.0, 20.0),
+        "time": {"end": 22.0, "step": 0.01},
+    },
+    "thick": {
+        "structure": _beam(1.0, THICK),
+        "motion": _spin_up(2.0, 4.0),
+        "time": {"end": 6.0, "step": 0.005},
+    },
+    "released on a hub": {
+        "structure": _beam(8.0, HUB_BEAM, hub_radius=1.0),
+        "motion": {"type": "constant", "speed": 4.0},
+        "initial": {"tip_displacement": 0.4},
+        "time": {"end": 8.0, "step": 0.008},
+    },
+    "tip mass": {
+        "structure": _beam(10.0, THIN, tip_mass=3.0, tip_inertia=0.05),
+        "motion": _spin_up(3.0, 15.0),
+        "time": {"end": 20.0, "step": 0.02},
+    },
+    "torque": {
+        "structure": _beam(0.5, ARM, hub_radius=0.05),
+        "motion": {"type": "torque", "hub_inertia": 2.0e-3, "pulses": [[0.0, 0.1, 0.1], [0.1, 0.2, -0.1]]},
+        "time": {"end": 0.5, "step": 0.0005},
+    },
+    "base": {
+        "structure": _beam(10.0, THIN, hub_radius=0.5),
+        "motion": {
+            **{"type": "constant", "speed": 2.0},
+            "base_acceleration": [[0, 0, 0], [0.5, 0, 0.4], [1.5, 0.2, -0.4], [2.0, 0, 0]],
+        },
+        "time": {"end": 8.0, "step": 0.008},
+    },
+    "gravity": {
+        "structure": _beam(10.0, THIN, tip_mass=0.5),
+        "motion": {"type": "constant", "speed": 3.0},
+        "loads": {"gravity": [0.0, -0.5]},
+        "time": {"end": 8.0, "step": 0.008},
+    },
+    "damped": {
+        "structure": _beam(10.0, THIN, damping={"kelvin_voigt": 2e-3, "rayleigh": [0.05, 0.0]}),
+        "motion": {"type": "constant", "speed": 2.0},
+        "loads": {"tip_force": [[0, 0, 0], [0.2, 0, 5.0], [3.0, 0, 5.0], [3.2, 0, 0]]},
+        "time": {"end": 8.0, "step": 0.008},
+    },
+    "large deflection": {
+        "structure": _beam(10.0, THIN),
+        "motion": {"type": "constant", "speed": 1.0},
+        "loads": {"tip_force": {"table": [[0, 0, 0], [4.0, 0, 250.0]], "kind": "follower"}},
+        "time": {"end": 8.0, "step": 0.008},
+    },
+    "stretched, steady": {
+        "structure": _beam(1.0, THICK, hub_radius=0.3, tip_mass=0.2),
+        "motion": {"type": "constant", "speed": 1.5},
+        "loads": {"tip_force": [0.0, 0.2]},
+    },
+    "flap and lag": {
+        "structure": {
+            **{"type": "spatial_beam", "length": 10.0, "hub_radius": 0.5, "section": BLADE},
+            **{"pretwist": [[0.0, 0.3], [10.0, 0.0]], "precone": 0.05},
+        },
+        "motion": _spin_up(5.0, 5.0),
+        "loads": {"tip_force": [[0, 0, 0, 0], [1.0, 0, 0, 30.0]]},
+        "mesh": {"elements": 8},
+        "time": {"end": 8.0, "step": 0.02},
+    },
+}
+
+
+def scene(name: str) -> Scene:
+    """Return one of the scenes; planar ones on 10 elements of degree 3."""
+    return Scene.from_dict({"mesh": {"elements": 10}, **SCENES[name]}, name.replace(" ", "_"))

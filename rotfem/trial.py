@@ -1,0 +1,281 @@
+"""A scene tried out on a coarse mesh with few steps, with any theory and any effects, to see what they change.
+
+The difference of two models depends little on mesh and step as long as both are solved alike: most of the error of
+discretisation is in both. Effects are switched, so each theory is compiled once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from rotfem.affine import PRESTRESS
+from rotfem.equilibrium import check_steady, newton_for, static_tip_shape, steady_state
+from rotfem.errors import ComputationError, SceneError
+from rotfem.hub import HubStepper
+from rotfem.integrators import Scheme, Stepper
+from rotfem.marching import LARGEST_LINEAR_DEFLECTION, fixed_steps
+from rotfem.outputs import HISTORY, MODES, STEADY, Beyond, Bound, Outputs
+from rotfem.pencil import ZERO, Pencil
+from rotfem.scene import PlateMesh, PlateStructure, Scene
+from rotfem.switches import SwitchedSystem
+from rotfem.theories import THEORIES
+
+Array = npt.NDArray[Any]
+
+#: Nodes along a coarse mesh for every wanted mode, and the fewest.
+NODES_A_MODE, FEWEST_NODES = 3, 12
+
+#: Steps in a period of the first and of the second eigenfrequency, and the fewest and most of a history.
+STEPS_A_PERIOD, FEWEST_STEPS, MOST_STEPS = (32, 10), 200, 1500
+
+#: Steps between two samples of a history, tried one after the other.
+FINER = (1, 4, 16)
+
+#: Share of halved steps from which on steps are too long to be trusted.
+HALVED = 0.01
+
+#: Newton stops here: small differences of two solutions are wanted.
+INCREMENT = 1e-12
+
+
+def coarse(scene: Scene) -> Scene:
+    """Return the scene on a mesh just fine enough for its modes, in the rotating frame, solved to round-off."""
+    changes: dict[str, Any] = {
+        "model.frame": "rotating",
+        "model.effects": "auto",
+        "model.tolerance": None,
+        "solver.increment_tolerance": min(INCREMENT, scene.solver.increment_tolerance),
+    }
+    nodes = max(FEWEST_NODES, NODES_A_MODE * scene.modes.count)
+    enough = int(np.ceil(nodes / scene.mesh.degree))
+    if isinstance(scene.mesh, PlateMesh):
+        if isinstance(scene.structure, PlateStructure) and scene.structure.mesh is None:
+            changes["mesh.elements"] = [min(n, enough) for n in scene.mesh.elements]
+    else:
+        changes["mesh.elements"] = min(scene.mesh.elements, enough)
+    return scene.replace(changes)
+
+
+class Trial:
+    """A scene to be tried out.
+
+    Args:
+        scene: validated scene.
+        outputs: which of "history", "steady" and "modes" are wanted; by default all the scene has.
+        speeds: speeds of the modes (rad/s); by default the final one of the scene's motion.
+        comm: MPI communicator.
+
+    Raises:
+        SceneError: the scene has none of the outputs.
+
+    Attributes:
+        effects: all effects the scene has data for.
+        wanted: outputs that are computed.
+        absent: output ↦ why the scene has none.
+        step: distance of the samples of a history, s.
+        finer: steps between two samples.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        outputs: Collection[str] | None = None,
+        speeds: Collection[float] | None = None,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+    ):
+        self.full, self.scene, self.comm = scene, coarse(scene), comm
+        self.newton = newton_for(self.scene)
+        self._systems: dict[str, SwitchedSystem] = {}
+        self._done: dict[tuple[str, frozenset[str]], Outputs] = {}
+        self._released: dict[str, Array] = {}
+        self._bound: Bound | None = None
+        self.finer = FINER[0]
+        self.effects = self.scene.effective_effects()
+        self.absent = self._absent()
+        named = outputs if outputs is not None else (HISTORY, STEADY, MODES)
+        self.wanted = tuple(name for name in named if name not in self.absent)
+        if not self.wanted:
+            scene.check_run()
+            check_steady(scene)
+        first = self.system("consistent_linear")
+        self.speeds = tuple(speeds) if speeds is not None else (self._final_speed(first),)
+        self.at_rest = self._steppable(first)
+        self.step = self._step()
+
+    def theories(self) -> tuple[str, ...]:
+        """Return the theories that this kind of structure has."""
+        return tuple(name for name, theory in THEORIES.items() if hasattr(theory.strains, self.scene.structure.type))
+
+    def outputs(self, theory: str, without: Collection[str] = (), bound: Bound | None = None) -> Outputs:
+        """Return what the scene gives in a theory without some effects; computed once.
+
+        Args:
+            theory: its name.
+            without: effects left out.
+            bound: what not to go beyond; a history that does is given up and counts as failed.
+        """
+        key = theory, frozenset(without)
+        if key not in self._done:
+            self._bound = bound
+            self._done[key] = self._compute(theory, key[1])
+        return self._done[key]
+
+    def system(self, theory: str) -> SwitchedSystem:
+        """Return the compiled system of a theory."""
+        if theory == "linear":
+            theory = "consistent_linear"  # the same without its geometric stiffness
+        if theory not in self._systems:
+            self._systems[theory] = SwitchedSystem(self.scene.replace({"model.theory": theory}), self.comm)
+        return self._systems[theory]
+
+    # --- what there is to compare -----------------------------------------------------------------------------------
+
+    def _absent(self) -> dict[str, str]:
+        scene, out = self.scene, {}
+        if scene.time is None:
+            out[HISTORY] = "the scene has no [time]"
+            try:
+                scene.check_run()
+            except SceneError as error:
+                out[STEADY] = str(error)
+        else:
+            out[STEADY] = "the scene asks for a history"
+        try:
+            check_steady(scene)
+        except SceneError as error:
+            out[MODES] = "gravity turns in the rotating frame, so there is no steady state to vibrate about"
+            out.setdefault(STEADY, str(error))
+        return out
+
+    def _final_speed(self, switched: SwitchedSystem) -> float:
+        end = self.scene.time.end if self.scene.time is not None else 0.0
+        return switched.prescribed.speed(max(end, getattr(self.scene.motion, "duration", 0.0)))
+
+    def _steppable(self, switched: SwitchedSystem) -> Array:
+        """Return the frequencies (rad/s) of the resting structure, its hub held."""
+        switched.leave_out(())
+        system = switched.system
+        system.set_time(0.0, switched.prescribed.at_speed(0.0))
+        pencil = Pencil(*system.mass_damping_stiffness())
+        return np.sort(np.abs(pencil.solve(max(2, self.scene.modes.count)).values))
+
+    def _step(self) -> float:
+        time = self.scene.time
+        if time is None:
+            return 0.0
+        wanted = max(w * n for w, n in zip(self.at_rest, STEPS_A_PERIOD, strict=False)) / (2 * np.pi)
+        steps = int(np.clip(np.ceil(time.end * wanted), FEWEST_STEPS, MOST_STEPS))
+        own = MOST_STEPS if time.step is None else int(np.ceil(time.end / time.step - 1e-9))
+        return time.end / min(steps, own)
+
+    # --- computing it -----------------------------------------------------------------------------------------------
+
+    def _compute(self, theory: str, without: frozenset[str]) -> Outputs:
+        switched, out = self.system(theory), Outputs()
+        without = without | {PRESTRESS} if theory == "linear" else without
+        for name in self.wanted:
+            switched.leave_out(without)
+            try:
+                if name == MODES:
+                    out.values = np.concatenate([self._eigenvalues(switched, speed) for speed in self.speeds])
+                elif name == STEADY:
+                    self._steady(switched, out)
+                else:
+                    self._march(switched, theory, without, out)
+            except ComputationError as error:
+                out.failed[name] = error.what
+        return out
+
+    def _steady(self, switched: SwitchedSystem, out: Outputs) -> None:
+        system = switched.system
+        q = steady_state(system, switched.prescribed.speed(0.0), self.newton)
+        self._sample(switched, [self._tip(switched, q)], out)
+        out.size = system.size(q)
+
+    def _march(self, switched: SwitchedSystem, theory: str, without: frozenset[str], out: Outputs) -> None:
+        """Compute a history, with shorter steps between the samples where a nonlinear model asks for them.
+
+        What one model needs all get from then on, since only histories solved alike can be compared.
+        """
+        for finer in FINER[FINER.index(self.finer) :]:
+            switched.leave_out(without)
+            try:
+                halved = self._march_once(switched, theory, out, finer)
+            except Beyond:
+                raise
+            except ComputationError:
+                if switched.system.linear or finer == FINER[-1]:
+                    raise
+                continue
+            if halved <= HALVED or finer == FINER[-1]:
+                break
+        if finer != self.finer:
+            self.finer = finer
+            self._done.clear()
+
+    def _march_once(self, switched: SwitchedSystem, theory: str, out: Outputs, finer: int) -> float:
+        """Compute a history; return the share of the steps that had to be halved."""
+        assert self.scene.time is not None
+        system, scheme = switched.system, Scheme.of(self.scene)
+        newton = newton_for(self.scene, monotone=True)
+        q = self._start(switched, theory)
+        hub = switched.hub
+        stepper = Stepper(system, scheme, newton) if hub is None else HubStepper(system, hub, scheme, newton)
+        state = stepper.start(0.0, q, np.zeros_like(q))
+        tips, out.size = [self._tip(switched, q)], system.size(q)
+        moved, bound = self._moved(switched), self._bound
+        try:
+            steps = fixed_steps(stepper, state, self.scene.time.end, self.step / finer)
+            for i, new in enumerate(steps, start=1):
+                if i % finer:
+                    continue
+                tips.append(self._tip(switched, new.q))
+                out.size = max(out.size, system.size(new.q))
+                if bound is not None and bound.passed(len(tips) - 1, tips[-1][moved]):
+                    raise Beyond(f"it is beyond the bound from t = {new.t:.4g} s on")
+                if system.linear and not out.size <= LARGEST_LINEAR_DEFLECTION:
+                    raise ComputationError(f"it diverges at t = {new.t:.4g} s")
+        finally:
+            self._sample(switched, tips, out)
+        return stepper.substeps / (finer * len(tips))
+
+    def _start(self, switched: SwitchedSystem, theory: str) -> Array:
+        initial, system = self.scene.initial, switched.system
+        if initial.tip_displacement is not None:
+            if theory not in self._released:
+                self._released[theory] = static_tip_shape(switched.scene, initial.tip_displacement, self.newton)
+            return self._released[theory].copy()
+        if initial.state == "steady":
+            return steady_state(system, switched.prescribed.speed(0.0), self.newton)
+        return np.zeros_like(system.q.x.array)
+
+    def _tip(self, switched: SwitchedSystem, q: Array) -> Array:
+        return np.asarray(switched.model.structure.probe(q))
+
+    def _sample(self, switched: SwitchedSystem, tips: list[Array], out: Outputs) -> None:
+        out.tip = np.array(tips)[:, self._moved(switched)]
+
+    def _moved(self, switched: SwitchedSystem) -> list[int]:
+        return [i for i, name in enumerate(switched.model.structure.components) if name.startswith("u")]
+
+    def _eigenvalues(self, switched: SwitchedSystem, speed: float) -> Array:
+        """Return λ of the wanted modes at a speed, without that of a rigid body."""
+        system, hub, count = switched.system, switched.hub, self.scene.modes.count
+        if self.scene.modes.about == "undeformed" or system.linear:
+            zero = np.zeros_like(system.q.x.array)
+            system.set_time(0.0, switched.prescribed.at_speed(speed))
+            system.set_state(zero, zero, zero)
+        else:
+            steady_state(system, speed, self.newton)
+        matrices = system.mass_damping_stiffness()
+        pencil = Pencil(*matrices)
+        if hub is None:
+            return pencil.solve(count).values[:count]
+        values = Pencil(*hub.bordered(*matrices)).solve(count, pencil.scale()).values
+        flexible = np.abs(values) > ZERO * np.median(np.abs(values))
+        return values[flexible][: count - int(not flexible.all())]

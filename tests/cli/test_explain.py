@@ -1,0 +1,107 @@
+"""`rotfem explain`, and `rotfem run` with a tolerance, as a user calls them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from rotfem.cli import app
+
+SCENE = """\
+[structure]
+type = "planar_beam"
+length = 1.0
+[structure.section]
+EA = 400.0
+GA = 130.0
+EI = 1.0
+mass_per_length = 1.0
+rotary_inertia = 0.0025
+[motion]
+type = "constant"
+speed = 1.0
+[loads]
+tip_force = [0.0, 0.02]
+[mesh]
+elements = 4
+[modes]
+count = 2
+"""
+
+
+class Done(NamedTuple):
+    status: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the working directory, with the scene in it."""
+    (tmp_path / "beam.toml").write_text(SCENE)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def rotfem(folder: Path, capsys: pytest.CaptureFixture[str]) -> Callable[..., Done]:
+    """Return a function that runs `rotfem …` there, in this process."""
+
+    def run(*arguments: str) -> Done:
+        with pytest.raises(SystemExit) as end:
+            app(list(arguments))
+        return Done(int(end.value.code or 0), *capsys.readouterr())
+
+    return run
+
+
+def test_explain_prints_groups_and_a_row_each(folder: Path, rotfem: Callable[..., Done]) -> None:
+    done = rotfem("explain", "beam.toml")
+    assert (done.status, done.err) == (0, "")
+    assert "Ω/ω₁" in done.out and "L/r" in done.out
+    for name in ("without coriolis", "without centrifugal", "without rotary_inertia", "theory consistent_linear"):
+        assert name in done.out
+    assert "no gravity" in done.out and "true" not in done.out
+    assert {f.name for f in (folder / "results" / "beam").iterdir()} == {"explain.json", "explain.png", "summary.json"}
+
+
+def test_check_puts_the_truth_beside_the_estimates(folder: Path, rotfem: Callable[..., Done]) -> None:
+    done = rotfem("explain", "beam.toml", "--check", "--json", "--no-plots", "-o", "out")
+    assert done.status == 0, done.err
+    summary = json.loads(done.out)
+    assert summary["outputs"] == ["steady", "modes"]
+    rows = json.loads((folder / "out" / "explain.json").read_text())["rows"]
+    assert rows == summary["rows"]
+    assert all(set(row["truth"]) == {"steady", "modes"} for row in rows)
+    assert not (folder / "out" / "explain.png").exists()
+    assert rotfem("explain", "beam.toml", "-q", "--no-plots", "-o", "out") == (0, "", "")
+    assert "true" in rotfem("explain", "beam.toml", "--check", "--no-plots").out
+
+
+def test_run_says_what_it_has_chosen(folder: Path, rotfem: Callable[..., Done]) -> None:
+    done = rotfem("run", "beam.toml", "--set", "model.tolerance=0.05", "--no-plots", "-o", "out")
+    assert done.status == 0, done.err
+    assert "chosen in" in done.out and "left out: reissner → consistent_linear" in done.out
+    choice = json.loads((folder / "out" / "summary.json").read_text())["choice"]
+    assert choice["theory"] == "consistent_linear"
+    assert choice["estimated_error"] <= choice["tolerance"] == 0.05
+    assert {"coriolis"} <= {row["name"] for row in choice["dropped"]}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("explain", "missing.toml"), "missing.toml"),
+        (("explain", "beam.toml", "--set", "model.on_exceed=no"), "model.on_exceed"),
+        (("run", "beam.toml", "--set", "model.tolerance=0.1", "--set", "model.effects=[]"), "model.tolerance"),
+        (("explain", "beam.toml", "-o", "beam.toml/out"), "beam.toml/out"),
+    ],
+)
+def test_bad_input(rotfem: Callable[..., Done], arguments: tuple[str, ...], message: str) -> None:
+    done = rotfem(*arguments)
+    assert (done.status, done.out) == (2, "")
+    assert message in done.err and "Traceback" not in done.err

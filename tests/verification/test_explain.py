@@ -1,0 +1,352 @@
+"""Estimates against both models run, choices against their tolerance, and what leaves a model's range."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rotfem
+from rotfem.choice import Choice, choose
+from rotfem.errors import ComputationError, SceneError
+from rotfem.estimate import NOTICEABLE, Estimates
+from rotfem.hub import Hub
+from rotfem.outputs import HISTORY, MODES, STEADY, tip_change
+from rotfem.scene import Scene
+from rotfem.switches import SwitchedSystem
+from rotfem.system import Model, compile_system
+from rotfem.trial import Trial
+
+SPIN_UP: dict[str, Any] = {
+    "structure": {
+        "type": "planar_beam",
+        "length": 10.0,
+        "section": {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4},
+    },
+    "motion": {"type": "spin_up", "speed": 4.0, "duration": 4.0},
+    "mesh": {"elements": 10},
+    "modes": {"count": 3},
+    "time": {"end": 5.0, "step": 0.01},
+}
+
+#: A thick beam with something of every effect that a prescribed motion has.
+ALL: dict[str, Any] = {
+    "structure": {
+        "type": "planar_beam",
+        "length": 1.0,
+        "hub_radius": 0.2,
+        "tip_mass": 0.3,
+        "tip_inertia": 0.01,
+        "section": {"EA": 400.0, "GA": 130.0, "EI": 1.0, "mass_per_length": 1.0, "rotary_inertia": 0.0025},
+        "damping": {"kelvin_voigt": 1e-3, "rayleigh": [0.02, 0.0]},
+    },
+    "motion": {"type": "spin_up", "speed": 1.5, "duration": 3.0, "base_acceleration": [0.1, 0.05]},
+    "loads": {"gravity": [0.0, -0.05]},
+    "mesh": {"elements": 4},
+    "time": {"end": 4.0, "step": 0.01},
+}
+
+
+def scene(tables: dict[str, Any], changes: dict[str, Any] | None = None) -> Scene:
+    return Scene.from_dict(copy.deepcopy(tables)).replace(changes or {})
+
+
+def tip(result: Any) -> Any:
+    return np.stack([v for k, v in result.history.items() if k.startswith("tip_u")], axis=1)
+
+
+# --- switches -------------------------------------------------------------------------------------------------------
+
+
+def state_of(system: Any, t: float) -> Any:
+    """Write a state into a system; return its residual and a tangent times a vector."""
+    rng = np.random.default_rng(3)
+    q, v, a = (size * rng.standard_normal(system.q.x.array.size) * system.scale for size in (1e-2, 1e-1, 1.0))
+    system.set_time(t)
+    system.set_state(q, v, a)
+    residual = system.residual().array.copy()
+    matrix = system.matrix(1.0, 2.0, 3.0, 0.0)
+    x, y = matrix.createVecs()
+    x.array[:] = rng.standard_normal(x.array.size)
+    x.array[system.clamped] = 0.0
+    matrix.mult(x, y)
+    return np.concatenate([residual, y.array])
+
+
+@pytest.mark.parametrize("theory", ["linear", "consistent_linear", "reissner"])
+def test_an_effect_switched_off_is_one_that_is_not_there(theory: str) -> None:
+    """Residual and tangent at a random state are those of the model compiled without it, to rounding."""
+    full = scene(ALL, {"model.theory": theory})
+    switched = SwitchedSystem(full)
+    assert switched.effects == full.effective_effects()
+    assert set(switched.effects) >= {"base", "gravity", "damping", "tip_mass", "rotary_inertia", "euler"}
+    whole = state_of(switched.system, 1.3)
+    for name in switched.effects:
+        rest = tuple(e for e in switched.effects if e != name)
+        expected = state_of(compile_system(Model(full, effects=rest)), 1.3)
+        switched.leave_out({name})
+        found = state_of(switched.system, 1.3)
+        size = np.abs(expected).max()
+        assert np.abs(found - expected).max() < 1e-12 * size  # rounding of sums of up to 1e3 terms
+        assert np.abs(found - whole).max() > 1e-9 * size  # the effect is felt in this state
+    switched.leave_out(())
+    assert np.array_equal(state_of(switched.system, 1.3), whole)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+def test_bodies_beside_the_axis_are_switched_too(theory: str) -> None:
+    """A spatial beam with a tip mass off its axis; each new form takes ten seconds and more to compile."""
+    section = {"EA": 400.0, "GA2": 130.0, "GA3": 130.0, "GJ": 0.8, "EI2": 1.0, "EI3": 2.0, "mass_per_length": 1.0}
+    inertia = {"rotary_inertia2": 2e-3, "rotary_inertia3": 4e-3}
+    tables = {
+        "structure": {
+            **{"type": "spatial_beam", "length": 1.0, "hub_radius": 0.2, "section": section | inertia},
+            **{"tip_mass": 0.3, "tip_inertia": 0.01, "tip_offset": [0.1, 0.05, -0.05]},
+        },
+        "motion": {"type": "spin_up", "speed": 1.5, "duration": 3.0},
+        "model": {"theory": theory},
+        "mesh": {"elements": 2},
+        "time": {"end": 4.0, "step": 0.01},
+    }
+    full = scene(tables)
+    switched = SwitchedSystem(full)
+    for name in ("tip_mass", "rotary_inertia"):
+        rest = tuple(e for e in switched.effects if e != name)
+        expected = state_of(compile_system(Model(full, effects=rest)), 1.3)
+        switched.leave_out({name})
+        size = np.abs(expected).max()
+        assert np.abs(state_of(switched.system, 1.3) - expected).max() < 1e-12 * size  # rounding
+
+
+def test_switches_reach_the_hub() -> None:
+    torque = {"type": "torque", "hub_inertia": 0.5, "pulses": [[0.0, 1.0, 0.2]]}
+    full = scene(ALL, {"motion": torque})
+    switched = SwitchedSystem(full)
+    assert "hub_coupling" in switched.effects
+    for name in ("coriolis", "centrifugal", "euler", "tip_mass", "gravity"):
+        rest = tuple(e for e in switched.effects if e != name)
+        system = compile_system(Model(full, effects=rest))
+        values = []
+        for s, hub in ((system, Hub(system, full.motion, True)), (switched.system, switched.hub)):
+            switched.leave_out({name})
+            hub.values[:] = (0.3, 2.0, 1.0)
+            state_of(s, 0.5)
+            values.append(hub.residual(0.5))
+        assert values[1] == pytest.approx(values[0], rel=1e-12)  # rounding
+    switched.leave_out({"hub_coupling"})
+    assert switched.hub is not None and not switched.hub.coupled
+
+
+# --- estimates ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [pytest.param(SPIN_UP, id="thin"), pytest.param(ALL | {"loads": {}}, id="thick", marks=pytest.mark.slow)],
+)
+def test_estimates_are_within_a_factor_three(tables: dict[str, Any]) -> None:
+    """Every change above 1e-8 (below it, rounding of the two solutions), and none above 1 % is called negligible."""
+    result = rotfem.explain(scene(tables), check=True)
+    compared = 0
+    for row in result.rows:
+        assert set(row["truth"]) == {HISTORY, MODES}
+        for name, truth in row["truth"].items():
+            estimate = row["estimate"][name]
+            if max(truth, estimate) < 1e-8 or min(truth, estimate) == np.inf:
+                continue
+            assert truth / 3 < estimate < 3 * truth, (row["name"], name)
+            compared += 1
+        if max(row["truth"].values()) > NOTICEABLE:
+            assert row["verdict"] != "negligible"
+    assert compared >= 12
+    assert {row["name"] for row in result.rows if row["verdict"] == "large"} >= {"euler"}
+
+
+def test_change_by_a_theory_is_that_of_spectral_histories() -> None:
+    """The tip at t = 7 s of the spin-up to 6 rad/s, from converged Legendre–Galerkin histories of both theories.
+
+    |Δu|/|u| = 0.032756985; the coarse steps of the trial make up the tolerance.
+    """
+    spin_up = scene(SPIN_UP, {"motion.speed": 6.0, "motion.duration": 15.0, "time.end": 20.0})
+    trial = Trial(spin_up, (HISTORY,))
+    estimates = Estimates(trial, "reissner", spin_up.effective_effects())
+    change = estimates.replaced("consistent_linear")
+    times = np.linspace(0.0, 20.0, len(estimates.own.tip))
+    exact, linear = (
+        np.array([np.interp(7.0, times, u) for u in trial.outputs(theory).tip.T])
+        for theory in ("reissner", "consistent_linear")
+    )
+    assert np.linalg.norm(linear - exact) / np.linalg.norm(exact) == pytest.approx(0.032756985, rel=1e-3)
+    assert 0.0327 < change.estimate[HISTORY] < 0.0335  # largest, over the largest |u|: a little before 7 s
+    diverging = estimates.replaced("linear")
+    assert np.isinf(diverging.worst) and diverging.verdict == "large" and "diverges" in diverging.notes[HISTORY]
+
+
+def test_changes_of_frequencies_are_those_of_a_spectral_method() -> None:
+    """L/r = 30 at η = 4 (lag and axial), from Legendre–Galerkin frequencies about the exact and the unstretched state.
+
+    Six elements of degree 3 have the fourth frequency to 1e-5, its change to better than 1e-3.
+    """
+    thick = {"EA": 900.0, "GA": 900.0 / 3.059, "EI": 1.0, "mass_per_length": 1.0, "rotary_inertia": 1 / 900}
+    tables = {
+        "structure": {"type": "planar_beam", "length": 1.0, "section": thick},
+        "motion": {"type": "constant", "speed": 4.0},
+        "modes": {"count": 4},
+    }
+    rows = {row["name"]: row for row in rotfem.explain(tables).rows}
+    exact = np.array([3.76847438954, 22.3489324515, 47.636876692, 55.2636353457])
+    without = np.array([3.81966748471, 22.4044524801, 46.9538176323, 55.2978247828])
+    unstretched = np.array([3.78734752635, 22.4372627458, 47.6372192198, 55.4788584972])
+    for name, other in (("coriolis", without), ("consistent_linear", unstretched)):
+        expected = float(np.max(np.abs(other / exact - 1)))
+        assert rows[name]["estimate"][MODES] == pytest.approx(expected, rel=5e-3), name
+
+
+def test_change_by_damping_is_the_damping_ratio() -> None:
+    """A beam at rest with η: λ = ω(−ζ ± i√(1 − ζ²)), ζ = ηω/2, ω₁ = 3.79773 rad/s less 1.2e-4 by shear."""
+    eta = 2e-3
+    still = scene(SPIN_UP, {"motion": {"type": "constant", "speed": 0.0}, "time": None, "modes.count": 1})
+    damped = still.replace({"structure.damping": {"kelvin_voigt": eta}})
+    estimates = Estimates(Trial(damped, (MODES,)), "reissner", damped.effective_effects())
+    change = estimates.effect("damping").estimate[MODES]
+    assert change == pytest.approx(eta * 3.79773 / 2, rel=3e-4)
+
+
+def test_an_effect_left_out_by_a_list_is_estimated_too() -> None:
+    asked = scene(SPIN_UP, {"model.effects": ["centrifugal", "euler"], "model.theory": "consistent_linear"})
+    rows = {row["name"]: row for row in rotfem.explain(asked).rows}
+    assert not rows["coriolis"]["included"] and rows["euler"]["included"]
+    assert "not in model.effects" in rows["coriolis"]["why"]
+    assert rows["coriolis"]["estimate"][HISTORY] > 0.0
+
+
+def test_groups_of_the_spin_up() -> None:
+    """ω₁ as above; r = √(EI/EA) = 0.02236 m; the largest rate of the spin-up is 2 · speed/duration."""
+    heavy = scene(SPIN_UP, {"structure.tip_mass": 3.0, "structure.hub_radius": 2.0})
+    numbers = rotfem.explain(scene(SPIN_UP)).summary["groups"]
+    assert numbers["speed_ratio"] == pytest.approx(4.0 / 3.79773, rel=3e-4)
+    assert numbers["slenderness"] == pytest.approx(10.0 / np.sqrt(1.4e4 / 2.8e7), rel=1e-12)
+    assert numbers["spin_rate_change"] == pytest.approx(2.0 / 3.79773**2, rel=1e-3)
+    assert "tip_mass_ratio" not in numbers
+    more = rotfem.explain(heavy).summary["groups"]
+    assert more["tip_mass_ratio"] == pytest.approx(0.25, rel=1e-12)
+    assert more["hub_ratio"] == 0.2
+
+
+def test_a_scene_without_any_output_is_refused() -> None:
+    """Gravity turns in the rotating frame, and there is no [time]."""
+    with pytest.raises(SceneError, match="loads.gravity"):
+        rotfem.explain(scene(ALL, {"time": None, "motion": {"type": "constant", "speed": 1.0}}))
+
+
+# --- choice ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("tolerance", "theory"), [(1e-1, "consistent_linear"), (1e-3, "reissner")])
+def test_a_chosen_model_is_within_its_tolerance(tolerance: float, theory: str) -> None:
+    gentle = {"motion.speed": 1.0}
+    full = rotfem.run(scene(SPIN_UP, gentle))
+    result = rotfem.run(scene(SPIN_UP, gentle | {"model.tolerance": tolerance}))
+    choice = result.summary["choice"]
+    assert choice["theory"] == result.summary["theory"] == theory
+    assert tip_change(tip(full), tip(result)) <= choice["estimated_error"] <= tolerance
+    left_out = set(scene(SPIN_UP).effective_effects()) - set(choice["effects"])
+    assert left_out == {row["name"] for row in choice["dropped"] if row["kind"] == "effect"}
+    assert "rotary_inertia" in left_out and "euler" not in left_out
+    assert result.summary["integrals"]["F"] < full.summary["integrals"]["F"]
+    assert result.summary["scene"]["model"]["tolerance"] == tolerance
+
+
+def test_theory_given_is_the_richest() -> None:
+    choice = choose(scene(SPIN_UP, {"model.theory": "consistent_linear", "model.tolerance": 1e-9}), (HISTORY,))
+    assert choice.theory == choice.richest == "consistent_linear"
+    assert choice.full and np.isinf(choice.limit)
+
+
+def test_modes_and_campbell_choose_by_frequency() -> None:
+    """A tolerance of 1e-3 leaves out Coriolis forces (1e-4 of a thin beam's frequencies)."""
+    asked = scene(SPIN_UP, {"model.tolerance": 1e-3})
+    full, chosen = rotfem.modes(scene(SPIN_UP)), rotfem.modes(asked)
+    assert "coriolis" not in chosen.summary["effects"] and chosen.summary["warnings"] == []
+    for a, b in zip(full.rows, chosen.rows, strict=True):
+        assert b["frequency"] == pytest.approx(a["frequency"], rel=1e-3)
+    speeds = [0.0, 2.0, 4.0]
+    diagram, reference = rotfem.campbell(asked, speeds), rotfem.campbell(scene(SPIN_UP), speeds)
+    assert diagram.summary["choice"]["theory"] == "consistent_linear"
+    for label, branch in reference.branches().items():
+        found = diagram.branches()[label]["frequency"]
+        assert found[-1] == pytest.approx(branch["frequency"][-1], rel=1e-3)
+
+
+def test_steady_state_is_chosen_by_its_tip() -> None:
+    still = scene(
+        ALL, {"motion": {"type": "constant", "speed": 1.5}, "loads": {"tip_force": [0.0, 0.05]}, "time": None}
+    )
+    trial = Trial(still)
+    assert trial.wanted == (STEADY, MODES)
+    result = rotfem.run(still.replace({"model.tolerance": 1e-2}))
+    full = rotfem.run(still)
+    assert tip_change(tip(full), tip(result)) < 1e-2
+    assert "coriolis" not in result.summary["effects"]  # nothing moves in the frame
+
+
+# --- what leaves its range ------------------------------------------------------------------------------------------
+
+#: A blow of 4 ms, which the samples of a trial, 12 ms apart, step over.
+BLOW = {
+    "loads": {"tip_force": [[0, 0, 0], [3.001, 0, 0], [3.003, 0, 4000.0], [3.005, 0, 0], [9.0, 0, 0]]},
+    "motion.speed": 0.1,
+    "time": {"end": 4.0, "step": 0.001, "output_every": 10},
+    "model.tolerance": 1e-2,
+}
+
+
+def test_a_run_that_leaves_its_range_starts_again_with_a_richer_model() -> None:
+    result = rotfem.run(scene(SPIN_UP, BLOW))
+    choice = result.summary["choice"]
+    upgrade = choice["upgrades"][0]
+    assert (upgrade["from"], upgrade["to"]) == ("linear", "reissner")
+    assert 3.0 < upgrade["time"] < 3.1
+    assert any(
+        "left the range" in text and "started again with reissner" in text for text in result.summary["warnings"]
+    )
+    full = rotfem.run(scene(SPIN_UP, BLOW | {"model.tolerance": None}))
+    assert np.array_equal(tip(result), tip(full))
+
+
+def test_a_run_that_leaves_its_range_stops_or_warns() -> None:
+    with pytest.raises(ComputationError, match="left the range of its model") as caught:
+        rotfem.run(scene(SPIN_UP, BLOW | {"model.on_exceed": "stop"}))
+    assert caught.value.result.history["t"][-1] < 3.1  # type: ignore[attr-defined]
+    result = rotfem.run(scene(SPIN_UP, BLOW | {"model.on_exceed": "warn"}))
+    assert result.summary["theory"] == "linear" and result.history["t"][-1] == 4.0
+    assert [text for text in result.summary["warnings"] if "left the range" in text]
+
+
+def test_the_next_richer_model_is_the_first_that_holds() -> None:
+    errors = {"linear": 1e-4, "consistent_linear": 1e-6, "reissner": 0.0}
+    everything = ("coriolis", "centrifugal")
+    choice = Choice("linear", (), 1e-3, 3e-4, [], "reissner", everything, errors, size=0.1)
+    assert choice.limit == pytest.approx(0.1 * np.sqrt(10.0))  # 1e-4 (s/0.1)² = 1e-3
+    near, far = choice.richer(0.5, 1.0, "why"), choice.richer(2.0, 1.0, "why")
+    assert (near.theory, near.effects) == ("consistent_linear", everything)
+    assert far.theory == "reissner" and far.full and far.check(1e9) == ""
+
+
+# --- bad input ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"model.effects": ["euler"]}, 'needs effects = "auto"'),
+        ({"model.frame": "inertial"}, 'needs frame = "rotating"'),
+        ({"model.on_exceed": "ignore"}, "model.on_exceed"),
+    ],
+)
+def test_a_tolerance_that_cannot_be_kept_is_refused(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(SceneError, match=message):
+        scene(SPIN_UP, {"model.tolerance": 1e-2} | changes)
