@@ -29,6 +29,9 @@ def _spin_up(speed: float, duration: float) -> dict[str, Any]:
     return {"type": "spin_up", "speed": speed, "duration": duration}
 
 
+#: Plates: a thin one that bends out of its plane, a thick one that spins about its normal.
+PLATE = {"type": "plate", "length": 1.0, "width": 0.5, "E": 70e9, "nu": 0.3, "rho": 2700.0}
+
 SCENES: dict[str, dict[str, Any]] = {
     "spin-up": {
         "structure": _beam(10.0, THIN),
@@ -107,9 +110,21 @@ SCENES: dict[str, dict[str, Any]] = {
         "mesh": {"elements": 8},
         "time": {"end": 8.0, "step": 0.02},
     },
+    "plate, spin-up": {
+        "structure": {**PLATE, "thickness": 0.01, "hub_radius": 0.3, "point_masses": [[1.0, 0.0, 2.0]]},
+        "motion": {**_spin_up(40.0, 0.5), "axis": [0, 1, 0]},
+        "mesh": {"elements": [6, 3]},
+        "time": {"end": 0.8, "step": 0.002},
+    },
+    "thick plate, steady": {
+        "structure": {**PLATE, "thickness": 0.08, "hub_radius": 1.0},
+        "motion": {"type": "constant", "speed": 150.0, "axis": [0.3, 0, 1]},
+        "loads": {"tip_force": [0, 0, 2.0e4]},
+        "mesh": {"elements": [6, 3]},
+    },
 }
 
 
 def scene(name: str) -> Scene:
-    """Return one of the scenes; planar ones on 10 elements of degree 3."""
+    """Return one of the scenes; beams on 10 elements of degree 3 where they do not say."""
     return Scene.from_dict({"mesh": {"elements": 10}, **SCENES[name]}, name.replace(" ", "_"))

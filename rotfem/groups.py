@@ -21,7 +21,7 @@ MEANING = {
     "hub_ratio": "R/L, hub radius to length",
     "spin_rate_change": "largest |dΩ/dt|/ω₁²",
     "damping": "ζ, damping ratio of the first mode",
-    "tip_mass_ratio": "tip mass/mass of the structure",
+    "tip_mass_ratio": "tip (or other added) mass/mass of the structure",
     "steps_per_period": "steps in a period of the fastest wanted mode",
 }
 
@@ -54,7 +54,7 @@ def groups(scene: Scene, trial: Trial, own: Outputs) -> dict[str, float]:
     if len(own.values) and not structure.damping.is_zero:
         out["damping"] = float(-own.values[0].real / abs(own.values[0]))
     if structure.has_tip_mass:
-        out["tip_mass_ratio"] = getattr(structure, "tip_mass", 0.0) / _mass(switched)
+        out["tip_mass_ratio"] = _mass(switched, "tip_mass") / _mass(switched) - 1.0
     if scene.time is not None and scene.time.step is not None:
         fastest = float(np.abs(own.values).max()) if len(own.values) else float(trial.at_rest[-1])
         out["steps_per_period"] = 2 * np.pi / fastest / scene.time.step
@@ -91,8 +91,8 @@ def _radius(structure: Any) -> float | None:
     return float(np.sqrt(min(float(b[0]) for b in bending) / float(at["EA"][0]))) if bending else None
 
 
-def _mass(switched: SwitchedSystem) -> float:
-    """Return the mass of the structure without what is at its tip, kg."""
-    bodies = [b for b in switched.model.structure.bodies(()) if b.is_position]
+def _mass(switched: SwitchedSystem, *effects: str) -> float:
+    """Return the mass of the structure, with the masses of an effect or without, kg."""
+    bodies = [b for b in switched.model.structure.bodies(effects) if b.is_position]
     local = sum(float(fem.assemble_scalar(fem.form(b.density * b.measure))) for b in bodies)
     return float(switched.model.comm.allreduce(local))
