@@ -16,6 +16,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rotfem.affine import AffineSystem
+from rotfem.errors import ComputationError
 from rotfem.modes import ModalAnalysis, Spinning
 from rotfem.pencil import Eigenpairs, Pencil
 
@@ -36,6 +37,34 @@ def worth_while(analysis: ModalAnalysis, speeds: Sequence[float]) -> bool:
     """Return whether a basis is possible (a linear theory, a fixed hub) and saves time."""
     possible = isinstance(analysis.system, AffineSystem) and analysis.hub is None
     return possible and analysis.system.A.getSize()[0] >= LARGE and len(speeds) >= MANY
+
+
+class SmallPencil(Pencil):
+    """A pencil of so few unknowns that all its eigenvalues are computed; double ones, as of a disk, do no harm then."""
+
+    def _right(self, M: Any, C: Any, K: Any, count: int, target: float) -> tuple[Array, Array, Array]:
+        """Return (λ, x, backward error) of the pairs nearest to the target, by LAPACK from the linear form in 1/λ'.
+
+        With λ = target + λ', the least λ' are the largest eigenvalues, so the stiff directions of the basis do not
+        spoil them.
+        """
+        m, c, k = (A.getValues(range(A.getSize()[0]), range(A.getSize()[1])) for A in (M, C, K))
+        n = len(k)
+        unit = np.sqrt(max(float(np.trace(k)) / max(float(np.trace(m)), 1e-300), 1e-300))
+        shifted = [k + target * c + target**2 * m, unit * (c + 2 * target * m), unit**2 * m]
+        try:
+            right_side = np.linalg.solve(shifted[0], np.hstack(shifted[1:]))
+        except np.linalg.LinAlgError:
+            raise ComputationError("the stiffness matrix is singular", advice="a slightly different speed") from None
+        nu, vectors = np.linalg.eig(np.vstack([-right_side, np.eye(n, 2 * n)]))
+        order = np.argsort(-np.abs(nu), kind="stable")[: min(2 * count + 2, 2 * n - 2)]
+        values = target + unit / nu[order]
+        x = vectors[n:, order]
+        x = x / np.linalg.norm(x, axis=0)
+        sizes = np.array([np.linalg.norm(a) for a in (k, c, m)])
+        powers = np.array([np.ones_like(values), values, values**2])
+        residual = np.linalg.norm((k @ x) * powers[0] + (c @ x) * powers[1] + (m @ x) * powers[2], axis=0)
+        return values, x, residual / (sizes @ np.abs(powers))
 
 
 class ReducedAnalysis(ModalAnalysis):
@@ -133,7 +162,7 @@ class ReducedAnalysis(ModalAnalysis):
         small = {kind: np.zeros((self.V.shape[1],) * 2) for kind in "MCK"}
         for ci, (p, matrix) in zip(c, self._pieces, strict=True):
             small[p.kind] += ci * matrix
-        pencil = Pencil(*(PETSc.Mat().createAIJ(m.shape, csr=_csr(m), comm=MPI.COMM_SELF) for m in small.values()))
+        pencil = SmallPencil(*(PETSc.Mat().createAIJ(m.shape, csr=_csr(m), comm=MPI.COMM_SELF) for m in small.values()))
         pairs = pencil.solve(min(count, self.V.shape[1] - 1))
         pairs.errors = self._backward_errors(pairs, c)
         pencil.owner = self
