@@ -44,9 +44,8 @@ def main(figure: Path | None = None) -> float:
         histories[theory] = result.history
     for theory, peak in peaks.items():  # of the linear theory, where it has come to at the end
         say(f"{theory:18s} min u3 at the tip {peak:.6f} m, {100 * (peak / peaks['reissner'] - 1):+.3f} % of reissner")
-    say(
-        f"the beam of spin_up.toml at the same step: {beam:.6f} m, the plate {peaks['reissner'] - beam:+.1e} m beside it"
-    )
+    off = peaks["reissner"] - beam
+    say(f"the beam of spin_up.toml at the same step: {beam:.6f} m, the plate {off:+.1e} m beside it")
     report("reissner, min u3 at the tip", peaks["reissner"], REFERENCE, "m")
     if figure is not None and FIRST_RANK:
         plot(histories, figure)

@@ -17,7 +17,7 @@ from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms import expand_derivatives
 
-from rotfem import compat
+from rotfem import compat, jit
 from rotfem.effects import ACCELERATIONS
 from rotfem.motion import Motion
 from rotfem.solvers import DirectSolver, combine
@@ -62,7 +62,7 @@ class AffineSystem(System):
         F = model.residual
         union = sum(ufl.derivative(F, x, du) for x in (self.q, self.v, self.a))
         self.integrals = {"F": integral_count(F), "J": 0}
-        pattern = fem.form(union)
+        pattern = jit.form(union)
         self.A = fem_petsc.create_matrix(pattern)
         fem_petsc.assemble_matrix(self.A, pattern, self.bcs)
         self.A.assemble()
@@ -135,7 +135,7 @@ class AffineSystem(System):
         ):
             if expand_derivatives(form).empty():
                 continue
-            compiled = fem.form(form)
+            compiled = jit.form(form)
             started = perf_counter()
             self.integrals["J"] += 0 if kind == "f" else len(expand_derivatives(form).integrals())
             for key in self._keys(name):
@@ -187,7 +187,7 @@ class AffineSystem(System):
                 force = first.force(ufl.replace(first.value, {self.q: q0}))
                 curvature = ufl.derivative(ufl.derivative(higher.value, self.q, self.structure.k.dq), self.q, du)
                 form += ufl.inner(force, curvature) * higher.measure
-        compiled = fem.form(form)
+        compiled = jit.form(form)
         self.integrals["J"] += len(expand_derivatives(form).integrals())
         started = perf_counter()
         for piece in [p for p in self.pieces if p.kind == "f"]:

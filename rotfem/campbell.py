@@ -49,6 +49,9 @@ SURE, AMBIGUOUS = 0.9, 0.5
 #: Correlation below which two modes have nothing in common: the branch is lost, not joined to a stranger.
 STRANGER = 0.02
 
+#: Relative distance of eigenvalues below which they are taken for one, as those of a disk at rest.
+TWIN = 1e-6
+
 #: Smallest refined step as a part of the speed range: a veering narrower than this passes as a crossing.
 FINEST = 1e-5
 
@@ -81,19 +84,35 @@ class Node:
         return complex(self.spinning.pairs.values[column]) if column >= 0 else complex(np.nan, np.nan)
 
 
-def correlation(a: Spinning, b: Spinning) -> Array:
-    """Return |y_i^H [(λ_i + μ_j) M + C] x_j|², shape (m_a, m_b), scaled to 1 for equal modes, 0 for different ones.
+def correlation(a: Spinning, b: Spinning) -> tuple[Array, Array]:
+    """Return the squared correlations of the modes at two speeds, shape (m_a, m_b): 1 for equal modes, 0 for different.
 
-    Both pencils serve in turn and the mean is taken, so the two speeds are treated alike.
+    That of two modes is |y_i^H [(λ_i + μ_j) M + C] x_j|², scaled. Both pencils serve in turn and the mean is taken, so
+    the two speeds are treated alike. The second array is this. In the first, modes with one frequency are not told
+    apart, for any combination of them is a mode, too: what counts is how much of the other is in the space they span,
+    the trace of the product of both projections by the smaller dimension.
     """
     ya, yb, xa, xb = a.pairs.left, b.pairs.left, a.pairs.right, b.pairs.right
     la, lb = a.pairs.values, b.pairs.values
     here, there = a.pencil.gram(ya, la, xb, lb), b.pencil.gram(yb, lb, xa, la)
-    own_a, own_b = np.diag(a.pencil.gram(ya, la, xa, la)), np.diag(b.pencil.gram(yb, lb, xb, lb))
-    size_a, size_b = np.abs(own_a), np.abs(own_b)
-    scale = np.sqrt(np.outer(np.maximum(size_a, 1e-300), np.maximum(size_b, 1e-300)))
+    own_a, own_b = a.pencil.gram(ya, la, xa, la), b.pencil.gram(yb, lb, xb, lb)
     # The two products cancel the unknown scaling of x_b and y_b against each other.
-    return np.asarray(np.abs(here) * np.abs(there.T) / scale**2)
+    scale = np.outer(*(np.maximum(np.abs(np.diag(own)), 1e-300) for own in (own_a, own_b)))
+    single = np.abs(here) * np.abs(there.T) / scale
+    joint = single.copy()
+    for i in twins(la):
+        for j in twins(lb):
+            if len(i) > 1 or len(j) > 1:
+                part_a, part_b = np.linalg.pinv(own_a[np.ix_(i, i)]), np.linalg.pinv(own_b[np.ix_(j, j)])
+                product = part_a @ here[np.ix_(i, j)] @ part_b @ there[np.ix_(j, i)]
+                joint[np.ix_(i, j)] = abs(np.trace(product)) / min(len(i), len(j))
+    return joint, single
+
+
+def twins(values: Array) -> list[Array]:
+    """Return the indices of eigenvalues (sorted by size) in groups of those that are one, but for TWIN."""
+    apart = np.abs(np.diff(values)) > TWIN * np.abs(values[1:])
+    return np.split(np.arange(len(values)), np.flatnonzero(apart) + 1)
 
 
 def assign(node: Node, following: Node) -> float:
@@ -102,8 +121,8 @@ def assign(node: Node, following: Node) -> float:
     A branch whose best partner is a stranger has the order −1 from there on.
     """
     known = np.flatnonzero(node.order >= 0)
-    c = np.clip(correlation(node.spinning, following.spinning)[node.order[known]], 0.0, 1.0)
-    rows, columns = linear_sum_assignment(-c)
+    c, single = (np.clip(x[node.order[known]], 0.0, 1.0) for x in correlation(node.spinning, following.spinning))
+    rows, columns = linear_sum_assignment(-c - 1e-3 * single)
     following.order = np.full(len(node.order), -1)
     following.confidence = np.zeros(len(node.order))
     following.confidence[known[rows]] = c[rows, columns]

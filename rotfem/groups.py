@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 
+from rotfem import jit
 from rotfem.outputs import Outputs
 from rotfem.scene import Scene, TorqueMotion
 from rotfem.switches import SwitchedSystem
@@ -94,5 +95,5 @@ def _radius(structure: Any) -> float | None:
 def _mass(switched: SwitchedSystem, *effects: str) -> float:
     """Return the mass of the structure, with the masses of an effect or without, kg."""
     bodies = [b for b in switched.model.structure.bodies(effects) if b.is_position]
-    local = sum(float(fem.assemble_scalar(fem.form(b.density * b.measure))) for b in bodies)
+    local = sum(float(fem.assemble_scalar(jit.form(b.density * b.measure))) for b in bodies)
     return float(switched.model.comm.allreduce(local))

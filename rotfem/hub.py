@@ -22,7 +22,7 @@ from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 from ufl.algorithms import expand_derivatives
 
-from rotfem import compat
+from rotfem import compat, jit
 from rotfem.affine import AffineSystem
 from rotfem.effects import ACCELERATIONS
 from rotfem.errors import ComputationError
@@ -129,21 +129,21 @@ class Hub:
         for load in model.applied:
             turn = load.turn(e)
             h -= ufl.inner(load.force, turn) * load.measure
-        self._h = fem.form(h)
+        self._h = jit.form(h)
         momentum = sum(
             b.density
             * ufl.inner(ufl.cross(b.resolve(e), b.x), b.rate(k) + ufl.cross(b.resolve(frame.w), b.x))
             * b.measure
             for b in model.bodies
         )
-        self._momentum = fem.form(momentum)
+        self._momentum = jit.form(momentum)
         s = system.structure.constant(0.0)
         spin, rate = ufl.variable(s), ufl.variable(s)
         self._dh = [self._by_spin(h, name, variable) for name, variable in (("w", spin), ("dw", rate))]
         shifts = [system.structure.constant(0.0) for _ in range(3)]
         self._shifts = shifts
         row = sum(c * ufl.derivative(h, x, k.dq) for c, x in zip(shifts, (k.q, k.v, k.a), strict=True))
-        self._row = fem.form(row)
+        self._row = jit.form(row)
         if not isinstance(system, AffineSystem):
             F = model.residual
             self._dF = [self._by_spin(F, name, variable) for name, variable in (("w", spin), ("dw", rate))]
@@ -157,7 +157,7 @@ class Hub:
         axis = self.system.motion.axis[-constant.value.size :]
         shifted = ufl.as_vector([constant[i] + s * float(e) for i, e in enumerate(axis)])
         derivative = expand_derivatives(ufl.diff(ufl.replace(form, {constant: shifted}), s))
-        return None if derivative.empty() else fem.form(derivative)
+        return None if derivative.empty() else jit.form(derivative)
 
     # --- the hub equation at the state written into the system --------------------------------------------------------
 

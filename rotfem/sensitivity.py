@@ -21,7 +21,7 @@ from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms import expand_derivatives
 
-from rotfem import compat
+from rotfem import compat, jit
 from rotfem.affine import AffineSystem
 from rotfem.modes import ModalAnalysis, Spinning
 from rotfem.solvers import DirectSolver
@@ -196,7 +196,7 @@ class Sensitivity:
         for p in parameters:
             equations[p.name] = self._compiled_diff(self.equation, p, variable)
             pencils[p.name] = self._compiled_diff(self.s, p, variable)
-        gradient = fem.form(ufl.derivative(self.s, self.base))
+        gradient = jit.form(ufl.derivative(self.s, self.base))
         system = self.system
         zero = np.zeros_like(self.base_state)
         system.set_time(0.0, system.motion.at_speed(self.spinning.speed))
@@ -223,7 +223,7 @@ class Sensitivity:
 
     def _compiled_diff(self, form: Any, parameter: Parameter, variable: Any) -> Any:
         derivative = expand_derivatives(ufl.diff(self._shifted(form, parameter, variable), variable))
-        return None if derivative.empty() else fem.form(derivative)
+        return None if derivative.empty() else jit.form(derivative)
 
     def _base_tangent(self) -> Any:
         """Return K_Rᵀ of the base equation, clamped rows 1."""

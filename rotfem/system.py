@@ -16,7 +16,7 @@ from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from ufl.algorithms import expand_derivatives
 
-from rotfem import compat
+from rotfem import compat, jit
 from rotfem.effects import ACCELERATIONS, damping, load_work, virtual_work
 from rotfem.motion import IDENTITY, Frame, Motion, motion_of
 from rotfem.scene import Scene
@@ -87,7 +87,7 @@ class Model:
         mesh = self.structure.mesh
         if self._stretch is None:
             points = quadrature_points(mesh, self.structure.V.element.basix_element.degree)
-            self._stretch = fem.Expression(self.structure.stretch(self.strains), points)
+            self._stretch = jit.expression(self.structure.stretch(self.strains), points, self.comm)
         cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local)
         lowest = float(self._stretch.eval(mesh, cells).min()) if len(cells) else 1.0
         return self.comm.allreduce(lowest, op=MPI.MIN) <= 0.0
@@ -153,7 +153,7 @@ class System:
         self._shift_values: tuple[float, ...] = (1.0, 0.0, 1.0)
         self._shifts = [self.structure.constant(c) for c in self._shift_values]
         self.clamp = TurningClamp(self.structure, self.motion) if model.fixed else None
-        self._energies = {name: fem.form(form) for name, form in model.energies().items()}
+        self._energies = {name: jit.form(form) for name, form in model.energies().items()}
         self._b = la.vector(self.V.dofmap.index_map, self.V.dofmap.index_map_bs)
         self._b_array = self._b.array
         self.b = compat.wrap(self._b)
@@ -164,7 +164,7 @@ class System:
         parts = (ufl.derivative(F, x, du) for x in (self.q, self.v, self.a))
         J = sum(c * form for c, form in zip(self._shifts, parts, strict=True))
         self.integrals = {"F": integral_count(F), "J": integral_count(J)}
-        self._F, self._J = fem.form(F), fem.form(J)
+        self._F, self._J = jit.form(F), jit.form(J)
         self.A = fem_petsc.create_matrix(self._J)
 
     def set_state(self, q: Array, v: Array, a: Array) -> None:

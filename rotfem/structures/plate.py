@@ -17,6 +17,7 @@ from dolfinx import fem
 from mpi4py import MPI
 from scipy.spatial import Delaunay
 
+from rotfem import jit
 from rotfem.errors import ComputationError, SceneError
 from rotfem.kinematics import AppliedLoad, Body, Strain
 from rotfem.plate_kinematics import PlateGradients, director, triad
@@ -256,7 +257,7 @@ class Plate(Structure):
         if name == "distributed":
             return load
         if "tip_length" not in self.scalars:
-            here = fem.assemble_scalar(fem.form(self.constant(1.0) * self.tip))
+            here = fem.assemble_scalar(jit.form(self.constant(1.0) * self.tip))
             self.scalar("tip_length", self.comm.allreduce(float(here)))
         return load / self.scalars["tip_length"]
 
