@@ -31,8 +31,9 @@ from rotfem.cost_record import Measurement, Record, fingerprint
 from rotfem.cost_reference import Reference, reference
 from rotfem.cost_result import CostResult
 from rotfem.errors import ComputationError, SceneError
-from rotfem.scene import Scene
-from rotfem.simulation import Progress, as_scene, versions
+from rotfem.scene import Scene, as_scene
+from rotfem.simulation import Progress
+from rotfem.version import versions
 
 #: Name of the file that keeps what has been measured.
 RECORD = "cost.jsonl"

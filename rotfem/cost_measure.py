@@ -15,7 +15,8 @@ from rotfem.cost_record import Measurement
 from rotfem.cost_reference import Samples
 from rotfem.equilibrium import check_steady
 from rotfem.errors import ComputationError, SceneError
-from rotfem.modes import ModalAnalysis, final_speed
+from rotfem.modal import ModalAnalysis
+from rotfem.modes import final_speed
 from rotfem.scene import Scene
 from rotfem.simulation import Simulation
 

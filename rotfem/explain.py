@@ -17,9 +17,10 @@ from rotfem.groups import MEANING, groups
 from rotfem.modes import modes
 from rotfem.outputs import HISTORY, MODES, STEADY, Outputs, change, notes, outputs_of
 from rotfem.results import ExplainResult
-from rotfem.scene import EFFECTS, Scene
-from rotfem.simulation import Progress, as_scene, run, versions
+from rotfem.scene import EFFECTS, Scene, as_scene
+from rotfem.simulation import Progress, run
 from rotfem.trial import INCREMENT, Trial
+from rotfem.version import versions
 
 #: Why an effect is in the full model; the scene reference has the same list.
 REASONS = {

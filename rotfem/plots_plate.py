@@ -119,7 +119,7 @@ def animate(result: ModesResult, mode: int, folder: Path) -> list[Path]:
     moving[name] = z[:, ["u1", "u2", "u3"].index(name)].real
     plotter.add_mesh(moving, scalars=name, cmap="RdBu_r", clim=(-peak, peak), scalar_bar_args=bar)
     plotter.add_text(title, font_size=10)
-    plotter.show_bounds(grid="back", xtitle="x (m)", ytitle="y (m)", ztitle="", font_size=9, show_zlabels=False)
+    plotter.show_bounds(grid="back", xtitle="x (m)", ytitle="y (m)", ztitle=" ", font_size=9, show_zlabels=False)
     moving.points = rest + scale * z.real
     plotter.camera_position = [(1.6 * size, -1.8 * size, 1.3 * size), mesh.center, (0, 0, 1)]
     plotter.reset_camera(bounds=np.array(mesh.bounds) + WARP * size * np.array([-1, 1] * 3))

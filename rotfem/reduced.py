@@ -17,7 +17,7 @@ from petsc4py import PETSc
 
 from rotfem.affine import AffineSystem
 from rotfem.errors import ComputationError
-from rotfem.modes import ModalAnalysis, Spinning
+from rotfem.modal import ModalAnalysis, Spinning
 from rotfem.pencil import Eigenpairs, Pencil
 
 Array = npt.NDArray[Any]

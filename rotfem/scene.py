@@ -265,6 +265,13 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
     return Scene._validate(tables, path.stem, path.name, str(path.parent))
 
 
+def as_scene(scene: Scene | str | Path | Mapping[str, Any]) -> Scene:
+    """Returns a validated scene from a scene, the path of a file or nested tables."""
+    if isinstance(scene, Scene):
+        return scene
+    return Scene.from_dict(scene) if isinstance(scene, Mapping) else load_scene(scene)
+
+
 def _plain(value: Any) -> Any:
     if isinstance(value, BaseModel):
         fields = {name: getattr(value, name) for name in type(value).model_fields}

@@ -23,7 +23,7 @@ from ufl.algorithms import expand_derivatives
 
 from rotfem import compat, jit
 from rotfem.affine import AffineSystem
-from rotfem.modes import ModalAnalysis, Spinning
+from rotfem.modal import ModalAnalysis, Spinning
 from rotfem.solvers import DirectSolver
 
 Array = npt.NDArray[Any]

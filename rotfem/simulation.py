@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Callable, Iterator, Mapping
-from importlib import metadata
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -19,28 +17,22 @@ from rotfem.choice import Choice, RangeExceeded, choose
 from rotfem.equilibrium import check_steady, critical_speed, newton_for, static_tip_shape, steady_state
 from rotfem.errors import ComputationError
 from rotfem.fields import Snapshots, writer
+from rotfem.figures import figures
 from rotfem.hub import Hub, HubStepper
 from rotfem.integrators import Scheme, State, Stepper
 from rotfem.marching import LARGEST_LINEAR_DEFLECTION, fixed_steps
 from rotfem.outputs import HISTORY, STEADY
 from rotfem.results import RunResult, Table
-from rotfem.scene import Scene, TorqueMotion, load_scene
+from rotfem.scene import Scene, TorqueMotion, as_scene
 from rotfem.solvers import Newton
 from rotfem.system import Model, System, compile_system
-from rotfem.version import __version__
+from rotfem.version import versions
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[float], None]
 
 #: Adaptive steps: safety factor, bounds of a change, changes not worth a new factorisation, smallest relative scale.
 SAFETY, SHRINK, GROW, KEEP, FLOOR = 0.9, 0.2, 2.0, (0.95, 1.3), 1e-6
-
-
-def as_scene(scene: Scene | str | Path | Mapping[str, Any]) -> Scene:
-    """Return a validated scene from a scene, the path of a file or nested tables."""
-    if isinstance(scene, Scene):
-        return scene
-    return Scene.from_dict(scene) if isinstance(scene, Mapping) else load_scene(scene)
 
 
 def run(
@@ -373,46 +365,3 @@ def upgrade_warnings(choice: Choice) -> list[str]:
         f"started again with {note['to']} and all effects"
         for note in choice.upgrades
     ]
-
-
-def figures(history: dict[str, Array]) -> dict[str, float]:
-    """Return the figures of merit of a history: extremes of the tip with their times, final values, Jacobi drift.
-
-    Extremes inside the history are those of the parabola through three neighbouring samples.
-    """
-    out: dict[str, float] = {}
-    t = history["t"]
-    if len(t) == 0:
-        return out
-    for name in [n for n in history if n.startswith("tip_")]:
-        out[f"{name}_final"] = history[name][-1]
-        if len(t) > 1:
-            out[f"{name}_min_time"], out[f"{name}_min"] = extreme(t, history[name], -1)
-            out[f"{name}_max_time"], out[f"{name}_max"] = extreme(t, history[name], 1)
-    if len(t) > 1:
-        scale = max(float(np.max(np.abs(history["kinetic"]))), float(np.max(np.abs(history["strain"]))), 1e-300)
-        out["jacobi_change"] = (history["jacobi"][-1] - history["jacobi"][0]) / scale
-    return {key: float(value) for key, value in out.items()}
-
-
-def extreme(t: Array, y: Array, sign: int) -> tuple[float, float]:
-    """Return (time, value) of the largest sign·y, by a parabola through the largest sample and its neighbours."""
-    i = int(np.argmax(sign * y))
-    if i in (0, len(y) - 1):
-        return float(t[i]), float(y[i])
-    c = np.polyfit(t[i - 1 : i + 2] - t[i], y[i - 1 : i + 2], 2)
-    if c[0] * sign >= 0:
-        return float(t[i]), float(y[i])
-    s = -c[1] / (2 * c[0])
-    return float(t[i] + s), float(np.polyval(c, s))
-
-
-def versions() -> dict[str, str]:
-    """Return the versions of the program and of what it computes with."""
-    out = {"rotfem": __version__, "python": platform.python_version()}
-    for name in ("fenics-dolfinx", "fenics-ufl", "petsc4py", "slepc4py", "numpy", "scipy"):
-        try:
-            out[name.removeprefix("fenics-")] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
-    return out

@@ -16,7 +16,7 @@ from scipy.io import mmwrite
 from scipy.sparse import csr_array, save_npz
 
 from rotfem.errors import OutputError, SceneError
-from rotfem.modes import ModalAnalysis, Spinning
+from rotfem.modal import ModalAnalysis, Spinning
 from rotfem.solvers import DirectSolver, Increment
 
 Array = npt.NDArray[Any]

@@ -28,12 +28,13 @@ LEVELS: tuple[tuple[str, ...], ...] = (
         "scene_structure",
         "results",
     ),
-    ("plots", "plots_explain", "plots_plate", "cost_grid", "cost_reference", "cost_tuned", "advice"),
+    ("plots", "plots_explain", "plots_plate", "cost_grid", "cost_reference", "cost_tuned", "advice", "figures"),
     ("cost_record", "cost_front"),
-    ("cost_result", "cost_report"),
+    ("cost_result", "cost_report", "reports"),
     ("plots_cost",),
+    ("session",),
     # FEniCSx from here on
-    ("compat", "kinematics", "motion", "plate_kinematics", "rotations"),
+    ("compat", "jit", "kinematics", "motion", "plate_kinematics", "rotations"),
     ("fields", "solvers", "theories", "theories.*", "effects", "structures", "structures.*"),
     ("system", "affine"),
     ("equilibrium", "integrators", "pencil"),
@@ -43,14 +44,15 @@ LEVELS: tuple[tuple[str, ...], ...] = (
     ("estimate",),
     ("choice",),
     ("simulation",),
-    ("modes", "sensitivity", "state_space"),
-    ("reduced",),
+    ("modal",),
+    ("reduced", "self_checks", "sensitivity", "state_space", "tracking"),
+    ("modes",),
     ("campbell", "cost_measure", "groups"),
     ("cost", "explain"),
     ("cli", "", "__main__"),
 )
 #: Number of levels that hold no FEniCSx.
-LIGHT = 7
+LIGHT = 8
 FENICSX = {"dolfinx", "ufl", "basix", "ffcx", "petsc4py", "slepc4py"}
 
 MODULES = {

@@ -12,9 +12,10 @@ import numpy.typing as npt
 import pytest
 
 from rotfem import SceneError, campbell, modes
-from rotfem.campbell import AMBIGUOUS, SURE, parse_speeds
+from rotfem.campbell import parse_speeds
 from rotfem.plots import plot
 from rotfem.results import CampbellResult
+from rotfem.tracking import AMBIGUOUS, SURE
 
 Array = npt.NDArray[np.float64]
 

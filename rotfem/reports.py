@@ -1,0 +1,95 @@
+"""What the commands print of their results, as lines of text; `cost` has cost_report.py."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+
+def run_report(summary: dict[str, Any], folder: Path) -> list[str]:
+    """Return the lines a run prints."""
+    f, time = summary["figures"], summary["timings"]
+    lines = [
+        f"{summary['name']}: {summary['theory']}, {summary['frame']} frame, {summary['elements']} elements, "
+        f"{summary['dofs']} dofs",
+        f"effects: {', '.join(summary['effects']) or 'none'} "
+        f"({summary['integrals']['F']} integrals in F, {summary['integrals']['J']} in J)",
+    ]
+    lines += choice_report(summary)
+    if summary["kind"] == "history":
+        lines.append(
+            f"{summary['steps']} steps, {summary['newton_iterations']} iterations in {time['total']:.2f} s "
+            f"(compile {time['compile']:.2f}, assemble {time['assemble']:.2f}, solve {time['solve']:.2f})"
+        )
+        for name in ("tip_u1", "tip_u2", "tip_u3"):
+            if f"{name}_min" in f:
+                low, high = (f"{f[f'{name}_{w}']:.6g} m at t = {f[f'{name}_{w}_time']:.4f} s" for w in ("min", "max"))
+                lines.append(f"{name.replace('_', ' ')}: {low} … {high}, at the end {f[f'{name}_final']:.6g} m")
+    else:
+        finals = {k.removesuffix("_final").replace("_", " "): v for k, v in f.items() if k.endswith("_final")}
+        values = (f"{name} = {value:.6g}" for name, value in finals.items())
+        lines.append(f"steady state in {time['total']:.2f} s: {', '.join(values)}")
+    return [*lines, f"results in {folder}"]
+
+
+def modes_report(summary: dict[str, Any], folder: Path) -> list[str]:
+    """Return the lines `modes` prints: a table."""
+    lines = [
+        f"{summary['name']}: {summary['theory']} about the {summary['about']} state at {summary['speed']:g} rad/s, "
+        f"{summary['dofs']} dofs, in {summary['timings']['total']:.2f} s",
+        f"effects: {', '.join(summary['effects']) or 'none'}",
+        *choice_report(summary),
+        f"{'mode':>4}  {'label':<16}{'rad/s':>14}{'Hz':>12}{'damping':>12}{'error':>10}",
+    ]
+    for row in summary["modes"]:
+        lines.append(
+            f"{row['mode']:>4}  {row['label']:<16}{row['frequency']:>14.6f}{row['frequency_hz']:>12.6f}"
+            f"{row['damping']:>12.3e}{row['residual']:>10.1e}"
+        )
+    return [*lines, f"results in {folder}"]
+
+
+def campbell_report(summary: dict[str, Any], folder: Path) -> list[str]:
+    """Return the lines `campbell` prints: branches and critical speeds."""
+    lines = [
+        f"{summary['name']}: {summary['theory']}, {summary['speeds']} speeds ({summary['speeds_solved']} solved), "
+        f"{summary['dofs']} dofs, in {summary['timings']['total']:.2f} s",
+        *choice_report(summary),
+        f"{'branch':>6}  {'label':<16}{'first rad/s':>14}{'last rad/s':>14}{'confidence':>12}",
+    ]
+    for b in summary["branches"]:
+        first, last = (f"{b[k]:.6f}" if b[k] == b[k] else "lost" for k in ("frequency_first", "frequency_last"))
+        lines.append(f"{b['branch']:>6}  {b['label']:<16}{first:>14}{last:>14}{b['confidence']:>12.3f}")
+    for c in summary["critical_speeds"]:
+        lines.append(f"critical speed {c['speed']:.6f} rad/s: {c['label']} meets {c['per_rev']}Ω")
+    return [*lines, f"results in {folder}"]
+
+
+def choice_report(summary: dict[str, Any]) -> list[str]:
+    """Return the line that says which model was chosen, if one was."""
+    choice = summary.get("choice")
+    if choice is None:
+        return []
+    dropped = ", ".join(row["name"] for row in choice["dropped"]) or "nothing"
+    error = f"estimated error {choice['estimated_error']:.1e} of {choice['tolerance']:g} allowed"
+    return [f"chosen in {choice['seconds']:.2f} s: {choice['theory']}; left out: {dropped}; {error}"]
+
+
+def explain_report(summary: dict[str, Any], folder: Path) -> list[str]:
+    """Return the lines `explain` prints: dimensionless groups, then a row an effect and a theory."""
+    outputs, rows = summary["outputs"], summary["rows"]
+    checked = any("truth" in row for row in rows)
+    lines = [
+        f"{summary['name']}: {summary['theory']} with {', '.join(summary['effects']) or 'no effects'}, "
+        f"in {summary['timings']['total']:.2f} s",
+        *(f"{value:>12.4g}  {summary['meaning'][name]}" for name, value in summary["groups"].items()),
+        f"{'relative change of':<26}" + "".join(f"{n:>10}{'true':>10}" if checked else f"{n:>10}" for n in outputs),
+    ]
+    for row in rows:
+        what = {True: "without ", False: "with "}[row["included"]] if row["kind"] == "effect" else "theory "
+        kinds = ("estimate", "truth") if checked else ("estimate",)
+        cells = "".join(f"{row[kind][name]:>10.1e}" for name in outputs for kind in kinds)
+        lines.append(f"{what + row['name']:<26}{cells}  {row['verdict']}: {row['why']}")
+    lines += choice_report(summary)
+    lines += [f"no {name}: {text}" for name, text in summary["absent_effects"].items()]
+    return [*lines, f"results in {folder}"]
