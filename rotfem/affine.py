@@ -85,6 +85,7 @@ class AffineSystem(System):
         self._coefficients: Array | None = None
         self._shift: tuple[float, float, float] | None = None
         self._changed = True
+        self.settled = False
 
     def leave_out(self, effects: Collection[str]) -> None:
         """Take the pieces of some effects, bodies or the PRESTRESS out of the equations, and put all others back in."""
@@ -212,13 +213,14 @@ class AffineSystem(System):
         c = self._products([constant.value.ravel() for constant in self._all_constants])
         old = self._coefficients
         self._coefficients = c
+        self.settled = True
         if old is not None and np.array_equal(old, c):
             return
         for kind, operator in self._operators.items():
             selected, operators = self._by_kind[kind]
             if old is None or not np.array_equal(old[selected], c[selected]):
                 combine(operator, operators, c[selected])
-                self._changed = True
+                self._changed, self.settled = True, False
         self._load.zeroEntries()
         selected, operators = self._by_kind["f"]
         for operator, value in zip(operators, c[selected], strict=True):
@@ -244,6 +246,11 @@ class AffineSystem(System):
         self.b.scale(-1.0)
         self.b.array[self.clamped] = 0.0
         return self.b
+
+    @property
+    def current(self) -> bool:
+        """Whether the last tangent is that of this time, but for its shifts (see `System`)."""
+        return not self._changed
 
     def tangent(self, c_k: float, c_v: float, c_m: float) -> tuple[Any, bool]:
         """Return (c_k K + c_v C + c_m M, whether it changed since the last call)."""

@@ -11,6 +11,7 @@ where a is an auxiliary acceleration; Newmark is α_m = α_f = 0.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -21,14 +22,24 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.scene import Scene
-from rotfem.solvers import SMALL, DirectSolver, Increment, Newton
+from rotfem.solvers import DirectSolver, Increment, Newton
 from rotfem.system import System
 
 Array = npt.NDArray[np.float64]
 
 
+#: Unknowns from which a factor is kept over steps, by the dimension of the mesh: a plate's matrix is dear to factorise.
+KEPT_FROM = {1: 5000, 2: 300}
+
 #: Iterations with an old factor after which the next step gets a new one.
 LONG = 5
+
+#: After an old factor has failed k times in a row, none is tried for 2^k steps; k grows to this.
+PATIENCE = 5
+
+#: A linear step is refined with an old factor up to this relative error, as long as that shrinks at this rate, or to
+#: where it stays at round-off.
+REFINED, RATE, ROUND_OFF = 1e-11, 0.3, 1e-8
 
 #: Part of K, relative to M in norm, that makes a singular M regular.
 TRACE = 1e-9
@@ -105,8 +116,10 @@ class Stepper:
         self._hub_increment = 0.0
         self.clamp = system.clamp
         #: Whether a factor is kept for the steps that follow, where factorising is dear.
-        self._keeps = not system.linear and system.A.getSize()[0] > SMALL
+        self._keeps = system.A.getSize()[0] > KEPT_FROM[system.structure.mesh.topology.dim]
         self._held: tuple[float, float, float] | None = None
+        #: How often in a row an old factor has failed, and for how many steps none is tried for that.
+        self._failed = self._pause = 0
 
     @property
     def factorisations(self) -> int:
@@ -161,12 +174,26 @@ class Stepper:
         Raises:
             ComputationError: Newton failed; the given state is untouched.
         """
-        if self._keeps and self._held == self.scheme.shifts(h):
-            try:
-                return self._step(state, h, chord=True)
-            except ComputationError:
-                self._held = None  # the old factor does not serve here
+        if self._keeps and self._held == self.scheme.shifts(h) and not self._new_factor_pays(state.t + h):
+            if self._pause == 0:
+                try:
+                    new = self._step(state, h, chord=True)
+                except ComputationError:  # the old factor does not serve here; nor will the next ones, perhaps
+                    self._held, self._failed = None, min(self._failed + 1, PATIENCE)
+                    self._pause = 2**self._failed
+                else:
+                    self._failed = 0
+                    return new
+            self._pause = max(self._pause - 1, 0)
         return self._step(state, h)
+
+    def _new_factor_pays(self, t: float) -> bool:
+        """Whether the matrix stays what it is now, though the factor is that of another: a last one serves for long."""
+        s = self.system
+        if not s.linear:
+            return False
+        s.set_time(t)
+        return s.settled and not s.current
 
     def _step(self, state: State, h: float, chord: bool = False) -> State:
         """One step, by Newton's method, or with the factor of an earlier step throughout."""
@@ -187,15 +214,35 @@ class Stepper:
 
         try:
             if s.linear and new.hub is None:
-                self.newton.iterations += 1
-                if not np.isfinite(increment()):
-                    raise ComputationError("the solution is not finite")
+                iterations = self._solve_linear(increment, new, chord)
             else:
                 iterations = self.newton.solve(increment, lambda: s.size(new.q), chord)
-                self._held = p.shifts(h) if self._keeps and not (chord and iterations > LONG) else None
+            self._held = p.shifts(h) if self._keeps and not (chord and iterations > LONG) else None
         except ComputationError as error:
             raise ComputationError(error.what, time=new.t, advice=error.advice) from None
         return new
+
+    def _solve_linear(self, increment: Callable[[], float], new: State, chord: bool) -> int:
+        """Solve the linear equations of a step; return the iterations: one, or those that refine with an old factor.
+
+        Raises:
+            ComputationError: not finite, or the old factor is too far from the matrix.
+        """
+        previous = np.inf
+        for k in range(1, LONG + 3):
+            d = increment()
+            self.newton.iterations += 1
+            if not np.isfinite(d):
+                raise ComputationError("the solution is not finite")
+            size = self.system.size(new.q)
+            if not chord or self.system.current or d <= REFINED * size:
+                return k
+            if d > RATE * previous:
+                if d <= ROUND_OFF * size:
+                    return k
+                break
+            previous = d
+        raise ComputationError("the old factor is too far from the matrix")
 
     def _chord(self, new: State) -> Array:
         """Return the correction of q at the state written into the system, with the factor at hand."""

@@ -32,7 +32,8 @@ def fixed_steps(stepper: Stepper, state: State, end: float, step: float) -> Iter
     for i in range(1, n + 1):
         t = end if i == n else i * step
         for stop in [*(j for j in jumps if state.t + close < j < t - close), t]:
-            state = stepper.advance(state, stop - state.t)
+            h = stop - state.t
+            state = stepper.advance(state, step if abs(h - step) <= close else h)  # one length, so one matrix
             state.t = stop
             if isinstance(stepper, HubStepper) and any(abs(stop - j) <= close for j in jumps):
                 state = stepper.restart(state)

@@ -103,6 +103,14 @@ class Increment:
         return self._array
 
 
+#: Part of the tolerance up to which iterations with an old factor go on. Newton's last increment leaves an error of its
+#: square; theirs leave a part of themselves, the same way in every step, which adds up.
+CHORD = 1e-2
+
+#: Increment, in the units of the unknowns, that round-off lets an old factor reach.
+SMALLEST = 1e-12
+
+
 @dataclass
 class Newton:
     """Newton iteration that is judged by its increments.
@@ -149,7 +157,11 @@ class Newton:
                 first = d
             if k == 2 and first > 0 and not chord:
                 self._kappa = max(0.5 * self._kappa if np.isfinite(self._kappa) else 0.0, d / first**2)
-            if d <= self.tolerance or (k == 1 and not chord and 4 * self._kappa * d**2 <= self.tolerance):
+            if chord:
+                enough = max(CHORD * self.tolerance, min(self.tolerance, SMALLEST))
+                if d <= enough or (d <= self.tolerance and d > 0.3 * previous):
+                    return k
+            elif d <= self.tolerance or (k == 1 and 4 * self._kappa * d**2 <= self.tolerance):
                 return k
             stalled = stalled + 1 if d > 0.3 * previous else 0
             if chord and stalled >= 2:

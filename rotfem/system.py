@@ -131,10 +131,12 @@ class System:
     Attributes:
         q, v, a: dolfinx functions that hold the state the forms are evaluated at.
         linear: False; the affine system of a linear theory says True.
+        settled: whether M, C and K are those of the time before; a linear theory may know they are.
         scale: size of each local unknown (m or 1), by which increments are judged.
     """
 
     linear = False
+    settled = False
 
     def __init__(self, model: Model):
         self.model, self.structure, self.motion = model, model.structure, model.motion
@@ -166,6 +168,11 @@ class System:
         self.integrals = {"F": integral_count(F), "J": integral_count(J)}
         self._F, self._J = jit.form(F), jit.form(J)
         self.A = fem_petsc.create_matrix(self._J)
+
+    @property
+    def current(self) -> bool:
+        """Whether the last tangent is that of this time, but for its shifts; a linear theory may know it is."""
+        return False
 
     def set_state(self, q: Array, v: Array, a: Array) -> None:
         """Write local dof arrays into the functions q, v, a that the forms are evaluated at."""

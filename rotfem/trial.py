@@ -43,15 +43,21 @@ HALVED = 0.01
 INCREMENT = 1e-12
 
 
-def coarse(scene: Scene) -> Scene:
-    """Return the scene on a mesh just fine enough for its modes, in the rotating frame, solved to round-off."""
+def coarse(scene: Scene, modes: bool = True) -> Scene:
+    """Return the scene on a mesh just fine enough, in the rotating frame, solved to round-off.
+
+    Args:
+        scene: validated scene.
+        modes: whether its modes are wanted; without, the mesh of a plate, whose time it makes, can be coarser still.
+    """
     changes: dict[str, Any] = {
         "model.frame": "rotating",
         "model.effects": "auto",
         "model.tolerance": None,
         "solver.increment_tolerance": min(INCREMENT, scene.solver.increment_tolerance),
     }
-    nodes = max(FEWEST_NODES, NODES_A_MODE * scene.modes.count)
+    plate = isinstance(scene.mesh, PlateMesh)
+    nodes = max(FEWEST_NODES, NODES_A_MODE * scene.modes.count if modes or not plate else 0)
     enough = int(np.ceil(nodes / scene.mesh.degree))
     if isinstance(scene.mesh, PlateMesh):
         if isinstance(scene.structure, PlateStructure) and scene.structure.mesh is None:
@@ -88,7 +94,11 @@ class Trial:
         speeds: Collection[float] | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
     ):
-        self.full, self.scene, self.comm = scene, coarse(scene), comm
+        self.full, self.comm = scene, comm
+        self.absent = self._absent()
+        named = outputs if outputs is not None else (HISTORY, STEADY, MODES)
+        self.wanted = tuple(name for name in named if name not in self.absent)
+        self.scene = coarse(scene, MODES in self.wanted)
         self.newton = newton_for(self.scene)
         self._systems: dict[str, SwitchedSystem] = {}
         self._done: dict[tuple[str, frozenset[str]], Outputs] = {}
@@ -96,9 +106,6 @@ class Trial:
         self._bound: Bound | None = None
         self.finer = FINER[0]
         self.effects = self.scene.effective_effects()
-        self.absent = self._absent()
-        named = outputs if outputs is not None else (HISTORY, STEADY, MODES)
-        self.wanted = tuple(name for name in named if name not in self.absent)
         if not self.wanted:
             scene.check_run()
             check_steady(scene)
@@ -136,7 +143,7 @@ class Trial:
     # --- what there is to compare -----------------------------------------------------------------------------------
 
     def _absent(self) -> dict[str, str]:
-        scene, out = self.scene, {}
+        scene, out = self.full.replace({"model.effects": "auto", "model.tolerance": None}), {}
         if scene.time is None:
             out[HISTORY] = "the scene has no [time]"
             try:
