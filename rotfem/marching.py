@@ -33,7 +33,9 @@ def fixed_steps(stepper: Stepper, state: State, end: float, step: float) -> Iter
         t = end if i == n else i * step
         for stop in [*(j for j in jumps if state.t + close < j < t - close), t]:
             h = stop - state.t
-            state = stepper.advance(state, step if abs(h - step) <= close else h)  # one length, so one matrix
+            if hub is None and abs(h - step) <= close:
+                h = step  # of one length to the last digit, so that the matrix stays; a hub must not pass a jump
+            state = stepper.advance(state, h)
             state.t = stop
             if isinstance(stepper, HubStepper) and any(abs(stop - j) <= close for j in jumps):
                 state = stepper.restart(state)

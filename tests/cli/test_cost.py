@@ -10,12 +10,13 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import pytest
 
-from rotfem.cli import app
 from rotfem.scene import load_scene
+
+Rotfem = Callable[..., Any]
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -43,33 +44,7 @@ step = 0.01
 SMALL = ("--theories", "reissner", "--steps", "0.04,0.02", "--elements", "2,4", "--degrees", "2", "--repeat", "1")
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the working directory, with the scene in it."""
-    (tmp_path / "beam.toml").write_text(SCENE)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-class Done(NamedTuple):
-    status: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def rotfem(folder: Path, capsys: pytest.CaptureFixture[str]) -> Callable[..., Done]:
-    """Return a function that runs `rotfem …` there, in this process."""
-
-    def run(*arguments: str) -> Done:
-        with pytest.raises(SystemExit) as end:
-            app(list(arguments))
-        return Done(int(end.value.code or 0), *capsys.readouterr())
-
-    return run
-
-
-def test_cost_writes_table_figure_and_tuned_scene(rotfem: Callable[..., Done], folder: Path) -> None:
+def test_cost_writes_table_figure_and_tuned_scene(rotfem: Rotfem, folder: Path) -> None:
     done = rotfem("cost", "beam.toml", *SMALL, "--accuracy", "0.02", "--write", "tuned.toml")
     assert done.status == 0 and done.err == ""
     assert "tuned scene in tuned.toml" in done.out and "for 0.02: reissner, " in done.out
@@ -83,7 +58,7 @@ def test_cost_writes_table_figure_and_tuned_scene(rotfem: Callable[..., Done], f
     assert rotfem("run", "tuned.toml", "--no-plots").status == 0
 
 
-def test_second_start_and_fresh(rotfem: Callable[..., Done]) -> None:
+def test_second_start_and_fresh(rotfem: Rotfem) -> None:
     first = json.loads(rotfem("cost", "beam.toml", *SMALL, "--json", "--no-plots").out)
     second = json.loads(rotfem("cost", "beam.toml", *SMALL, "--json", "--no-plots").out)
     fresh = json.loads(rotfem("cost", "beam.toml", *SMALL, "--json", "--no-plots", "--fresh").out)
@@ -91,7 +66,7 @@ def test_second_start_and_fresh(rotfem: Callable[..., Done]) -> None:
     assert first["references"] == second["references"] == fresh["references"]
 
 
-def test_an_accuracy_out_of_reach(rotfem: Callable[..., Done], folder: Path) -> None:
+def test_an_accuracy_out_of_reach(rotfem: Rotfem, folder: Path) -> None:
     done = rotfem("cost", "beam.toml", *SMALL, "--accuracy", "1e-12", "--write", "tuned.toml")
     assert done.status == 3 and "no setting tried is within 1e-12" in done.err
     assert (folder / "results" / "beam" / "cost.csv").exists() and not (folder / "tuned.toml").exists()
@@ -106,7 +81,7 @@ def test_an_accuracy_out_of_reach(rotfem: Callable[..., Done], folder: Path) -> 
         (("--accuracy", "0"), "must be a number greater than 0"),
     ],
 )
-def test_bad_options(rotfem: Callable[..., Done], arguments: tuple[str, ...], says: str) -> None:
+def test_bad_options(rotfem: Rotfem, arguments: tuple[str, ...], says: str) -> None:
     done = rotfem("cost", "beam.toml", *arguments)
     assert done.status == 2 and says in done.err and "Traceback" not in done.err
 
@@ -131,7 +106,7 @@ def test_interrupt_keeps_what_is_finished(folder: Path) -> None:
     assert all(json.loads(line)["measurement"]["status"] for line in record.read_text().splitlines())
 
 
-def test_hint_at_the_start_of_a_run(rotfem: Callable[..., Done], folder: Path) -> None:
+def test_hint_at_the_start_of_a_run(rotfem: Rotfem, folder: Path) -> None:
     coarse = ("run", "beam.toml", "--set", "time.step=0.2", "--no-plots")
     done = rotfem(*coarse)
     assert done.status == 0 and done.err.startswith("hint: time.step = 0.2 s") and done.err.count("\n") == 1
@@ -143,7 +118,7 @@ def test_hint_at_the_start_of_a_run(rotfem: Callable[..., Done], folder: Path) -
     assert rotfem("run", "beam.toml", "--no-plots").err == ""
 
 
-def test_hints_of_modes_and_campbell(rotfem: Callable[..., Done]) -> None:
+def test_hints_of_modes_and_campbell(rotfem: Rotfem) -> None:
     many = ("--set", "modes.count=6", "--set", "mesh.elements=3", "--no-plots")
     assert rotfem("modes", "beam.toml", *many).err.startswith("hint: mesh.elements = 3")
     fast = ("campbell", "beam.toml", "--speeds", "0,5", "--set", "model.theory=linear", "--set", "modes.count=1")

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import pytest
 
-from rotfem.cli import app
+Rotfem = Callable[..., Any]
 
 SCENE = """\
 [structure]
@@ -33,33 +33,7 @@ count = 2
 """
 
 
-class Done(NamedTuple):
-    status: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the working directory, with the scene in it."""
-    (tmp_path / "beam.toml").write_text(SCENE)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-@pytest.fixture
-def rotfem(folder: Path, capsys: pytest.CaptureFixture[str]) -> Callable[..., Done]:
-    """Return a function that runs `rotfem …` there, in this process."""
-
-    def run(*arguments: str) -> Done:
-        with pytest.raises(SystemExit) as end:
-            app(list(arguments))
-        return Done(int(end.value.code or 0), *capsys.readouterr())
-
-    return run
-
-
-def test_explain_prints_groups_and_a_row_each(folder: Path, rotfem: Callable[..., Done]) -> None:
+def test_explain_prints_groups_and_a_row_each(folder: Path, rotfem: Rotfem) -> None:
     done = rotfem("explain", "beam.toml")
     assert (done.status, done.err) == (0, "")
     assert "Ω/ω₁" in done.out and "L/r" in done.out
@@ -69,7 +43,7 @@ def test_explain_prints_groups_and_a_row_each(folder: Path, rotfem: Callable[...
     assert {f.name for f in (folder / "results" / "beam").iterdir()} == {"explain.json", "explain.png", "summary.json"}
 
 
-def test_check_puts_the_truth_beside_the_estimates(folder: Path, rotfem: Callable[..., Done]) -> None:
+def test_check_puts_the_truth_beside_the_estimates(folder: Path, rotfem: Rotfem) -> None:
     done = rotfem("explain", "beam.toml", "--check", "--json", "--no-plots", "-o", "out")
     assert done.status == 0, done.err
     summary = json.loads(done.out)
@@ -82,7 +56,7 @@ def test_check_puts_the_truth_beside_the_estimates(folder: Path, rotfem: Callabl
     assert "true" in rotfem("explain", "beam.toml", "--check", "--no-plots").out
 
 
-def test_run_says_what_it_has_chosen(folder: Path, rotfem: Callable[..., Done]) -> None:
+def test_run_says_what_it_has_chosen(folder: Path, rotfem: Rotfem) -> None:
     done = rotfem("run", "beam.toml", "--set", "model.tolerance=0.05", "--no-plots", "-o", "out")
     assert done.status == 0, done.err
     assert "chosen in" in done.out and "left out: reissner → consistent_linear" in done.out
@@ -101,7 +75,7 @@ def test_run_says_what_it_has_chosen(folder: Path, rotfem: Callable[..., Done]) 
         (("explain", "beam.toml", "-o", "beam.toml/out"), "beam.toml/out"),
     ],
 )
-def test_bad_input(rotfem: Callable[..., Done], arguments: tuple[str, ...], message: str) -> None:
+def test_bad_input(rotfem: Rotfem, arguments: tuple[str, ...], message: str) -> None:
     done = rotfem(*arguments)
     assert (done.status, done.out) == (2, "")
     assert message in done.err and "Traceback" not in done.err

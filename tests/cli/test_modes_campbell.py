@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
 
-from rotfem.cli import app
+Rotfem = Callable[..., Any]
 
 SCENE = """\
 [structure]
@@ -35,37 +35,11 @@ count = 3
 """
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the working directory, with the scene in it."""
-    (tmp_path / "beam.toml").write_text(SCENE)
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
-class Done(NamedTuple):
-    status: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def rotfem(folder: Path, capsys: pytest.CaptureFixture[str]) -> Callable[..., Done]:
-    """Return a function that runs `rotfem …` there, in this process."""
-
-    def run(*arguments: str) -> Done:
-        with pytest.raises(SystemExit) as end:
-            app(list(arguments))
-        return Done(int(end.value.code or 0), *capsys.readouterr())
-
-    return run
-
-
 def written(path: Path) -> set[str]:
     return {file.name for file in path.iterdir()}
 
 
-def test_modes_prints_a_table_and_writes_files(folder: Path, rotfem: Callable[..., Done]) -> None:
+def test_modes_prints_a_table_and_writes_files(folder: Path, rotfem: Rotfem) -> None:
     done = rotfem("modes", "beam.toml")
     assert done.status == 0, done.err
     assert done.err == ""
@@ -77,7 +51,7 @@ def test_modes_prints_a_table_and_writes_files(folder: Path, rotfem: Callable[..
     assert len(json.loads((out / "modes.json").read_text())["modes"]) == 3
 
 
-def test_modes_json_is_alone_on_stdout(folder: Path, rotfem: Callable[..., Done]) -> None:
+def test_modes_json_is_alone_on_stdout(folder: Path, rotfem: Rotfem) -> None:
     """A hint and a warning (an unstable mode, here) go to stderr."""
     options = ("--set", "model.theory=linear", "--set", "motion.speed=5", "--no-plots", "-o", "out")
     done = rotfem("modes", "beam.toml", "--json", *options)
@@ -91,7 +65,7 @@ def test_modes_json_is_alone_on_stdout(folder: Path, rotfem: Callable[..., Done]
     assert quiet == (0, "", "")
 
 
-def test_modes_exports(folder: Path, rotfem: Callable[..., Done]) -> None:
+def test_modes_exports(folder: Path, rotfem: Rotfem) -> None:
     done = rotfem("modes", "beam.toml", "-q", "--no-plots", "--state-space", "--matrices", "-o", "out")
     assert done.status == 0, done.err
     assert {"state_space.npz", "M.mtx", "C.mtx", "K.mtx", "M.npz", "unknowns.csv"} <= written(folder / "out")
@@ -99,7 +73,7 @@ def test_modes_exports(folder: Path, rotfem: Callable[..., Done]) -> None:
         assert file["A"].shape == (6, 6)
 
 
-def test_campbell_prints_branches_and_writes_files(folder: Path, rotfem: Callable[..., Done]) -> None:
+def test_campbell_prints_branches_and_writes_files(folder: Path, rotfem: Rotfem) -> None:
     done = rotfem("campbell", "beam.toml", "--speeds", "0:6:4", "--per-rev", "2")
     assert done.status == 0, done.err
     assert "critical speed" in done.out and "meets 2Ω" in done.out and "confidence" in done.out
@@ -109,7 +83,7 @@ def test_campbell_prints_branches_and_writes_files(folder: Path, rotfem: Callabl
     assert {row["speed"] for row in rows if not row["refined"]} == {0.0, 2.0, 4.0, 6.0}
 
 
-def test_campbell_json_and_quiet(folder: Path, rotfem: Callable[..., Done]) -> None:
+def test_campbell_json_and_quiet(folder: Path, rotfem: Rotfem) -> None:
     options = ("--speeds", "0,2,3.5", "--set", "model.theory=linear", "--no-plots", "-o", "out")
     done = rotfem("campbell", "beam.toml", "--json", *options)
     assert done.status == 0, done.err
@@ -144,9 +118,7 @@ BENT = tuple(
         (("modes", "beam.toml", *BENT), 3, "no steady state"),
     ],
 )
-def test_what_cannot_be_done(
-    rotfem: Callable[..., Done], arguments: tuple[str, ...], status: int, message: str
-) -> None:
+def test_what_cannot_be_done(rotfem: Rotfem, arguments: tuple[str, ...], status: int, message: str) -> None:
     done = rotfem(*arguments)
     assert done.status == status
     assert done.out == ""
