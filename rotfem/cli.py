@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from inspect import Parameter, Signature, signature
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,7 +13,7 @@ import typer
 
 from rotfem.errors import ComputationError, SceneError
 from rotfem.reports import campbell_report, explain_report, modes_report, run_report
-from rotfem.scene import load_scene
+from rotfem.scene import Scene, load_scene
 from rotfem.session import Session
 
 app = typer.Typer(
@@ -22,139 +25,159 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="scene file (TOML)", show_default=False)]
-Output = Annotated[Path | None, typer.Option("-o", "--output", help="result folder [results/<scene name>]")]
-Overrides = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="change a scene key, repeatable")]
-Json = Annotated[bool, typer.Option("--json", help="print the summary as JSON, and nothing else, on stdout")]
-NoPlots = Annotated[bool, typer.Option("--no-plots", help="write no figures")]
-NoAdvice = Annotated[bool, typer.Option("--no-advice", help="give no hints at the start")]
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")]
-Debug = Annotated[bool, typer.Option("--debug", help="show the traceback of an error")]
-
 
 @app.callback()
 def _root() -> None:
     """Rotating beams and plates with FEniCSx."""
 
 
-@app.command()
-def run(
-    scene: ScenePath,
-    output: Output = None,
-    overrides: Overrides = [],  # noqa: B006 (typer reads the default)
-    as_json: Json = False,
-    no_plots: NoPlots = False,
-    no_advice: NoAdvice = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
-) -> None:
-    """Compute the steady state or the time history of SCENE."""
+@dataclass
+class Job:
+    """What every command works on.
+
+    Attributes:
+        scene: the scene, with the changes of --set.
+        folder: where its results go; it is there.
+        session: who speaks.
+        plots: whether figures are wanted.
+        hint: what tells advice; None where none is wanted.
+    """
+
+    scene: Scene
+    folder: Path
+    session: Session
+    plots: bool
+    hint: Callable[[str], None] | None
+
+    def progress(self, what: str = "") -> Any:
+        """Return the progress bar of the computation."""
+        return self.session.progress(f"{self.scene.name}: {what or self.scene.model.theory}")
+
+    def finish(self, result: Any, lines: Callable[[dict[str, Any], Path], list[str]]) -> None:
+        """Write a result and print its report."""
+        self.session.write(result, self.folder, self.plots)
+        self.session.say(lines(result.summary, self.folder))
+
+
+@contextmanager
+def job(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="scene file (TOML)", show_default=False)],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="result folder [results/<scene name>]")] = None,
+    overrides: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="change a scene key, repeatable")
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="print the summary as JSON, and nothing else, on stdout")
+    ] = False,
+    no_plots: Annotated[bool, typer.Option("--no-plots", help="write no figures")] = False,
+    no_advice: Annotated[bool, typer.Option("--no-advice", help="give no hints at the start")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False,
+) -> Iterator[Job]:
+    """Give a command its job; these are the options of all commands."""
     with Session(as_json, quiet, debug) as session:
-        loaded = load_scene(scene, overrides)
+        loaded = load_scene(scene, overrides or ())
         folder = session.folder(output or Path("results") / loaded.name)
-        from rotfem.simulation import run as simulate
-
-        try:
-            with session.progress(f"{loaded.name}: {loaded.model.theory}") as progress:
-                result = simulate(loaded, progress=progress, hint=session.hint(no_advice))
-        except (ComputationError, KeyboardInterrupt) as error:
-            partial = getattr(error, "result", None)
-            if partial is not None:
-                session.write(partial, folder, plots=not no_plots)
-            raise
-        session.write(result, folder, plots=not no_plots)
-        session.say(run_report(result.summary, folder))
+        yield Job(loaded, folder, session, not no_plots, session.hint(no_advice))
 
 
-@app.command()
+def command(advice: bool = True) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Make a command of a function of a job and its own options; `advice` says whether it gives any."""
+
+    def decorate(work: Callable[..., None]) -> Callable[..., None]:
+        shared = [p for name, p in signature(job, eval_str=True).parameters.items() if advice or name != "no_advice"]
+        own = list(signature(work, eval_str=True).parameters.values())[1:]
+
+        def call(**given: Any) -> None:
+            options = {p.name: given.pop(p.name) for p in own}
+            with job(**given) as todo:
+                work(todo, **options)
+
+        ordered = [shared[0], *own, *shared[1:]]
+        call.__name__, call.__doc__ = work.__name__, work.__doc__
+        call.__signature__ = Signature(  # type: ignore[attr-defined]
+            [p.replace(kind=Parameter.KEYWORD_ONLY) for p in ordered]
+        )
+        app.command()(call)
+        return work
+
+    return decorate
+
+
+@command()
+def run(todo: Job) -> None:
+    """Compute the steady state or the time history of SCENE."""
+    from rotfem.simulation import run as simulate
+
+    try:
+        with todo.progress() as progress:
+            result = simulate(todo.scene, progress=progress, hint=todo.hint)
+    except (ComputationError, KeyboardInterrupt) as error:
+        partial = getattr(error, "result", None)
+        if partial is not None:
+            todo.session.write(partial, todo.folder, todo.plots)
+        raise
+    todo.finish(result, run_report)
+
+
+@command()
 def modes(
-    scene: ScenePath,
-    output: Output = None,
-    overrides: Overrides = [],  # noqa: B006
+    todo: Job,
     sensitivities: Annotated[
         bool, typer.Option("--sensitivities", help="derivatives to section, hub and speed")
     ] = False,
     state_space: Annotated[bool, typer.Option("--state-space", help="write the modal model state_space.npz")] = False,
     matrices: Annotated[bool, typer.Option("--matrices", help="write M, C, K as Matrix Market and npz")] = False,
     animate: Annotated[int | None, typer.Option("--animate", metavar="MODE", help="animate a mode of a plate")] = None,
-    as_json: Json = False,
-    no_plots: NoPlots = False,
-    no_advice: NoAdvice = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
 ) -> None:
     """Compute the gyroscopic eigenmodes of SCENE at its speed."""
-    with Session(as_json, quiet, debug) as session:
-        loaded = load_scene(scene, overrides)
-        folder = session.folder(output or Path("results") / loaded.name)
-        from rotfem.modes import modes as analyse
+    from rotfem.modes import modes as analyse
 
-        result = analyse(loaded, sensitivities=sensitivities, hint=session.hint(no_advice))
-        if state_space or matrices:
-            from rotfem.state_space import state_space as reduce
-            from rotfem.state_space import write_matrices
+    result = analyse(todo.scene, sensitivities=sensitivities, hint=todo.hint)
+    if state_space or matrices:
+        from rotfem.state_space import state_space as reduce
+        from rotfem.state_space import write_matrices
 
-            if state_space:
-                reduce(result.analysis, result.spinning, loaded.modes.count).write(folder / "state_space.npz")
-            if matrices:
-                write_matrices(result.analysis, result.spinning, folder)
-        session.write(result, folder, plots=not no_plots)
-        if animate is not None:
-            session.animate(result, animate, folder)
-        session.say(modes_report(result.summary, folder))
+        if state_space:
+            model = reduce(result.analysis, result.spinning, todo.scene.modes.count)
+            model.write(todo.folder / "state_space.npz")
+        if matrices:
+            write_matrices(result.analysis, result.spinning, todo.folder)
+    if animate is not None:
+        todo.session.animate(result, animate, todo.folder)
+    todo.finish(result, modes_report)
 
 
-@app.command()
+@command()
 def campbell(
-    scene: ScenePath,
+    todo: Job,
     speeds: Annotated[str, typer.Option("--speeds", metavar="RANGE", help="first:last:number or s1,s2,… in rad/s")],
     per_rev: Annotated[int | None, typer.Option("--per-rev", min=0, help="per-rev lines 1Ω … NΩ to cross")] = None,
-    output: Output = None,
-    overrides: Overrides = [],  # noqa: B006
-    as_json: Json = False,
-    no_plots: NoPlots = False,
-    no_advice: NoAdvice = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
 ) -> None:
     """Follow the modes of SCENE over a range of speeds."""
-    with Session(as_json, quiet, debug) as session:
-        loaded = load_scene(scene, overrides)
-        folder = session.folder(output or Path("results") / loaded.name)
-        from rotfem.campbell import campbell as sweep
+    from rotfem.campbell import campbell as sweep
 
-        with session.progress(f"{loaded.name}: {loaded.model.theory}") as progress:
-            result = sweep(loaded, speeds, orders=per_rev, progress=progress, hint=session.hint(no_advice))
-        session.write(result, folder, plots=not no_plots)
-        session.say(campbell_report(result.summary, folder))
+    with todo.progress() as progress:
+        result = sweep(todo.scene, speeds, orders=per_rev, progress=progress, hint=todo.hint)
+    todo.finish(result, campbell_report)
 
 
-@app.command()
+@command(advice=False)
 def explain(
-    scene: ScenePath,
-    output: Output = None,
-    overrides: Overrides = [],  # noqa: B006
+    todo: Job,
     check: Annotated[bool, typer.Option("--check", help="run the full models too: truth beside the estimates")] = False,
-    as_json: Json = False,
-    no_plots: NoPlots = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
 ) -> None:
     """Say which effects and which theory SCENE calls for, and what each of them changes."""
-    with Session(as_json, quiet, debug) as session:
-        loaded = load_scene(scene, overrides)
-        folder = session.folder(output or Path("results") / loaded.name)
-        from rotfem.explain import explain as estimate
+    from rotfem.explain import explain as estimate
 
-        with session.progress(f"{loaded.name}: {loaded.model.theory}") as progress:
-            result = estimate(loaded, check, progress=progress)
-        session.write(result, folder, plots=not no_plots)
-        session.say(explain_report(result.summary, folder))
+    with todo.progress() as progress:
+        result = estimate(todo.scene, check, progress=progress)
+    todo.finish(result, explain_report)
 
 
-@app.command()
+@command(advice=False)
 def cost(
-    scene: ScenePath,
+    todo: Job,
     quick: Annotated[bool, typer.Option("--quick", help="a small grid")] = False,
     accuracy: Annotated[float, typer.Option("--accuracy", help="relative error wanted, the model's included")] = 1e-4,
     write: Annotated[Path | None, typer.Option("--write", metavar="FILE", help="write the tuned scene there")] = None,
@@ -166,41 +189,31 @@ def cost(
     schemes: Annotated[str | None, typer.Option("--schemes", metavar="A,B,…", help="time-stepping schemes")] = None,
     repeat: Annotated[int, typer.Option("--repeat", min=1, help="repetitions; times are medians")] = 3,
     resume: Annotated[bool, typer.Option("--resume/--fresh", help="go on with what is in the result folder")] = True,
-    output: Output = None,
-    overrides: Overrides = [],  # noqa: B006
-    as_json: Json = False,
-    no_plots: NoPlots = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
 ) -> None:
     """Measure what accuracy costs: error and time of SCENE over theory, mesh, degree, step and scheme."""
-    with Session(as_json, quiet, debug) as session:
-        loaded = load_scene(scene, overrides)
-        folder = session.folder(output or Path("results") / loaded.name)
-        from rotfem.cost import cost as study
-        from rotfem.cost_report import cost_report
+    from rotfem.cost import cost as study
+    from rotfem.cost_report import cost_report
 
-        with session.progress(f"{loaded.name}: cost") as progress:
-            result = study(
-                loaded,
-                quick=quick,
-                accuracy=accuracy,
-                output=of,
-                repeat=repeat,
-                folder=folder,
-                resume=resume,
-                theories=listed("--theories", theories, str),
-                elements=listed("--elements", elements, int),
-                degrees=listed("--degrees", degrees, int),
-                steps=listed("--steps", steps, float),
-                schemes=listed("--schemes", schemes, str),
-                progress=progress,
-            )
-        session.write(result, folder, plots=not no_plots)
-        session.say(cost_report(result.summary, result.rows, folder))
-        if write is not None and session.first:
-            result.write_tuned(write)
-            session.say([f"tuned scene in {write}"])
+    with todo.progress("cost") as progress:
+        result = study(
+            todo.scene,
+            quick=quick,
+            accuracy=accuracy,
+            output=of,
+            repeat=repeat,
+            folder=todo.folder,
+            resume=resume,
+            theories=listed("--theories", theories, str),
+            elements=listed("--elements", elements, int),
+            degrees=listed("--degrees", degrees, int),
+            steps=listed("--steps", steps, float),
+            schemes=listed("--schemes", schemes, str),
+            progress=progress,
+        )
+    todo.finish(result, lambda summary, folder: cost_report(summary, result.rows, folder))
+    if write is not None and todo.session.first:
+        result.write_tuned(write)
+        todo.session.say([f"tuned scene in {write}"])
 
 
 def listed(option: str, text: str | None, kind: Callable[[str], Any]) -> list[Any] | None:
