@@ -75,6 +75,7 @@ class ModalAnalysis:
         coupled = "hub_coupling" in self.model.effects
         self.hub = Hub(self.system, motion, coupled) if isinstance(motion, TorqueMotion) else None
         self.newton: Newton = newton_for(rotating)
+        self._unit = 1.0
         assembled = self.system.assembled
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
         self.seconds |= {"equilibrium": 0.0, "factor": 0.0, "eigen": 0.0}
@@ -105,7 +106,9 @@ class ModalAnalysis:
         clamped = Pencil(*matrices)
         pencil = clamped if self.hub is None else Pencil(*self.hub.bordered(*matrices))
         t2 = perf_counter()
+        clamped.unit = pencil.unit = self._unit
         pairs = pencil.solve(count, clamped.scale() if self.hub is not None else 0.0)
+        self._unit = pencil.unit
         t3 = perf_counter()
         factored = pencil.factored
         spans = {"equilibrium": t1 - t0, "assemble": t2 - t1, "factor": factored, "eigen": t3 - t2 - factored}

@@ -29,6 +29,9 @@ Array = npt.NDArray[Any]
 #: Largest accepted backward error of an eigenpair; one above it is an error, not a row.
 BACKWARD_TOLERANCE = 1e-8
 
+#: Backward error below which a solution need not be done again in a better unit of time.
+GOOD = 1e-10
+
 #: Random vectors by which the asymmetry of a large matrix is estimated.
 PROBES = 4
 
@@ -81,6 +84,8 @@ class Pencil:
         self.comm: MPI.Comm = M.comm.tompi4py()
         self._x, self._y = K.createVecs()
         self._smallest = 1.0
+        #: Unit of λ in the eigensolver, 1/s, a power of two: numbers of order one keep all digits.
+        self.unit = 1.0
         #: Time of factorisations, s.
         self.factored = 0.0
         self.spectrum_error: float | None = None
@@ -157,6 +162,10 @@ class Pencil:
 
     def _solve(self, count: int, target: float) -> Eigenpairs:
         values, right, errors = self._right(self.M, self.C, self.K, count, target)
+        unit = 2.0 ** np.round(np.log2(max(float(np.median(np.abs(values))), 1e-300)))
+        if float(np.max(errors)) > GOOD and not 0.25 <= unit / self.unit <= 4.0:
+            self.unit = unit
+            values, right, errors = self._right(self.M, self.C, self.K, count, target)
         self._smallest = float(np.median(np.abs(values)))
         conservative = self.conservative
         if conservative:
@@ -183,6 +192,18 @@ class Pencil:
 
     def _right(self, M: Any, C: Any, K: Any, count: int, target: float) -> tuple[Array, Array, Array]:
         """Return (λ, x, backward error) of the pairs nearest to the target, both signs of the imaginary part."""
+        unit = self.unit
+        C.scale(unit)
+        M.scale(unit**2)
+        try:
+            values, right, errors = self._nearest(M, C, K, count, target / unit)
+        finally:  # exact, as the unit is a power of two
+            C.scale(1 / unit)
+            M.scale(1 / unit**2)
+        return unit * values, right, errors
+
+    def _nearest(self, M: Any, C: Any, K: Any, count: int, target: float) -> tuple[Array, Array, Array]:
+        """Return (λ, x, backward error) nearest to the target, of matrices in the unit of λ."""
         n = K.getSize()[0]
         wanted = min(2 * count + 2, 2 * n - 2)
         pep = SLEPc.PEP().create(K.comm)

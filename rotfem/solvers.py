@@ -43,6 +43,7 @@ def use_direct_solver(ksp: Any, size: int, symmetric: bool = False) -> None:
         pc.setType(PETSc.PC.Type.REDUNDANT)
         return
     pc.setType(PETSc.PC.Type.CHOLESKY if symmetric and size > SMALL else PETSc.PC.Type.LU)
+    pc.setFactorPivot(0.0)  # what is small depends on the units; a singular matrix is seen in the solution
     if size > SMALL:
         pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
 

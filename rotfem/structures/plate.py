@@ -33,6 +33,9 @@ from rotfem.theories import THEORIES
 #: Largest |alpha_2|, rad: at π/2 the two angles of the director meet their pole.
 LARGEST_TILT = 1.5
 
+#: Part of the energy that reduced integration does not see and is put back; all of it would stiffen the plate.
+SEEN = 0.1
+
 #: Nodes closer than this part of the plate's size share a coordinate when they are put in order.
 SAME_PLACE = 1e-7
 
@@ -185,14 +188,28 @@ class Plate(Structure):
         return ufl.dot(ufl.cross(p.dr[:, 0], p.dr[:, 1]), triad(p.alpha)[2])
 
     def strains(self, measures: Callable[..., tuple[Any, ...]]) -> list[Strain]:
-        """Return membrane strain, shear and curvature of one theory's measures with this plate's stiffnesses."""
+        """Return membrane strain, shear and curvature of one theory's measures with this plate's stiffnesses.
+
+        Reduced integration does not see displacements like (1 − 3ξ²)(1 − 3η²) of neighbouring elements. So the
+        membrane is integrated fully in the linear theories, where it does not lock; in the others SEEN of its linear
+        part is, and in all of them a part of the shear by u_3 that the bending stiffness bounds.
+        """
         membrane, shear, curvature = measures(self.k.q)
-        h, Q = self.section["thickness"], self.plane_stress()
-        return [
-            Strain("membrane", _voigt(membrane), h * Q, self.dx_elastic),
-            Strain("shear", shear, h * self.shear_moduli(), self.dx_elastic),
+        linear, p = THEORIES[self.scene.model.theory].linear, PlateGradients(self.k.q)
+        h, Q, kG = self.section["thickness"], self.plane_stress(), self.shear_moduli()
+        strains = [
+            Strain("membrane", _voigt(membrane), h * Q, self.dx if linear else self.dx_elastic),
+            Strain("shear", shear, h * kG, self.dx_elastic),
             Strain("bending", _voigt(curvature), h**3 / 12 * Q, self.dx),
         ]
+        if self.scene.mesh.integration == "full":
+            return strains
+        bounded = SEEN * h**3 / (h**2 + abs(ufl.JacobianDeterminant(self.mesh)))
+        unseen = [] if linear else [("membrane", _voigt(ufl.sym(p.du)), SEEN * h * Q)]
+        for name, value, stiffness in [*unseen, ("shear", p.dw, bounded * kG)]:
+            strains.append(Strain(f"{name}, full", value, stiffness, self.dx))
+            strains.append(Strain(f"{name}, reduced", value, -stiffness, self.dx_elastic))
+        return strains
 
     def bodies(self, effects: tuple[str, ...]) -> list[Body]:
         """Return the bodies the effects call for: mid-surface, director, point and line masses."""

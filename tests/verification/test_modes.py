@@ -457,6 +457,21 @@ def test_free_hub(unit_beam: Any, tmp_path: Path) -> None:
             refused()
 
 
+@pytest.mark.parametrize("size", [1e-4, 1.0, 1e4])
+def test_modes_do_not_depend_on_the_units(size: float) -> None:
+    """The same beam from half a millimetre to 5 km: ω scales with 1/L. Reference: the frequencies at 5 m."""
+    section = {"E": 1.6e11, "nu": 0.25, "rho": 2330.0, "shape": "rectangle", "width": 0.1 * size, "height": 0.04 * size}
+    tables = {
+        "structure": {"type": "planar_beam", "length": 5.0 * size, "hub_radius": size, "section": section},
+        "motion": {"type": "constant", "speed": 5.0 / size},
+        "mesh": {"elements": 8},
+    }
+    rows = modes(Scene.from_dict(tables)).rows
+    assert max(row["residual"] for row in rows) < 1e-9
+    frequencies = [row["frequency"] * size for row in rows[:3]]
+    np.testing.assert_allclose(frequencies, [13.9176567928, 85.3687580580, 237.1074722131], rtol=1e-6)
+
+
 def test_pencil_outlives_its_result(unit_beam: Any) -> None:
     """PETSc matrices need the communicator of the mesh they were made on, so they keep it."""
     pencils = [modes(unit_beam({"motion.speed": speed})).spinning.pencil for speed in (0.0, 3.0)]

@@ -120,7 +120,7 @@ def test_spinning_square_converges() -> None:
     wanted = np.array([SPINNING[case][i] for i in range(1, 6)])
     errors = [np.max(np.abs(spinning(case, mesh__elements=[n, n])[:5] / wanted - 1)) for n in (4, 8, 16)]
     assert errors[0] / errors[1] > 8
-    assert errors[2] < 6e-5
+    assert errors[2] < 7e-5
 
 
 @pytest.mark.parametrize(
@@ -131,6 +131,43 @@ def test_elements_that_lock_are_refused(cell: str, degree: int, integration: str
         square(0.01, mesh__cell=cell, mesh__degree=degree, mesh__integration=integration)
     with pytest.raises(SceneError, match="lock"):
         square(0.01, mesh__degree=2, mesh__integration="full")
+
+
+@pytest.mark.parametrize("mesh", [{}, {"degree": 3}, {"cell": "triangle"}], ids=["Q2", "Q3", "P3"])
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+def test_no_modes_that_reduced_integration_does_not_see(theory: str, mesh: dict[str, Any]) -> None:
+    """A wide cantilever 1 × 4 × 0.1 m: (1 − 3ξ²)(1 − 3η²) had 1527 rad/s. Reference: Legendre–Ritz, Mindlin, 1e-3."""
+    scene = square(
+        0.1,
+        structure__width=4.0,
+        model__theory=theory,
+        motion={"type": "constant", "speed": 0.0},
+        modes__count=6,
+        mesh=mesh,
+    )
+    frequencies = [row["frequency"] for row in rotfem.modes(scene).rows]
+    np.testing.assert_allclose(frequencies, [535.0, 610.1, 824.4, 1169.9, 1668.4, 2335.7], rtol=2e-2)
+    np.testing.assert_allclose(frequencies[:4], [535.0, 610.1, 824.4, 1169.9], rtol=3e-3)
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "von_karman", "reissner"])
+def test_stretch_in_the_plane(theory: str) -> None:
+    """A spinning square on a hub: u1 of the tip against Legendre–Ritz 7.38340e-4 (von Kármán linear, 6e-5)."""
+    speed = 2.0 * unit(0.05)
+    scene = square(
+        0.05,
+        structure__hub_radius=1.0,
+        model__theory=theory,
+        motion={"type": "constant", "speed": speed, "axis": [0, 0, 1]},
+    )
+    wanted = 7.38340e-4
+    assert rotfem.run(scene).summary["figures"]["tip_u1_final"] == pytest.approx(wanted, rel=3e-3)
+
+
+def test_many_modes_of_a_thick_plate() -> None:
+    """Forty pairs to a backward error far below what is accepted: the eigensolver counts in a fitting unit of time."""
+    scene = square(0.3, model__theory="consistent_linear", motion={"type": "constant", "speed": 0.0}, modes__count=40)
+    assert max(row["residual"] for row in rotfem.modes(scene).rows) < 1e-11
 
 
 # --- strips are beams ------------------------------------------------------------------------------------------------
@@ -332,7 +369,7 @@ def test_symmetries_and_tangents(theory: str) -> None:
     assert max(checks[f"asymmetry_{name}"] for name in "MCK") < 1e-12
     assert checks["spectrum"] < 1e-8
     if theory != "consistent_linear":
-        assert checks["linearisation"] < 1e-5  # round-off of the differences: 3e-6 seen
+        assert checks["linearisation"] < 1e-8
 
 
 def test_exact_theory_contains_the_linear_one() -> None:
