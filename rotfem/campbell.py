@@ -160,7 +160,7 @@ def node_rows(analysis: ModalAnalysis, node: Node, labels: list[str]) -> list[di
             continue
         row = columns[node.order[b]]
         kept = {k: row[k] for k in ("frequency", "frequency_hz", "damping", "growth", "residual")}
-        shares = {k: v for k, v in row.items() if k.startswith("share_")}
+        shares = {k: v for k, v in row.items() if k.startswith("share_") or k == "turning"}
         rows.append(
             {
                 "speed": node.speed,

@@ -178,6 +178,21 @@ class ModalAnalysis:
             out.append(f"{kind}–{families[order[1]]} {number}" if mixed else f"{kind} {number}")
         return out
 
+    def turning(self, spinning: Spinning) -> list[float]:
+        """Return for every mode of a disk whether it travels with its spin (1), against it (−1) or stands (0).
+
+        Empty for other structures. Without spin it is the direction of growing angles that counts.
+        """
+        axis = self.system.motion.axis
+        sign = -1.0 if spinning.speed * axis[2] < 0.0 else 1.0
+        out, right = [], self.right(spinning)
+        for j in range(right.shape[1]):
+            part = self.model.structure.turning(*self.shape(right[:, j]))
+            if part is None:
+                return []
+            out.append(sign * part)
+        return out
+
     def shape(self, x: Array) -> tuple[dict[str, Array], Array]:
         """Return (coordinates of the nodes, m; complex components (n, bs) of a mode), on every rank."""
         coordinates, real = self.model.structure.nodes(x.real)

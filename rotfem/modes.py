@@ -99,7 +99,7 @@ def final_speed(analysis: ModalAnalysis) -> float:
 
 def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any]]:
     """Return one row a mode: frequency (rad/s, Hz), damping ratio, growth (1/s), label, shares, backward error."""
-    shares, names = analysis.shares(spinning), analysis.names(spinning)
+    shares, names, turning = analysis.shares(spinning), analysis.names(spinning), analysis.turning(spinning)
     rows = []
     for i, (lam, error) in enumerate(zip(spinning.pairs.values, spinning.pairs.errors, strict=True)):
         size = abs(lam)
@@ -113,6 +113,7 @@ def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any
                 "growth": float(lam.real),
                 "stability": stability(lam),
                 **{f"share_{name}": float(share[i]) for name, share in shares.items()},
+                **({"turning": turning[i]} if turning else {}),
                 "residual": float(error),
             }
         )

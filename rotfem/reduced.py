@@ -23,7 +23,7 @@ from rotfem.pencil import Eigenpairs, Pencil
 Array = npt.NDArray[Any]
 
 #: Unknowns from which, and speeds from which, a basis saves time.
-LARGE, MANY = 8000, 5
+LARGE, MANY = 8000, 3
 
 #: Accepted relative difference of a frequency from that of the full system; most full solutions in the search for it.
 AGREEMENT, MOST = 1e-6, 9

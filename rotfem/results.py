@@ -133,7 +133,8 @@ class CampbellResult:
         summary: scene, branches, critical speeds, instabilities, self-checks, warnings, timings; JSON-able.
         rows: one dictionary a speed and branch: `speed` (rad/s), `branch`, `label`, `mode` (its name at this speed),
             `frequency` (rad/s), `frequency_hz`, `damping`, `growth` (1/s), `residual`, `share_…`, `confidence` (squared
-            correlation with the speed before), `refined` (1 where the speed was not asked for).
+            correlation with the speed before), `refined` (1 where the speed was not asked for); of a disk `turning` (1
+            for a wave that travels with the spin, −1 against it, 0 for a standing one).
     """
 
     summary: dict[str, Any]
@@ -151,18 +152,28 @@ class CampbellResult:
     def travelling_waves(self) -> dict[str, dict[str, Array]]:
         """Return label ↦ `speed`, `forward`, `backward` (rad/s) of a disk's modes with nodal diameters, fixed frame.
 
-        A pair of modes with m nodal diameters makes waves that travel against and with the disk: ω + mΩ and ω − mΩ. A
-        backward wave stands still where ω = mΩ, a critical speed. The second branch of a pair is left out.
+        Of a pair of modes with m nodal diameters one travels with the spin and one against it (column `turning`). Seen
+        from the fixed frame they have ω₊ + mΩ and ω₋ − mΩ; the backward wave stands still where ω₋ = mΩ, a critical
+        speed. Where only one of a pair was computed it stands for both.
         """
         out: dict[str, dict[str, Array]] = {}
-        for label, b in self.branches().items():
+        branches = self.branches()
+        for label, a in branches.items():
             kind, _, number = label.partition(" ")
             diameters = int(number.split(".")[0]) if kind == "diameters" else 0
             if diameters == 0 or label[-1] in "bcdefgh":
                 continue
-            wave = diameters * np.abs(b["speed"])
             name = label.removesuffix("a")
-            out[name] = {"speed": b["speed"], "forward": b["frequency"] + wave, "backward": b["frequency"] - wave}
+            b = branches.get(f"{name}b", a)
+            speed, here, there = np.intersect1d(a["speed"], b["speed"], return_indices=True)
+            first, second = ({k: c[i] for k, c in x.items()} for x, i in ((a, here), (b, there)))
+            ahead = first["turning"] >= second["turning"]
+            wave = diameters * np.abs(speed)
+            out[name] = {
+                "speed": speed,
+                "forward": np.where(ahead, first["frequency"], second["frequency"]) + wave,
+                "backward": np.where(ahead, second["frequency"], first["frequency"]) - wave,
+            }
         return out
 
     def write(self, folder: str | Path) -> list[Path]:

@@ -31,6 +31,9 @@ from rotfem.version import versions
 Array = npt.NDArray[np.float64]
 Progress = Callable[[float], None]
 
+#: Displacement over L in the plane of a plate from which a run says what its strains leave out there.
+NOTICED = 1e-3
+
 #: Adaptive steps: safety factor, bounds of a change, changes not worth a new factorisation, smallest relative scale.
 SAFETY, SHRINK, GROW, KEEP, FLOOR = 0.9, 0.2, 2.0, (0.95, 1.3), 1e-6
 
@@ -313,6 +316,7 @@ class Simulation:
                 f"the speed is above {self.critical:.6g} rad/s, where the {self.scene.model.theory} stiffness is no "
                 f"longer definite, since t = {self._critical_since:.4g} s"
             )
+        self._warn_of_what_the_strains_lack(history)
         summary: dict[str, Any] = {
             "command": "run",
             "status": status,
@@ -350,6 +354,19 @@ class Simulation:
         if self.snapshots is not None:
             out.fields = writer(self.system.V, "fields", self.snapshots.kept)
         return out
+
+    def _warn_of_what_the_strains_lack(self, history: dict[str, Array]) -> None:
+        """Warn where a structure moves in a way that its theory's strains do not stiffen by the spin."""
+        structure, theory = self.model.structure, self.scene.model.theory
+        spins = np.any(history.get("psi_dot", np.zeros(1)) != 0.0)
+        if not structure.unstiffened or theory == "reissner" or not spins or "centrifugal" not in self.model.effects:
+            return
+        size = float(np.max(np.abs(history["tip_u2"]), initial=0.0)) / structure.length
+        if size > NOTICED:
+            self.warnings.append(
+                f"the tip moves by up to {size:.2g} L in the plane: the strains of {theory} for this structure leave "
+                'out the stiffening of such motions by the spin; model.theory = "reissner" has it'
+            )
 
     def _timings(self) -> dict[str, float]:
         chosen = {} if self.choice is None else {"choice": self.choice.seconds}

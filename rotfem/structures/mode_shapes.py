@@ -55,6 +55,22 @@ def plate_mode_name(family: str, coordinates: dict[str, npt.NDArray[Any]], y: np
     return ("bending", "torsion")[along], str(across + 1)
 
 
+def turning(coordinates: dict[str, npt.NDArray[Any]], w: npt.NDArray[Any]) -> float | None:
+    """Return how a mode w e^{iωt} of a disk travels: 1 towards growing angles, −1 against, 0 standing; None of others.
+
+    Args:
+        coordinates: x, y of the nodes, (n,) each.
+        w: the transverse displacement at the nodes, complex, (n,).
+    """
+    x, y = coordinates["x"] - np.mean(coordinates["x"]), coordinates["y"] - np.mean(coordinates["y"])
+    if not _is_disk(x, y):
+        return None
+    with_it, against = (_diameters(x, y, wave)[1] for wave in (w, w.conj()))
+    m = int(np.argmax(with_it + against))
+    total = with_it[m] + against[m]
+    return float((with_it[m] - against[m]) / total) if m > 0 and total > 0.0 else 0.0
+
+
 def _is_disk(x: npt.NDArray[Any], y: npt.NDArray[Any]) -> bool:
     """Return whether nodes about their centre leave a round hole there and lie at all angles."""
     r = np.hypot(x, y)
@@ -84,8 +100,10 @@ def _lines(x: npt.NDArray[Any], y: npt.NDArray[Any], w: npt.NDArray[Any]) -> tup
     return along, sign_changes(parts[:, along], 0.02)
 
 
-def _polar_lines(x: npt.NDArray[Any], y: npt.NDArray[Any], w: npt.NDArray[Any]) -> tuple[int, int]:
-    """Return (nodal diameters, nodal circles) of a shape on a disk about the origin."""
+def _diameters(
+    x: npt.NDArray[Any], y: npt.NDArray[Any], w: npt.NDArray[Any]
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """Return (parts, (rings, m); their squares' sum over the rings, (m,)) of a shape in e^{−imθ}, m = 0, 1, …"""
     r, angle = np.hypot(x, y), np.arctan2(y, x)
     edges = np.linspace(r.min(), r.max(), STATIONS // 2 + 1)
     ring = np.clip(np.digitize(r, edges) - 1, 0, STATIONS // 2 - 1)
@@ -94,6 +112,12 @@ def _polar_lines(x: npt.NDArray[Any], y: npt.NDArray[Any], w: npt.NDArray[Any]) 
     for i in range(STATIONS // 2):
         here = ring == i
         if np.any(here):
-            parts[i] = np.mean(w[here] * np.exp(-1j * np.outer(orders, angle[here])), axis=1)
-    best = int(np.argmax(np.sum(np.abs(parts) ** 2, axis=0) * np.where(orders == 0, 1, 2)))
+            parts[i] = np.mean(w[here] * np.exp(1j * np.outer(orders, angle[here])), axis=1)
+    return parts, np.sum(np.abs(parts) ** 2, axis=0)
+
+
+def _polar_lines(x: npt.NDArray[Any], y: npt.NDArray[Any], w: npt.NDArray[Any]) -> tuple[int, int]:
+    """Return (nodal diameters, nodal circles) of a shape on a disk about the origin."""
+    parts, squares = _diameters(x, y, w)
+    best = int(np.argmax(squares * np.where(np.arange(len(squares)) == 0, 1, 2)))
     return best, sign_changes(in_phase(parts[:, best]), 0.05)

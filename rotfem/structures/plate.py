@@ -23,7 +23,7 @@ from rotfem.kinematics import AppliedLoad, Body, Strain
 from rotfem.plate_kinematics import PlateGradients, director, triad
 from rotfem.scene import MomentLoad, PlateMesh, PlateStructure, Scene
 from rotfem.scene_plate import locking
-from rotfem.structures.mode_shapes import plate_mode_name
+from rotfem.structures.mode_shapes import plate_mode_name, turning
 from rotfem.structures.plate_loads import EdgeMoment, PointPlace, locate, point_measure
 from rotfem.structures.plate_mesh import PlateGrid, plate_grid
 from rotfem.structures.probe import Probe
@@ -248,7 +248,11 @@ class Plate(Structure):
     # --- loads ------------------------------------------------------------------------------------------------------
 
     def loads(self) -> list[AppliedLoad]:
-        """Return the scene's non-zero loads: tip force and moment are spread evenly over the edge "tip"."""
+        """Return the scene's non-zero loads: tip force and moment are spread over the edge "tip".
+
+        A director has no rotation about itself: the third component of the moment is a couple of forces in the plane,
+        e_3×(X − X_c) in direction and growing with the distance from the middle X_c of the edge.
+        """
         loads = self.scene.loads
         for name in ("tip_force", "tip_moment"):
             load = getattr(loads, name)
@@ -262,11 +266,13 @@ class Plate(Structure):
         moment, out = loads.tip_moment, self.forces()
         if moment is not None and not moment.is_zero:
             m, dead, q = self.add_load("tip_moment", 3, partial(_moment, moment)), moment.kind == "dead", self.k.q
-            M = m if dead else self.turned(q, m)
-            alpha = PlateGradients(q).alpha
+            tilting, alpha = ufl.as_vector((m[0], m[1], 0)), PlateGradients(q).alpha
+            density = self.spread("tip_moment", tilting if dead else self.turned(q, tilting))
             about = ufl.as_vector((alpha[1], -alpha[0], 0))
-            density = self.spread("tip_moment", M)
             out.append(EdgeMoment("tip_moment", density, about, self.tip, dead, director=self.director(q)))
+            couple = m[2] * self._couple()
+            force = couple if dead else self.turned(q, couple)
+            out.append(AppliedLoad("tip_moment", force, self.position(q), self.tip, dead))
         return out
 
     def spread(self, name: str, load: Any) -> Any:
@@ -274,9 +280,21 @@ class Plate(Structure):
         if name == "distributed":
             return load
         if "tip_length" not in self.scalars:
-            here = fem.assemble_scalar(jit.form(self.constant(1.0) * self.tip))
-            self.scalar("tip_length", self.comm.allreduce(float(here)))
+            self.scalar("tip_length", self._along_tip(self.constant(1.0)))
         return load / self.scalars["tip_length"]
+
+    def _couple(self) -> Any:
+        """Return the forces along the edge "tip" (per length, in the plane) that make a couple of one."""
+        x = ufl.SpatialCoordinate(self.mesh)
+        length = self._along_tip(self.constant(1.0))
+        middle = [self._along_tip(x[i]) / length for i in range(2)]
+        arm = ufl.as_vector([x[i] - self.scalar(f"tip_middle_{i + 1}", middle[i]) for i in range(2)])
+        inertia = self.scalar("tip_inertia", self._along_tip(ufl.dot(arm, arm)))
+        return ufl.as_vector((-arm[1], arm[0], 0)) / inertia
+
+    def _along_tip(self, density: Any) -> float:
+        """Return the integral of a density over the edge "tip"."""
+        return float(self.comm.allreduce(float(fem.assemble_scalar(jit.form(density * self.tip)))))
 
     # --- values -----------------------------------------------------------------------------------------------------
 
@@ -309,6 +327,10 @@ class Plate(Structure):
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> tuple[str, str]:
         """Return "bending", "torsion", … and how many nodal lines, circles or diameters (see `plate_mode_name`)."""
         return plate_mode_name(family, coordinates, values[:, self.families[family][1]])
+
+    def turning(self, coordinates: dict[str, Array], values: Array) -> float | None:
+        """Return 1 for a wave that travels around a disk towards growing angles, −1 against, 0 for a standing one."""
+        return turning(coordinates, values[:, 2])
 
     def check_range(self, q: Array, time: float | None = None) -> None:
         """Refuse a state whose director has come to the pole of its angles.

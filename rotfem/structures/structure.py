@@ -170,6 +170,10 @@ class Structure:
         """Return kind and number of a mode of a family, from its complex shape at the nodes (n, components)."""
         raise NotImplementedError
 
+    def turning(self, coordinates: dict[str, Array], values: Array) -> float | None:
+        """Return how a complex shape at the nodes travels around a disk; None where there is none (see the plate)."""
+        return None
+
     def oriented(self, values: Array) -> Array:
         """Return the components along the undeformed structure of nodal values (n, components, …), to name modes by."""
         return values

@@ -336,6 +336,19 @@ def test_roll_up() -> None:
     assert tip["tip_alpha1"][-1] == pytest.approx(2 * np.pi, rel=bound)
 
 
+@pytest.mark.parametrize("kind", ["dead", "follower"])
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+def test_couple_in_the_plane(theory: str, kind: str) -> None:
+    """A strip bent in its plane by a moment at its tip: u2 = M L²/2EI in first order (1 %: Green's strain)."""
+    moment, EI = 100.0, 1.2e6 * 0.1 * 1.0**3 / 12
+    scene = cantilever(
+        loads__tip_moment={"value": [0, 0, moment], "kind": kind}, model__theory=theory, mesh__elements=[16, 2]
+    )
+    figures = rotfem.run(scene).summary["figures"]
+    assert figures["tip_u2_final"] == pytest.approx(moment * 10.0**2 / (2 * EI), rel=1e-2)
+    assert abs(figures["tip_u3_final"]) < 1e-9
+
+
 # --- theorems --------------------------------------------------------------------------------------------------------
 
 
@@ -515,21 +528,30 @@ def test_annular_disk(tmp_path: Path) -> None:
 
 
 def test_travelling_waves(tmp_path: Path) -> None:
-    """Waves with and against the spin differ by 2mΩ in the fixed frame."""
-    mesh = disk_mesh(tmp_path / "disk.msh", 0.1, 0.3, 24, 3)
-    scene = square(
-        1e-3,
-        structure__length=None,
-        structure__width=None,
-        structure__mesh=str(mesh),
-        modes__count=5,
-        model__theory="consistent_linear",
+    """A thick disk: the modes of a pair travel with and against the spin, the one against it at the higher frequency.
+
+    Reference: Mindlin–Ritz in e^{imθ}, frequencies in the disk at 6000 rad/s, 1e-5; here a coarser mesh, 1e-3.
+    """
+    mesh = disk_mesh(tmp_path / "disk.msh", 0.05, 0.2, 32, 6)
+    structure = {"type": "plate", "mesh": str(mesh), "thickness": 0.04, "E": 70e9, "nu": 0.3, "rho": 2700.0}
+    scene = Scene.from_dict(
+        {
+            "structure": structure,
+            "motion": {"type": "constant", "speed": 6000.0},
+            "model": {"theory": "consistent_linear"},
+            "modes": {"count": 7},
+        }
     )
-    waves = rotfem.campbell(scene, [0.0, 40.0, 80.0]).travelling_waves()
-    assert set(waves) == {"diameters 1.1", "diameters 2.1"}
-    for name, w in waves.items():
-        m = int(name.split()[1][0])
-        np.testing.assert_allclose(w["forward"] - w["backward"], 2 * m * w["speed"], rtol=1e-12)
+    result = rotfem.campbell(scene, [5900.0, 6000.0], orders=0)
+    waves, branches = result.travelling_waves(), result.branches()
+    assert {"diameters 1.1", "diameters 2.1"} <= set(waves)
+    for m, (low, high) in {1: (10070.0, 10275.0), 2: (12829.0, 13253.0)}.items():
+        w, a, b = waves[f"diameters {m}.1"], branches[f"diameters {m}.1a"], branches[f"diameters {m}.1b"]
+        assert sorted([a["frequency"][-1], b["frequency"][-1]]) == pytest.approx([low, high], rel=1e-3)
+        assert sorted([a["turning"][-1], b["turning"][-1]]) == pytest.approx([-1.0, 1.0], abs=1e-3)
+        # The Coriolis force on the directors couples the angles against the spin: ω₋ > ω₊.
+        assert w["forward"][-1] == pytest.approx(low + m * 6000.0, rel=1e-3)
+        assert w["backward"][-1] == pytest.approx(high - m * 6000.0, abs=1e-3 * high)
 
 
 def test_reduced_basis_with_double_modes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
