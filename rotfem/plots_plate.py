@@ -25,7 +25,7 @@ def panels(count: int, aspect: float) -> tuple[Figure, list[Any]]:
     columns = min(count, 3 if aspect > 0.4 else 1)
     rows = -(-count // columns)
     width = 10.0 / columns
-    height = float(np.clip(width * aspect, 0.9, 6.0)) + 0.9
+    height = float(np.clip((0.55 if columns > 1 else 0.9) * width * aspect, 0.9, 6.0)) + 0.9  # bars take room
     figure = Figure(figsize=(10.0, rows * height), layout="constrained")
     return figure, [figure.add_subplot(rows, columns, i + 1) for i in range(count)]
 
@@ -60,7 +60,10 @@ def modes_figure(result: ModesResult) -> Figure:
     figure, axes = panels(len(shapes), aspect)
     for axis, (title, columns), row in zip(axes, shapes.items(), rows, strict=True):
         name = leading(columns)
-        map_of(figure, axis, mesh, columns[name], f"{title}\n{row['frequency']:.5g} rad/s", f"{name} (–)")
+        turning = row.get("turning", 0.0)
+        wave = "" if abs(turning) < 0.5 else (", forward wave" if turning > 0 else ", backward wave")
+        caption = f"{title}{wave}\n{row['frequency']:.5g} rad/s"
+        map_of(figure, axis, mesh, columns[name], caption, f"{name} (–)")
     return figure
 
 
