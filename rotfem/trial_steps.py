@@ -89,7 +89,9 @@ def parts(signals: list[Given], times: Array, period: float, most: int, own: int
     out: Array = np.ones(len(times) - 1, dtype=np.int64)
     for signal in signals:
         out = np.maximum(out, _parts(signal, times, period, looks))
-    longest = MOST_PARTS
+    # Steps of half the scene's own length see all that the run sees.
+    longest = MOST_PARTS if own is None else min(MOST_PARTS, -(-2 * own // len(out)))
+    out = np.minimum(out, longest)
     while out.sum() > max(most, len(out)):
         longest //= 2
         out = np.minimum(out, longest)
