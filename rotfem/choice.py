@@ -14,13 +14,16 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.errors import ComputationError
 from rotfem.estimate import SAFETY
 from rotfem.outputs import HISTORY, Bound, change
 from rotfem.scene import EFFECTS, Scene
-from rotfem.trial import Trial
+from rotfem.trial import Dear, Trial
+
+Array = npt.NDArray[Any]
 
 #: Richest allowed theory ↦ those to choose from, cheapest first. Nonlinear theories of moderate rotation cost what the
 #: exact one costs, so they are not among its cheaper neighbours.
@@ -33,17 +36,23 @@ LADDERS = {
     "reissner": ("linear", "consistent_linear", "reissner"),
 }
 
+#: What is left out is taken to grow as the square of the motion up to this multiple of the motion that was tried out.
+GROWTH = 3.0
+
+#: Motion (over L, or rad) that round-off makes of none, and estimates that it makes of zero.
+REST, UNKNOWN = 1e-12, 1e-9
+
 
 class RangeExceeded(ComputationError):
     """A run has left the range its model was chosen for.
 
     Attributes:
-        size: displacement over L, or rotation in rad, that it has met.
+        sizes: displacement over L, or rotation in rad, that each component has met.
     """
 
-    def __init__(self, what: str, time: float | None, size: float) -> None:
+    def __init__(self, what: str, time: float | None, sizes: Array) -> None:
         super().__init__(what, time, 'model.on_exceed = "upgrade", or a richer model.theory without model.tolerance')
-        self.size = size
+        self.sizes = sizes
 
 
 @dataclass
@@ -58,8 +67,9 @@ class Choice:
         richest: theory of the full model.
         everything: its effects.
         errors: theory of the ladder ↦ estimated change when it takes the place of the richest, all effects in it.
-        size: largest displacement over L, or rotation in rad, that the estimates found.
+        sizes: largest displacement over L, or rotation in rad, of each component that the estimates found.
         seconds: what choosing took.
+        remark: why nothing was tried out, where nothing was.
         upgrades: what was given up during a run, and why.
     """
 
@@ -71,8 +81,9 @@ class Choice:
     richest: str
     everything: tuple[str, ...]
     errors: dict[str, float]
-    size: float
+    sizes: Array
     seconds: float = 0.0
+    remark: str = ""
     upgrades: list[dict[str, Any]] = field(default_factory=list)
 
     @property
@@ -81,15 +92,28 @@ class Choice:
         return self.theory == self.richest and self.effects == self.everything
 
     @property
-    def limit(self) -> float:
-        """Largest displacement over L, or rotation in rad, up to which the estimate stays below the tolerance.
+    def size(self) -> float:
+        """Largest displacement over L, or rotation in rad, that the estimates found."""
+        return float(np.max(self.sizes, initial=0.0))
+
+    @property
+    def limits(self) -> Array:
+        """Displacement over L, or rotation in rad, of each component up to which the model may serve.
 
         What is left out of a model is taken to grow as the square of the motion: estimate · (size/expected size)²; the
-        safety factor is used up then.
+        safety factor is used up where that reaches the tolerance. The law holds for the motion that was tried out, so
+        it is not trusted beyond `GROWTH` times that, in each component: a beam that was only stretched says nothing
+        of one that bends. Only what is too small to change the outputs by the tolerance may be any motion.
         """
-        if self.full or self.estimated_error == 0.0:
-            return np.inf
-        return float(self.size * np.sqrt(SAFETY * self.tolerance / self.estimated_error))
+        factor = GROWTH
+        if self.estimated_error > 0.0:
+            factor = min(factor, float(np.sqrt(SAFETY * self.tolerance / self.estimated_error)))
+        return np.maximum(factor * self.sizes, max(REST, self.tolerance / SAFETY * self.size))
+
+    @property
+    def limit(self) -> float:
+        """Largest of the limits; infinite where nothing is left out."""
+        return np.inf if self.full else float(np.max(self.limits, initial=0.0))
 
     def apply(self, scene: Scene) -> Scene:
         """Return the scene with the chosen model."""
@@ -97,30 +121,39 @@ class Choice:
             {"model.theory": self.theory, "model.effects": list(self.effects), "model.tolerance": None}
         )
 
-    def check(self, size: float) -> str:
-        """Return why a state of this size is outside the range of the choice; nothing where it is not."""
-        if size <= self.limit:
+    def check(self, sizes: Array) -> str:
+        """Return why a state of this size is outside the range of the choice; nothing where it is not.
+
+        Args:
+            sizes: displacement over L, or rotation in rad, of each component.
+        """
+        if self.full or bool(np.all(sizes <= self.limits)):
             return ""
+        worst = int(np.argmax(sizes / self.limits))
         return (
             f"the run has left the range of its model: {self.theory} with {', '.join(self.effects) or 'no effects'} "
-            f"was chosen for displacements up to {self.size:.3g} L (or rad), its estimated error passes the tolerance "
-            f"{self.tolerance:g} from {self.limit:.3g} on, and {size:.3g} was met"
+            f"was chosen for displacements up to {self.sizes[worst]:.3g} L (or rad), may serve up to "
+            f"{self.limits[worst]:.3g}, and {sizes[worst]:.3g} was met"
         )
 
-    def richer(self, size: float, time: float | None, why: str) -> Choice:
+    def richer(self, sizes: Array, time: float | None, why: str) -> Choice:
         """Return the next richer model that is good enough for a state of this size, all effects in it.
 
         Args:
-            size: displacement over L, or rotation in rad, that the last model has met.
+            sizes: displacement over L, or rotation in rad, that each component has met.
             time: when (s).
             why: what happened.
         """
-        growth = (size / self.size) ** 2 if self.size > 0.0 else np.inf
+        size, moves = float(np.max(sizes)), sizes > self.limits
+        seen = np.where(self.sizes > REST, self.sizes, 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            growth = float(np.max(np.divide(sizes, seen)[moves], initial=1.0)) ** 2
         ladder = LADDERS[self.richest]
         theory, error = self.richest, 0.0
         for poorer in ladder[ladder.index(self.theory) + 1 : -1]:
-            if SAFETY * self.errors[poorer] * growth <= self.tolerance:
-                theory, error = poorer, SAFETY * self.errors[poorer]
+            expected = SAFETY * max(self.errors[poorer], UNKNOWN) * growth
+            if expected <= self.tolerance:
+                theory, error = poorer, expected
                 break
         note = {"time": time, "size": size, "from": self.theory, "to": theory, "why": why}
         dropped = [theory_step(self.richest, theory, self.errors[theory])] if theory != self.richest else []
@@ -129,6 +162,7 @@ class Choice:
             theory=theory,
             effects=self.everything,
             estimated_error=error,
+            sizes=np.maximum(self.sizes, sizes),
             dropped=dropped,
             upgrades=[*self.upgrades, note],
         )
@@ -145,6 +179,7 @@ class Choice:
             "full_model": {"theory": self.richest, "effects": list(self.everything)},
             **(expected if self.size > 0.0 else {}),
             "seconds": self.seconds,
+            **({"remark": self.remark} if self.remark else {}),
         }
         return out | ({"upgrades": self.upgrades} if self.upgrades else {})
 
@@ -166,7 +201,28 @@ def choose(
     started = perf_counter()
     tolerance, richest = scene.model.tolerance, scene.model.theory
     assert tolerance is not None
-    trial = Trial(scene, outputs, speeds, comm)
+    trial = Trial(scene, outputs, speeds, comm, thrifty=True)
+    try:
+        choice = cheapest(trial, tolerance, richest)
+    except Dear as dear:
+        remark = f"trying models out would take longer than running the full one: {dear.what}"
+        size = np.zeros(0)
+        choice = Choice(richest, trial.effects, tolerance, 0.0, [], richest, trial.effects, {}, size, remark=remark)
+    choice.seconds = perf_counter() - started
+    return choice
+
+
+def cheapest(trial: Trial, tolerance: float, richest: str) -> Choice:
+    """Return the cheapest model (see `choose`).
+
+    Args:
+        trial: the scene to be tried out.
+        tolerance: relative change of the outputs that is allowed.
+        richest: theory of the full model.
+
+    Raises:
+        Dear: trying out would not pay.
+    """
     allowed = tolerance / SAFETY
 
     def error(base: str, theory: str, without: Collection[str] = ()) -> float:
@@ -197,9 +253,8 @@ def choose(
     without = {name for _, name in left_out}
     total = SAFETY * max(spent + sum(cost for cost, _ in left_out), together)
     effects = tuple(name for name in EFFECTS if name in trial.effects and name not in without)
-    size = trial.outputs(theory, without).size
-    seconds = perf_counter() - started
-    return Choice(theory, effects, tolerance, total, dropped, richest, trial.effects, errors, size, seconds)
+    sizes = trial.outputs(theory, without).sizes
+    return Choice(theory, effects, tolerance, total, dropped, richest, trial.effects, errors, sizes)
 
 
 def theory_step(richest: str, theory: str, estimate: float) -> dict[str, Any]:

@@ -194,6 +194,8 @@ def cost(
     from rotfem.cost import cost as study
     from rotfem.cost_report import cost_report
 
+    if write is not None:
+        todo.session.check_writable("--write", write)
     with todo.progress("cost") as progress:
         result = study(
             todo.scene,

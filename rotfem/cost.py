@@ -33,6 +33,7 @@ from rotfem.cost_result import CostResult
 from rotfem.errors import ComputationError, SceneError
 from rotfem.scene import Scene, as_scene
 from rotfem.simulation import Progress
+from rotfem.system import Model
 from rotfem.version import versions
 
 #: Name of the file that keeps what has been measured.
@@ -89,12 +90,12 @@ def cost(
     if scene.model.tolerance is not None:  # the study chooses by itself, over all theories
         scene = scene.replace({"model.tolerance": None})
     if not (np.isfinite(accuracy) and accuracy > 0):
-        raise SceneError(scene.file, "cost accuracy", accuracy, "must be a number greater than 0")
+        raise SceneError(scene.file, "cost --accuracy", accuracy, "must be a number greater than 0")
     if repeat < 1:
-        raise SceneError(scene.file, "cost repeat", repeat, "must be an integer at least 1")
+        raise SceneError(scene.file, "cost --repeat", repeat, "must be an integer at least 1")
     output = default_output(scene) if output is None else output
     if output not in OUTPUTS:
-        raise SceneError(scene.file, "cost output", output, f"allowed: {', '.join(OUTPUTS)}")
+        raise SceneError(scene.file, "cost --of", output, f"allowed: {', '.join(OUTPUTS)}")
     if output == "tip":
         scene.check_run()
     chosen = {"theories": theories, "elements": elements, "degrees": degrees, "steps": steps, "schemes": schemes}
@@ -121,13 +122,15 @@ class Study:
         path = folder / RECORD if folder is not None and comm.rank == 0 else None
         self.record = Record(path, fingerprint(scene, output, comm.size), fresh=not resume)
         self.bench = Bench(scene, output, comm)
-        self.taken = self.new = 0
+        self.taken: set[Setting] = set()
+        self.new = 0
 
     def measure(self, setting: Setting, repeat: int) -> Measurement:
         """Return the measurement of a setting, from the record where it has it."""
-        found = self.comm.bcast(self.record.get(setting, repeat))
+        found, earlier = self.comm.bcast((self.record.get(setting, repeat), self.record.is_earlier(setting)))
         if found is not None:
-            self.taken += 1
+            if earlier:
+                self.taken.add(setting)
             return found
         measurement: Measurement = self.comm.bcast(self.bench.measure(setting, repeat))
         self.record.put(setting, measurement)
@@ -140,6 +143,7 @@ class Study:
         """Return the result (see `cost`)."""
         base = self.base_step()
         settings = grid(self.scene, self.output, quick, base, chosen)
+        self.check_degrees(chosen.get("degrees") or ())
         interval = None if base is None else sample_interval(self.scene, base)
         own = own_setting(self.scene)
         theories = unique([*(s.theory for s in settings), RICHEST])
@@ -164,9 +168,21 @@ class Study:
         for theory, levels in finer.items():
             self._refer(theory, levels, get, references, failures)
         if not self.each and RICHEST in references and not np.any(references[RICHEST].samples.values):
-            raise SceneError(self.scene.file, "cost output", "tip", 'the tip does not move; try output "frequencies"')
+            raise SceneError(self.scene.file, "cost --of", "tip", 'the tip does not move; try output "frequencies"')
         rows = rows_of(measured, references, self.each)
         return CostResult(self._summary(rows, references, failures, accuracy, quick), rows, self.scene, references)
+
+    def check_degrees(self, degrees: Sequence[int]) -> None:
+        """Check that elements of these degrees may be used; of a mesh file only the file says of what shape they are.
+
+        Raises:
+            SceneError: they may not.
+        """
+        for degree in degrees if getattr(self.scene.structure, "mesh", None) is not None else ():
+            try:
+                Model(self.scene.replace({"mesh.degree": degree}), self.comm, effects=())
+            except SceneError as error:
+                raise SceneError(self.scene.file, "cost --degrees", degree, error.allowed) from None
 
     def base_step(self) -> float | None:
         """Return the fixed step (s) around which steps are tried: the scene's own, or the mean of its adaptive ones.
@@ -243,7 +259,7 @@ class Study:
             "settings": len(rows),
             "failed": sum(row["status"] == "failed" for row in rows),
             "measured": self.new,
-            "resumed": self.taken,
+            "resumed": len(self.taken),
             "timings": {"compile": self.bench.compiling, "other": total - self.bench.compiling, "total": total},
             "warnings": warnings,
             "versions": versions(),

@@ -222,19 +222,40 @@ def check_choice(scene: Scene, chosen: Mapping[str, Sequence[Any] | None]) -> No
         for value in chosen.get(name) or ():
             if value not in allowed:
                 reason = f"{did_you_mean(value, allowed)}allowed: {', '.join(allowed)}"
-                raise SceneError(scene.file, f"cost {name}", value, reason)
+                raise SceneError(scene.file, f"cost --{name}", value, reason)
     for name, kind in (("elements", int), ("degrees", int), ("steps", float)):
         for value in chosen.get(name) or ():
             parts = value if isinstance(value, tuple | list) else (value,)
             if not all(isinstance(v, int | kind) and not isinstance(v, bool) and v > 0 for v in parts):
                 what = "numbers greater than 0 (s)" if kind is float else "integers greater than 0"
-                raise SceneError(scene.file, f"cost {name}", value, f"must be {what}")
+                raise SceneError(scene.file, f"cost --{name}", value, f"must be {what}")
     if scene.time is None and (chosen.get("steps") or chosen.get("schemes")):
         raise SceneError(scene.file, "time", None, "missing; steps and schemes have a meaning only with [time]")
     end = scene.time.end if scene.time is not None else 0.0
     too_long = [h for h in chosen.get("steps") or () if h > end]
     if too_long:
-        raise SceneError(scene.file, "cost steps", too_long[0], f"must be at most time.end = {end:g}")
+        raise SceneError(scene.file, "cost --steps", too_long[0], f"must be at most time.end = {end:g}")
+    for name, values in chosen.items():
+        for value in values or ():
+            _check_value(scene, name, value)
+
+
+def _check_value(scene: Scene, name: str, value: Any) -> None:
+    """Check that the scene allows a value on its own.
+
+    Raises:
+        SceneError: it does not.
+    """
+    own = own_setting(scene)
+    if name == "elements" and own.elements is None:
+        raise SceneError(scene.file, "cost --elements", value, "has no meaning with structure.mesh; leave it out")
+    fields = {"theories": "theory", "elements": "elements", "degrees": "degree", "schemes": "scheme", "steps": "step"}
+    change: dict[str, Any] = {fields[name]: tuple(value) if isinstance(value, list) else value}
+    change |= {"tolerance": None} if name == "steps" else {}
+    try:
+        scene.replace(replace(own, **change).changes(scene))
+    except SceneError as error:
+        raise SceneError(scene.file, f"cost --{name}", value, error.allowed) from None
 
 
 def unique(values: Sequence[Any]) -> list[Any]:

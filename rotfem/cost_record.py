@@ -60,9 +60,11 @@ class Measurement:
 def fingerprint(scene: Scene, output: str, ranks: int) -> str:
     """Return a hash of all that a measurement depends on besides its setting: scene, output, version, processes.
 
-    A Python function in the scene counts by its name only.
+    A mesh file counts by its content, a Python function in the scene by its name only.
     """
-    text = json.dumps([scene.to_dict(), output, __version__, ranks], sort_keys=True, default=str)
+    mesh = getattr(scene.structure, "mesh", None)
+    content = hashlib.sha256(Path(mesh).read_bytes()).hexdigest() if mesh is not None else None
+    text = json.dumps([scene.to_dict(), content, output, __version__, ranks], sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
@@ -83,6 +85,7 @@ class Record:
     def __init__(self, path: Path | None, identity: str, fresh: bool = False):
         self.path, self.identity = path, identity
         self._found: dict[str, Measurement] = {}
+        self._earlier: frozenset[str] = frozenset()
         self.resumed = 0
         if path is None:
             return
@@ -102,7 +105,12 @@ class Record:
                     self._found[_text(entry["setting"])] = Measurement.from_json(entry["measurement"])
             except (ValueError, KeyError, TypeError):
                 continue
+        self._earlier = frozenset(self._found)
         self.resumed = len(self._found)
+
+    def is_earlier(self, setting: Setting) -> bool:
+        """Return whether the measurement of a setting comes from an earlier start."""
+        return _text(setting.key()) in self._earlier
 
     def get(self, setting: Setting, repeat: int) -> Measurement | None:
         """Return the measurement of a setting, if there is one and it was repeated often enough."""
@@ -115,7 +123,9 @@ class Record:
         Raises:
             OutputError: the file cannot be written.
         """
-        self._found[_text(setting.key())] = measurement
+        key = _text(setting.key())
+        self._found[key] = measurement
+        self._earlier -= {key}
         if self.path is None:
             return
         entry = {"study": self.identity, "setting": setting.key(), "measurement": measurement.to_json()}

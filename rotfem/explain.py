@@ -74,6 +74,10 @@ def explain(
         check_changes(asked, effects, changes, trial, comm, progress or (lambda share: None))
     own = estimates.own
     warnings = [f"{name} of {theory} cannot be computed: {why}" for name, why in own.failed.items()]
+    if trial.unknown:
+        warnings.append(
+            f"frequencies at rest cannot be computed, the estimates take the scene's steps: {trial.unknown}"
+        )
     if scene.model.frame == "inertial":
         warnings.append("estimates are of the rotating frame, where the same physics is a sum of effects")
     total = perf_counter() - started

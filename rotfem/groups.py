@@ -39,10 +39,11 @@ def groups(scene: Scene, trial: Trial, own: Outputs) -> dict[str, float]:
         own: what its model gives.
     """
     switched = trial.system("consistent_linear")
-    structure, first = scene.structure, float(trial.at_rest[0])
+    structure = scene.structure
     # Neither a mesh file's plate nor any other structure need have a length of its own.
     length = float(getattr(structure, "length", None) or switched.model.structure.length)
-    out = {"speed_ratio": _largest(scene, switched, "speed") / first}
+    known = bool(trial.at_rest.size)
+    out = {"speed_ratio": _largest(scene, switched, "speed") / float(trial.at_rest[0])} if known else {}
     radius = _radius(structure)
     if radius is not None and radius > 0.0:
         out["slenderness"] = length / radius
@@ -51,12 +52,13 @@ def groups(scene: Scene, trial: Trial, own: Outputs) -> dict[str, float]:
         out["rotation"] = own.size
     hub = getattr(structure, "hub_offset", None)
     out["hub_ratio"] = float(np.linalg.norm(hub) if hub is not None else structure.hub_radius) / length
-    out["spin_rate_change"] = _largest(scene, switched, "rate") / first**2
+    if known:
+        out["spin_rate_change"] = _largest(scene, switched, "rate") / float(trial.at_rest[0]) ** 2
     if len(own.values) and not structure.damping.is_zero:
         out["damping"] = float(-own.values[0].real / abs(own.values[0]))
     if structure.has_tip_mass:
         out["tip_mass_ratio"] = _mass(switched, "tip_mass") / _mass(switched) - 1.0
-    if scene.time is not None and scene.time.step is not None:
+    if scene.time is not None and scene.time.step is not None and (known or len(own.values)):
         fastest = float(np.abs(own.values).max()) if len(own.values) else float(trial.at_rest[-1])
         out["steps_per_period"] = 2 * np.pi / fastest / scene.time.step
     return out

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -13,7 +13,9 @@ from rotfem.integrators import State, Stepper
 LARGEST_LINEAR_DEFLECTION = 1.0
 
 
-def fixed_steps(stepper: Stepper, state: State, end: float, step: float) -> Iterator[State]:
+def fixed_steps(
+    stepper: Stepper, state: State, end: float, step: float, parts: Sequence[int] | None = None
+) -> Iterator[State]:
     """Yield the states at step, 2 step, … and end (s).
 
     Args:
@@ -21,6 +23,7 @@ def fixed_steps(stepper: Stepper, state: State, end: float, step: float) -> Iter
         state: where to start.
         end: last time, s.
         step: distance of the states, s; the last one may be closer.
+        parts: in how many equal steps each of these distances is gone; in one, if not given.
 
     Raises:
         ComputationError: a step failed, however short.
@@ -31,10 +34,15 @@ def fixed_steps(stepper: Stepper, state: State, end: float, step: float) -> Iter
     close = 1e-9 * step
     for i in range(1, n + 1):
         t = end if i == n else i * step
-        for stop in [*(j for j in jumps if state.t + close < j < t - close), t]:
+        m = 1 if parts is None else int(parts[i - 1])
+        begin, length = (i - 1) * step, step / m
+        between = [begin + (t - begin) * j / m for j in range(1, m)]
+        for stop in sorted([*(j for j in jumps if state.t + close < j < t - close), *between, t]):
             h = stop - state.t
-            if hub is None and abs(h - step) <= close:
-                h = step  # of one length to the last digit, so that the matrix stays; a hub must not pass a jump
+            if h <= close:
+                continue  # a jump within rounding of a stop
+            if hub is None and abs(h - length) <= close:
+                h = length  # of one length to the last digit, so that the matrix stays; a hub must not pass a jump
             state = stepper.advance(state, h)
             state.t = stop
             if isinstance(stepper, HubStepper) and any(abs(stop - j) <= close for j in jumps):

@@ -29,14 +29,19 @@ class Outputs:
     Attributes:
         tip: displacement of the tip over time, shape (steps + 1, components), or (1, components) if steady; m.
         values: eigenvalues λ at the final speed, 1/s, sorted by size; one of each conjugate pair.
-        size: largest displacement over L, or rotation in rad.
+        sizes: largest displacement over L, or rotation in rad, of each component.
         failed: output ↦ why there is none of it.
     """
 
     tip: Array = field(default_factory=lambda: np.empty((0, 0)))
     values: Array = field(default_factory=lambda: np.empty(0))
-    size: float = 0.0
+    sizes: Array = field(default_factory=lambda: np.zeros(0))
     failed: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def size(self) -> float:
+        """Largest displacement over L, or rotation in rad, of all."""
+        return float(self.sizes.max(initial=0.0))
 
 
 class Beyond(ComputationError):

@@ -72,6 +72,7 @@ def choice_report(summary: dict[str, Any]) -> list[str]:
         return []
     dropped = ", ".join(row["name"] for row in choice["dropped"]) or "nothing"
     error = f"estimated error {choice['estimated_error']:.1e} of {choice['tolerance']:g} allowed"
+    error = choice.get("remark", error)
     return [f"chosen in {choice['seconds']:.2f} s: {choice['theory']}; left out: {dropped}; {error}"]
 
 

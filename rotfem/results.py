@@ -235,6 +235,21 @@ def prepare_folder(folder: str | Path) -> Path:
     return path
 
 
+def unwritable(path: Path) -> str:
+    """Return why a file cannot be written there; nothing where it can. Neither folder nor file is made or changed."""
+    if path.is_dir():
+        return "is a folder; must be the path of a file"
+    if not path.parent.is_dir():
+        return f"there is no folder {path.parent}; must be in one that is there"
+    if path.exists() and not os.access(path, os.W_OK):
+        return "the file cannot be written; must be a writable one"
+    try:
+        with tempfile.TemporaryFile(dir=path.parent):
+            return ""
+    except OSError as error:
+        return f"nothing can be written in {path.parent}: {error.strerror or error}"
+
+
 def csv_text(columns: dict[str, Array]) -> str:
     """Return columns as CSV with a header; numbers keep all their digits."""
     buffer = io.StringIO()

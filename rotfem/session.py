@@ -74,6 +74,18 @@ class Session:
             raise problem
         return path
 
+    def check_writable(self, option: str, path: Path) -> None:
+        """See that the file of an option can be written, before anything is computed.
+
+        Raises:
+            SceneError: it cannot.
+        """
+        from rotfem.results import unwritable
+
+        reason = self.comm.bcast(unwritable(path) if self.first else None)
+        if reason:
+            raise SceneError("command line", option, str(path), reason)
+
     def progress(self, title: str) -> ProgressBar:
         """Return the progress bar: on a terminal only, and only where the command may speak."""
         return ProgressBar(title, self.first and not self.quiet and not self.as_json and sys.stderr.isatty())

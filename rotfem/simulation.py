@@ -85,8 +85,8 @@ def run_chosen(scene: Scene, comm: MPI.Comm, progress: Progress | None, hint: Hi
             if choice.full or scene.model.on_exceed != "upgrade":
                 raise
             # Any other failure of a poorer model is one that the richer one may not have: it is taken as far out.
-            size = error.size if isinstance(error, RangeExceeded) else np.inf
-            choice = choice.richer(size, error.time, error.what)
+            sizes = error.sizes if isinstance(error, RangeExceeded) else np.full_like(choice.sizes, np.inf)
+            choice = choice.richer(sizes, error.time, error.what)
 
 
 class Simulation:
@@ -267,12 +267,12 @@ class Simulation:
         """
         if self.choice is None or self.exceeded:
             return
-        size = self.system.size(state.q)
-        self.exceeded = self.choice.check(size)
+        sizes = self.system.sizes(state.q)
+        self.exceeded = self.choice.check(sizes)
         if not self.exceeded:
             return
         if self.asked.model.on_exceed != "warn":
-            raise RangeExceeded(self.exceeded, state.t if self.scene.time is not None else None, size)
+            raise RangeExceeded(self.exceeded, state.t if self.scene.time is not None else None, sizes)
         self.warnings.append(f"{self.exceeded}, at t = {state.t:.6g} s")
 
     def _record(self, state: State) -> None:

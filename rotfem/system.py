@@ -253,6 +253,13 @@ class System:
         here = float(np.max(np.abs(x) / self.scale)) if x.size else 0.0
         return here if self.model.comm.size == 1 else self.model.comm.allreduce(here, op=MPI.MAX)
 
+    def sizes(self, x: Array) -> Array:
+        """Return the largest entry of each component in units of `scale`, over all ranks, shape (components,)."""
+        here = (np.abs(x) / self.scale).reshape(-1, self.V.dofmap.index_map_bs).max(axis=0, initial=0.0)
+        if self.model.comm.size > 1:
+            self.model.comm.Allreduce(MPI.IN_PLACE, here, op=MPI.MAX)
+        return np.asarray(here)
+
     def shape(self) -> dict[str, Array]:
         """Return the deflected structure at the state: position x (m), u1, u2 (m), alpha, … in the turning frame."""
         coordinates, q = self.structure.nodes(self.q.x.array)

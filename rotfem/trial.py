@@ -24,6 +24,7 @@ from rotfem.pencil import ZERO, Pencil
 from rotfem.scene import PlateMesh, PlateStructure, Scene
 from rotfem.switches import SwitchedSystem
 from rotfem.theories import THEORIES
+from rotfem.trial_steps import given, parts
 
 Array = npt.NDArray[Any]
 
@@ -33,8 +34,14 @@ NODES_A_MODE, FEWEST_NODES = 3, 12
 #: Steps in a period of the first and of the second eigenfrequency, and the fewest and most of a history.
 STEPS_A_PERIOD, FEWEST_STEPS, MOST_STEPS = (32, 10), 200, 1500
 
-#: Steps between two samples of a history, tried one after the other.
+#: Steps between two samples of a history, tried one after the other as far as the scene has as many steps itself.
 FINER = (1, 4, 16)
+
+#: Share of the scene's own steps from which on shorter steps of a trial cost more than they can save.
+DEAR = 0.5
+
+#: Samples in 1/ω₁ where no frequency is known.
+SAMPLES_A_RADIAN = 5
 
 #: Share of halved steps from which on steps are too long to be trusted.
 HALVED = 0.01
@@ -67,6 +74,10 @@ def coarse(scene: Scene, modes: bool = True) -> Scene:
     return scene.replace(changes)
 
 
+class Dear(ComputationError):
+    """A trial would take about as long as the run it is to spare."""
+
+
 class Trial:
     """A scene to be tried out.
 
@@ -75,6 +86,7 @@ class Trial:
         outputs: which of "history", "steady" and "modes" are wanted; by default all the scene has.
         speeds: speeds of the modes (rad/s); by default the final one of the scene's motion.
         comm: MPI communicator.
+        thrifty: whether to give up with `Dear` where the histories need about as many steps as the scene's own.
 
     Raises:
         SceneError: the scene has none of the outputs.
@@ -83,8 +95,12 @@ class Trial:
         effects: all effects the scene has data for.
         wanted: outputs that are computed.
         absent: output ↦ why the scene has none.
+        at_rest: frequencies of the resting structure, rad/s; none where its eigenproblem failed.
+        unknown: why it did.
         step: distance of the samples of a history, s.
-        finer: steps between two samples.
+        own: steps of the scene itself; none where they are adaptive.
+        parts: steps between two samples that what is prescribed asks for, (samples,).
+        finer: the fewest steps between two samples, from where Newton needs them.
     """
 
     def __init__(
@@ -93,8 +109,9 @@ class Trial:
         outputs: Collection[str] | None = None,
         speeds: Collection[float] | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
+        thrifty: bool = False,
     ):
-        self.full, self.comm = scene, comm
+        self.full, self.comm, self.thrifty = scene, comm, thrifty
         self.absent = self._absent()
         named = outputs if outputs is not None else (HISTORY, STEADY, MODES)
         self.wanted = tuple(name for name in named if name not in self.absent)
@@ -111,8 +128,14 @@ class Trial:
             check_steady(scene)
         first = self.system("consistent_linear")
         self.speeds = tuple(speeds) if speeds is not None else (self._final_speed(first),)
-        self.at_rest = self._steppable(first)
-        self.step = self._step()
+        self.unknown = ""
+        try:
+            self.at_rest = self._steppable(first)
+        except ComputationError as error:
+            self.at_rest, self.unknown = np.empty(0), error.what
+        self.step, self.own = self._step()
+        self.parts = self._parts(first)
+        self.levels = self._levels()
 
     def theories(self) -> tuple[str, ...]:
         """Return the theories that this kind of structure has."""
@@ -171,14 +194,31 @@ class Trial:
         pencil = Pencil(*system.mass_damping_stiffness())
         return np.sort(np.abs(pencil.solve(max(2, self.scene.modes.count)).values))
 
-    def _step(self) -> float:
+    def _step(self) -> tuple[float, int | None]:
+        """Return the distance of the samples (s) and the number of steps of the scene itself."""
         time = self.scene.time
         if time is None:
-            return 0.0
-        wanted = max(w * n for w, n in zip(self.at_rest, STEPS_A_PERIOD, strict=False)) / (2 * np.pi)
-        steps = int(np.clip(np.ceil(time.end * wanted), FEWEST_STEPS, MOST_STEPS))
-        own = MOST_STEPS if time.step is None else int(np.ceil(time.end / time.step - 1e-9))
-        return time.end / min(steps, own)
+            return 0.0, None
+        own = None if time.step is None else int(np.ceil(time.end / time.step - 1e-9))
+        wanted = max((w * n for w, n in zip(self.at_rest, STEPS_A_PERIOD, strict=False)), default=np.inf) / (2 * np.pi)
+        steps = int(np.clip(np.ceil(min(time.end * wanted, MOST_STEPS)), FEWEST_STEPS, MOST_STEPS))
+        return time.end / min(steps, own or MOST_STEPS), own
+
+    def _parts(self, switched: SwitchedSystem) -> Array:
+        if self.scene.time is None or HISTORY not in self.wanted:
+            return np.ones(0, dtype=np.int64)
+        end = self.scene.time.end
+        times = np.linspace(0.0, end, round(end / self.step) + 1)
+        period = 1 / self.at_rest[0] if self.at_rest.size else SAMPLES_A_RADIAN * self.step
+        most = self.own or FINER[-1] * len(times)
+        return parts(given(self.scene, switched.prescribed), times, float(period), most, self.own)
+
+    def _levels(self) -> tuple[int, ...]:
+        """Return `FINER` as far as no history takes more steps than the scene itself, and the most that does not."""
+        finest = FINER[-1]
+        while self.own is not None and finest > 1 and np.maximum(self.parts, finest).sum() > self.own:
+            finest -= 1
+        return tuple(dict.fromkeys(min(finer, finest) for finer in FINER))
 
     # --- computing it -----------------------------------------------------------------------------------------------
 
@@ -194,6 +234,8 @@ class Trial:
                     self._steady(switched, out)
                 else:
                     self._march(switched, theory, without, out)
+            except Dear:
+                raise
             except ComputationError as error:
                 out.failed[name] = error.what
         return out
@@ -202,31 +244,37 @@ class Trial:
         system = switched.system
         q = steady_state(system, switched.prescribed.speed(0.0), self.newton)
         self._sample(switched, [self._tip(switched, q)], out)
-        out.size = system.size(q)
+        out.sizes = system.sizes(q)
 
     def _march(self, switched: SwitchedSystem, theory: str, without: frozenset[str], out: Outputs) -> None:
         """Compute a history, with shorter steps between the samples where a nonlinear model asks for them.
 
         What one model needs all get from then on, since only histories solved alike can be compared.
         """
-        for finer in FINER[FINER.index(self.finer) :]:
+        for finer in self.levels[self.levels.index(self.finer) :]:
+            if self.thrifty and finer > 1 and self._count(finer) > DEAR * (self.own or np.inf):
+                raise Dear(f"{self._count(finer)} steps would be needed")
             switched.leave_out(without)
+            last = finer == self.levels[-1]
             try:
-                halved = self._march_once(switched, theory, out, finer)
+                trusted = self._march_once(switched, theory, out, finer, last)
             except Beyond:
                 raise
             except ComputationError:
-                if switched.system.linear or finer == FINER[-1]:
+                if switched.system.linear or last:
                     raise
                 continue
-            if halved <= HALVED or finer == FINER[-1]:
+            if trusted:
                 break
         if finer != self.finer:
             self.finer = finer
             self._done.clear()
 
-    def _march_once(self, switched: SwitchedSystem, theory: str, out: Outputs, finer: int) -> float:
-        """Compute a history; return the share of the steps that had to be halved."""
+    def _count(self, finer: int) -> int:
+        return int(np.maximum(self.parts, finer).sum())
+
+    def _march_once(self, switched: SwitchedSystem, theory: str, out: Outputs, finer: int, last: bool) -> bool:
+        """Compute a history; return whether few enough steps had to be halved, or it is the last resort."""
         assert self.scene.time is not None
         system, scheme = switched.system, Scheme.of(self.scene)
         newton = newton_for(self.scene, monotone=True)
@@ -234,22 +282,23 @@ class Trial:
         hub = switched.hub
         stepper = Stepper(system, scheme, newton) if hub is None else HubStepper(system, hub, scheme, newton)
         state = stepper.start(0.0, q, np.zeros_like(q))
-        tips, out.size = [self._tip(switched, q)], system.size(q)
+        tips, out.sizes = [self._tip(switched, q)], system.sizes(q)
         moved, bound = self._moved(switched), self._bound
+        halved = HALVED * self._count(finer)
         try:
-            steps = fixed_steps(stepper, state, self.scene.time.end, self.step / finer)
-            for i, new in enumerate(steps, start=1):
-                if i % finer:
-                    continue
+            counts = [max(finer, int(n)) for n in self.parts]
+            for new in fixed_steps(stepper, state, self.scene.time.end, self.step, counts):
                 tips.append(self._tip(switched, new.q))
-                out.size = max(out.size, system.size(new.q))
+                out.sizes = np.maximum(out.sizes, system.sizes(new.q))
                 if bound is not None and bound.passed(len(tips) - 1, tips[-1][moved]):
                     raise Beyond(f"it is beyond the bound from t = {new.t:.4g} s on")
                 if system.linear and not out.size <= LARGEST_LINEAR_DEFLECTION:
                     raise ComputationError(f"it diverges at t = {new.t:.4g} s")
+                if not last and stepper.substeps > halved:
+                    return False
         finally:
             self._sample(switched, tips, out)
-        return stepper.substeps / (finer * len(tips))
+        return True
 
     def _start(self, switched: SwitchedSystem, theory: str) -> Array:
         initial, system = self.scene.initial, switched.system

@@ -63,6 +63,7 @@ def test_second_start_and_fresh(rotfem: Rotfem) -> None:
     second = json.loads(rotfem("cost", "beam.toml", *SMALL, "--json", "--no-plots").out)
     fresh = json.loads(rotfem("cost", "beam.toml", *SMALL, "--json", "--no-plots", "--fresh").out)
     assert first["measured"] == fresh["measured"] > 0 == second["measured"]
+    assert first["resumed"] == fresh["resumed"] == 0 and second["resumed"] == first["measured"]
     assert first["references"] == second["references"] == fresh["references"]
 
 
@@ -79,11 +80,38 @@ def test_an_accuracy_out_of_reach(rotfem: Rotfem, folder: Path) -> None:
         (("--theories", "reisner"), 'did you mean "reissner"'),
         (("--of", "tipp"), "allowed: tip, frequencies"),
         (("--accuracy", "0"), "must be a number greater than 0"),
+        (("--degrees", "9"), "cost --degrees = 9: must be"),
+        (("--theories", "linear", "--set", "model.frame=inertial"), 'cost --theories = "linear"'),
+        (("--write", "no/where.toml"), '--write = "no/where.toml": there is no folder no'),
+        (("--write", "results"), '--write = "results": is a folder'),
     ],
 )
-def test_bad_options(rotfem: Rotfem, arguments: tuple[str, ...], says: str) -> None:
+def test_bad_options(rotfem: Rotfem, folder: Path, arguments: tuple[str, ...], says: str) -> None:
     done = rotfem("cost", "beam.toml", *arguments)
     assert done.status == 2 and says in done.err and "Traceback" not in done.err
+    assert not (folder / "results" / "beam" / "cost.jsonl").exists()  # nothing was computed
+
+
+def test_degrees_that_lock_on_a_mesh_file_are_refused(rotfem: Rotfem, folder: Path) -> None:
+    gmsh = pytest.importorskip("gmsh")
+    gmsh.initialize()
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.occ.addRectangle(0.0, 0.0, 0.0, 1.0, 0.5)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(1, [4], name="clamped")
+        gmsh.model.addPhysicalGroup(2, [1], name="plate")
+        gmsh.model.mesh.generate(2)
+        gmsh.write(str(folder / "plate.msh"))
+    finally:
+        gmsh.finalize()
+    (folder / "plate.toml").write_text(
+        '[structure]\ntype = "plate"\nmesh = "plate.msh"\nthickness = 0.01\nE = 7e10\nnu = 0.3\nrho = 2700.0\n'
+        '[motion]\ntype = "constant"\nspeed = 5.0\n[modes]\ncount = 2\n'
+    )
+    done = rotfem("cost", "plate.toml", "--degrees", "1")
+    assert done.status == 2 and "cost --degrees = 1: triangles of degree 1" in done.err
+    assert rotfem("cost", "plate.toml", "--elements", "4").status == 2
 
 
 def test_interrupt_keeps_what_is_finished(folder: Path) -> None:

@@ -144,6 +144,7 @@ def test_ladder_is_one_of_powers_of_two() -> None:
         ({"elements": [0]}, "integers greater than 0"),
         ({"steps": [-0.1]}, "numbers greater than 0"),
         ({"steps": [21.0]}, "at most time.end = 20"),
+        ({"degrees": [3, 9]}, "cost --degrees = 9: must be an integer at least 1 and at most 6"),
     ],
 )
 def test_a_bad_choice_is_refused(choice: dict[str, Any], says: str) -> None:
@@ -166,6 +167,9 @@ def test_record_is_read_back_but_for_other_studies_and_torn_lines(tmp_path: Path
     np.testing.assert_array_equal(found.samples.values, done.samples.values if done.samples else None)
     assert record.get(a, 4) is None and record.get(b, 1) is None
     record.put(c, Measurement(status="failed", reason="why"))
+    assert record.is_earlier(a) and not record.is_earlier(c)
+    record.put(a, done)
+    assert not record.is_earlier(a)
     again = Record(path, "one")
     failed = again.get(c, 3)
     assert again.resumed == 2 and failed is not None and failed.reason == "why"
@@ -179,6 +183,34 @@ def test_fingerprint_tells_studies_apart(monkeypatch: pytest.MonkeyPatch) -> Non
     others = {fingerprint(scene.replace({"motion.speed": 5.0}), "tip", 1), fingerprint(scene, "frequencies", 1)}
     monkeypatch.setattr("rotfem.cost_record.__version__", "0.0.0")
     assert one not in others | {fingerprint(scene, "tip", 1)}
+
+
+def plate_on(mesh: Path) -> Scene:
+    plate = {"type": "plate", "mesh": str(mesh), "thickness": 1e-3, "E": 2.1e11, "nu": 0.3, "rho": 7850.0}
+    return Scene.from_dict({"structure": plate, "motion": {"type": "constant", "speed": 1.0}})
+
+
+def test_fingerprint_sees_what_is_in_a_mesh_file(tmp_path: Path) -> None:
+    mesh = tmp_path / "plate.msh"
+    mesh.write_text("one")
+    one = fingerprint(plate_on(mesh), "tip", 1)
+    assert one == fingerprint(plate_on(mesh), "tip", 1)
+    mesh.write_text("two")
+    assert one != fingerprint(plate_on(mesh), "tip", 1)
+
+
+def test_numbers_of_elements_are_refused_for_a_mesh_file(tmp_path: Path) -> None:
+    (tmp_path / "plate.msh").write_text("")
+    with pytest.raises(SceneError, match=r"cost --elements = 4: has no meaning with structure\.mesh"):
+        grid(plate_on(tmp_path / "plate.msh"), "frequencies", True, None, {"elements": [4]})
+
+
+def test_locking_degrees_are_refused() -> None:
+    plate = {"type": "plate", "length": 1.0, "width": 1.0, "thickness": 1e-3, "E": 2.1e11, "nu": 0.3, "rho": 7850.0}
+    motion = {"type": "constant", "speed": 1.0}
+    scene = Scene.from_dict({"structure": plate, "motion": motion, "mesh": {"cell": "triangle"}})
+    with pytest.raises(SceneError, match="cost --degrees = 1: triangles of degree 1.*at least 3"):
+        grid(scene, "frequencies", True, None, {"degrees": [1]})
 
 
 def test_tuned_scene_keeps_keys_and_finds_its_files(tmp_path: Path) -> None:

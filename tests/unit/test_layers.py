@@ -39,7 +39,7 @@ LEVELS: tuple[tuple[str, ...], ...] = (
     ("system", "affine"),
     ("equilibrium", "integrators", "pencil"),
     ("hub",),
-    ("marching", "outputs", "switches"),
+    ("marching", "outputs", "switches", "trial_steps"),
     ("trial",),
     ("estimate",),
     ("choice",),

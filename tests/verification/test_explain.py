@@ -295,7 +295,7 @@ def test_steady_state_is_chosen_by_its_tip() -> None:
 
 # --- what leaves its range ------------------------------------------------------------------------------------------
 
-#: A blow of 4 ms, which the samples of a trial, 12 ms apart, step over.
+#: A blow of 4 ms; the samples of a trial are 12 ms apart.
 BLOW = {
     "loads": {"tip_force": [[0, 0, 0], [3.001, 0, 0], [3.003, 0, 4000.0], [3.005, 0, 0], [9.0, 0, 0]]},
     "motion.speed": 0.1,
@@ -304,6 +304,13 @@ BLOW = {
 }
 
 
+@pytest.fixture
+def blind(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let trials step over what the scene prescribes."""
+    monkeypatch.setattr("rotfem.trial.given", lambda *_: [])
+
+
+@pytest.mark.usefixtures("blind")
 def test_a_run_that_leaves_its_range_starts_again_with_a_richer_model() -> None:
     result = rotfem.run(scene(SPIN_UP, BLOW))
     choice = result.summary["choice"]
@@ -317,6 +324,7 @@ def test_a_run_that_leaves_its_range_starts_again_with_a_richer_model() -> None:
     assert np.array_equal(tip(result), tip(full))
 
 
+@pytest.mark.usefixtures("blind")
 def test_a_run_that_leaves_its_range_stops_or_warns() -> None:
     with pytest.raises(ComputationError, match="left the range of its model") as caught:
         rotfem.run(scene(SPIN_UP, BLOW | {"model.on_exceed": "stop"}))
@@ -326,14 +334,102 @@ def test_a_run_that_leaves_its_range_stops_or_warns() -> None:
     assert [text for text in result.summary["warnings"] if "left the range" in text]
 
 
+#: The same blow on a beam at rest, and on one that spins in its equilibrium, stretched but not bent.
+AT_REST = BLOW | {"motion": {"type": "constant", "speed": 0.0}}
+STRETCHED = BLOW | {"motion": {"type": "constant", "speed": 2.0}, "initial": {"state": "steady"}}
+
+
+@pytest.mark.usefixtures("blind")
+@pytest.mark.parametrize("changes", [AT_REST, STRETCHED], ids=["at rest", "stretched"])
+def test_a_model_chosen_for_no_motion_or_another_is_given_up(changes: dict[str, Any]) -> None:
+    """A hundredth of the blow: an estimate of 0 or of round-off must not allow any bending that was not tried out."""
+    weak = [[0, 0, 0], [3.001, 0, 0], [3.003, 0, 40.0], [3.005, 0, 0], [9.0, 0, 0]]
+    asked = scene(SPIN_UP, changes | {"loads": {"tip_force": weak}})
+    result = rotfem.run(asked)
+    assert result.summary["choice"]["upgrades"][0]["from"] == "linear"
+    assert tip_change(tip(rotfem.run(asked.replace({"model.tolerance": None}))), tip(result)) < 1e-2
+
+
+@pytest.mark.parametrize("as_function", [False, True], ids=["table", "function"])
+@pytest.mark.parametrize("changes", [BLOW, AT_REST, STRETCHED], ids=["spin-up", "at rest", "stretched"])
+def test_a_trial_sees_a_blow_between_its_samples(changes: dict[str, Any], as_function: bool) -> None:
+    """The largest deflection, of the trial against the run: 1 % of the impulse may be missed, the steps are longer."""
+    asked = scene(SPIN_UP, changes | {"model.tolerance": None})
+    rows = np.array(BLOW["loads"]["tip_force"])  # type: ignore[index]
+    if as_function:
+        force = lambda t: [np.interp(t, rows[:, 0], rows[:, i]) for i in (1, 2)]  # noqa: E731
+        asked = asked.replace({"loads": {"tip_force": force}})
+    trial = Trial(asked, (HISTORY,))
+    assert trial.step > 0.01 and trial.parts.max() >= 4
+    assert trial.parts.sum() < 1.5 * len(trial.parts)  # shorter steps at the blow only
+    full = np.abs(tip(rotfem.run(asked))[:, 1]).max()
+    assert np.abs(trial.outputs("reissner").tip[:, 1]).max() == pytest.approx(full, rel=0.05)
+
+
+@pytest.mark.parametrize("changes", [BLOW, AT_REST, STRETCHED], ids=["spin-up", "at rest", "stretched"])
+def test_a_blow_does_not_cost_the_tolerance(changes: dict[str, Any]) -> None:
+    result = rotfem.run(scene(SPIN_UP, changes))
+    full = rotfem.run(scene(SPIN_UP, changes | {"model.tolerance": None}))
+    assert tip_change(tip(full), tip(result)) < 1e-2
+    assert "upgrades" not in result.summary["choice"]  # seen beforehand
+
+
 def test_the_next_richer_model_is_the_first_that_holds() -> None:
     errors = {"linear": 1e-4, "consistent_linear": 1e-6, "reissner": 0.0}
     everything = ("coriolis", "centrifugal")
-    choice = Choice("linear", (), 1e-3, 3e-4, [], "reissner", everything, errors, size=0.1)
-    assert choice.limit == pytest.approx(0.1 * np.sqrt(10.0))  # 1e-4 (s/0.1)² = 1e-3
-    near, far = choice.richer(0.5, 1.0, "why"), choice.richer(2.0, 1.0, "why")
+    choice = Choice("linear", (), 1e-3, 1.5e-3, [], "reissner", everything, errors, sizes=np.array([0.01, 0.1]))
+    assert choice.limits == pytest.approx(np.sqrt(2.0) * choice.sizes)  # 5e-4 (s/0.1)² = 1e-3
+    near, far = (choice.richer(np.array([0.01, s]), 1.0, "why") for s in (0.5, 2.0))
     assert (near.theory, near.effects) == ("consistent_linear", everything)
-    assert far.theory == "reissner" and far.full and far.check(1e9) == ""
+    assert near.size == 0.5 and near.check(np.array([0.01, 0.6])) == ""
+    assert far.theory == "reissner" and far.full and far.check(np.array([1e9, 1e9])) == ""
+
+
+def test_no_choice_is_trusted_far_beyond_what_was_tried_out() -> None:
+    """Estimates of 0 and of round-off, and components that did not move; 1e-3/3 of the motion cannot be felt."""
+    errors = {"linear": 0.0, "consistent_linear": 1e-12, "reissner": 0.0}
+    for estimate in (0.0, 1e-14):
+        still = Choice("linear", (), 1e-3, estimate, [], "reissner", ("coriolis",), errors, sizes=np.zeros(3))
+        assert still.check(np.full(3, 1e-15)) == "" and still.check(np.array([0.0, 1e-9, 0.0])) != ""
+        assert still.richer(np.array([0.0, 1e-9, 0.0]), None, "why").theory == "reissner"
+        stretched = Choice("linear", (), 1e-3, estimate, [], "reissner", (), errors, sizes=np.array([1e-5, 0.0, 0.0]))
+        assert stretched.limit == pytest.approx(3e-5)
+        assert stretched.check(np.array([2e-5, 1e-9, 0.0])) == "" and stretched.check(np.array([0, 1e-8, 0])) != ""
+        assert stretched.richer(np.array([4e-5, 0.0, 0.0]), None, "why").theory == "consistent_linear"
+        # 3 · 1e-9 (as good as unknown) times 1000² is above the tolerance.
+        assert stretched.richer(np.array([1e-2, 0.0, 0.0]), None, "why").theory == "reissner"
+
+
+# --- what a trial takes ---------------------------------------------------------------------------------------------
+
+
+def test_a_trial_takes_no_more_steps_than_the_scene() -> None:
+    """A release from 0.6 L, whose Newton wants shorter steps than the modes do."""
+    changes = {"motion": {"type": "constant", "speed": 1.0}, "initial": {"tip_displacement": 6.0}}
+    asked = scene(SPIN_UP, changes | {"time": {"end": 8.0, "step": 0.01}})
+    trial = Trial(asked, (HISTORY,))
+    assert trial.own == 800
+    assert trial.levels[-1] == 2 and trial.outputs("reissner").failed == {}
+    assert all(np.maximum(trial.parts, finer).sum() <= 800 for finer in trial.levels)
+    assert trial.finer == 2
+    choice = choose(asked.replace({"model.tolerance": 1e-1}), (HISTORY,))
+    assert choice.full and "would take longer" in choice.remark
+    assert "remark" in choice.summary()
+
+
+def test_a_failing_eigenproblem_at_rest_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: Any) -> None:
+        raise ComputationError("an eigenpair has the backward error 1, above 0")
+
+    monkeypatch.setattr("rotfem.trial.Pencil.solve", fail)
+    result = rotfem.explain(scene(SPIN_UP))
+    rows = {row["name"]: row for row in result.rows}
+    assert np.isinf(rows["euler"]["estimate"][MODES]) and "backward error" in rows["euler"]["notes"][MODES]
+    assert rows["euler"]["estimate"][HISTORY] == pytest.approx(1.0, abs=0.1)
+    assert any("frequencies at rest cannot be computed" in text for text in result.summary["warnings"])
+    assert "speed_ratio" not in result.summary["groups"]
+    chosen = rotfem.run(scene(SPIN_UP, {"motion.speed": 1.0, "model.tolerance": 1e-1}))
+    assert chosen.summary["theory"] == "consistent_linear"
 
 
 # --- bad input ------------------------------------------------------------------------------------------------------
