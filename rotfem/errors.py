@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 _LONGEST_VALUE = 72
@@ -108,17 +110,24 @@ def show(value: Any) -> str:
         value: Any value read from a scene.
 
     Returns:
-        One line, shortened to a readable length.
+        One line, shortened to a readable length; a path in full, so that it can be found.
     """
     text = _full_text(value)
+    if isinstance(value, Path):
+        return text
     return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 1] + "…"
+
+
+def shown(path: str | Path) -> Path:
+    """Return a path as it is found from the working directory, relative where that is shorter."""
+    return Path(min(str(path), os.path.relpath(path), key=len))
 
 
 def _full_text(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, str | Path):
+        return json.dumps(str(value), ensure_ascii=False)
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_full_text, value))}]"
     try:

@@ -63,6 +63,10 @@ class ModalAnalysis:
     Args:
         scene: validated scene; its own speed is only a default.
         comm: MPI communicator.
+        sweep: whether the speed will change.
+
+    Raises:
+        SceneError: more modes are asked for than the mesh has, or it cannot be shared by the processes.
     """
 
     def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD, sweep: bool = False):
@@ -70,6 +74,8 @@ class ModalAnalysis:
         rotating = scene.replace({"model.frame": "rotating"}) if scene.model.frame == "inertial" else scene
         self.scene, self.comm = rotating, comm
         self.model = Model(rotating, comm, rotating.effective_effects(spinning=True) if sweep else None)
+        self.model.structure.check_shared()  # SLEPc waits for ever where a process has no unknowns
+        self._check_count()
         self.system: System = compile_system(self.model)
         motion = rotating.motion
         coupled = "hub_coupling" in self.model.effects
@@ -79,6 +85,14 @@ class ModalAnalysis:
         assembled = self.system.assembled
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
         self.seconds |= {"equilibrium": 0.0, "factor": 0.0, "eigen": 0.0}
+
+    def _check_count(self) -> None:
+        """Refuse more modes than there are unknowns; a count that was not asked for is only an upper limit."""
+        modes = self.scene.modes
+        allowed = self.model.structure.free_unknowns() + int(isinstance(self.scene.motion, TorqueMotion))
+        if "count" in modes.model_fields_set and modes.count > allowed:
+            why = f"must be at most {allowed}, the number of unknowns that are free on this mesh"
+            raise SceneError(self.scene.file, "modes.count", modes.count, why)
 
     def advise(self, command: str, hint: Hint | None, speed: float) -> list[str]:
         """Return hints about the computation ahead, up to a speed (rad/s), and hand them on."""
@@ -116,10 +130,12 @@ class ModalAnalysis:
             self.seconds[name] += span
         # A PETSc matrix must not outlive the mesh it was made on: their communicator goes with the mesh.
         clamped.owner = pencil.owner = self
+        finite = massed(clamped.M)
         if self.hub is None:
-            return Spinning(speed, q, pencil, pairs, clamped)
+            return Spinning(speed, q, pencil, pairs.select(np.arange(len(pairs.values))[:finite]), clamped)
         flexible = np.flatnonzero(np.abs(pairs.values) > ZERO * np.median(np.abs(pairs.values)))
-        return Spinning(speed, q, pencil, pairs.select(flexible), clamped, rigid=len(flexible) < len(pairs.values))
+        rigid = len(flexible) < len(pairs.values)
+        return Spinning(speed, q, pencil, pairs.select(flexible[:finite]), clamped, rigid)
 
     def needs_fixed_hub(self, what: str) -> None:
         """Refuse what is not there for a free hub.
@@ -198,6 +214,13 @@ class ModalAnalysis:
         coordinates, real = self.model.structure.nodes(x.real)
         _, imaginary = self.model.structure.nodes(x.imag)
         return coordinates, real + 1j * imaginary
+
+
+def massed(M: Any) -> int:
+    """Return how many unknowns have a mass: as many modes there are, and infinite eigenvalues beyond them."""
+    indptr, _, data = M.getValuesCSR()
+    rows = np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))
+    return int(M.comm.tompi4py().allreduce(len(np.unique(rows[data != 0.0]))))
 
 
 def stability(lam: complex) -> str:

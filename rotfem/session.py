@@ -5,6 +5,7 @@ Exit status 0 done, 2 bad input, 3 the computation failed, 130 interrupted.
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Callable
@@ -29,12 +30,15 @@ class Session:
         self.comm = MPI.COMM_WORLD
         self.as_json, self.quiet, self.debug = as_json, quiet, debug
         self.first = self.comm.rank == 0
+        self._made: list[Path] = []
 
     def __enter__(self) -> Session:
         signal.signal(signal.SIGTERM, _interrupt)
         return self
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        if error is not None:
+            self._tidy()
         if error is None or (self.debug and not isinstance(error, SystemExit)):
             return
         if isinstance(error, SceneError | OutputError):
@@ -55,6 +59,14 @@ class Session:
             print(f"rotfem: {message}", file=sys.stderr)
         raise SystemExit(status) from None
 
+    def _tidy(self) -> None:
+        """Remove the folders that this command made, the innermost first, as far as they are empty."""
+        for made in self._made:
+            try:
+                made.rmdir()
+            except OSError:
+                return
+
     def folder(self, path: Path) -> Path:
         """Return the result folder, made by rank 0.
 
@@ -65,6 +77,7 @@ class Session:
 
         problem = None
         if self.first:
+            self._made = [p for p in (path, *path.parents) if not os.path.exists(p)]  # Path.exists may raise
             try:
                 prepare_folder(path)
             except OutputError as error:

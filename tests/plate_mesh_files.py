@@ -15,20 +15,24 @@ KINDS = {2: (1, 1), 3: (2, 2), 4: (3, 2), 8: (5, 3)}
 def write_msh(
     path: Path, points: npt.ArrayLike, groups: Mapping[str, Sequence[Sequence[int]]], dimension: int | None = None
 ) -> Path:
-    """Write nodes (n, 2 or 3) and cells by group name (node numbers from 0) as a .msh file; return its path."""
+    """Write nodes (n, 2 or 3) and cells by group name (node numbers from 0) as a .msh file; return its path.
+
+    Cells of the name "" are in no physical group.
+    """
     x = np.asarray(points, dtype=float)
     x = np.column_stack([x, np.zeros((len(x), 3 - x.shape[1]))])
     names, cells = [], []
     for tag, (name, members) in enumerate(groups.items(), start=1):
         size = dimension or (KINDS[len(members[0])][1] if members else 2)
-        names.append(f'{size} {tag} "{name}"')
-        cells += [(KINDS[len(c)][0], tag, c) for c in members]
+        if name:
+            names.append(f'{size} {tag} "{name}"')
+        cells += [(KINDS[len(c)][0], tag if name else 0, tag, c) for c in members]
     lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names)), *names]
     lines += ["$EndPhysicalNames", "$Nodes", str(len(x))]
     lines += [f"{i} {a!r} {b!r} {c!r}" for i, (a, b, c) in enumerate(x.tolist(), start=1)]
     lines += ["$EndNodes", "$Elements", str(len(cells))]
-    for i, (kind, tag, nodes) in enumerate(cells, start=1):
-        lines.append(f"{i} {kind} 2 {tag} {tag} " + " ".join(str(n + 1) for n in nodes))
+    for i, (kind, group, tag, nodes) in enumerate(cells, start=1):
+        lines.append(f"{i} {kind} 2 {group} {tag} " + " ".join(str(n + 1) for n in nodes))
     path.write_text("\n".join([*lines, "$EndElements", ""]))
     return path
 

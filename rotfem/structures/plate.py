@@ -57,7 +57,8 @@ class Plate(Structure):
         comm: communicator the mesh is distributed over.
 
     Raises:
-        SceneError: a mesh file that is no mesh of a plate, elements that lock on it, masses beside it.
+        SceneError: a mesh file that is no mesh of a plate, elements that lock on it, masses beside it, more processes
+            than the mesh can be shared by.
     """
 
     type = "plate"
@@ -80,6 +81,7 @@ class Plate(Structure):
         if (why := locking(cell, k, settings.integration)) is not None:
             raise SceneError(scene.file, "mesh.degree", k, why)
         self.discretise(self.grid.mesh, k)
+        self.check_shared()
         self._places = [self._place(row) for row in s.point_masses]
         self._subdomains = [(i, place.cells) for i, place in enumerate(self._places, start=1)] or None
         self.dx = ufl.dx(self.mesh, subdomain_data=self._subdomains, metadata={"quadrature_degree": 2 * k})

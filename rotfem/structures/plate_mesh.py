@@ -1,4 +1,4 @@
-"""Meshes of plates: a rectangle, or a gmsh file that is checked on one process before any other one waits for it."""
+"""Meshes of plates: a rectangle, or a gmsh file."""
 
 from __future__ import annotations
 
@@ -14,17 +14,13 @@ from dolfinx import mesh
 from mpi4py import MPI
 
 from rotfem import compat
-from rotfem.errors import SceneError
+from rotfem.errors import SceneError, shown
 from rotfem.scene import PlateMesh, PlateStructure, Scene
 from rotfem.structures.beam import beam_nodes
+from rotfem.structures.mesh_checks import BadMesh
+from rotfem.structures.mesh_file import read
 
 Array = npt.NDArray[np.float64]
-
-#: gmsh's numbers of the cells a plate can be made of: triangles and quadrilaterals of first and second order.
-CELLS = {2: "triangle", 9: "triangle", 3: "quadrilateral", 10: "quadrilateral", 16: "quadrilateral"}
-
-#: Part of the mean area below which a cell counts as having none; part of the size by which nodes may leave the plane.
-NO_AREA, FLAT = 1e-10, 1e-9
 
 #: Edges of a rectangle, where a coordinate equals an end of its range: (axis, end).
 EDGES = {"clamped": (0, 0), "tip": (0, 1), "lower": (1, 0), "upper": (1, 1)}
@@ -105,124 +101,22 @@ def from_file(scene: str, path: Path, regions: Sequence[str], comm: MPI.Comm) ->
     """
     import gmsh
 
-    names: dict[int, dict[str, int]] = {}
+    groups: dict[int, dict[str, int]] = {}
     why: str | None = None
     if comm.rank == 0:
         try:
-            names = _open(gmsh, path, tuple(regions) or ("plate",))
-        except _BadMesh as error:
+            groups = read(gmsh, path, tuple(regions) or ("plate",))
+            compat.extract(gmsh.model)
+        except BadMesh as error:
             why = str(error)
-    why, names = comm.bcast((why, names))
+        except Exception as error:  # the others wait for rank 0: whatever happens there must be told
+            why = f"cannot be used as the mesh of a plate ({type(error).__name__}: {' '.join(str(error).split())})"
+    why, groups = comm.bcast((why, groups))
     try:
         if why is not None:
-            raise SceneError(scene, "structure.mesh", path.name, why)
+            raise SceneError(scene, "structure.mesh", shown(path), why)
         out, cell_tags, edge_tags = compat.model_to_mesh(gmsh.model, comm)
     finally:
         if comm.rank == 0 and gmsh.isInitialized():
             gmsh.finalize()
-    return PlateGrid(out, edge_tags, names[1], cell_tags, names[2])
-
-
-class _BadMesh(Exception):
-    """Why a file is not the mesh of a plate."""
-
-
-def _open(gmsh: Any, path: Path, surfaces: tuple[str, ...]) -> dict[int, dict[str, int]]:
-    """Load a file into gmsh and return dimension ↦ name ↦ tag of its physical groups."""
-    gmsh.initialize([], False, False, False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    if path.suffix != ".msh":
-        raise _BadMesh("must be a mesh file of gmsh, with the ending .msh")
-    try:
-        gmsh.merge(str(path))
-    except Exception as error:
-        raise _BadMesh(f"gmsh cannot read it: {error}") from None
-    groups: dict[int, dict[str, int]] = {0: {}, 1: {}, 2: {}, 3: {}}
-    for dimension, tag in gmsh.model.getPhysicalGroups():
-        groups[dimension][gmsh.model.getPhysicalName(dimension, tag) or f"{tag}"] = tag
-    if len(gmsh.model.mesh.getNodes()[0]) == 0:
-        raise _BadMesh("it holds no mesh")
-    if groups[3] or len(gmsh.model.mesh.getElements(3)[0]):
-        raise _BadMesh("it holds cells of dimension 3; a plate is a mesh of triangles or quadrilaterals in a plane")
-    _check_names(groups, surfaces)
-    _check_cells(gmsh, [groups[2][name] for name in surfaces], surfaces)
-    _check_curves(gmsh, groups[1])
-    return groups
-
-
-def _check_names(groups: dict[int, dict[str, int]], surfaces: tuple[str, ...]) -> None:
-    if "clamped" not in groups[1]:
-        raise _BadMesh(f'has no physical curve "clamped" (physical curves: {_listed(groups[1])})')
-    missing = [name for name in surfaces if name not in groups[2]]
-    if missing:
-        raise _BadMesh(f'has no physical surface "{missing[0]}" (physical surfaces: {_listed(groups[2])})')
-    others = [name for name in groups[2] if name not in surfaces]
-    if others:
-        raise _BadMesh(
-            f'its physical surface "{others[0]}" is not part of the plate; with several surfaces give '
-            'structure.thickness as a table of all of them, and with one call it "plate"'
-        )
-
-
-def _check_cells(gmsh: Any, tags: list[int], surfaces: tuple[str, ...]) -> None:
-    """Refuse mixed cells, cells without area and nodes outside the plane x_3 = 0."""
-    numbers, x, _ = gmsh.model.mesh.getNodes()
-    x = x.reshape(-1, 3)
-    size = float(np.max(np.ptp(x, axis=0)))
-    if np.max(np.abs(x[:, 2])) > FLAT * size:
-        raise _BadMesh(f"it leaves the plane x₃ = 0 (by {np.max(np.abs(x[:, 2])):.3g} m); a plate lies in it")
-    row = np.zeros(int(numbers.max()) + 1, dtype=np.int64)
-    row[numbers.astype(np.int64)] = np.arange(len(numbers))
-    kinds: set[int] = set()
-    seen: list[npt.NDArray[Any]] = []
-    for tag, name in zip(tags, surfaces, strict=True):
-        count = 0
-        for entity in gmsh.model.getEntitiesForPhysicalGroup(2, tag):
-            for kind, cells, nodes in zip(*gmsh.model.mesh.getElements(2, entity), strict=True):
-                kinds.add(int(kind))
-                if int(kind) not in CELLS:
-                    what = gmsh.model.mesh.getElementProperties(int(kind))[0]
-                    raise _BadMesh(f'has cells "{what}"; can be triangles or quadrilaterals of order 1 or 2')
-                corners = 3 if CELLS[int(kind)] == "triangle" else 4
-                node = nodes.reshape(len(cells), -1)[:, :corners].astype(np.int64)
-                _check_areas(cells, x[row[node]][:, :, :2])
-                seen.append(cells)
-                count += len(cells)
-        if count == 0:
-            raise _BadMesh(f'its physical surface "{name}" has no cells')
-    if len(kinds) > 1:
-        what = " and ".join(sorted(gmsh.model.mesh.getElementProperties(k)[0] for k in kinds))
-        raise _BadMesh(f"mixes cells ({what}); all must be of one kind")
-    cells = np.concatenate(seen)
-    if len(np.unique(cells)) < len(cells):
-        raise _BadMesh("has cells that belong to two physical surfaces")
-
-
-def _check_areas(cells: npt.NDArray[Any], corners: Array) -> None:
-    """Refuse a cell without area, or a quadrilateral with a corner of no angle or more than 180°."""
-    n = corners.shape[1]
-    after, before = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
-    turn = after[..., 0] * before[..., 1] - after[..., 1] * before[..., 0]  # twice the area of the corner's triangle
-    area = np.abs(turn.sum(axis=1)) / (4 if n == 4 else 6)
-    mean = float(np.mean(area))
-    bad = np.flatnonzero(area <= NO_AREA * mean) if mean > 0 else np.arange(len(area))
-    if len(bad):
-        where = corners[bad[0]].mean(axis=0)
-        raise _BadMesh(f"cell {int(cells[bad[0]])} at ({where[0]:.4g}, {where[1]:.4g}) m has no area")
-    folded = np.flatnonzero(np.min(turn * np.sign(turn.sum(axis=1))[:, None], axis=1) <= 0.0)
-    if len(folded):
-        where = corners[folded[0]].mean(axis=0)
-        raise _BadMesh(
-            f"cell {int(cells[folded[0]])} at ({where[0]:.4g}, {where[1]:.4g}) m has a corner of 180° or more"
-        )
-
-
-def _check_curves(gmsh: Any, names: dict[str, int]) -> None:
-    for name, tag in names.items():
-        entities = gmsh.model.getEntitiesForPhysicalGroup(1, tag)
-        if not sum(len(part) for e in entities for part in gmsh.model.mesh.getElements(1, e)[1]):
-            raise _BadMesh(f'its physical curve "{name}" has no edges')
-
-
-def _listed(names: dict[str, int]) -> str:
-    return ", ".join(f'"{name}"' for name in names) or "none"
+    return PlateGrid(out, edge_tags, groups[1], cell_tags, groups[2])

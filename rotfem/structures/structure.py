@@ -14,6 +14,7 @@ from dolfinx import default_scalar_type, fem
 from mpi4py import MPI
 
 from rotfem import scene_common
+from rotfem.errors import SceneError, shown
 from rotfem.kinematics import AppliedLoad, Damping, Kinematics, Strain
 from rotfem.scene import Load, Scene
 from rotfem.structures.probe import Probe
@@ -80,6 +81,32 @@ class Structure:
         self.V = fem.functionspace(mesh, element("Lagrange", mesh.basix_cell(), degree, shape=(self.size,)))
         q, v, a = (fem.Function(self.V, name=name) for name in "qva")
         self.k = Kinematics(q, v, a, ufl.TestFunction(self.V))
+
+    def check_shared(self) -> None:
+        """Refuse a mesh that leaves a process without cells or unknowns, where it would fail or wait for ever.
+
+        Raises:
+            SceneError: says how many cells there are; on every process the same.
+        """
+        cells, nodes = self.mesh.topology.index_map(self.mesh.topology.dim), self.V.dofmap.index_map
+        idle = self.comm.allreduce(int(min(cells.size_local, nodes.size_local) == 0))
+        if idle == 0:
+            return
+        file = getattr(self.scene.structure, "mesh", None)
+        key, value = ("structure.mesh", shown(file)) if file else ("mesh.elements", self.scene.mesh.elements)
+        raise SceneError(
+            self.scene.file,
+            key,
+            value,
+            f"the mesh (cells: {cells.size_global}) cannot be shared by {self.comm.size} processes: {idle} would have "
+            "nothing to do; start fewer, or refine it",
+        )
+
+    def free_unknowns(self) -> int:
+        """Return how many unknowns are not clamped, over all processes."""
+        owned = self.V.dofmap.index_map.size_local
+        clamped = int(np.count_nonzero(self.clamped < owned))
+        return self.size * (self.V.dofmap.index_map.size_global - int(self.comm.allreduce(clamped)))
 
     def position(self, q: Any) -> Any:
         """Return the axis or mid-surface r(q), frame components (m)."""

@@ -124,3 +124,65 @@ def test_what_cannot_be_done(rotfem: Rotfem, arguments: tuple[str, ...], status:
     assert done.out == ""
     assert message in done.err
     assert "Traceback" not in done.err
+
+
+@pytest.mark.parametrize("command", [("modes",), ("campbell", "--speeds", "0:4:3")])
+@pytest.mark.parametrize(
+    ("changes", "allowed"),
+    [
+        ((), 36),  # 3 unknowns at 12 nodes
+        (('motion={type="torque", hub_inertia=1.0, pulses=[[0.0, 1.0, 1.0]]}', "time={end=1.0, step=0.1}"), 37),
+        (('structure={type="plate", length=1.0, width=0.5, thickness=0.1, E=1e6, nu=0.3, rho=1.0}',), 30),
+    ],
+    ids=["beam", "free hub", "plate"],
+)
+def test_more_modes_than_unknowns(
+    folder: Path, rotfem: Rotfem, command: tuple[str, ...], changes: tuple[str, ...], allowed: int
+) -> None:
+    grid = "mesh={elements=[1, 1], degree=2}" if "plate" in "".join(changes) else "mesh={elements=4, degree=3}"
+    options = [part for change in (*changes, grid, f"modes.count={allowed + 1}") for part in ("--set", change)]
+    done = rotfem(command[0], "beam.toml", *command[1:], *options)
+    assert done.status == 2, done.err
+    (told,) = done.err.splitlines()
+    assert f"modes.count = {allowed + 1}: must be at most {allowed}, " in told
+
+
+def test_all_modes_there_are(folder: Path, rotfem: Rotfem) -> None:
+    """Three free unknowns: as many modes, two without rotary inertia; the default count is no demand for more."""
+    small = ("--json", "--no-plots", "--set", "mesh={elements=1, degree=1}")
+    done = rotfem("modes", "beam.toml", *small)
+    assert done.status == 0, done.err
+    assert len(json.loads(done.out)["modes"]) == 3
+    done = rotfem("modes", "beam.toml", *small, "--set", 'model.effects=["coriolis", "centrifugal"]')
+    assert done.status == 0, done.err
+    assert len(json.loads(done.out)["modes"]) == 2
+    text = (folder / "beam.toml").read_text()
+    (folder / "beam.toml").write_text(text.replace("[modes]\ncount = 3\n", ""))
+    done = rotfem("modes", "beam.toml", *small)
+    assert done.status == 0, done.err
+    assert len(json.loads(done.out)["modes"]) == 3
+
+
+def test_a_campbell_diagram_of_all_modes_there_are(rotfem: Rotfem) -> None:
+    """The infinite eigenvalues of the clamped unknowns are no branches, nor spare ones."""
+    mesh = ("--set", "mesh={elements=1, degree=3}", "--set", "modes.count=9", "--set", "model.theory=reissner")
+    done = rotfem("campbell", "beam.toml", "--speeds", "0:3:3", "--json", "--no-plots", *mesh)
+    assert done.status == 0, done.err
+    branches = json.loads(done.out)["branches"]
+    assert len(branches) == 9
+    assert max(branch["frequency_last"] for branch in branches) < 1e5
+
+
+def test_bad_input_leaves_no_empty_folders(folder: Path, rotfem: Rotfem) -> None:
+    """Those that the command made go, those that were there before stay, and so do all that hold something."""
+    bad = ("modes", "beam.toml", "--set", "modes.count=1000")
+    assert rotfem(*bad).status == 2
+    assert not (folder / "results").exists()
+    (folder / "kept").mkdir()
+    assert rotfem(*bad, "-o", "kept/made/twice").status == 2
+    assert list((folder / "kept").iterdir()) == []
+    assert rotfem(*bad, "-o", "kept").status == 2
+    assert (folder / "kept").is_dir()
+    (folder / "kept" / "note").write_text("mine")
+    assert rotfem(*bad, "-o", "kept/../kept/new").status == 2
+    assert [path.name for path in (folder / "kept").iterdir()] == ["note"]

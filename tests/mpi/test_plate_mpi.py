@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rotfem.results import read_csv
-from tests.launch import MPIRUN, rotfem
+from tests.launch import MPIRUN, environment, rotfem
 from tests.plate_mesh_files import grid, write_msh
 
 pytestmark = [pytest.mark.mpi, pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")]
@@ -128,6 +131,49 @@ def rubbish(path: Path) -> None:
     path.write_text("$MeshFormat\n4.1 0 8\nnonsense")
 
 
+def joined(apart: float, across: float, path: Path) -> None:
+    """Two rectangles with nodes of their own, the second one so far from the first and moved along it."""
+    points = np.concatenate([POINTS, POINTS + [1.0 + apart, across]])
+    plate = GROUPS["plate"] + [[n + len(POINTS) for n in cell] for cell in GROUPS["plate"]]
+    write_msh(path, points, {**GROUPS, "plate": plate})
+
+
+def one_point(path: Path) -> None:
+    points = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [2, 1], [2, 2], [1, 2]])
+    write_msh(path, points, {"clamped": [[0, 3]], "plate": [[0, 1, 2, 3], [2, 4, 5, 6]]})
+
+
+def three_at_an_edge(path: Path) -> None:
+    """Three triangles at one edge; and a node of no cell, which leaves a gap in the numbers."""
+    points = np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1], [0.5, 0.2]])
+    write_msh(path, points, {"clamped": [[0, 3]], "plate": [[0, 1, 4], [0, 4, 3], [1, 2, 4], [1, 4, 6]]})
+
+
+def twice(path: Path) -> None:
+    write_msh(path, POINTS, {**GROUPS, "plate": GROUPS["plate"] + GROUPS["plate"][-1:]})
+
+
+def turned_over(path: Path) -> None:
+    """Two cells on the same side of their common edge."""
+    points = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.1, 0.8], [0.1, 0.2]])
+    write_msh(path, points, {"clamped": [[0, 3]], "plate": [[0, 1, 2, 3], [1, 2, 4, 5]]})
+
+
+def across(curve: str, path: Path) -> None:
+    a, _, b, _ = GROUPS["plate"][0]
+    write_msh(path, POINTS, {**GROUPS, curve: [[a, b]]})
+
+
+def two_curves(path: Path) -> None:
+    write_msh(path, POINTS, {**GROUPS, "outline": GROUPS["clamped"] + [[6, 3]]})
+
+
+def no_surface(path: Path) -> None:
+    """A cell in no physical group, which gmsh writes with Mesh.SaveAll."""
+    write_msh(path, POINTS, {**GROUPS, "plate": GROUPS["plate"][:-1], "": GROUPS["plate"][-1:], "tip": [[6, 7]]})
+
+
+LOOSE = 'not connected to the curve "clamped"'
 BAD: dict[str, tuple[Callable[[Path], None] | None, str]] = {
     "no clamped group": (no_group, 'no physical curve "clamped" (physical curves: "edge")'),
     "no plate group": (no_plate, 'no physical surface "plate" (physical surfaces: "wing")'),
@@ -139,6 +185,23 @@ BAD: dict[str, tuple[Callable[[Path], None] | None, str]] = {
     "no surface": (line, 'no physical surface "plate"'),
     "not a mesh": (rubbish, "structure.mesh"),
     "missing": (None, "file not found"),
+    "gap": (partial(joined, 0.1, 0.0), f"4 of its 8 cells are {LOOSE}, at 1.1 ≤ x ≤ 2.1 m, -0.5 ≤ y ≤ 0.5 m"),
+    "nodes not shared": (
+        partial(joined, 0.0, 0.25),
+        f"4 of its 8 cells are {LOOSE}, at 1 ≤ x ≤ 2 m, -0.25 ≤ y ≤ 0.75 m",
+    ),
+    "parts that overlap": (partial(joined, -0.3, 0.0), f"4 of its 8 cells are {LOOSE}, at 0.7 ≤ x ≤ 1.7 m"),
+    "joined at a point": (one_point, f"1 of its 2 cells are {LOOSE}, at 1 ≤ x ≤ 2 m, 1 ≤ y ≤ 2 m"),
+    "three cells at an edge": (three_at_an_edge, "cells 2, 4, 5 overlap at their common edge at (1, 0.5) m"),
+    "a cell twice": (twice, "overlap (two have the same nodes)"),
+    "a cell turned over": (turned_over, "cells 2, 3 overlap at their common edge at (1, 0.5) m"),
+    "clamp inside a cell": (
+        partial(across, "clamped"),
+        '"clamped" has an edge at (0.25, -0.25) m that is no edge of a cell',
+    ),
+    "tip inside a cell": (partial(across, "tip"), '"tip" has an edge at (0.25, -0.25) m that is no edge of a cell'),
+    "an edge of two curves": (two_curves, '"clamped" and "outline" share an edge at (0, -0.25) m'),
+    "a cell in no group": (no_surface, "has 1 cells in no physical surface"),
 }
 
 
@@ -146,17 +209,18 @@ BAD: dict[str, tuple[Callable[[Path], None] | None, str]] = {
 @pytest.mark.parametrize("name", list(BAD))
 def test_bad_meshes(tmp_path: Path, name: str, ranks: int) -> None:
     make, message = BAD[name]
+    (tmp_path / "meshes").mkdir()
     if make is not None:
-        make(tmp_path / "bad.msh")
-    (tmp_path / "plate.toml").write_text(SCENE.format(shape='mesh = "bad.msh"', mesh=""))
+        make(tmp_path / "meshes" / "bad.msh")
+    (tmp_path / "plate.toml").write_text(SCENE.format(shape='mesh = "meshes/bad.msh"', mesh=""))
     done = rotfem(tmp_path, ranks, "modes", "plate.toml", timeout=60)
     told = [text for text in done.stderr.splitlines() if text.startswith("rotfem:")]
     assert done.returncode == 2, done.stderr
     assert len(told) == 1, done.stderr
-    assert "bad.msh" in told[0]
+    assert 'structure.mesh = "meshes/bad.msh"' in told[0]
     assert message in told[0]
     assert "Traceback" not in done.stderr
-    assert not list((tmp_path / "results").glob("*/*"))
+    assert not (tmp_path / "results").exists()
 
 
 def test_a_good_mesh_file(tmp_path: Path) -> None:
@@ -169,3 +233,90 @@ def test_a_good_mesh_file(tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
         found.append([row["frequency"] for row in json.loads(done.stdout)["modes"]])
     np.testing.assert_allclose(found[1], found[0], rtol=1e-8)
+
+
+def test_nodes_of_no_cell(tmp_path: Path) -> None:
+    """Anywhere in the numbers and off the plane: they are no part of the plate."""
+    spoiled = np.insert(np.column_stack([POINTS, np.zeros(len(POINTS))]), 4, [9.0, 9.0, 9.0], axis=0)
+    moved = {name: [[n + (n >= 4) for n in cell] for cell in cells] for name, cells in GROUPS.items()}
+    write_msh(tmp_path / "good.msh", POINTS, GROUPS)
+    write_msh(tmp_path / "more.msh", spoiled, moved)
+    found = []
+    for name, ranks in (("good", 1), ("more", 1), ("more", 2)):
+        (tmp_path / "plate.toml").write_text(SCENE.format(shape=f'mesh = "{name}.msh"', mesh=""))
+        done = rotfem(tmp_path, ranks, "modes", "plate.toml", "--json", "--no-plots", timeout=120)
+        assert done.returncode == 0, done.stderr
+        found.append([row["frequency"] for row in json.loads(done.stdout)["modes"]])
+    np.testing.assert_allclose(found[1:], [found[0]] * 2, rtol=1e-8)
+
+
+BROKEN = """\
+import sys
+sys.argv = ["rotfem", "modes", "plate.toml"]
+import gmsh
+def clear():
+    raise ZeroDivisionError("on purpose")
+gmsh.clear = clear
+from rotfem.cli import main
+main()
+"""
+
+
+def test_any_failure_of_the_reader_is_told_by_all(tmp_path: Path) -> None:
+    """What nobody foresaw fails on rank 0 alone, and ends the other too."""
+    write_msh(tmp_path / "bad.msh", POINTS, GROUPS)
+    (tmp_path / "plate.toml").write_text(SCENE.format(shape='mesh = "bad.msh"', mesh=""))
+    start = [str(MPIRUN), "-n", "2", "--oversubscribe", sys.executable, "-c", BROKEN]
+    done = subprocess.run(
+        start, cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    assert "cannot be used as the mesh of a plate (ZeroDivisionError: on purpose)" in done.stderr
+
+
+# --- more processes than cells ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("command", ["modes", "run"])
+@pytest.mark.parametrize(
+    ("ranks", "shape", "mesh"),
+    [
+        (2, "length = 1.0\nwidth = 0.6", "elements = [1, 1]"),
+        (4, "length = 1.0\nwidth = 0.6", "elements = [3, 1]"),
+        (2, 'mesh = "one.msh"', ""),
+    ],
+)
+def test_more_processes_than_cells(tmp_path: Path, ranks: int, shape: str, mesh: str, command: str) -> None:
+    write_msh(tmp_path / "one.msh", *grid(1, 1))
+    time = "[time]\nend = 0.01\nstep = 0.005\n"
+    (tmp_path / "plate.toml").write_text(SCENE.format(shape=shape, mesh=mesh) + time)
+    done = rotfem(tmp_path, ranks, command, "plate.toml", timeout=60)
+    told = [text for text in done.stderr.splitlines() if text.startswith("rotfem:")]
+    assert done.returncode == 2, done.stderr
+    assert len(told) == 1, done.stderr
+    assert f"mesh.{mesh}: " in told[0] if mesh else 'structure.mesh = "one.msh": ' in told[0]
+    assert f"cannot be shared by {ranks} processes" in told[0]
+    assert not (tmp_path / "results").exists()
+
+
+BEAM = """\
+[structure]
+type = "planar_beam"
+length = 1.0
+section = { EA = 1e6, GA = 4e5, EI = 1e2, mass_per_length = 1.0, rotary_inertia = 1e-4 }
+[motion]
+type = "constant"
+speed = 5.0
+[mesh]
+elements = 1
+"""
+
+
+def test_beams_of_fewer_cells_than_processes(tmp_path: Path) -> None:
+    """Their modes cannot be computed; their histories and steady states can."""
+    (tmp_path / "beam.toml").write_text(BEAM)
+    done = rotfem(tmp_path, 2, "modes", "beam.toml", timeout=60)
+    assert done.returncode == 2, done.stderr
+    assert "mesh.elements = 1: the mesh (cells: 1) cannot be shared by 2 processes" in done.stderr
+    assert rotfem(tmp_path, 2, "run", "beam.toml", "--no-plots", timeout=120).returncode == 0
