@@ -209,7 +209,7 @@ def choose(
         size = np.zeros(0)
         choice = Choice(richest, trial.effects, tolerance, 0.0, [], richest, trial.effects, {}, size, remark=remark)
     choice.seconds = perf_counter() - started
-    return choice
+    return comm.bcast(choice) if comm.size > 1 else choice
 
 
 def cheapest(trial: Trial, tolerance: float, richest: str) -> Choice:

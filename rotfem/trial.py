@@ -111,7 +111,9 @@ class Trial:
         comm: MPI.Comm = MPI.COMM_WORLD,
         thrifty: bool = False,
     ):
-        self.full, self.comm, self.thrifty = scene, comm, thrifty
+        self.full, self.thrifty = scene, thrifty
+        # A coarse mesh is not worth sharing: every process does it all. That of a file may be large.
+        self.comm = comm if getattr(scene.structure, "mesh", None) is not None else MPI.COMM_SELF
         self.absent = self._absent()
         named = outputs if outputs is not None else (HISTORY, STEADY, MODES)
         self.wanted = tuple(name for name in named if name not in self.absent)
