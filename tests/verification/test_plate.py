@@ -69,7 +69,7 @@ def test_thin_square_on_a_distorted_mesh(tmp_path: Path, t: float) -> None:
     mesh = write_msh(tmp_path / "distorted.msh", points, groups)
     scene = square(t, structure__length=None, structure__width=None, structure__mesh=str(mesh))
     found = transverse(scene)[:5] / unit(t)
-    np.testing.assert_allclose(found, THIN, rtol=2e-3)  # the fifth is 1.2e-3 off
+    np.testing.assert_allclose(found, THIN, rtol=1e-3)
 
 
 def reference(name: str, value: int | str) -> dict[tuple[float, str, float, float], dict[int, float]]:
