@@ -7,10 +7,15 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
+import rotfem
+
 History = Mapping[str, np.ndarray]
+
+THEORIES = ("linear", "consistent_linear", "von_karman_linear", "second_order", "von_karman", "reissner")
 
 FIRST_RANK = MPI.COMM_WORLD.rank == 0
 
@@ -31,6 +36,49 @@ def say(text: str) -> None:
 def report(what: str, value: float, reference: float, unit: str) -> None:
     """Print a computed number, what it should be, and the difference."""
     say(f"{what}: {value:.9g} {unit}, reference {reference:.9g} {unit}, difference {value - reference:+.1e} {unit}")
+
+
+def in_every_theory(scene: rotfem.Scene, column: str) -> tuple[dict[str, History], dict[str, float]]:
+    """Return theory ↦ history and, where it does not diverge, the least value (m) of a column; print the latter."""
+    histories: dict[str, History] = {}
+    peaks = {}
+    for theory in THEORIES:
+        try:
+            result = rotfem.run(scene.replace({"model.theory": theory}))
+        except rotfem.ComputationError as error:
+            say(f"{theory:18s} diverged at t = {error.time:.2f} s")
+            result = error.result
+        else:
+            peaks[theory] = float(result.summary["figures"][f"{column}_min"])
+        histories[theory] = result.history
+    for theory, peak in peaks.items():
+        off = 100 * (peak / peaks["reissner"] - 1)
+        say(f"{theory:18s} min {column.removeprefix('tip_')} at the tip {peak:.6f} m, {off:+.3f} % of reissner")
+    return histories, peaks
+
+
+def ladder(
+    histories: Mapping[str, History], column: str, inset: tuple[float, float, float, float]
+) -> tuple[Figure, Axes]:
+    """Return a figure of a column over time in all theories, with the differences at the peak enlarged in an inset.
+
+    Args:
+        histories: theory ↦ history; the last one, which the others are compared with, is drawn in black.
+        column: what is drawn, m.
+        inset: where the inset is, in parts of the axes: left, bottom, width, height.
+    """
+    figure = Figure(figsize=(9, 4.5), layout="constrained")
+    axis = figure.subplots()
+    peak = axis.inset_axes(inset, xlim=(6.2, 7.4), ylim=(-0.5775, -0.563))
+    styles = {"linear": "-", "consistent_linear": "-", "von_karman_linear": ":"}
+    for panel in (axis, peak):
+        for theory, h in histories.items():
+            panel.plot(h["t"], h[column], styles.get(theory, "--"), lw=1.6, label=theory)
+        panel.lines[-1].set(color="black", lw=1.0, ls="-")
+    axis.indicate_inset_zoom(peak, edgecolor="grey")
+    peak.tick_params(labelsize="x-small")
+    axis.grid(True, lw=0.4, alpha=0.6)
+    return figure, axis
 
 
 def plot_tip(histories: Mapping[str, History], path: Path | None, title: str) -> None:

@@ -45,6 +45,18 @@ def finish(
     gmsh.write(str(path))
 
 
+def blade(path: Path, name: str, corners: list[tuple[float, float]], size: float, triangles: bool) -> None:
+    """Write the mesh of a blade with four corners (m): root and tip at their trailing edge, then tip and root again."""
+    with model(name) as gm:
+        points = [gm.geo.addPoint(x, y, 0, size) for x, y in corners]
+        lines = [gm.geo.addLine(points[i], points[(i + 1) % 4]) for i in range(4)]
+        surface = gm.geo.addPlaneSurface([gm.geo.addCurveLoop(lines)])
+        gm.geo.synchronize()
+        names = ("trailing", "tip", "leading", "clamped")
+        groups = {edge: (1, [line]) for edge, line in zip(names, lines, strict=True)}
+        finish(path, {**groups, "plate": (2, [surface])}, triangles)
+
+
 def command(make: Callable[..., None], description: str, **defaults: float) -> None:
     """Run a script: FILE.msh, --triangles, and one option for each number of `defaults` (m)."""
     parser = argparse.ArgumentParser(description=description)

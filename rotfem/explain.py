@@ -35,11 +35,9 @@ REASONS = {
     "hub_coupling": ("the hub is free and coupled", "the hub does not feel the structure"),
 }
 
-
-#: What follows from the size of a change: for an effect, for a poorer theory and for a richer one.
+#: What follows from the size of a change: for an effect or a richer theory, and for a poorer theory.
 NEEDED = {"negligible": "not needed", "noticeable": "needed where {:.1%} matters", "large": "needed"}
 ENOUGH = {"negligible": "good enough", "noticeable": "good to {:.1%}", "large": "not good enough"}
-RICHER = {"negligible": "not needed", "noticeable": "needed where {:.1%} matters", "large": "needed"}
 
 #: What the notes of a check are marked with.
 FULL = " of the full model"
@@ -116,7 +114,7 @@ def why(item: Change, scene: Scene) -> str:
             reason += ", but it is not in model.effects"
         return f"{reason}; {NEEDED[item.verdict].format(item.worst)}{failed}"
     poorer = LADDER.index(item.name) < LADDER.index(scene.model.theory)
-    return (ENOUGH if poorer else RICHER)[item.verdict].format(item.worst) + failed
+    return (ENOUGH if poorer else NEEDED)[item.verdict].format(item.worst) + failed
 
 
 # --- the truth ------------------------------------------------------------------------------------------------------

@@ -112,7 +112,8 @@ class Stepper:
         self._solver: DirectSolver | None = None
         self._dx = Increment(system.V)
         self.seconds = {"assemble": 0.0, "solve": 0.0}
-        self.substeps = 0
+        #: Steps that were halved because Newton failed, and adaptive ones that were taken back.
+        self.substeps = self.rejected = 0
         self._hub_increment = 0.0
         self.clamp = system.clamp
         #: Whether a factor is kept for the steps that follow, where factorising is dear.

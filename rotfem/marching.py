@@ -1,4 +1,4 @@
-"""Fixed steps through a time history: every jump of a torque is met, and the history goes on from there afresh."""
+"""Fixed and adaptive steps through a time history: every jump of a torque is met, and there it goes on afresh."""
 
 from __future__ import annotations
 
@@ -6,11 +6,16 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from rotfem.errors import ComputationError
 from rotfem.hub import HubStepper
 from rotfem.integrators import State, Stepper
+from rotfem.scene import Time
 
 #: A linear theory has lost its meaning when a displacement exceeds the structure's own length, or a rotation 1 rad.
 LARGEST_LINEAR_DEFLECTION = 1.0
+
+#: Adaptive steps: safety factor, bounds of a change, changes not worth a new factorisation, smallest relative scale.
+SAFETY, SHRINK, GROW, KEEP, FLOOR = 0.9, 0.2, 2.0, (0.95, 1.3), 1e-6
 
 
 def fixed_steps(
@@ -29,8 +34,7 @@ def fixed_steps(
         ComputationError: a step failed, however short.
     """
     n = int(np.ceil(end / step - 1e-9))
-    hub = stepper.hub if isinstance(stepper, HubStepper) else None
-    jumps = [] if hub is None else [t for t in hub.torque.jumps if 0.0 < t < end]
+    jumps = jumps_of(stepper, end)
     close = 1e-9 * step
     for i in range(1, n + 1):
         t = end if i == n else i * step
@@ -41,10 +45,63 @@ def fixed_steps(
             h = stop - state.t
             if h <= close:
                 continue  # a jump within rounding of a stop
-            if hub is None and abs(h - length) <= close:
+            if not isinstance(stepper, HubStepper) and abs(h - length) <= close:
                 h = length  # of one length to the last digit, so that the matrix stays; a hub must not pass a jump
             state = stepper.advance(state, h)
             state.t = stop
             if isinstance(stepper, HubStepper) and any(abs(stop - j) <= close for j in jumps):
                 state = stepper.restart(state)
         yield state
+
+
+def adaptive_steps(stepper: Stepper, state: State, time: Time) -> Iterator[State]:
+    """Yield states whose local errors add up to the tolerance, relative to the largest displacement so far.
+
+    Args:
+        stepper: what advances the state; it counts the steps that are taken back.
+        state: where to start.
+        time: end, tolerance and bounds of the step.
+
+    Raises:
+        ComputationError: a step failed, or would have to be shorter than allowed.
+    """
+    assert time.tolerance is not None
+    longest = time.max_step or time.end / 20
+    shortest = time.min_step or 1e-9 * time.end
+    h, largest = min(longest, 1e-4 * time.end), FLOOR
+    jumps = jumps_of(stepper, time.end)
+    while state.t < time.end:
+        stop = min((j for j in jumps if j > state.t), default=time.end)
+        left = stop - state.t
+        wanted = min(h, longest)
+        h = left if wanted >= left * (1 - 1e-9) else (left / 2 if wanted > 0.6 * left else wanted)
+        new = stepper.advance(state, h)
+        if h == left:
+            new.t = stop
+        largest = max(largest, stepper.system.size(new.q))
+        allowed = time.tolerance * largest * h / time.end  # so that the errors of all steps add up to the tolerance
+        error = stepper.local_error(new, state) / allowed
+        factor = float(np.clip(SAFETY * max(error, 1e-12) ** (-1 / 2), SHRINK, GROW))
+        if error > 1.0:
+            stepper.rejected += 1
+            h *= min(factor, 0.9)
+            if h < shortest:
+                raise ComputationError(
+                    f"the step fell below {shortest:.3g} s without meeting the tolerance",
+                    time=state.t,
+                    advice="a looser time.tolerance, a smaller time.min_step, or some damping",
+                )
+            continue
+        if isinstance(stepper, HubStepper) and new.t in jumps:
+            new = stepper.restart(new)
+            h = min(h, 1e-4 * time.end)
+        elif not KEEP[0] <= factor <= KEEP[1]:
+            stepper.resize(new, state, h * factor)
+            h *= factor
+        state = new
+        yield state
+
+
+def jumps_of(stepper: Stepper, end: float) -> list[float]:
+    """Return the times (s) before the end at which the torque on a free hub jumps."""
+    return [t for t in stepper.hub.torque.jumps if 0.0 < t < end] if isinstance(stepper, HubStepper) else []

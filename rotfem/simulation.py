@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -20,7 +20,7 @@ from rotfem.fields import Snapshots, writer
 from rotfem.figures import figures
 from rotfem.hub import Hub, HubStepper
 from rotfem.integrators import Scheme, State, Stepper
-from rotfem.marching import LARGEST_LINEAR_DEFLECTION, fixed_steps
+from rotfem.marching import LARGEST_LINEAR_DEFLECTION, adaptive_steps, fixed_steps
 from rotfem.outputs import HISTORY, STEADY
 from rotfem.results import RunResult, Table
 from rotfem.scene import Scene, TorqueMotion, as_scene
@@ -33,9 +33,6 @@ Progress = Callable[[float], None]
 
 #: Displacement over L in the plane of a plate from which a run says what its strains leave out there.
 NOTICED = 1e-3
-
-#: Adaptive steps: safety factor, bounds of a change, changes not worth a new factorisation, smallest relative scale.
-SAFETY, SHRINK, GROW, KEEP, FLOOR = 0.9, 0.2, 2.0, (0.95, 1.3), 1e-6
 
 
 def run(
@@ -126,7 +123,7 @@ class Simulation:
         self.snapshots = Snapshots() if scene.structure.type == "plate" else None
         self.newton = newton_for(scene)
         self.stepper: Stepper | None = None
-        self.steps = self.rejected = 0
+        self.steps = 0
         self.critical = critical_speed(self.system) if isinstance(self.system, AffineSystem) else None
         self._critical_since: float | None = None
 
@@ -163,8 +160,11 @@ class Simulation:
             self.stepper = Stepper(self.system, scheme, newton)
         state = self.stepper.start(0.0, *self._initial())
         self._record(state)
-        grid = self._fixed_steps if time.tolerance is None else self._adaptive_steps
-        for new in grid(state):
+        if time.step is not None:
+            states = fixed_steps(self.stepper, state, time.end, time.step)
+        else:
+            states = adaptive_steps(self.stepper, state, time)
+        for new in states:
             self.steps += 1
             self._check(new)
             if new.t >= time.end or self.steps % time.output_every == 0:
@@ -184,50 +184,6 @@ class Simulation:
         if self.system.clamp is not None:
             return self.system.clamp.rigid(q, 0.0)
         return q, np.zeros_like(q)
-
-    def _fixed_steps(self, state: State) -> Iterator[State]:
-        time, stepper = self.scene.time, self.stepper
-        assert time is not None and time.step is not None and stepper is not None
-        return fixed_steps(stepper, state, time.end, time.step)
-
-    def _adaptive_steps(self, state: State) -> Any:
-        """Yield states whose local errors add up to the tolerance, relative to the largest displacement so far."""
-        time, stepper = self.scene.time, self.stepper
-        assert time is not None and time.tolerance is not None and stepper is not None
-        longest = time.max_step or time.end / 20
-        shortest = time.min_step or 1e-9 * time.end
-        h, largest = min(longest, 1e-4 * time.end), FLOOR
-        jumps = [] if self.hub is None else [t for t in self.hub.torque.jumps if 0.0 < t < time.end]
-        while state.t < time.end:
-            stop = min((j for j in jumps if j > state.t), default=time.end)
-            left = stop - state.t
-            wanted = min(h, longest)
-            h = left if wanted >= left * (1 - 1e-9) else (left / 2 if wanted > 0.6 * left else wanted)
-            new = stepper.advance(state, h)
-            if h == left:
-                new.t = stop
-            largest = max(largest, self.system.size(new.q))
-            allowed = time.tolerance * largest * h / time.end  # so that the errors of all steps add up to the tolerance
-            error = stepper.local_error(new, state) / allowed
-            factor = float(np.clip(SAFETY * max(error, 1e-12) ** (-1 / 2), SHRINK, GROW))
-            if error > 1.0:
-                self.rejected += 1
-                h *= min(factor, 0.9)
-                if h < shortest:
-                    raise ComputationError(
-                        f"the step fell below {shortest:.3g} s without meeting the tolerance",
-                        time=state.t,
-                        advice="a looser time.tolerance, a smaller time.min_step, or some damping",
-                    )
-                continue
-            if isinstance(stepper, HubStepper) and new.t in jumps:
-                new = stepper.restart(new)
-                h = min(h, 1e-4 * time.end)
-            elif not KEEP[0] <= factor <= KEEP[1]:
-                stepper.resize(new, state, h * factor)
-                h *= factor
-            state = new
-            yield state
 
     # --- record -----------------------------------------------------------------------------------------------------
 
@@ -343,8 +299,8 @@ class Simulation:
         }
         if self.choice is not None:
             summary["choice"] = self.choice.summary()
-        if self.rejected:
-            summary["rejected_steps"] = self.rejected
+        if self.stepper is not None and self.stepper.rejected:
+            summary["rejected_steps"] = self.stepper.rejected
         if self.critical is not None:
             summary["figures"]["critical_speed"] = self.critical
         if failure is not None:

@@ -26,6 +26,7 @@ from rotfem.scene_plate import locking
 from rotfem.structures.mode_shapes import plate_mode_name, turning
 from rotfem.structures.plate_loads import EdgeMoment, PointPlace, locate, point_measure
 from rotfem.structures.plate_mesh import PlateGrid, plate_grid
+from rotfem.structures.plate_section import constants, plane_stress, shear_moduli, thickness_field
 from rotfem.structures.probe import Probe
 from rotfem.structures.structure import Array, Structure
 from rotfem.theories import THEORIES
@@ -125,48 +126,12 @@ class Plate(Structure):
     def _properties(self) -> None:
         """Make the constants and fields of thickness and material, and of the hub."""
         s = self.data
-        self.section["thickness"] = self._thickness()
-        names = ("E1", "E2", "nu12", "G12", "G13", "G23") if s.is_orthotropic else ("E", "nu")
-        values = {name: getattr(s, name) for name in names}
-        if s.is_orthotropic:
-            values = {**values, **{g: values[g] or values["G12"] for g in ("G13", "G23")}}
-        for name, value in {**values, "rho": s.rho, "shear_correction": s.shear_correction}.items():
-            self.section[name] = self.constant(value)
+        h = self.constant(s.thickness) if isinstance(s.thickness, float) else thickness_field(s, self.grid)
+        self.section["thickness"] = h
+        self.section |= {name: self.constant(value) for name, value in constants(s).items()}
         names_of = ("hub_radius", "hub_offset_2", "hub_offset_3")
         root = zip(names_of, s.root_position, strict=True)
         self._root = [self.scalar(name, c) if c != 0.0 or name == "hub_radius" else 0 for name, c in root]
-
-    def _thickness(self) -> Any:
-        s = self.data
-        if isinstance(s.thickness, float):
-            return self.constant(s.thickness)
-        if isinstance(s.thickness, dict):
-            h = fem.Function(fem.functionspace(self.mesh, ("DG", 0)), name="thickness")
-            for name, value in s.thickness.items():
-                h.x.array[self.grid.regions.find(self.grid.region_names[name])] = value
-            h.x.scatter_forward()
-            return h
-        h = fem.Function(fem.functionspace(self.mesh, ("DG", 1)), name="thickness")
-        h.interpolate(lambda x: s.thickness_at(x[0]))  # exact on a rectangle: the knots are mesh lines
-        return h
-
-    def plane_stress(self) -> Any:
-        """Return Q of σ = Q (ε_11, ε_22, 2ε_12), shape (3, 3), Pa."""
-        p = self.section
-        if not self.data.is_orthotropic:
-            E, nu = p["E"], p["nu"]
-            return E / (1 - nu**2) * ufl.as_matrix([[1, nu, 0], [nu, 1, 0], [0, 0, (1 - nu) / 2]])
-        E1, E2, nu12 = p["E1"], p["E2"], p["nu12"]
-        both = 1 - nu12**2 * E2 / E1
-        coupling = nu12 * E2 / both
-        return ufl.as_matrix([[E1 / both, coupling, 0], [coupling, E2 / both, 0], [0, 0, p["G12"]]])
-
-    def shear_moduli(self) -> Any:
-        """Return k G of the transverse shear stresses, shape (2, 2), Pa."""
-        p = self.section
-        if not self.data.is_orthotropic:
-            return p["shear_correction"] * p["E"] / (2 * (1 + p["nu"])) * ufl.Identity(2)
-        return p["shear_correction"] * ufl.as_matrix([[p["G13"], 0], [0, p["G23"]]])
 
     # --- kinematics -------------------------------------------------------------------------------------------------
 
@@ -198,7 +163,7 @@ class Plate(Structure):
         """
         membrane, shear, curvature = measures(self.k.q)
         linear, p = THEORIES[self.scene.model.theory].linear, PlateGradients(self.k.q)
-        h, Q, kG = self.section["thickness"], self.plane_stress(), self.shear_moduli()
+        h, Q, kG = self.section["thickness"], plane_stress(self.section), shear_moduli(self.section)
         strains = [
             Strain("membrane", _voigt(membrane), h * Q, self.dx if linear else self.dx_elastic),
             Strain("shear", shear, h * kG, self.dx_elastic),

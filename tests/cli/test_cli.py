@@ -15,21 +15,16 @@ import numpy as np
 import pytest
 
 from rotfem.results import read_csv
+from tests.beams import SECTION
 
 ROOT = Path(__file__).resolve().parents[2]
 
-SCENE = """\
+SCENE = f"""\
 [structure]
 type = "planar_beam"
 length = 10.0
 
-[structure.section]
-EA = 2.8e7
-GA = 1.0e7
-EI = 1.4e4
-mass_per_length = 1.2
-rotary_inertia = 6.0e-4
-
+{SECTION}
 [motion]
 type = "spin_up"
 speed = 6.0

@@ -15,22 +15,17 @@ from typing import Any
 import pytest
 
 from rotfem.scene import load_scene
+from tests.beams import SECTION
 
 Rotfem = Callable[..., Any]
 
 ROOT = Path(__file__).resolve().parents[2]
 
-SCENE = """\
+SCENE = f"""\
 [structure]
 type = "planar_beam"
 length = 10.0
-[structure.section]
-EA = 2.8e7
-GA = 1.0e7
-EI = 1.4e4
-mass_per_length = 1.2
-rotary_inertia = 6.0e-4
-[motion]
+{SECTION}[motion]
 type = "spin_up"
 speed = 6.0
 duration = 15.0

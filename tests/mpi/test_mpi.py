@@ -10,22 +10,17 @@ import numpy as np
 import pytest
 
 from rotfem.results import read_csv
+from tests.beams import SECTION
 from tests.launch import MPIRUN, rotfem
 
 pytestmark = [pytest.mark.mpi, pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")]
 
-SCENE = """\
+SCENE = f"""\
 [structure]
 type = "planar_beam"
 length = 10.0
 tip_mass = 1.0
-[structure.section]
-EA = 2.8e7
-GA = 1.0e7
-EI = 1.4e4
-mass_per_length = 1.2
-rotary_inertia = 6.0e-4
-[structure.damping]
+{SECTION}[structure.damping]
 kelvin_voigt = 1e-3
 [motion]
 type = "spin_up"

@@ -18,15 +18,10 @@ from rotfem.cost_reference import Samples, distance, observed_order, reference
 from rotfem.cost_tuned import write_tuned
 from rotfem.errors import SceneError
 from rotfem.scene import Scene, load_scene
+from tests.beams import SPIN_UP
 
 BEAM: dict[str, Any] = {
-    "structure": {
-        "type": "planar_beam",
-        "length": 10.0,
-        "section": {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4},
-    },
-    "motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0},
-    "mesh": {"elements": 10, "degree": 3},
+    **SPIN_UP,
     "time": {"end": 20.0, "step": 0.004, "output_every": 5},
 }
 TIMES = np.linspace(0.0, 2.0, 101)

@@ -10,20 +10,10 @@ from typing import Any
 import pytest
 
 from rotfem.scene import Scene
+from tests.beams import SPIN_UP
 
 #: Reference values of the project (see its README.md): spectral and collocation codes, no finite elements.
 REFERENCE = Path(__file__).resolve().parents[2].parent / "shared" / "reference"
-
-#: Kane, Ryan & Banerjee (1987) as in Simo & Vu-Quoc (1986): 6 rad/s in 15 s.
-SPIN_UP: dict[str, Any] = {
-    "structure": {
-        "type": "planar_beam",
-        "length": 10.0,
-        "section": {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4},
-    },
-    "motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0},
-    "mesh": {"elements": 10, "degree": 3},
-}
 
 #: The hub beam of ICCIA (2017), with shear as in the reference values: nu = 0.3, k = 5/6.
 HUB_BEAM: dict[str, Any] = {

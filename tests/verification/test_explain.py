@@ -18,13 +18,10 @@ from rotfem.scene import Scene
 from rotfem.switches import SwitchedSystem
 from rotfem.system import Model, compile_system
 from rotfem.trial import Trial
+from tests.beams import STRUCTURE
 
 SPIN_UP: dict[str, Any] = {
-    "structure": {
-        "type": "planar_beam",
-        "length": 10.0,
-        "section": {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4},
-    },
+    "structure": STRUCTURE,
     "motion": {"type": "spin_up", "speed": 4.0, "duration": 4.0},
     "mesh": {"elements": 10},
     "modes": {"count": 3},

@@ -1,0 +1,23 @@
+"""The beam that most tests are about: Kane, Ryan & Banerjee (1987) as in Simo & Vu-Quoc (1986), 6 rad/s in 15 s."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import Any
+
+#: Its section as a scene file has it.
+SECTION = """\
+[structure.section]
+EA = 2.8e7
+GA = 1.0e7
+EI = 1.4e4
+mass_per_length = 1.2
+rotary_inertia = 6.0e-4
+"""
+
+STRUCTURE: dict[str, Any] = {"type": "planar_beam", "length": 10.0, **tomllib.loads(SECTION)["structure"]}
+SPIN_UP: dict[str, Any] = {
+    "structure": STRUCTURE,
+    "motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0},
+    "mesh": {"elements": 10, "degree": 3},
+}
