@@ -76,14 +76,15 @@ def unit_beam() -> MakeScene:
     return _factory(UNIT_BEAM)
 
 
+def reference_file(name: str) -> Path:
+    """Return the path of a reference file; skips the test where there is none."""
+    path = REFERENCE / name
+    if not path.is_file():
+        pytest.skip(f"no reference values here: {name}")
+    return path
+
+
 @pytest.fixture(scope="session")
 def reference() -> Callable[[str], Path]:
-    """Return the path of a reference file; skips the test where there is none."""
-
-    def find(name: str) -> Path:
-        path = REFERENCE / name
-        if not path.is_file():
-            pytest.skip(f"no reference values here: {name}")
-        return path
-
-    return find
+    """Return the function that finds a reference file."""
+    return reference_file

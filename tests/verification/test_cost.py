@@ -20,7 +20,7 @@ from rotfem.cost_record import Measurement
 from rotfem.cost_reference import Samples, distance
 from rotfem.cost_result import CostResult
 
-from .conftest import REFERENCE, SPIN_UP
+from .conftest import SPIN_UP, reference_file
 
 SCENE = {**SPIN_UP, "time": {"end": 20.0, "step": 0.01, "output_every": 2}}
 SHORT = {**SPIN_UP, "mesh": {"elements": 4, "degree": 2}, "time": {"end": 1.0, "step": 0.02}}
@@ -28,7 +28,7 @@ SHORT = {**SPIN_UP, "mesh": {"elements": 4, "degree": 2}, "time": {"end": 1.0, "
 
 def truth(theory: str) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Return times (s) and tip (u1, u2) (m) of the spectral solution, without t = 1 … where it gives too few digits."""
-    table = np.array(json.loads((REFERENCE / "spin_up.json").read_text())[theory]["table t,u1,u2,alpha"])
+    table = np.array(json.loads(reference_file("spin_up.json").read_text())[theory]["table t,u1,u2,alpha"])
     return table[:, 0], table[:, 1:3]
 
 
