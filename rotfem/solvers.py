@@ -41,6 +41,8 @@ def use_direct_solver(ksp: Any, size: int, symmetric: bool = False) -> None:
     if ksp.comm.size > 1 and size <= SMALL:
         # Every process factors the whole small matrix: far quicker than sharing it out.
         pc.setType(PETSc.PC.Type.REDUNDANT)
+        PETSc.Options()[f"{ksp.getOptionsPrefix() or ''}redundant_pc_factor_zeropivot"] = 0.0  # as below
+        ksp.setFromOptions()
         return
     pc.setType(PETSc.PC.Type.CHOLESKY if symmetric and size > SMALL else PETSc.PC.Type.LU)
     pc.setFactorPivot(0.0)  # what is small depends on the units; a singular matrix is seen in the solution

@@ -85,3 +85,17 @@ def test_estimates_are_those_of_one_process(tmp_path: Path) -> None:
     chosen = run(tmp_path, 2, "--json", "--set", "model.tolerance=0.1")
     assert chosen.returncode == 0, chosen.stderr
     assert json.loads(chosen.stdout)["choice"]["theory"] == "linear"
+
+
+def test_a_beam_of_half_a_millimetre(tmp_path: Path) -> None:
+    """What counts as a zero pivot must not depend on the units, on any number of processes."""
+    section = 'E = 1.6e11\nnu = 0.25\nrho = 2330.0\nshape = "rectangle"\nwidth = 1e-5\nheight = 4e-6\n'
+    (tmp_path / "beam.toml").write_text(
+        f'[structure]\ntype = "planar_beam"\nlength = 5e-4\n[structure.section]\n{section}[mesh]\nelements = 4\n'
+        '[motion]\ntype = "spin_up"\nspeed = 5e4\nduration = 2e-4\n[time]\nend = 1e-4\nstep = 2e-6\n'
+    )
+    done = [run(tmp_path, ranks) for ranks in (1, 2)]
+    assert [d.returncode for d in done] == [0, 0], done[1].stderr
+    one, two = (read_csv(tmp_path / f"r{ranks}" / "history.csv")["tip_u2"] for ranks in (1, 2))
+    assert np.max(np.abs(one)) > 1e-6
+    np.testing.assert_allclose(two, one, rtol=0, atol=1e-8 * np.max(np.abs(one)))
