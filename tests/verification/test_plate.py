@@ -84,7 +84,7 @@ SPINNING = [
 
 
 def spectral(case: tuple[float, str, float, float, bool]) -> np.ndarray:
-    """Return the first five λ of a case from ../shared/reference, geometric stiffness of von Kármán."""
+    """Return the first five λ of a case from tests/reference, geometric stiffness of von Kármán."""
     *key, coriolis = case
     name = "plate_mindlin_coriolis.csv" if coriolis else f"plate_mindlin_h{case[0]:g}.csv"
     found: dict[int, float] = {}
@@ -107,7 +107,7 @@ def spinning(case: tuple[float, str, float, float, bool], **changes: Any) -> np.
 
 @pytest.mark.parametrize("case", SPINNING, ids=str)
 def test_spinning_square(case: tuple[float, str, float, float, bool]) -> None:
-    """Spectral values of Mindlin's plate, ../shared/reference; default mesh, tolerance of the acceptance."""
+    """Spectral values of Mindlin's plate, tests/reference; default mesh, tolerance of the acceptance."""
     np.testing.assert_allclose(spinning(case)[:5], spectral(case), rtol=1e-3)
 
 
