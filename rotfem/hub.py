@@ -11,6 +11,7 @@ solved by block elimination, one factorisation for both right-hand sides.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from time import perf_counter
 from typing import Any
 
@@ -34,6 +35,9 @@ from rotfem.system import System
 
 Array = npt.NDArray[np.float64]
 
+#: Relative difference of two times that rounding can make.
+ROUNDING = 1e-14
+
 
 @dataclass(frozen=True)
 class Torque:
@@ -45,10 +49,20 @@ class Torque:
 
     scene: TorqueMotion
 
+    @cached_property
+    def pulses(self) -> tuple[tuple[float, float, float], ...]:
+        """Pulses (start, end, torque) in s, s, N·m; times that differ by a rounding only are one and the same."""
+        rows, last = self.scene.pulses or (), -np.inf
+        same: dict[float, float] = {}
+        for t in sorted({t for start, end, _ in rows for t in (start, end)}):
+            last = last if t - last <= ROUNDING * abs(t) else t
+            same[t] = last
+        return tuple((same[start], same[end], torque) for start, end, torque in rows)
+
     @property
     def jumps(self) -> tuple[float, ...]:
         """Times (s) of discontinuity."""
-        return tuple(sorted({t for start, end, _ in self.scene.pulses or () for t in (start, end)}))
+        return tuple(sorted({t for start, end, _ in self.pulses for t in (start, end)}))
 
     def at(self, t: float, after: bool = False) -> float:
         """Return M(t): the limit from the left, or from the right with `after` (they differ at a jump)."""
@@ -56,7 +70,7 @@ class Torque:
             rows = np.array(self.scene.table)
             return float(np.interp(t, rows[:, 0], rows[:, 1]))
         inside = (lambda a, b: a <= t < b) if after else (lambda a, b: a < t <= b)
-        return float(sum(torque for start, end, torque in self.scene.pulses or () if inside(start, end)))
+        return float(sum(torque for start, end, torque in self.pulses if inside(start, end)))
 
 
 def border(A: Any, row: Array, column: Array, corner: float) -> Any:
@@ -285,9 +299,9 @@ class HubStepper(Stepper):
         new.hub[4:] = state.hub[4:]
         return new
 
-    def step(self, state: State, h: float) -> State:
+    def step(self, state: State, h: float, end: float | None = None) -> State:
         """Return the state at state.t + h (see `Stepper.step`)."""
-        new = super().step(state, h)
+        new = super().step(state, h, end)
         assert new.hub is not None and state.hub is not None
         turn, speed = new.hub[0] - state.hub[0], 0.5 * (new.hub[1] + state.hub[1])
         mean = 0.5 * (self.hub.torque.at(state.t, after=True) + self.hub.torque.at(new.t))
@@ -296,9 +310,9 @@ class HubStepper(Stepper):
         new.hub[5] = state.hub[5] + mean * h - brake * turn
         return new
 
-    def _predict(self, state: State, h: float) -> State:
+    def _predict(self, state: State, h: float, end: float) -> State:
         p = self.scheme
-        new = super()._predict(state, h)
+        new = super()._predict(state, h, end)
         assert state.hub is not None
         psi, speed, rate, old = state.hub[:4]
         auxiliary = (rate - p.alpha_m * old) / (1 - p.alpha_m)

@@ -169,16 +169,22 @@ class Stepper:
             solver = DirectSolver(M)
         return solver, massless
 
-    def step(self, state: State, h: float) -> State:
+    def step(self, state: State, h: float, end: float | None = None) -> State:
         """Return the state at state.t + h.
+
+        Args:
+            state: where the step starts.
+            h: length of the step, s.
+            end: its last instant, where state.t + h must not be off by a rounding (a jump, that is before it).
 
         Raises:
             ComputationError: Newton failed; the given state is untouched.
         """
-        if self._keeps and self._held == self.scheme.shifts(h) and not self._new_factor_pays(state.t + h):
+        end = state.t + h if end is None else end
+        if self._keeps and self._held == self.scheme.shifts(h) and not self._new_factor_pays(end):
             if self._pause == 0:
                 try:
-                    new = self._step(state, h, chord=True)
+                    new = self._step(state, h, end, chord=True)
                 except ComputationError:  # the old factor does not serve here; nor will the next ones, perhaps
                     self._held, self._failed = None, min(self._failed + 1, PATIENCE)
                     self._pause = 2**self._failed
@@ -186,7 +192,7 @@ class Stepper:
                     self._failed = 0
                     return new
             self._pause = max(self._pause - 1, 0)
-        return self._step(state, h)
+        return self._step(state, h, end)
 
     def _new_factor_pays(self, t: float) -> bool:
         """Whether the matrix stays what it is now, though the factor is that of another: a last one serves for long."""
@@ -196,12 +202,12 @@ class Stepper:
         s.set_time(t)
         return s.settled and not s.current
 
-    def _step(self, state: State, h: float, chord: bool = False) -> State:
+    def _step(self, state: State, h: float, end: float, chord: bool = False) -> State:
         """One step, by Newton's method, or with the factor of an earlier step throughout."""
         s, p = self.system, self.scheme
         c_q, c_v, c_m = p.shifts(h)
-        new = self._predict(state, h)
-        s.set_time(new.t)
+        new = self._predict(state, h, end)
+        s.set_time(end)
         self._prescribe(new)
 
         def increment() -> float:
@@ -275,14 +281,14 @@ class Stepper:
         elif changed:
             self._solver.refresh()
 
-    def advance(self, state: State, h: float, halvings: int = 5) -> State:
-        """Return the state at state.t + h, in halved steps where Newton does not manage the whole one.
+    def advance(self, state: State, h: float, end: float | None = None, halvings: int = 5) -> State:
+        """Return the state at state.t + h (see `step`), in halved steps where Newton does not manage the whole one.
 
         Raises:
             ComputationError: Newton failed at the smallest step too; says how small it was.
         """
         try:
-            return self.step(state, h)
+            return self.step(state, h, end)
         except ComputationError as error:
             if self.system.linear:
                 raise
@@ -293,8 +299,8 @@ class Stepper:
                     advice="a smaller time.step, or a look at the load and speed at this time",
                 ) from None
             self.substeps += 1
-            middle = self.advance(state, h / 2, halvings - 1)
-            return self.advance(middle, h / 2, halvings - 1)
+            middle = self.advance(state, h / 2, None, halvings - 1)
+            return self.advance(middle, h / 2, state.t + h if end is None else end, halvings - 1)
 
     def resize(self, state: State, last: State, h: float) -> None:
         """Prepare a state for a step h other than the last one.
@@ -314,13 +320,13 @@ class Stepper:
         h = state.t - last.t
         return self.system.size(abs(self.scheme.beta - 1 / 6) * h * h * (state.auxiliary - last.auxiliary))
 
-    def _predict(self, state: State, h: float) -> State:
+    def _predict(self, state: State, h: float, end: float) -> State:
         """Return the step that keeps q̈, which is free of residual when the acceleration is constant."""
         p = self.scheme
         auxiliary: Array = np.divide(state.a - p.alpha_m * state.auxiliary, 1 - p.alpha_m, dtype=np.float64)
         q = state.q + h * state.v + h * h * ((0.5 - p.beta) * state.auxiliary + p.beta * auxiliary)
         v = state.v + h * ((1 - p.gamma) * state.auxiliary + p.gamma * auxiliary)
-        new = State(state.t + h, q, v, state.a.copy(), auxiliary)
+        new = State(end, q, v, state.a.copy(), auxiliary)
         if self.clamp is not None:
             self._shift(new, state, h, self.clamp.turned(state.q, state.v, state.t, new.t))
         return new

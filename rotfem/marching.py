@@ -34,24 +34,27 @@ def fixed_steps(
         ComputationError: a step failed, however short.
     """
     n = int(np.ceil(end / step - 1e-9))
-    jumps = jumps_of(stepper, end)
     close = 1e-9 * step
+    jumps = jumps_of(stepper, end + close)
     for i in range(1, n + 1):
         t = end if i == n else i * step
         m = 1 if parts is None else int(parts[i - 1])
         begin, length = (i - 1) * step, step / m
         between = [begin + (t - begin) * j / m for j in range(1, m)]
-        for stop in sorted([*(j for j in jumps if state.t + close < j < t - close), *between, t]):
+        for stop in stops([*between, t], [j for j in jumps if state.t + close < j < t + close], close):
             h = stop - state.t
-            if h <= close:
-                continue  # a jump within rounding of a stop
-            if not isinstance(stepper, HubStepper) and abs(h - length) <= close:
-                h = length  # of one length to the last digit, so that the matrix stays; a hub must not pass a jump
-            state = stepper.advance(state, h)
-            state.t = stop
-            if isinstance(stepper, HubStepper) and any(abs(stop - j) <= close for j in jumps):
+            if abs(h - length) <= close:
+                h = length  # of one length to the last digit, so that the matrix stays
+            state = stepper.advance(state, h, stop)
+            if isinstance(stepper, HubStepper) and stop in jumps:
                 state = stepper.restart(state)
         yield state
+
+
+def stops(times: Sequence[float], jumps: Sequence[float], close: float) -> list[float]:
+    """Return times and jumps (s) in order; a time closer to a jump than `close` is that jump, exactly."""
+    snapped = (min((j for j in jumps if abs(j - t) <= close), key=lambda j: abs(j - t), default=t) for t in times)
+    return sorted({*snapped, *jumps})
 
 
 def adaptive_steps(stepper: Stepper, state: State, time: Time) -> Iterator[State]:
@@ -69,15 +72,14 @@ def adaptive_steps(stepper: Stepper, state: State, time: Time) -> Iterator[State
     longest = time.max_step or time.end / 20
     shortest = time.min_step or 1e-9 * time.end
     h, largest = min(longest, 1e-4 * time.end), FLOOR
-    jumps = jumps_of(stepper, time.end)
-    while state.t < time.end:
+    close = 1e-12 * time.end
+    jumps = jumps_of(stepper, time.end + close)
+    while state.t < time.end - close:
         stop = min((j for j in jumps if j > state.t), default=time.end)
         left = stop - state.t
         wanted = min(h, longest)
         h = left if wanted >= left * (1 - 1e-9) else (left / 2 if wanted > 0.6 * left else wanted)
-        new = stepper.advance(state, h)
-        if h == left:
-            new.t = stop
+        new = stepper.advance(state, h, stop if h == left else None)
         largest = max(largest, stepper.system.size(new.q))
         allowed = time.tolerance * largest * h / time.end  # so that the errors of all steps add up to the tolerance
         error = stepper.local_error(new, state) / allowed
@@ -103,5 +105,5 @@ def adaptive_steps(stepper: Stepper, state: State, time: Time) -> Iterator[State
 
 
 def jumps_of(stepper: Stepper, end: float) -> list[float]:
-    """Return the times (s) before the end at which the torque on a free hub jumps."""
-    return [t for t in stepper.hub.torque.jumps if 0.0 < t < end] if isinstance(stepper, HubStepper) else []
+    """Return the times (s) up to the end at which the torque on a free hub jumps."""
+    return [t for t in stepper.hub.torque.jumps if 0.0 < t <= end] if isinstance(stepper, HubStepper) else []

@@ -167,7 +167,7 @@ class Simulation:
         for new in states:
             self.steps += 1
             self._check(new)
-            if new.t >= time.end or self.steps % time.output_every == 0:
+            if new.t >= time.end * (1 - 1e-9) or self.steps % time.output_every == 0:
                 self._record(new)
                 progress(new.t / time.end)
 
