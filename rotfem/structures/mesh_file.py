@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,14 @@ from rotfem.structures.mesh_checks import FLAT, Array, BadMesh, Cells, Integers,
 #: gmsh's number of a kind of cells ↦ corners of a cell, and the kind of its edges. (Of second-order quadrilaterals
 #: those with a node in the middle: dolfinx has no others.)
 KINDS = {2: (3, 1), 9: (3, 8), 3: (4, 1), 10: (4, 8)}
+
+#: The head of a mesh file: text, or binary with the integer 1 in either order of bytes. Version 2.0 gave the names of
+#: groups no dimension. gmsh knows a mesh by its first characters alone, and runs what does not begin like one as a
+#: script.
+HEAD = re.compile(
+    rb"\$MeshFormat(\r?\n)[ \t]*(?:2\.[12]|3|4|4\.[01])[ \t]+"
+    rb"(?:0[ \t]+8[ \t]*\1|1[ \t]+8[ \t]*\1(?:\x01\0\0\0|\0\0\0\x01)(?:\1)?)\$EndMeshFormat\1"
+)
 
 #: Names of physical groups ↦ tag, by dimension.
 Groups = dict[int, dict[str, int]]
@@ -37,10 +47,8 @@ def read(gmsh: Any, path: Path, surfaces: Sequence[str]) -> Groups:
     gmsh.option.setNumber("General.Terminal", 0)
     if path.suffix != ".msh":
         raise BadMesh("must be a mesh file of gmsh, with the ending .msh")
-    try:
-        gmsh.merge(str(path))
-    except Exception as error:
-        raise BadMesh(f"gmsh cannot read it: {error}") from None
+    _check_head(path)
+    _merge(gmsh, path)
     groups: Groups = {0: {}, 1: {}, 2: {}, 3: {}}
     for dimension, tag in gmsh.model.getPhysicalGroups():
         groups[dimension][gmsh.model.getPhysicalName(dimension, tag) or f"{tag}"] = tag
@@ -66,6 +74,30 @@ def read(gmsh: Any, path: Path, surfaces: Sequence[str]) -> Groups:
     cells.check_held(curves["clamped"][:, :2])
     _replace(gmsh, x[used], {1: (KINDS[kind][1], curves), 2: (kind, nodes)}, used)
     return {1: _tags(curves), 2: _tags(nodes)}
+
+
+def _check_head(path: Path) -> None:
+    """Refuse what gmsh would not read as a mesh: a script would be run, with all that it asks of the system."""
+    with path.open("rb") as file:
+        head = file.read(512)
+    if HEAD.match(head):
+        return
+    lines = [line.decode("utf-8", "backslashreplace").strip("\r")[:60] for line in head.rstrip().split(b"\n")[:3]]
+    raise BadMesh(
+        f"is no mesh of gmsh: it begins with {' | '.join(lines)!r}; must be $MeshFormat, without anything before, then "
+        "version (2.1, 2.2, 3, 4, 4.0 or 4.1), file type (0 text, 1 binary) and data size (8), then $EndMeshFormat"
+    )
+
+
+def _merge(gmsh: Any, path: Path) -> None:
+    """Load the file under another name: gmsh runs a script "<name>.opt" that lies beside what it reads."""
+    with TemporaryDirectory(prefix="rotfem-") as folder:
+        link = Path(folder) / "plate.msh"
+        link.symlink_to(path.resolve())
+        try:
+            gmsh.merge(str(link))
+        except Exception as error:
+            raise BadMesh(f"gmsh cannot read it: {str(error).replace(str(link), path.name)}") from None
 
 
 def _check_names(groups: Groups, surfaces: Sequence[str]) -> None:
