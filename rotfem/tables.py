@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -51,28 +52,45 @@ def as_time_table(value: Any, info: ValidationInfo, columns: Sequence[int], shap
 
 
 def read_csv(path: Path) -> list[list[float]]:
-    """Returns the rows of a CSV file of numbers; ``#`` starts a comment, and the first row may be a header.
+    """Returns the rows of a CSV file of finite numbers, all of one length.
+
+    ``#`` starts a comment. The first row may be a header, and is one if none of its cells is a number.
 
     Args:
         path: File with comma-separated columns.
 
     Raises:
-        PydanticCustomError: If it cannot be read or holds anything else, naming the line.
+        PydanticCustomError: If it cannot be read or holds anything else, naming the line and the cell.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise problem("", str(path), f"cannot be read: {error}") from None
     rows: list[list[float]] = []
-    header_possible = True
+    width, top = 0, 0  # columns of the first row, and its line
     for number, line in enumerate(text.splitlines(), start=1):
         content = line.split("#", 1)[0].strip()
         if not content:
             continue
-        try:
-            rows.append([float(cell) for cell in content.split(",")])
-        except ValueError:
-            if not header_possible:
-                raise problem("", str(path), f"line {number} is not numbers separated by commas: {content}") from None
-        header_possible = False
+        cells = [cell.strip() for cell in content.split(",")]
+        values = [_number(cell) for cell in cells]
+        if not top:
+            width, top = len(cells), number
+            if any(cells) and all(value is None for value in values):
+                continue
+        for column, (cell, value) in enumerate(zip(cells, values, strict=True), start=1):
+            if value is None or not math.isfinite(value):
+                reason = f'line {number}, column {column}: "{cell}" must be a finite number'
+                raise problem("", str(path), f"{reason} (only the first row may be a header, one without any number)")
+        if len(cells) != width:
+            raise problem("", str(path), f"line {number} has {len(cells)} columns; must be {width}, as in line {top}")
+        rows.append([value for value in values if value is not None])
     return rows
+
+
+def _number(cell: str) -> float | None:
+    """Returns the number in a cell, ``None`` if there is none."""
+    try:
+        return float(cell)
+    except ValueError:
+        return None
