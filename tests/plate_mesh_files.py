@@ -1,4 +1,4 @@
-"""Small gmsh files (format 2.2) for tests, written without gmsh."""
+"""Small gmsh files (format 2.2) for tests, written without gmsh, and a scene for them."""
 
 from __future__ import annotations
 
@@ -10,6 +10,28 @@ import numpy.typing as npt
 
 #: gmsh's number of a cell by its nodes, and the dimension of its group.
 KINDS = {2: (1, 1), 3: (2, 2), 4: (3, 2), 8: (5, 3)}
+
+#: A spinning plate under a tip force; shape and mesh are to be filled in.
+PLATE_SCENE = """\
+[structure]
+type = "plate"
+{shape}
+thickness = 0.02
+E = 70.0e9
+nu = 0.3
+rho = 2700.0
+hub_radius = 0.5
+[motion]
+type = "constant"
+speed = 60.0
+axis = [0.2, 1.0, 0.5]
+[mesh]
+{mesh}
+[modes]
+count = 5
+[loads]
+tip_force = [0, 0, 300.0]
+"""
 
 
 def write_msh(
