@@ -26,10 +26,10 @@ import numpy as np
 from explain_scenes import SCENES, scene
 
 import rotfem
-import rotfem.trial
-from rotfem.estimate import NOTICEABLE
-from rotfem.outputs import tip_change
+import rotfem.selection.coarse_model
 from rotfem.scene import Scene
+from rotfem.selection.distance import tip_change
+from rotfem.selection.estimate import NOTICEABLE
 
 #: Below it a change is not compared: round-off of two Newton solutions.
 SMALLEST = 1e-8
@@ -130,7 +130,8 @@ from time import perf_counter
 from rotfem.scene import Scene
 sys.path.insert(0, sys.argv[1])
 from explain_scenes import scene
-from rotfem.system import Model, compile_system
+from rotfem.equations.system import compile_system
+from rotfem.equations.model import Model
 s = scene(sys.argv[2])
 effects = s.effective_effects()
 compile_system(Model(s, effects=()))  # what all of them share: libraries, elements
@@ -188,7 +189,7 @@ def exceeded(_: list[str]) -> None:
     result = rotfem.run(struck.replace({"model.tolerance": 1e-2}))
     choice = result.summary["choice"]
     print(f"seen: {choice['theory']}, {' '.join(choice['effects'])}; {choice.get('remark', '')}", flush=True)
-    rotfem.trial.given = lambda *_: []
+    rotfem.selection.coarse_model.given = lambda *_: []
     for reaction in ("upgrade", "stop", "warn"):
         asked = struck.replace({"model.tolerance": 1e-2, "model.on_exceed": reaction})
         try:

@@ -20,7 +20,7 @@ from pathlib import Path
 from _demo import FIRST_RANK, command_line, report, save, say
 
 import rotfem
-from rotfem.plots import campbell_figure
+from rotfem.results.plots import campbell_figure
 
 SCENE = Path(__file__).with_name("campbell.toml")
 REFERENCE = 8.8572904  # rad/s; Legendre–Galerkin with 18 functions a field, all digits converged

@@ -28,7 +28,7 @@ from _demo import FIRST_RANK, History, command_line, report, save, say
 from matplotlib.figure import Figure
 
 import rotfem
-from rotfem.motion import Motion, motion_of
+from rotfem.mechanics.motion import Motion, motion_of
 
 SCENE = Path(__file__).with_name("satellite_boom.toml")
 REFERENCE = 0.0  # exact

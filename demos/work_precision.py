@@ -42,7 +42,7 @@ def main(figure: Path | None = None) -> float:
     order = result.references["reissner"].order or 0.0
     report("order in the time step", order, REFERENCE, "(–)")
     if figure is not None and FIRST_RANK:
-        from rotfem.plots_cost import cost_figure
+        from rotfem.commands.cost.plot import cost_figure
 
         save(cost_figure(result), figure)
     return order

@@ -6,9 +6,7 @@ load FEniCSx when first used.
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from rotfem.errors import ComputationError, OutputError, SceneError
@@ -16,11 +14,11 @@ from rotfem.scene import Scene, load_scene
 from rotfem.version import __version__
 
 if TYPE_CHECKING:
-    from rotfem.campbell import campbell
-    from rotfem.cost import cost
-    from rotfem.explain import explain
-    from rotfem.modes import modes
-    from rotfem.simulation import run
+    from rotfem.commands.campbell import campbell
+    from rotfem.commands.cost.study import cost
+    from rotfem.commands.explain import explain
+    from rotfem.commands.modes import modes
+    from rotfem.commands.run import run
 
 __all__ = [
     "ComputationError",
@@ -36,28 +34,22 @@ __all__ = [
     "run",
 ]
 
-
-def _verb(name: str, module: str) -> property:
-    """Return a verb as an attribute of the package, even where the module it is in has the same name.
-
-    Importing a submodule binds its name in the package; the setter lets that pass without effect.
-    """
-
-    def get(package: ModuleType) -> Any:
-        return getattr(import_module(module), name)
-
-    def ignore(package: ModuleType, value: object) -> None:
-        return None
-
-    return property(get, ignore)
+#: Name ↦ module that has it: what loads FEniCSx is imported when it is first asked for.
+_LATER = {
+    "campbell": "rotfem.commands.campbell",
+    "cost": "rotfem.commands.cost.study",
+    "explain": "rotfem.commands.explain",
+    "modes": "rotfem.commands.modes",
+    "run": "rotfem.commands.run",
+}
 
 
-class _Package(ModuleType):
-    run = _verb("run", "rotfem.simulation")
-    modes = _verb("modes", "rotfem.modes")
-    campbell = _verb("campbell", "rotfem.campbell")
-    cost = _verb("cost", "rotfem.cost")
-    explain = _verb("explain", "rotfem.explain")
+def __getattr__(name: str) -> Any:
+    if name not in _LATER:
+        raise AttributeError(f"module 'rotfem' has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_LATER[name]), name)
+    return value
 
 
-sys.modules[__name__].__class__ = _Package
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

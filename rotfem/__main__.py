@@ -1,6 +1,6 @@
 """`python -m rotfem`."""
 
-from rotfem.cli import main
+from rotfem.commands.cli import main
 
 if __name__ == "__main__":
     main()

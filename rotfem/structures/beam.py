@@ -10,11 +10,11 @@ import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from rotfem.kinematics import Strain
+from rotfem.mechanics.bodies import Strain
 from rotfem.scene import BeamMesh, PlanarBeamStructure, Scene, SpatialBeamStructure
-from rotfem.structures.mode_shapes import in_phase, sign_changes
-from rotfem.structures.probe import Probe
+from rotfem.structures.mode_names import in_phase, sign_changes
 from rotfem.structures.structure import Array, Structure
+from rotfem.structures.tip_values import Probe
 
 #: Polynomial degree that holds any section property of linearly tapered dimensions (I of a tube: fourth degree).
 TAPER_DEGREE = 4

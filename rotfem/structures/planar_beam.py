@@ -10,7 +10,7 @@ import numpy as np
 import ufl
 from mpi4py import MPI
 
-from rotfem.kinematics import AppliedLoad, Body, Strain
+from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
 from rotfem.scene import PlanarBeamStructure, Scene
 from rotfem.structures.beam import Array, Beam
 

@@ -17,19 +17,19 @@ from dolfinx import fem
 from mpi4py import MPI
 from scipy.spatial import Delaunay
 
-from rotfem import jit
 from rotfem.errors import ComputationError, SceneError
-from rotfem.kinematics import AppliedLoad, Body, Strain
-from rotfem.plate_kinematics import PlateGradients, director, triad
+from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
+from rotfem.mechanics.mindlin import PlateGradients, director, triad
+from rotfem.mechanics.strains import THEORIES
+from rotfem.numerics import forms
 from rotfem.scene import MomentLoad, PlateMesh, PlateStructure, Scene
-from rotfem.scene_plate import locking
-from rotfem.structures.mode_shapes import plate_mode_name, turning
+from rotfem.scene.plates import locking
+from rotfem.structures.meshes.plate_mesh import PlateGrid, plate_grid
+from rotfem.structures.mode_names import plate_mode_name, turning
 from rotfem.structures.plate_loads import EdgeMoment, PointPlace, locate, point_measure
-from rotfem.structures.plate_mesh import PlateGrid, plate_grid
 from rotfem.structures.plate_section import constants, plane_stress, shear_moduli, thickness_field
-from rotfem.structures.probe import Probe
 from rotfem.structures.structure import Array, Structure
-from rotfem.theories import THEORIES
+from rotfem.structures.tip_values import Probe
 
 #: Largest |alpha_2|, rad: at π/2 the two angles of the director meet their pole.
 LARGEST_TILT = 1.5
@@ -261,7 +261,7 @@ class Plate(Structure):
 
     def _along_tip(self, density: Any) -> float:
         """Return the integral of a density over the edge "tip"."""
-        return float(self.comm.allreduce(float(fem.assemble_scalar(jit.form(density * self.tip)))))
+        return float(self.comm.allreduce(float(fem.assemble_scalar(forms.form(density * self.tip)))))
 
     # --- values -----------------------------------------------------------------------------------------------------
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import ufl
 from dolfinx import geometry
 
-from rotfem.kinematics import AppliedLoad, Kinematics
+from rotfem.mechanics.bodies import AppliedLoad, Kinematics
 
 #: Distance from a cell, relative to the size of the mesh, at which a point still counts as in it.
 NEAR = 1e-9

@@ -9,7 +9,7 @@ import ufl
 from dolfinx import fem
 
 from rotfem.scene import PlateStructure
-from rotfem.structures.plate_mesh import PlateGrid
+from rotfem.structures.meshes.plate_mesh import PlateGrid
 
 
 def constants(data: PlateStructure) -> dict[str, float]:

@@ -23,15 +23,15 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from rotfem.errors import ComputationError
-from rotfem.kinematics import AppliedLoad, Body, Strain
-from rotfem.quantities import evaluate
-from rotfem.rotations import FULL_TURN
+from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
+from rotfem.mechanics.rotations import FULL_TURN
+from rotfem.mechanics.strains import THEORIES
 from rotfem.scene import MomentLoad, Scene, SpatialBeamStructure
+from rotfem.scene.values import evaluate
 from rotfem.structures.beam import Array, Beam
-from rotfem.structures.rigid import AppliedMoment, Director, OffsetMass, SectionTurn, rotation_part
 from rotfem.structures.spatial_section import SectionForms, euler_tensor
 from rotfem.structures.swept_axis import swept_axis
-from rotfem.theories import THEORIES
+from rotfem.structures.turning_bodies import AppliedMoment, Director, OffsetMass, SectionTurn, rotation_part
 
 
 def _moment(load: MomentLoad, t: float) -> Array:

@@ -15,8 +15,8 @@ import numpy.typing as npt
 import ufl
 
 from rotfem.errors import SceneError
-from rotfem.kinematics import Strain
-from rotfem.section_spatial import SpatialSection
+from rotfem.mechanics.bodies import Strain
+from rotfem.scene.section_spatial import SpatialSection
 from rotfem.structures.beam import Array, Beam
 
 #: Strains in the order of the section matrices, and the stiffness of each.

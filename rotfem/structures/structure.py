@@ -13,11 +13,11 @@ from basix.ufl import element
 from dolfinx import default_scalar_type, fem
 from mpi4py import MPI
 
-from rotfem import scene_common
 from rotfem.errors import SceneError, shown
-from rotfem.kinematics import AppliedLoad, Damping, Kinematics, Strain
+from rotfem.mechanics.bodies import AppliedLoad, Damping, Kinematics, Strain
 from rotfem.scene import Load, Scene
-from rotfem.structures.probe import Probe
+from rotfem.scene import clamp_and_damping as scene_common
+from rotfem.structures.tip_values import Probe
 
 Array = npt.NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from rotfem.quantities import Profile
+from rotfem.scene.values import Profile
 from rotfem.structures.beam import Array, Beam
 
 #: Degree of the polynomials the axis of an arc is held in; strains see its exact angle, only inertia sees these.

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import pytest
 
-from rotfem.cli import app
+from rotfem.commands.cli import app
 
 
 class Done(NamedTuple):

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotfem.results import read_csv
+from rotfem.results.files import read_csv
 from tests.beams import SECTION
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -227,8 +227,8 @@ def test_debug_shows_the_traceback(rotfem: Run) -> None:
 #: Runs the command line with a signal to itself after the step numbered 30.
 SIGNALLED = """
 import os, signal, sys
-from rotfem import simulation
-from rotfem.cli import main
+from rotfem.commands import run as simulation
+from rotfem.commands.cli import main
 
 check = simulation.Simulation._check
 

@@ -13,11 +13,11 @@ from types import ModuleType
 import pytest
 
 import rotfem
-from rotfem import scene
-from rotfem.quantities import SceneModel
-from rotfem.scene_common import Damping
-from rotfem.section import PlanarSection
-from rotfem.section_spatial import SpatialSection
+from rotfem.scene import scene
+from rotfem.scene.clamp_and_damping import Damping
+from rotfem.scene.section import PlanarSection
+from rotfem.scene.section_spatial import SpatialSection
+from rotfem.scene.values import SceneModel
 from tests.launch import MPIRUN, environment
 
 DEMOS = Path(__file__).parents[2] / "demos"

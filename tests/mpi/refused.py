@@ -19,7 +19,7 @@ from unittest.mock import patch
 
 from mpi4py import MPI
 
-from rotfem.cli import app, main
+from rotfem.commands.cli import app, main
 
 
 def ended(arguments: list[str]) -> tuple[Any, str]:

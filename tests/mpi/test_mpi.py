@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotfem.results import read_csv
+from rotfem.results.files import read_csv
 from tests.beams import SECTION
 from tests.launch import MPIRUN, rotfem
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotfem.results import read_csv
+from rotfem.results.files import read_csv
 from tests.launch import MPIRUN, rotfem
 from tests.plate_mesh_files import PLATE_SCENE, grid, write_msh
 

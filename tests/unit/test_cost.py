@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rotfem.advice import advise, estimates
-from rotfem.cost_front import Row, pareto, recommend
-from rotfem.cost_grid import Setting, grid, ladder, own_setting, reference_settings
-from rotfem.cost_record import Measurement, Record, fingerprint
-from rotfem.cost_reference import Samples, distance, observed_order, reference
-from rotfem.cost_tuned import write_tuned
+from rotfem.commands.cost.front import Row, pareto, recommend
+from rotfem.commands.cost.record import Measurement, Record, fingerprint
+from rotfem.commands.cost.reference import Samples, distance, observed_order, reference
+from rotfem.commands.cost.settings import Setting, grid, ladder, own_setting, reference_settings
+from rotfem.commands.cost.tuned import write_tuned
 from rotfem.errors import SceneError
 from rotfem.scene import Scene, load_scene
+from rotfem.scene.advice import advise, estimates
 from tests.beams import SPIN_UP
 
 BEAM: dict[str, Any] = {
@@ -176,7 +176,7 @@ def test_fingerprint_tells_studies_apart(monkeypatch: pytest.MonkeyPatch) -> Non
     one = fingerprint(scene, "tip", 1)
     assert one == fingerprint(Scene.from_dict(BEAM), "tip", 1)
     others = {fingerprint(scene.replace({"motion.speed": 5.0}), "tip", 1), fingerprint(scene, "frequencies", 1)}
-    monkeypatch.setattr("rotfem.cost_record.__version__", "0.0.0")
+    monkeypatch.setattr("rotfem.commands.cost.record.__version__", "0.0.0")
     assert one not in others | {fingerprint(scene, "tip", 1)}
 
 

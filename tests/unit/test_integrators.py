@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotfem.integrators import Scheme
+from rotfem.analysis.stepper import Scheme
 from rotfem.scene import Scene
 
 RADII = (0.0, 0.3, 0.5, 0.8, 0.9, 1.0)

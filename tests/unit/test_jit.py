@@ -12,7 +12,7 @@ import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from rotfem import jit
+from rotfem.numerics import forms
 
 COMPILE = """
 import sys, time
@@ -20,7 +20,7 @@ from pathlib import Path
 import dolfinx.jit, ffcx.codegeneration.jit as ffcx_jit, ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
-from rotfem import jit
+from rotfem.numerics import forms
 
 cache = Path(sys.argv[1])
 dolfinx.jit.DOLFINX_DEFAULT_JIT_OPTIONS["cache_dir"] = (cache, "")
@@ -35,7 +35,7 @@ def slow(*args, **kwargs):
 ffcx_jit._compile_objects = slow
 domain = mesh.create_unit_interval(MPI.COMM_SELF, 2)
 v = ufl.TestFunction(fem.functionspace(domain, ("Lagrange", 1)))
-print(fem.assemble_vector(jit.form(v * ufl.dx)).array.sum())
+print(fem.assemble_vector(forms.form(v * ufl.dx)).array.sum())
 """
 
 
@@ -53,19 +53,19 @@ def mass() -> ufl.Form:
 
 
 def test_form_left_behind_is_made_anew(cache: Path) -> None:
-    jit.form(mass())
+    forms.form(mass())
     (source,) = cache.glob("libffcx_forms_*.c")
     for path in cache.glob("libffcx_forms_*"):
         path.unlink()
     source.touch()  # all that a compiler leaves which was killed at once
-    assert fem.assemble_matrix(jit.form(mass())).to_dense().sum() == pytest.approx(1.0, rel=1e-14)
+    assert fem.assemble_matrix(forms.form(mass())).to_dense().sum() == pytest.approx(1.0, rel=1e-14)
     assert source.with_suffix(".c.cached").exists()
 
 
 def test_errors_of_the_compiler_are_errors(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(dolfinx.jit.DOLFINX_DEFAULT_JIT_OPTIONS, "cffi_libraries", (["no_such_library"], ""))
     with pytest.raises(Exception, match=r"[Ll]inkError|failed"):
-        jit.form(mass())
+        forms.form(mass())
 
 
 def test_two_programs_want_one_form(tmp_path: Path) -> None:

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from rotfem.errors import OutputError
-from rotfem.results import RunResult, Table, csv_text, json_text, prepare_folder, read_csv, write_text
+from rotfem.results.files import csv_text, json_text, prepare_folder, read_csv, write_text
+from rotfem.results.results import RunResult, Table
 
 
 def test_table_grows_by_rows() -> None:

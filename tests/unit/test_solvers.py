@@ -9,7 +9,8 @@ import pytest
 from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
-from rotfem.solvers import DirectSolver, Newton, combine
+from rotfem.numerics.linear import DirectSolver, combine
+from rotfem.numerics.newton import Newton
 
 
 class Scalar:

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 from pydantic_core import PydanticCustomError
 
-from rotfem.scene import SceneError, load_scene
-from rotfem.tables import read_csv
+from rotfem.errors import SceneError
+from rotfem.scene import load_scene
+from rotfem.scene.files import read_csv
 
 SCENE = """\
 [structure]

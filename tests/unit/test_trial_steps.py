@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rotfem.motion import motion_of
+from rotfem.mechanics.motion import motion_of
 from rotfem.scene import Scene
-from rotfem.trial_steps import MOST_PARTS, given, parts
+from rotfem.selection.resolution import MOST_PARTS, given, parts
 
 BEAM: dict[str, Any] = {
     "structure": {

@@ -12,10 +12,10 @@ import numpy.typing as npt
 import pytest
 
 from rotfem import SceneError, campbell, modes
-from rotfem.campbell import parse_speeds
-from rotfem.plots import plot
-from rotfem.results import CampbellResult
-from rotfem.tracking import AMBIGUOUS, SURE
+from rotfem.analysis.branches import AMBIGUOUS, SURE
+from rotfem.commands.campbell import parse_speeds
+from rotfem.results.plots import plot
+from rotfem.results.results import CampbellResult
 
 Array = npt.NDArray[np.float64]
 

@@ -13,9 +13,10 @@ import numpy.typing as npt
 import pytest
 
 from rotfem import Scene, run
-from rotfem.equilibrium import newton_for, steady_state
-from rotfem.system import Model, System, compile_system
-from rotfem.theories import THEORIES
+from rotfem.analysis.equilibrium import newton_for, steady_state
+from rotfem.equations.model import Model
+from rotfem.equations.system import System, compile_system
+from rotfem.mechanics.strains import THEORIES
 
 Array = npt.NDArray[np.float64]
 

@@ -12,13 +12,13 @@ import numpy.typing as npt
 import pytest
 
 import rotfem
-from rotfem.cost import RECORD
-from rotfem.cost_front import setting_of
-from rotfem.cost_grid import Setting
-from rotfem.cost_measure import Bench
-from rotfem.cost_record import Measurement
-from rotfem.cost_reference import Samples, distance
-from rotfem.cost_result import CostResult
+from rotfem.commands.cost.bench import Bench
+from rotfem.commands.cost.front import setting_of
+from rotfem.commands.cost.record import Measurement
+from rotfem.commands.cost.reference import Samples, distance
+from rotfem.commands.cost.result import CostResult
+from rotfem.commands.cost.settings import Setting
+from rotfem.commands.cost.study import RECORD
 
 from .conftest import SPIN_UP, reference_file
 
@@ -161,7 +161,7 @@ def test_second_start_computes_only_what_is_new(tmp_path: Path, monkeypatch: pyt
     more = study(tmp_path, theories=["consistent_linear", "reissner"])
     assert more.summary["measured"] == first.summary["measured"]  # as many of the other theory
     assert [row["time"] for row in more.rows if row["theory"] == "reissner"] == [row["time"] for row in first.rows]
-    monkeypatch.setattr("rotfem.cost_record.__version__", "0.0.0")
+    monkeypatch.setattr("rotfem.commands.cost.record.__version__", "0.0.0")
     assert study(tmp_path).summary["measured"] == first.summary["measured"]
 
 

@@ -10,9 +10,9 @@ import pytest
 import ufl
 
 from rotfem import Scene, run
-from rotfem.affine import AffineSystem
+from rotfem.equations.affine import AffineSystem
+from rotfem.equations.model import Model, integral_count
 from rotfem.scene import EFFECTS
-from rotfem.system import Model, integral_count
 
 Array = npt.NDArray[np.float64]
 

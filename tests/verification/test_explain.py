@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 
 import rotfem
-from rotfem.choice import Choice, choose
+from rotfem.equations.hub import Hub
+from rotfem.equations.model import Model
+from rotfem.equations.switched import SwitchedSystem
+from rotfem.equations.system import compile_system
 from rotfem.errors import ComputationError, SceneError
-from rotfem.estimate import NOTICEABLE, Estimates
-from rotfem.hub import Hub
-from rotfem.outputs import HISTORY, MODES, STEADY, tip_change
 from rotfem.scene import Scene
-from rotfem.switches import SwitchedSystem
-from rotfem.system import Model, compile_system
-from rotfem.trial import Trial
+from rotfem.selection.coarse_model import Trial
+from rotfem.selection.distance import HISTORY, MODES, STEADY, tip_change
+from rotfem.selection.estimate import NOTICEABLE, Estimates
+from rotfem.selection.model_choice import Choice, choose
 from tests.beams import STRUCTURE
 
 SPIN_UP: dict[str, Any] = {
@@ -304,7 +305,7 @@ BLOW = {
 @pytest.fixture
 def blind(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let trials step over what the scene prescribes."""
-    monkeypatch.setattr("rotfem.trial.given", lambda *_: [])
+    monkeypatch.setattr("rotfem.selection.coarse_model.given", lambda *_: [])
 
 
 @pytest.mark.usefixtures("blind")
@@ -418,7 +419,7 @@ def test_a_failing_eigenproblem_at_rest_ends_nothing(monkeypatch: pytest.MonkeyP
     def fail(*_: Any) -> None:
         raise ComputationError("an eigenpair has the backward error 1, above 0")
 
-    monkeypatch.setattr("rotfem.trial.Pencil.solve", fail)
+    monkeypatch.setattr("rotfem.selection.coarse_model.Pencil.solve", fail)
     result = rotfem.explain(scene(SPIN_UP))
     rows = {row["name"]: row for row in result.rows}
     assert np.isinf(rows["euler"]["estimate"][MODES]) and "backward error" in rows["euler"]["notes"][MODES]

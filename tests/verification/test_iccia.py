@@ -19,7 +19,7 @@ from numpy.polynomial import legendre
 from scipy.integrate import solve_ivp
 
 from rotfem import ComputationError, run
-from rotfem.motion import smooth_spin_up
+from rotfem.mechanics.motion import smooth_spin_up
 
 Array = npt.NDArray[np.float64]
 

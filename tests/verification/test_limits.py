@@ -15,11 +15,12 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 from rotfem import Scene, run
-from rotfem.equilibrium import newton_for, steady_state
-from rotfem.integrators import Scheme, State, Stepper
-from rotfem.motion import smooth_spin_up
-from rotfem.system import Model, System, compile_system
-from rotfem.theories import THEORIES
+from rotfem.analysis.equilibrium import newton_for, steady_state
+from rotfem.analysis.stepper import Scheme, State, Stepper
+from rotfem.equations.model import Model
+from rotfem.equations.system import System, compile_system
+from rotfem.mechanics.motion import smooth_spin_up
+from rotfem.mechanics.strains import THEORIES
 
 Array = npt.NDArray[np.float64]
 

@@ -20,15 +20,16 @@ from numpy.polynomial import legendre
 from scipy.io import mmread
 from scipy.optimize import brentq, minimize_scalar, newton
 
-from rotfem import ComputationError, Scene, SceneError, modes, pencil
-from rotfem.affine import AffineSystem
-from rotfem.campbell import campbell
-from rotfem.equilibrium import critical_speed
-from rotfem.modal import ModalAnalysis
-from rotfem.plots import plot
-from rotfem.results import ModesResult
-from rotfem.self_checks import linearisation_error
-from rotfem.state_space import state_space, write_matrices
+from rotfem import ComputationError, Scene, SceneError, modes
+from rotfem.analysis.equilibrium import critical_speed
+from rotfem.analysis.modal import ModalAnalysis
+from rotfem.analysis.mode_checks import linearisation_error
+from rotfem.analysis.state_space import state_space, write_matrices
+from rotfem.commands.campbell import campbell
+from rotfem.equations.affine import AffineSystem
+from rotfem.numerics import eigenproblem as pencil
+from rotfem.results.plots import plot
+from rotfem.results.results import ModesResult
 
 Array = npt.NDArray[Any]
 

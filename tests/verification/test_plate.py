@@ -13,11 +13,12 @@ from scipy.optimize import brentq
 from scipy.special import iv, jv, kv, yv
 
 import rotfem
-from rotfem.affine import AffineSystem
+from rotfem.analysis.modal import ModalAnalysis
+from rotfem.equations.affine import AffineSystem
+from rotfem.equations.model import Model
+from rotfem.equations.system import System, compile_system
 from rotfem.errors import SceneError
-from rotfem.modal import ModalAnalysis
 from rotfem.scene import Scene
-from rotfem.system import Model, System, compile_system
 from tests.plate_mesh_files import grid, write_msh
 
 from .conftest import reference_file
@@ -401,7 +402,7 @@ def test_gravity_is_an_upward_acceleration_of_the_hub() -> None:
 @pytest.mark.parametrize("theory", ["consistent_linear", "von_karman", "reissner"])
 def test_a_factor_kept_over_steps_changes_nothing(theory: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps with an old factor against steps with their own: the same history to the tolerance, spin-up and after."""
-    import rotfem.integrators
+    import rotfem.analysis.stepper
 
     scene = square(
         0.05,
@@ -412,7 +413,7 @@ def test_a_factor_kept_over_steps_changes_nothing(theory: str, monkeypatch: pyte
         solver__increment_tolerance=1e-12,
     )
     kept = rotfem.run(scene)
-    monkeypatch.setattr(rotfem.integrators, "KEPT_FROM", {2: np.inf})
+    monkeypatch.setattr(rotfem.analysis.stepper, "KEPT_FROM", {2: np.inf})
     own = rotfem.run(scene)
     scale = np.max(np.abs(own.history["tip_u3"]))
     np.testing.assert_allclose(kept.history["tip_u3"], own.history["tip_u3"], rtol=0, atol=1e-9 * scale)
@@ -423,7 +424,7 @@ def test_reduced_basis(monkeypatch: pytest.MonkeyPatch) -> None:
     """A Campbell diagram in a basis of modes against full solutions at every speed."""
     from importlib import import_module
 
-    reduced = import_module("rotfem.reduced")
+    reduced = import_module("rotfem.analysis.reduced_basis")
     scene = square(
         0.05, motion={"type": "constant", "speed": 0.0, "axis": [0, 1, 0]}, mesh__elements=[5, 5], modes__count=5
     )
@@ -560,7 +561,7 @@ def test_reduced_basis_with_double_modes(tmp_path: Path, monkeypatch: pytest.Mon
     scene = square(1e-3, **shape, modes__count=7, model__theory="consistent_linear")
     speeds = [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]
     full = rotfem.campbell(scene, speeds, orders=1)
-    monkeypatch.setattr(import_module("rotfem.reduced"), "LARGE", 0)
+    monkeypatch.setattr(import_module("rotfem.analysis.reduced_basis"), "LARGE", 0)
     quick = rotfem.campbell(scene, speeds, orders=1)
     assert quick.summary["reduced_basis"]["checks"][-1]["difference"] < 1e-6
     assert max(row["residual"] for row in quick.rows) < 1e-6

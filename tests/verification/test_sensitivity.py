@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pytest
 
 from rotfem import Scene, modes
-from rotfem.modal import ModalAnalysis
+from rotfem.analysis.modal import ModalAnalysis
 
 Array = npt.NDArray[Any]
 

@@ -17,11 +17,12 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
 from rotfem import ComputationError, Scene, SceneError, modes, run
-from rotfem.equilibrium import newton_for, steady_state
-from rotfem.modal import ModalAnalysis
-from rotfem.sensitivity import sensitivities
-from rotfem.system import Model, System, compile_system
-from rotfem.theories import THEORIES
+from rotfem.analysis.equilibrium import newton_for, steady_state
+from rotfem.analysis.modal import ModalAnalysis
+from rotfem.analysis.sensitivity import sensitivities
+from rotfem.equations.model import Model
+from rotfem.equations.system import System, compile_system
+from rotfem.mechanics.strains import THEORIES
 
 Array = npt.NDArray[np.float64]
 

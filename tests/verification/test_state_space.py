@@ -16,7 +16,7 @@ from scipy.io import mmread
 from scipy.sparse import load_npz
 
 from rotfem import OutputError, modes, run
-from rotfem.state_space import state_space, write_matrices
+from rotfem.analysis.state_space import state_space, write_matrices
 
 Array = npt.NDArray[np.float64]
 

@@ -1,0 +1,266 @@
+"""Modes followed over speed: which mode at one speed is which at the next.
+
+Two neighbouring speeds are joined by the bi-orthogonal correlation of left vectors at one with right vectors at the
+other, by an optimal one-to-one assignment. Where it is weak, or where two modes change places, the speed is refined:
+a veering then shows itself as two branches that keep their order, a true crossing as two that change it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import brentq, linear_sum_assignment
+
+from rotfem.analysis.modal import GROWTH, ModalAnalysis, Spinning, stability
+from rotfem.errors import ComputationError
+from rotfem.listeners import Progress
+from rotfem.numerics.eigenproblem import SAME
+
+Array = npt.NDArray[Any]
+
+#: Correlation (squared) from which a step needs no refinement, and below which it is called ambiguous.
+SURE, AMBIGUOUS = 0.9, 0.5
+
+
+#: Correlation below which two modes have nothing in common: the branch is lost, not joined to a stranger.
+STRANGER = 0.02
+
+
+#: Relative distance of eigenvalues below which they are taken for one, as those of a disk at rest.
+TWIN = 1e-6
+
+
+#: Smallest refined step as a part of the speed range: a veering narrower than this passes as a crossing.
+FINEST = 1e-5
+
+
+#: Modes computed beyond those asked for, so that a branch that falls in the order is still there.
+SPARE = 3
+
+
+@dataclass
+class Node:
+    """Modes at one speed of a sweep; `order[b]` is the column of branch b, −1 where it was lost.
+
+    Attributes:
+        requested: whether the speed was asked for (else it refines a step).
+        confidence: squared correlation with the previous node, a branch each.
+    """
+
+    spinning: Spinning
+    requested: bool
+    order: Array = field(default_factory=lambda: np.empty(0, dtype=int))
+    confidence: Array = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def speed(self) -> float:
+        """Ω, rad/s."""
+        return self.spinning.speed
+
+    def value(self, branch: int) -> complex:
+        """Return λ of a branch, nan where it was lost."""
+        column = self.order[branch]
+        return complex(self.spinning.pairs.values[column]) if column >= 0 else complex(np.nan, np.nan)
+
+
+def correlation(a: Spinning, b: Spinning) -> tuple[Array, Array]:
+    """Return the squared correlations of the modes at two speeds, shape (m_a, m_b): 1 for equal modes, 0 for different.
+
+    That of two modes is |y_i^H [(λ_i + μ_j) M + C] x_j|², scaled. Both pencils serve in turn and the mean is taken, so
+    the two speeds are treated alike. The second array is this. In the first, modes with one frequency are not told
+    apart, for any combination of them is a mode, too: what counts is how much of the other is in the space they span,
+    the trace of the product of both projections by the smaller dimension.
+    """
+    ya, yb, xa, xb = a.pairs.left, b.pairs.left, a.pairs.right, b.pairs.right
+    la, lb = a.pairs.values, b.pairs.values
+    here, there = a.pencil.gram(ya, la, xb, lb), b.pencil.gram(yb, lb, xa, la)
+    own_a, own_b = a.pencil.gram(ya, la, xa, la), b.pencil.gram(yb, lb, xb, lb)
+    # The two products cancel the unknown scaling of x_b and y_b against each other.
+    scale = np.outer(*(np.maximum(np.abs(np.diag(own)), 1e-300) for own in (own_a, own_b)))
+    single = np.abs(here) * np.abs(there.T) / scale
+    joint = single.copy()
+    for i in twins(la):
+        for j in twins(lb):
+            if len(i) > 1 or len(j) > 1:
+                part_a, part_b = np.linalg.pinv(own_a[np.ix_(i, i)]), np.linalg.pinv(own_b[np.ix_(j, j)])
+                product = part_a @ here[np.ix_(i, j)] @ part_b @ there[np.ix_(j, i)]
+                joint[np.ix_(i, j)] = abs(np.trace(product)) / min(len(i), len(j))
+    return joint, single
+
+
+def twins(values: Array) -> list[Array]:
+    """Return the indices of eigenvalues (sorted by size) in groups of those that are one, but for TWIN."""
+    apart = np.abs(np.diff(values)) > TWIN * np.abs(values[1:])
+    return np.split(np.arange(len(values)), np.flatnonzero(apart) + 1)
+
+
+def assign(node: Node, following: Node) -> float:
+    """Join the branches of a node with the columns of the following one; return the least squared correlation.
+
+    A branch whose best partner is a stranger has the order −1 from there on.
+    """
+    known = np.flatnonzero(node.order >= 0)
+    c, single = (np.clip(x[node.order[known]], 0.0, 1.0) for x in correlation(node.spinning, following.spinning))
+    rows, columns = linear_sum_assignment(-c - 1e-3 * single)
+    following.order = np.full(len(node.order), -1)
+    following.confidence = np.zeros(len(node.order))
+    following.confidence[known[rows]] = c[rows, columns]
+    kin = c[rows, columns] >= STRANGER
+    following.order[known[rows[kin]]] = columns[kin]
+    return float(np.min(c[rows, columns], initial=1.0))
+
+
+def swapped(a: Node, b: Node) -> bool:
+    """Return whether two branches change their order by frequency between two nodes."""
+    both = [i for i in range(len(a.order)) if a.order[i] >= 0 and b.order[i] >= 0]
+    wa, wb = (np.array([n.value(i).imag for i in both]) for n in (a, b))
+    da, db = wa[:, None] - wa[None, :], wb[:, None] - wb[None, :]
+    level = SAME * max(float(np.max(np.abs(wa), initial=0.0)), float(np.max(np.abs(wb), initial=0.0)))
+    return bool(np.any((da > level) & (db < -level)))
+
+
+class Sweep:
+    """A Campbell diagram in the making.
+
+    Args:
+        analysis: compiled scene.
+        count: number of branches.
+    """
+
+    def __init__(self, analysis: ModalAnalysis, count: int):
+        self.analysis, self.count = analysis, count
+        self.nodes: list[Node] = []
+        self.solves = 0
+        self.ambiguous: list[dict[str, float]] = []
+
+    def solve(self, speed: float, start: Array | None, requested: bool) -> Node:
+        """Return the modes at a speed, its equilibrium continued from start."""
+        self.solves += 1
+        return Node(self.analysis.at(speed, self.count + SPARE, start), requested)
+
+    def run(self, speeds: Sequence[float], progress: Progress) -> None:
+        """Follow the modes over increasing speeds."""
+        first = self.solve(speeds[0], None, True)
+        total = len(first.spinning.pairs.values)
+        first.order, first.confidence = np.arange(total), np.ones(total)
+        self.nodes = [first]
+        self.finest = FINEST * max(speeds[-1] - speeds[0], 1e-300)
+        for i, speed in enumerate(speeds[1:], start=1):
+            self._advance(self.solve(speed, self.nodes[-1].spinning.q, True))
+            progress(i / (len(speeds) - 1))
+
+    def _advance(self, target: Node) -> None:
+        """Append a node, and nodes before it as long as the step is not sure."""
+        last = self.nodes[-1]
+        confidence = assign(last, target)
+        near = self._watched(last, target)
+        if (confidence < SURE and near) or swapped(last, target):
+            if target.speed - last.speed > 2 * self.finest:
+                middle = 0.5 * (last.speed + target.speed)
+                self._advance(self.solve(middle, last.spinning.q, False))
+                self._advance(target)
+                return
+            weak = [b for b in range(self.count) if last.order[b] >= 0 and target.confidence[b] < AMBIGUOUS]
+            self.ambiguous += [
+                {"branch": b + 1, "speed": target.speed, "confidence": float(target.confidence[b])} for b in weak
+            ]
+        self.nodes.append(target)
+
+    def _watched(self, last: Node, target: Node) -> bool:
+        """Whether a branch that is asked for (not only a spare one) is unsure."""
+        return bool(np.any(target.confidence[: self.count][last.order[: self.count] >= 0] < SURE))
+
+    # --- what the diagram says ----------------------------------------------------------------------------------------
+
+    def between(self, left: Node, speed: float) -> Node:
+        """Return the modes at a speed to the right of a node, joined with its branches."""
+        node = self.solve(speed, left.spinning.q, False)
+        assign(left, node)
+        return node
+
+    def crossings(self, orders: int) -> list[dict[str, Any]]:
+        """Return the speeds where a branch meets k Ω, k = 1 … orders, by root finding on the true frequency."""
+        out = []
+        for left, right in zip(self.nodes[:-1], self.nodes[1:], strict=True):
+            for b in range(self.count):
+                for k in range(1, orders + 1):
+                    gap = [n.value(b).imag - k * abs(n.speed) for n in (left, right)]
+                    if not np.all(np.isfinite(gap)) or gap[0] == 0.0 or gap[0] * gap[1] > 0.0:
+                        continue
+
+                    def f(s: float, left: Node = left, b: int = b, k: int = k) -> float:
+                        return self.between(left, s).value(b).imag - k * abs(s)
+
+                    speed = right.speed if gap[1] == 0.0 else brentq(f, left.speed, right.speed, xtol=1e-12, rtol=1e-8)
+                    out.append(
+                        {"branch": b + 1, "per_rev": k, "speed": float(speed), "frequency": k * abs(float(speed))}
+                    )
+        return sorted(out, key=lambda c: c["speed"])
+
+    def onsets(self) -> list[dict[str, Any]]:
+        """Return the ranges in which a mode is unstable, and how: `speed` where each begins, `kind`, and `until`.
+
+        A range that the sweep begins with has the first speed; `until` is None where none of the speeds ends it.
+        """
+        kinds = [unstable(node.spinning) for node in self.nodes]
+        out: list[dict[str, Any]] = []
+        if kinds[0] is not None:
+            out.append({"speed": self.nodes[0].speed, "kind": kinds[0], "until": None})
+        for i, (before, after) in enumerate(pairwise(kinds)):
+            if before == after:
+                continue
+            speed = self._change(self.nodes[i], self.nodes[i + 1], before, after)
+            if speed is None:
+                continue
+            if before is not None and out:
+                out[-1]["until"] = speed
+            if after is not None:
+                out.append({"speed": speed, "kind": after, "until": None})
+        return out
+
+    def _change(self, left: Node, right: Node, before: str | None, after: str | None) -> float | None:
+        """Return the speed where the kind of instability changes; None if it only left the computed modes."""
+        if None in (before, after) and "static instability" in (before, after):
+            speed = self._static_onset(left, right)
+            if speed is not None or after is None:
+                return speed
+        return self._bisect(left, right, before, after)
+
+    def _static_onset(self, left: Node, right: Node) -> float | None:
+        """Return the speed where λ² of the least eigenvalue passes zero; None if it does not between the nodes."""
+
+        def square(speed: float) -> float:
+            try:
+                values = self.solve(speed, left.spinning.q, False).spinning.pairs.values
+            except ComputationError:
+                return 0.0  # K is singular: this is the speed
+            return float((values[np.argmin(np.abs(values))] ** 2).real)
+
+        if square(left.speed) * square(right.speed) > 0.0:
+            return None
+        return float(brentq(square, left.speed, right.speed, xtol=1e-12, rtol=1e-10))
+
+    def _bisect(self, left: Node, right: Node, before: str | None, after: str | None) -> float | None:
+        """Return the lowest speed that is no longer of the kind before; None where growth ends with a jump."""
+        low, high = left.spinning, right.speed
+        while high - low.speed > 1e-9 * max(abs(high), abs(low.speed)):
+            middle = self.solve(0.5 * (low.speed + high), low.q, False).spinning
+            if unstable(middle) == before:
+                low = middle
+            else:
+                high = middle.speed
+        worst = max(low.pairs.values, key=lambda lam: lam.real)
+        return None if after is None and worst.real > 1e-2 * abs(worst) else high
+
+
+def unstable(spinning: Spinning) -> str | None:
+    """Return the kind of instability of the worst mode at a speed, None if all are stable."""
+    values = spinning.pairs.values
+    size = float(np.max(np.abs(values), initial=0.0))
+    worst = max(values, key=lambda lam: lam.real, default=0.0)
+    return stability(complex(worst)) if worst.real > GROWTH * min(abs(worst), size) else None

@@ -1,0 +1,183 @@
+"""Relative equilibria: the steady state of a constant spin, the static shape of a tip displacement, critical speed."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+from slepc4py import SLEPc
+
+from rotfem.equations.affine import AffineSystem
+from rotfem.equations.model import Model
+from rotfem.equations.system import System, compile_system
+from rotfem.errors import ComputationError, SceneError
+from rotfem.numerics.linear import DirectSolver, Increment, use_direct_solver
+from rotfem.numerics.newton import Newton
+from rotfem.scene import Scene
+
+Array = npt.NDArray[np.float64]
+
+#: A continuation that must cut its steps below this share of the whole has met a limit point.
+SMALLEST_SHARE = 1e-3
+
+
+def newton_for(scene: Scene, monotone: bool = False) -> Newton:
+    """Return the Newton control a scene asks for; monotone for time steps."""
+    return Newton(scene.solver.increment_tolerance, scene.solver.max_iterations, monotone)
+
+
+def steady_state(system: System, omega: float, newton: Newton, start: Array | None = None) -> Array:
+    """Return q (local dof array) with F(q, 0, 0) = 0 at constant speed: the equilibrium in the rotating frame.
+
+    Speed and loads are raised together, in one step where Newton allows and in smaller ones where not; the state is
+    left in the system's functions.
+
+    Args:
+        system: equations of motion.
+        omega: speed, rad/s.
+        newton: iteration control.
+        start: first guess, the equilibrium at a nearby speed; the whole load is then applied at once.
+
+    Raises:
+        ComputationError: no equilibrium was reached; says how far the load got.
+    """
+    q = np.zeros_like(system.q.x.array) if start is None else start.copy()
+    if start is not None:
+        try:
+            return _balance(system, omega, 1.0, q, newton)
+        except ComputationError:
+            q[:] = 0.0
+    done, share = 0.0, 1.0
+    while done < 1.0:
+        target = min(1.0, done + share)
+        try:
+            q = _balance(system, omega, target, q, newton)
+        except ComputationError as error:
+            share /= 2
+            if share < SMALLEST_SHARE:
+                raise ComputationError(
+                    f"no steady state at {omega:g} rad/s: the last equilibrium was at {done:.3g} of the load "
+                    f"({np.sqrt(done) * omega:.4g} rad/s); {error.what}",
+                    advice="a lower speed or load, a stiffer section, or a theory that holds at large deflection",
+                ) from None
+            continue
+        done = target
+        share *= 1.5
+    system.structure.check_range(q)
+    return q
+
+
+def _balance(system: System, omega: float, share: float, guess: Array, newton: Newton) -> Array:
+    """Newton for F(q, 0, 0) = 0 with loads, base acceleration and omega² multiplied by share."""
+    motion = system.motion.at_speed(np.sqrt(share) * omega)
+    system.set_time(0.0, motion, share)
+    q, dx = guess.copy(), Increment(system.V)
+    system.v.x.array[:] = 0.0
+    system.a.x.array[:] = 0.0
+
+    def increment() -> float:
+        system.q.x.array[:] = q
+        b = system.residual()
+        A, _ = system.tangent(1.0, 0.0, 0.0)
+        q[:] += dx.solve(DirectSolver(A), b)
+        system.q.x.array[:] = q
+        return system.size(dx.function.x.array)
+
+    if system.linear:
+        if not np.isfinite(increment()):
+            raise ComputationError("the stiffness is singular")
+        newton.iterations += 1
+    else:
+        newton.solve(increment, lambda: system.size(q))
+        if system.model.inside_out():
+            raise ComputationError("Newton met a state that is turned inside out (an axial strain below −1)")
+    return q
+
+
+def check_steady(scene: Scene) -> None:
+    """Refuse what has no steady state in the rotating frame: gravity that turns with it.
+
+    Raises:
+        SceneError: gravity has a component across the spin axis while the frame spins.
+    """
+    across = np.cross(scene.loads.gravity, scene.motion.unit_axis)
+    spinning = scene.motion.is_spinning
+    if spinning and np.any(np.abs(across) > 0) and "gravity" in scene.effective_effects():
+        raise SceneError(
+            scene.file,
+            "loads.gravity",
+            list(scene.loads.gravity),
+            "gravity across the spin axis turns in the rotating frame, so there is no steady state; give [time], or "
+            "gravity along motion.axis, or leave gravity out of model.effects",
+        )
+
+
+def static_tip_shape(scene: Scene, displacement: float, newton: Newton) -> Array:
+    """Return q (local dof array) of the beam at rest under the tip force F_2 that gives u_2(L) = displacement (m).
+
+    Raises:
+        ComputationError: no equilibrium with this displacement was found.
+    """
+    changes = {
+        "model.frame": "rotating",
+        "model.effects": [],
+        "motion": {"type": "constant", "speed": 0.0},
+        "initial": {},
+        "loads": {"tip_force": [0.0, 1.0]},
+    }
+    system = compile_system(Model(scene.replace(changes)))
+    force = system.structure.load_constants["tip_force"][0]
+    system.set_time(0.0)
+    probe, q, F = system.structure.probe, np.zeros_like(system.q.x.array), [0.0]
+    under_load, under_residual = Increment(system.V), Increment(system.V)
+
+    def increment() -> float:
+        system.q.x.array[:] = q
+        _set_force(system, force, F[0] + 1.0)
+        loaded = system.residual().copy()
+        _set_force(system, force, F[0])
+        residual = system.residual()
+        loaded.axpy(-1.0, residual)
+        solver = DirectSolver(system.tangent(1.0, 0.0, 0.0)[0])
+        solver.refresh()
+        dq, per_force = under_residual.solve(solver, residual), under_load.solve(solver, loaded)
+        dF = (displacement - probe(q)[1] - probe(dq)[1]) / probe(per_force)[1]
+        F[0] += dF
+        q[:] += dq + dF * per_force
+        return system.size(dq + dF * per_force)
+
+    newton.solve(increment, lambda: system.size(q))
+    return q
+
+
+def _set_force(system: System, force: object, value: float) -> None:
+    system.structure.load_constants["tip_force"] = (force, lambda t: np.array([0.0, value]))
+    system.set_time(0.0)
+
+
+def critical_speed(system: AffineSystem) -> float | None:
+    """Return the lowest speed (rad/s) at which the stiffness of a linear theory is singular; None if there is none.
+
+    Raises:
+        ComputationError: the eigensolver did not converge.
+
+    K = K_1 + Omega² K_2: the least positive Omega² of K_1 x = −Omega² K_2 x.
+    """
+    K_1, K_2 = system.stiffness_pieces()
+    if K_2.norm() == 0.0:
+        return None
+    eps = SLEPc.EPS().create(K_1.comm)
+    # K_1 is definite: nu = 1/Omega² is the largest eigenvalue of −K_2 x = nu K_1 x.
+    K_2.scale(-1.0)
+    eps.setOperators(K_2, K_1)
+    eps.setProblemType(SLEPc.EPS.ProblemType.GHEP)
+    eps.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_REAL)
+    eps.setDimensions(1, min(K_1.getSize()[0], 100))
+    eps.setTolerances(1e-12, 2000)
+    K_1.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    use_direct_solver(eps.getST().getKSP(), K_1.getSize()[0], symmetric=True)
+    eps.solve()
+    if eps.getConverged() == 0:
+        raise ComputationError("the eigenproblem of the critical speed did not converge")
+    nu = eps.getEigenvalue(0).real
+    return float(1 / np.sqrt(nu)) if nu > 0 else None

@@ -1,0 +1,230 @@
+"""The quadratic eigenproblem of the spinning structure at any speed, and the names of its modes.
+
+Small motions e^{λt} x about an equilibrium q̄ at constant speed satisfy (λ² M + λ C + K) x = 0 with M = ∂F/∂a,
+C = ∂F/∂v, K = ∂F/∂q at (q̄, 0, 0).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from rotfem.analysis.equilibrium import critical_speed, newton_for, steady_state
+from rotfem.equations.affine import AffineSystem
+from rotfem.equations.hub import Hub
+from rotfem.equations.model import Model
+from rotfem.equations.system import System, compile_system
+from rotfem.errors import SceneError
+from rotfem.listeners import Hint
+from rotfem.numerics.eigenproblem import SAME, ZERO, Eigenpairs, Pencil
+from rotfem.numerics.newton import Newton
+from rotfem.scene import Scene, TorqueMotion
+from rotfem.scene.advice import advise
+
+Array = npt.NDArray[Any]
+
+#: Share of kinetic energy from which a mode belongs to one family; below it is named as mixed.
+PURE = 0.8
+
+
+#: Part of the least eigenvalue a real part must exceed to count as growth.
+GROWTH = 1e-6
+
+
+@dataclass
+class Spinning:
+    """The structure at one speed: its equilibrium, pencil and eigenpairs.
+
+    Attributes:
+        speed: Ω, rad/s.
+        q: equilibrium, local dof array.
+        pencil: M, C, K there.
+        pairs: eigenpairs, sorted by |λ|, one of each conjugate pair.
+        clamped: M, C, K without the hub's unknown (the same pencil where the hub is not free).
+        rigid: whether hub and structure can turn as a rigid body (λ = 0, not among the pairs).
+    """
+
+    speed: float
+    q: Array
+    pencil: Pencil
+    pairs: Eigenpairs
+    clamped: Pencil
+    rigid: bool = False
+
+
+class ModalAnalysis:
+    """Compiled once, solved at any speed.
+
+    Args:
+        scene: validated scene; its own speed is only a default.
+        comm: MPI communicator.
+        sweep: whether the speed will change.
+
+    Raises:
+        SceneError: more modes are asked for than the mesh has, or it cannot be shared by the processes.
+    """
+
+    def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD, sweep: bool = False):
+        started = perf_counter()
+        rotating = scene.replace({"model.frame": "rotating"}) if scene.model.frame == "inertial" else scene
+        self.scene, self.comm = rotating, comm
+        self.model = Model(rotating, comm, rotating.effective_effects(spinning=True) if sweep else None)
+        self.model.structure.check_shared()  # SLEPc waits for ever where a process has no unknowns
+        self._check_count()
+        self.system: System = compile_system(self.model)
+        motion = rotating.motion
+        coupled = "hub_coupling" in self.model.effects
+        self.hub = Hub(self.system, motion, coupled) if isinstance(motion, TorqueMotion) else None
+        self.newton: Newton = newton_for(rotating)
+        self._unit = 1.0
+        assembled = self.system.assembled
+        self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
+        self.seconds |= {"equilibrium": 0.0, "factor": 0.0, "eigen": 0.0}
+
+    def _check_count(self) -> None:
+        """Refuse more modes than there are unknowns; a count that was not asked for is only an upper limit."""
+        modes = self.scene.modes
+        allowed = self.model.structure.free_unknowns() + int(isinstance(self.scene.motion, TorqueMotion))
+        if "count" in modes.model_fields_set and modes.count > allowed:
+            why = f"must be at most {allowed}, the number of unknowns that are free on this mesh"
+            raise SceneError(self.scene.file, "modes.count", modes.count, why)
+
+    def advise(self, command: str, hint: Hint | None, speed: float) -> list[str]:
+        """Return hints about the computation ahead, up to a speed (rad/s), and hand them on."""
+        critical = None
+        if hint is not None and isinstance(self.system, AffineSystem) and self.scene.model.theory == "linear":
+            critical = critical_speed(self.system)
+        return advise(self.scene, command, hint, speed, critical)
+
+    def at(self, speed: float, count: int, start: Array | None = None, keep: bool = True) -> Spinning:
+        """Return equilibrium and eigenpairs at a speed (rad/s).
+
+        Args:
+            speed: Ω, rad/s.
+            count: number of pairs, at least.
+            start: an equilibrium nearby, to continue from.
+            keep: whether the pencil must outlast another call; large systems save memory without.
+
+        Raises:
+            ComputationError: no equilibrium, or eigenpairs not to be trusted.
+        """
+        t0 = perf_counter()
+        q = self.equilibrium(speed, start)
+        t1 = perf_counter()
+        matrices = self.system.mass_damping_stiffness(keep)
+        clamped = Pencil(*matrices)
+        pencil = clamped if self.hub is None else Pencil(*self.hub.bordered(*matrices))
+        t2 = perf_counter()
+        clamped.unit = pencil.unit = self._unit
+        pairs = pencil.solve(count, clamped.scale() if self.hub is not None else 0.0)
+        self._unit = pencil.unit
+        t3 = perf_counter()
+        factored = pencil.factored
+        spans = {"equilibrium": t1 - t0, "assemble": t2 - t1, "factor": factored, "eigen": t3 - t2 - factored}
+        for name, span in spans.items():
+            self.seconds[name] += span
+        # A PETSc matrix must not outlive the mesh it was made on: their communicator goes with the mesh.
+        clamped.owner = pencil.owner = self
+        finite = massed(clamped.M)
+        if self.hub is None:
+            return Spinning(speed, q, pencil, pairs.select(np.arange(len(pairs.values))[:finite]), clamped)
+        flexible = np.flatnonzero(np.abs(pairs.values) > ZERO * np.median(np.abs(pairs.values)))
+        rigid = len(flexible) < len(pairs.values)
+        return Spinning(speed, q, pencil, pairs.select(flexible[:finite]), clamped, rigid)
+
+    def needs_fixed_hub(self, what: str) -> None:
+        """Refuse what is not there for a free hub.
+
+        Raises:
+            SceneError: the hub is free.
+        """
+        if self.hub is not None:
+            raise SceneError(self.scene.file, "motion.type", "torque", f"{what} cannot be computed for a free hub yet")
+
+    def equilibrium(self, speed: float, start: Array | None = None) -> Array:
+        """Return the state the modes are about, left in the system's functions: steady, or undeformed."""
+        s = self.system
+        zero = np.zeros_like(s.q.x.array)
+        if self.scene.modes.about == "undeformed" or s.linear:
+            s.set_time(0.0, s.motion.at_speed(speed))
+            s.set_state(zero, zero, zero)
+            return zero
+        return steady_state(s, speed, self.newton, start)
+
+    def right(self, spinning: Spinning) -> Array:
+        """Return the eigenvectors of the locally owned unknowns, one column each."""
+        return spinning.pairs.right
+
+    def mass_times(self, spinning: Spinning) -> Array:
+        """Return M times the eigenvectors."""
+        return spinning.pencil.apply(spinning.pencil.M, spinning.pairs.right)
+
+    # --- names ------------------------------------------------------------------------------------------------------
+
+    def shares(self, spinning: Spinning) -> dict[str, Array]:
+        """Return family ↦ share of the kinetic energy x^H M x in its components, shape (m,)."""
+        X, MX = self.right(spinning), self.mass_times(spinning)
+        bs = self.system.V.dofmap.index_map_bs
+        owned = self.system.V.dofmap.index_map.size_local * bs
+        along = [self.model.structure.oriented(Y[:owned].reshape(-1, bs, X.shape[1])) for Y in (X, MX)]
+        local = np.real(along[0].conj() * along[1]).sum(axis=0)
+        hub = np.real(X[owned:].conj() * MX[owned:]).sum(axis=0, keepdims=True)  # on the last rank, if it is free
+        energy = np.concatenate([local, hub])
+        energy = self.comm.allreduce(energy) if self.comm.size > 1 else energy
+        total = energy.sum(axis=0)
+        families = self.model.structure.families
+        shares = {name: energy[list(components)].sum(axis=0) / total for name, (components, _) in families.items()}
+        return shares if self.hub is None else {**shares, "hub": energy[-1] / total}
+
+    def names(self, spinning: Spinning) -> list[str]:
+        """Return "kind n" for every mode, as its structure counts them; mixed ones name both families."""
+        shares, structure = self.shares(spinning), self.model.structure
+        families = [name for name in shares if name != "hub"]
+        table, right = np.array([shares[name] for name in families]), self.right(spinning)
+        out = []
+        for j in range(table.shape[1]):
+            order = np.argsort(-table[:, j])
+            kind, number = structure.mode_name(families[order[0]], *self.shape(right[:, j]))
+            mixed = len(order) > 1 and table[order[0], j] < PURE
+            out.append(f"{kind}–{families[order[1]]} {number}" if mixed else f"{kind} {number}")
+        return out
+
+    def turning(self, spinning: Spinning) -> list[float]:
+        """Return for every mode of a disk whether it travels with its spin (1), against it (−1) or stands (0).
+
+        Empty for other structures. Without spin it is the direction of growing angles that counts.
+        """
+        axis = self.system.motion.axis
+        sign = -1.0 if spinning.speed * axis[2] < 0.0 else 1.0
+        out, right = [], self.right(spinning)
+        for j in range(right.shape[1]):
+            part = self.model.structure.turning(*self.shape(right[:, j]))
+            if part is None:
+                return []
+            out.append(sign * part)
+        return out
+
+    def shape(self, x: Array) -> tuple[dict[str, Array], Array]:
+        """Return (coordinates of the nodes, m; complex components (n, bs) of a mode), on every rank."""
+        coordinates, real = self.model.structure.nodes(x.real)
+        _, imaginary = self.model.structure.nodes(x.imag)
+        return coordinates, real + 1j * imaginary
+
+
+def massed(M: Any) -> int:
+    """Return how many unknowns have a mass: as many modes there are, and infinite eigenvalues beyond them."""
+    indptr, _, data = M.getValuesCSR()
+    rows = np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))
+    return int(M.comm.tompi4py().allreduce(len(np.unique(rows[data != 0.0]))))
+
+
+def stability(lam: complex) -> str:
+    """Return "stable", "static instability" (real growth) or "dynamic instability" (growing oscillation)."""
+    if lam.real <= GROWTH * abs(lam):
+        return "stable"
+    return "static instability" if lam.imag <= SAME * abs(lam) else "dynamic instability"

@@ -1,0 +1,196 @@
+"""Modes of a large linear system over a range of speeds, by a basis of its modes at a few of them.
+
+With the M-orthonormal columns V of modes at some speeds, (λ² M + λ C + K) x = 0 becomes the small problem of VᵀMV, VᵀCV
+and VᵀKV, whose pieces (of Omega, Omega², …) are projected once. It keeps symmetry and skewness, so it is a pencil like
+the full one. The basis grows until full solutions at speeds between agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from rotfem.analysis.modal import ModalAnalysis, Spinning
+from rotfem.equations.affine import AffineSystem
+from rotfem.errors import ComputationError
+from rotfem.numerics.eigenproblem import Eigenpairs, Pencil
+
+Array = npt.NDArray[Any]
+
+#: Unknowns from which, and speeds from which, a basis saves time.
+LARGE, MANY = 8000, 3
+
+#: Accepted relative difference of a frequency from that of the full system; most full solutions in the search for it.
+AGREEMENT, MOST = 1e-6, 9
+
+#: Directions whose kinetic energy is below this part of the largest are dropped: the others hold them to round-off. A
+#: larger part would drop what makes the small differences between modes at two speeds.
+DEPENDENT = 1e-13
+
+
+def worth_while(analysis: ModalAnalysis, speeds: Sequence[float]) -> bool:
+    """Return whether a basis is possible (a linear theory, a fixed hub) and saves time."""
+    possible = isinstance(analysis.system, AffineSystem) and analysis.hub is None
+    return possible and analysis.system.A.getSize()[0] >= LARGE and len(speeds) >= MANY
+
+
+class SmallPencil(Pencil):
+    """A pencil of so few unknowns that all its eigenvalues are computed; double ones, as of a disk, do no harm then."""
+
+    def _right(self, M: Any, C: Any, K: Any, count: int, target: float) -> tuple[Array, Array, Array]:
+        """Return (λ, x, backward error) of the pairs nearest to the target, by LAPACK from the linear form in 1/λ'.
+
+        With λ = target + λ', the least λ' are the largest eigenvalues, so the stiff directions of the basis do not
+        spoil them.
+        """
+        m, c, k = (A.getValues(range(A.getSize()[0]), range(A.getSize()[1])) for A in (M, C, K))
+        n = len(k)
+        unit = np.sqrt(max(float(np.trace(k)) / max(float(np.trace(m)), 1e-300), 1e-300))
+        shifted = [k + target * c + target**2 * m, unit * (c + 2 * target * m), unit**2 * m]
+        try:
+            right_side = np.linalg.solve(shifted[0], np.hstack(shifted[1:]))
+        except np.linalg.LinAlgError:
+            raise ComputationError("the stiffness matrix is singular", advice="a slightly different speed") from None
+        nu, vectors = np.linalg.eig(np.vstack([-right_side, np.eye(n, 2 * n)]))
+        order = np.argsort(-np.abs(nu), kind="stable")[: min(2 * count + 2, 2 * n - 2)]
+        values = target + unit / nu[order]
+        x = vectors[n:, order]
+        x = x / np.linalg.norm(x, axis=0)
+        sizes = np.array([np.linalg.norm(a) for a in (k, c, m)])
+        powers = np.array([np.ones_like(values), values, values**2])
+        residual = np.linalg.norm((k @ x) * powers[0] + (c @ x) * powers[1] + (m @ x) * powers[2], axis=0)
+        return values, x, residual / (sizes @ np.abs(powers))
+
+
+class ReducedAnalysis(ModalAnalysis):
+    """Modal analysis of a linear theory in a basis of its own modes; eigenvectors are in its coordinates.
+
+    Args:
+        full: the compiled scene, of a linear theory.
+
+    Attributes:
+        checks: speeds of full solutions with the largest relative difference of a frequency found there.
+    """
+
+    def __init__(self, full: ModalAnalysis):
+        self.__dict__.update(full.__dict__)
+        self.full = full
+        self.checks: list[dict[str, float]] = []
+        self._columns: list[Array] = []
+
+    def prepare(self, first: float, last: float, count: int) -> None:
+        """Build the basis for speeds from first to last (rad/s) and `count` modes; middle speeds are checked.
+
+        Raises:
+            ComputationError: a full solution failed.
+        """
+        for speed in (first, last):
+            self._add(self._solve(speed, count))
+        self._project()
+        gaps = [(first, last)]
+        while gaps and len(self.checks) + 2 < MOST:
+            low, high = gaps.pop(0)
+            middle = 0.5 * (low + high)
+            exact = self._solve(middle, count)
+            error = self._difference(middle, exact, count)
+            self.checks.append({"speed": middle, "difference": error})
+            if error > AGREEMENT:
+                self._add(exact)
+                self._project()
+                gaps += [(low, middle), (middle, high)]
+
+    def report(self) -> dict[str, Any]:
+        """Return what a summary says of the basis: columns, and the checks."""
+        return {"reduced_basis": {"columns": self.V.shape[1], "checks": self.checks}}
+
+    def _solve(self, speed: float, count: int) -> Eigenpairs:
+        return self.full.at(speed, count, keep=False).pairs
+
+    def _difference(self, speed: float, exact: Eigenpairs, count: int) -> float:
+        reduced = self.at(speed, count).pairs.values
+        n = min(count, len(reduced), len(exact.values))
+        return float(np.max(np.abs(reduced[:n] - exact.values[:n]) / np.abs(exact.values[:n]), initial=0.0))
+
+    def _add(self, pairs: Eigenpairs) -> None:
+        for x in pairs.right.T:
+            self._columns += [x.real, x.imag] if np.max(np.abs(x.imag)) > 0 else [x.real]
+
+    def _project(self) -> None:
+        """Make the columns M-orthonormal and project every piece."""
+        system = self.system
+        assert isinstance(system, AffineSystem)
+        V = np.array([c / max(np.sqrt(self._sum(c @ c)), 1e-300) for c in self._columns]).T
+        self._index = [i for i, p in enumerate(system.pieces) if p.kind in "MCK"]
+        pieces = [system.pieces[i] for i in self._index]
+        for _ in range(2):  # once more, as what is left of nearly equal columns is orthogonal only roughly
+            mass = sum(self._times(p.operator, V) for p in pieces if p.kind == "M")
+            gram = self._sum(V.T @ mass)
+            sizes, turns = np.linalg.eigh(0.5 * (gram + gram.T))
+            keep = sizes > DEPENDENT * sizes[-1]
+            V = V @ (turns[:, keep] / np.sqrt(sizes[keep]))
+        self.V = V
+        self.mass = sum(self._times(p.operator, V) for p in pieces if p.kind == "M")
+        products = [self._times(p.operator, self.V) for p in pieces]
+        self._pieces = [(p, self._sum(self.V.T @ PV)) for p, PV in zip(pieces, products, strict=True)]
+        self._grams = np.array([[self._sum(A.T @ B) for B in products] for A in products])
+        self._metric = self._sum(self.V.T @ self.V)
+        self._norms = [float(p.operator.norm()) for p in pieces]
+
+    def _sum(self, local: Any) -> Any:
+        return self.comm.allreduce(local, op=MPI.SUM) if self.comm.size > 1 else local
+
+    def _times(self, A: Any, X: Array) -> Array:
+        x, y = A.createVecs()
+        out = np.empty_like(X)
+        for j in range(X.shape[1]):
+            x.array[:] = X[:, j]
+            A.mult(x, y)
+            out[:, j] = y.array
+        return out
+
+    def at(self, speed: float, count: int, start: Array | None = None, keep: bool = True) -> Spinning:
+        """Return the eigenpairs of the basis at a speed (see `ModalAnalysis.at`), with errors in the full system."""
+        system = self.system
+        assert isinstance(system, AffineSystem)
+        zero = np.zeros_like(system.q.x.array)
+        c = system.coefficients(system.motion.at_speed(speed))[self._index]
+        small = {kind: np.zeros((self.V.shape[1],) * 2) for kind in "MCK"}
+        for ci, (p, matrix) in zip(c, self._pieces, strict=True):
+            small[p.kind] += ci * matrix
+        pencil = SmallPencil(*(PETSc.Mat().createAIJ(m.shape, csr=_csr(m), comm=MPI.COMM_SELF) for m in small.values()))
+        pairs = pencil.solve(min(count, self.V.shape[1] - 1))
+        pairs.errors = self._backward_errors(pairs, c)
+        pencil.owner = self
+        return Spinning(speed, zero, pencil, pairs, pencil)
+
+    def right(self, spinning: Spinning) -> Array:
+        """Return the eigenvectors in the unknowns of the mesh."""
+        return self.V @ spinning.pairs.right
+
+    def mass_times(self, spinning: Spinning) -> Array:
+        """Return M times the eigenvectors."""
+        return self.mass @ spinning.pairs.right
+
+    def _backward_errors(self, pairs: Eigenpairs, c: Array) -> Array:
+        """Return the normwise backward errors of the lifted eigenpairs in the full system, shape (m,).
+
+        Norms of full vectors are taken by products of the columns, so nothing below 1e-8 is seen.
+        """
+        power = {"M": 2, "C": 1, "K": 0}
+        out = np.empty(len(pairs.values))
+        for j, (lam, x) in enumerate(zip(pairs.values, pairs.right.T, strict=True)):
+            factors = np.array([ci * lam ** power[p.kind] for ci, (p, _) in zip(c, self._pieces, strict=True)])
+            residual = np.einsum("i,k,a,ikab,b->", factors.conj(), factors, x.conj(), self._grams, x).real
+            size = float(np.abs(factors) @ self._norms) * np.sqrt((x.conj() @ self._metric @ x).real)
+            out[j] = np.sqrt(max(residual, 0.0)) / size
+        return out
+
+
+def _csr(m: Array) -> tuple[Array, Array, Array]:
+    n = len(m)
+    return np.arange(n + 1, dtype=np.int32) * n, np.tile(np.arange(n, dtype=np.int32), n), m.ravel()

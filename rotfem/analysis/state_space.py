@@ -1,0 +1,159 @@
+"""Modal state-space model of the spinning structure: tip force and moment in, tip motion out.
+
+With q = Σ_j x_j η_j over pairs λ_j, η̇_j = λ_j η_j + y_j^H B u / n_j, n_j = y_j^H (2λ_j M + C) x_j. A conjugate pair
+gives two real states (Re η, Im η); what the left-out modes answer statically goes into D.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.io import mmwrite
+from scipy.sparse import csr_array, save_npz
+
+from rotfem.analysis.modal import ModalAnalysis, Spinning
+from rotfem.errors import OutputError, SceneError
+from rotfem.numerics.linear import DirectSolver, Increment
+
+Array = npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class StateSpace:
+    """ż = A z + B u, y = C z + D u, as scipy.signal takes it.
+
+    Attributes:
+        A, B, C, D: real matrices.
+        inputs: names of u, "tip_force_1" (N), …, "tip_moment" (N·m), components in the rotating frame.
+        outputs: names of y, "tip_u1" (m), …, deviations from the equilibrium.
+        speed: Ω of the equilibrium, rad/s.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    speed: float
+
+    def system(self) -> tuple[Array, Array, Array, Array]:
+        """Return (A, B, C, D)."""
+        return self.A, self.B, self.C, self.D
+
+    def write(self, path: Path) -> Path:
+        """Write all of it as an .npz file.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        names = {"inputs": np.array(self.inputs), "outputs": np.array(self.outputs), "speed": np.array(self.speed)}
+        try:
+            np.savez(path, A=self.A, B=self.B, C=self.C, D=self.D, **names)  # type: ignore[arg-type]
+        except OSError as error:
+            raise OutputError(path, error.strerror or str(error)) from None
+        return path
+
+
+def state_space(analysis: ModalAnalysis, spinning: Spinning, count: int) -> StateSpace:
+    """Return the model of the first `count` modes (and the static answer of all others).
+
+    Args:
+        analysis: compiled scene.
+        spinning: equilibrium and eigenpairs at one speed.
+        count: modes kept; a conjugate pair is one mode of two states.
+
+    Raises:
+        SceneError: the analysis is distributed over several processes.
+    """
+    serial(analysis, "the state-space model")
+    structure, pencil = analysis.model.structure, spinning.pencil
+    pairs = spinning.pairs.select(np.arange(min(count, len(spinning.pairs.values))))
+    tip = np.arange(structure.probe.dofs.start, structure.probe.dofs.stop)
+    n = np.diag(pencil.gram(pairs.left, pairs.values, pairs.right, pairs.values))
+    blocks, rows, columns = [], [], []
+    for j, lam in enumerate(pairs.values):
+        gain, shape = pairs.left[tip, j].conj() / n[j], pairs.right[tip, j]
+        if lam.imag > 0.0:
+            blocks.append(np.array([[lam.real, -lam.imag], [lam.imag, lam.real]]))
+            rows += [gain.real, gain.imag]
+            columns += [2 * shape.real, -2 * shape.imag]
+        else:
+            blocks.append(np.array([[lam.real]]))
+            rows.append(gain.real)
+            columns.append(shape.real)
+    A = block_diagonal(blocks)
+    B, C = np.array(rows), np.array(columns).T
+    D = tip_flexibility(analysis, spinning, tip) + C @ np.linalg.solve(A, B)
+    components = structure.components
+    outputs = tuple(f"tip_{name}" for name in components)
+    return StateSpace(A, B, C, D, structure.tip_inputs, outputs, spinning.speed)
+
+
+def tip_flexibility(analysis: ModalAnalysis, spinning: Spinning, tip: Array) -> Array:
+    """Return the static answer of the tip (m, rad) to unit tip forces and moment, shape (components, inputs)."""
+    solver, dx = DirectSolver(spinning.pencil.K), Increment(analysis.system.V)
+    b = analysis.system.b.duplicate()
+    out = np.zeros((len(tip), len(tip)))
+    for i, dof in enumerate(tip):
+        b.zeroEntries()
+        b.array[dof] = 1.0
+        out[:, i] = dx.solve(solver, b)[tip]
+    return out
+
+
+def block_diagonal(blocks: list[Array]) -> Array:
+    """Return the matrix with these square blocks on its diagonal."""
+    size = sum(len(block) for block in blocks)
+    out, at = np.zeros((size, size)), 0
+    for block in blocks:
+        out[at : at + len(block), at : at + len(block)] = block
+        at += len(block)
+    return out
+
+
+def write_matrices(analysis: ModalAnalysis, spinning: Spinning, folder: Path) -> list[Path]:
+    """Write M, C and K without the clamped unknowns as Matrix Market and npz, and what each unknown is; return paths.
+
+    Raises:
+        OutputError: the folder cannot be written.
+        SceneError: the analysis is distributed over several processes.
+    """
+    serial(analysis, "the export of matrices")
+    structure = analysis.model.structure
+    free = np.setdiff1d(np.arange(len(spinning.q)), analysis.system.clamped)
+    paths = []
+    try:
+        for name in "MCK":
+            A = getattr(spinning.pencil, name)
+            indptr, indices, data = A.getValuesCSR()
+            matrix = csr_array((data, indices, indptr), shape=A.getSize())[free][:, free]
+            matrix.eliminate_zeros()
+            mmwrite(folder / f"{name}.mtx", matrix, symmetry="general", precision=17)
+            save_npz(folder / f"{name}.npz", matrix)
+            paths += [folder / f"{name}.mtx", folder / f"{name}.npz"]
+        bs = len(structure.components)
+        x = structure.V.tabulate_dof_coordinates()
+        lines = ["row,x1,x2,x3,component"]
+        for row, dof in enumerate(free):
+            where = ",".join(repr(float(c)) for c in x[dof // bs])
+            lines.append(f"{row},{where},{structure.components[dof % bs]}")
+        (folder / "unknowns.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise OutputError(folder, error.strerror or str(error)) from None
+    return [*paths, folder / "unknowns.csv"]
+
+
+def serial(analysis: ModalAnalysis, what: str) -> None:
+    """Refuse to gather a distributed system, and a free hub, whose angle is no unknown of the mesh.
+
+    Raises:
+        SceneError: there is more than one process, or the hub is free.
+    """
+    analysis.needs_fixed_hub(what)
+    if analysis.comm.size > 1:
+        raise SceneError("command line", "mpirun -n", analysis.comm.size, f"{what} needs one process")

@@ -1,0 +1,176 @@
+"""`rotfem campbell`: modes over speed, named once, with critical speeds and the onset of instability."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from rotfem.analysis.branches import SPARE, Node, Sweep
+from rotfem.analysis.equilibrium import check_steady
+from rotfem.analysis.modal import ModalAnalysis
+from rotfem.analysis.mode_checks import self_checks
+from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
+from rotfem.commands.modes import advice, instabilities, mode_rows, unstiffened
+from rotfem.commands.summary import summary_of
+from rotfem.errors import SceneError
+from rotfem.listeners import Hint, Progress, silent
+from rotfem.results.results import CampbellResult
+from rotfem.scene import Scene, as_scene
+from rotfem.selection.distance import MODES
+from rotfem.selection.model_choice import choose
+
+Array = npt.NDArray[Any]
+
+
+def parse_speeds(text: str) -> list[float]:
+    """Return speeds (rad/s) from "first:last:number" or "s1,s2,…".
+
+    Raises:
+        SceneError: the text is neither, or the speeds do not increase.
+    """
+    allowed = (
+        "must be first:last:number (number at least 2) or a list s1,s2,… of at least two increasing speeds (rad/s)"
+    )
+    try:
+        if ":" in text:
+            first, last, number = text.split(":")
+            ends = float(first), float(last)
+            speeds = [float(s) for s in np.linspace(*ends, int(number))] if np.all(np.isfinite(ends)) else []
+        else:
+            speeds = [float(s) for s in text.split(",")]
+    except ValueError:
+        raise SceneError("command line", "--speeds", text, allowed) from None
+    if len(speeds) < 2 or not np.all(np.isfinite(speeds)) or np.any(np.diff(speeds) <= 0):
+        raise SceneError("command line", "--speeds", text, allowed)
+    return speeds
+
+
+def campbell(
+    scene: Scene | str | Path | Mapping[str, Any],
+    speeds: Sequence[float] | str,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    orders: int | None = None,
+    progress: Progress | None = None,
+    hint: Hint | None = silent,
+) -> CampbellResult:
+    """Return the modes of a scene followed over speed.
+
+    Args:
+        scene: scene, path of a scene file, or nested tables; its own speed is not used.
+        speeds: increasing speeds in rad/s, or text such as "0:12:25".
+        comm: MPI communicator.
+        orders: per-rev lines 1Ω … orders·Ω to cross; by default as many as meet a branch in the range, at most 4.
+        progress: called with the share of the speeds done, between 0 and 1.
+        hint: called with every line of advice before the computation starts; None asks for none.
+
+    Raises:
+        SceneError: the scene or the speeds are not valid.
+        ComputationError: no equilibrium at a speed, or eigenpairs that fail their check.
+    """
+    started = perf_counter()
+    scene = as_scene(scene)
+    values = parse_speeds(speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds))
+    if scene.modes.about == "steady":
+        check_steady(
+            scene.replace({"motion": {"type": "constant", "speed": values[-1]}}) if any(scene.loads.gravity) else scene
+        )
+    asked, choice = scene, None
+    if scene.model.tolerance is not None:
+        spinning = scene if scene.motion.is_spinning else scene.replace({"motion.speed": values[-1] or values[0]})
+        choice = choose(spinning, (MODES,), (values[0], 0.5 * (values[0] + values[-1]), values[-1]), comm)
+        scene = choice.apply(scene)
+    analysis = ModalAnalysis(scene, comm, sweep=True)
+    hints = analysis.advise("campbell", hint, max(map(abs, values)))
+    if worth_while(analysis, values):
+        analysis = ReducedAnalysis(analysis)
+        analysis.prepare(values[0], values[-1], scene.modes.count + SPARE)
+    sweep = Sweep(analysis, scene.modes.count)
+    sweep.run(values, progress or (lambda share: None))
+    count = min(scene.modes.count, len(sweep.nodes[0].order))
+    sweep.count = count
+    lowest = min((n.value(b).imag for n in sweep.nodes for b in range(count) if n.value(b).imag > 0), default=0.0)
+    fastest = max(abs(values[0]), abs(values[-1]))
+    highest = max((n.value(b).imag for n in sweep.nodes for b in range(count)), default=lowest)
+    orders = orders if orders is not None else int(np.clip(np.ceil(highest / max(fastest, 1e-300)), 1, 4))
+    labels = branch_labels(analysis, sweep.nodes[0], count)
+    rows = [row for node in sweep.nodes for row in node_rows(analysis, node, labels)]
+    crossings, onsets = sweep.crossings(orders), sweep.onsets()
+    for crossing in crossings:
+        crossing["label"] = labels[crossing["branch"] - 1]
+    lost = [labels[b] for b in range(count) if sweep.nodes[-1].order[b] < 0]
+    ends = mode_rows(analysis, sweep.nodes[-1].spinning)[:count]
+    warnings = [] if choice is not None else [*advice(analysis, fastest)]
+    warnings += unstiffened(analysis, fastest, ends)
+    warnings += [f"{name} left the computed modes before the last speed; more modes.count keeps it" for name in lost]
+    warnings += [
+        f"ambiguous: {labels[int(a['branch']) - 1]} at {a['speed']:.6g} rad/s, correlation {a['confidence']:.2f}"
+        for a in sweep.ambiguous
+    ]
+    warnings += [
+        f"{onset['kind']} from {onset['speed']:.8g} rad/s "
+        + ("on" if onset["until"] is None else f"to {onset['until']:.8g} rad/s")
+        for onset in onsets
+    ]
+    last = sweep.nodes[-1].spinning
+    checks = self_checks(analysis, last)
+    warnings += [f"at {last.speed:g} rad/s, {text}" for text in instabilities(ends)]
+    summary = {
+        **summary_of(analysis, "campbell", asked, choice, started),
+        "branches": [{"branch": b + 1, "label": labels[b], **branch_summary(sweep, b)} for b in range(count)],
+        "per_rev": orders,
+        "critical_speeds": crossings,
+        "instabilities": onsets,
+        "ambiguous": sweep.ambiguous,
+        "speeds": len(values),
+        "speeds_solved": sweep.solves,
+        "checks": checks,
+        **(analysis.report() if isinstance(analysis, ReducedAnalysis) else {}),
+        "lowest_frequency": lowest,
+        "warnings": warnings,
+        "advice": hints,
+    }
+    return CampbellResult(summary, rows)
+
+
+def branch_labels(analysis: ModalAnalysis, first: Node, count: int) -> list[str]:
+    """Return the names of the branches, those of the first speed; a name that occurs again gets a letter."""
+    names = analysis.names(first.spinning)[:count]
+    return [n if names.count(n) == 1 else f"{n}{'abcdefgh'[names[:i].count(n)]}" for i, n in enumerate(names)]
+
+
+def branch_summary(sweep: Sweep, b: int) -> dict[str, float]:
+    """Return the least confidence of a branch and its frequency at both ends (rad/s)."""
+    confidence = min(float(n.confidence[b]) for n in sweep.nodes)
+    first, last = (float(sweep.nodes[i].value(b).imag) for i in (0, -1))
+    return {"confidence": confidence, "frequency_first": first, "frequency_last": last}
+
+
+def node_rows(analysis: ModalAnalysis, node: Node, labels: list[str]) -> list[dict[str, Any]]:
+    """Return one row a branch at one speed; `mode` is its present name, `label` the name of the branch."""
+    columns = mode_rows(analysis, node.spinning)
+    rows = []
+    for b, label in enumerate(labels):
+        if node.order[b] < 0:
+            continue
+        row = columns[node.order[b]]
+        kept = {k: row[k] for k in ("frequency", "frequency_hz", "damping", "growth", "residual")}
+        shares = {k: v for k, v in row.items() if k.startswith("share_") or k == "turning"}
+        rows.append(
+            {
+                "speed": node.speed,
+                "branch": b + 1,
+                "label": label,
+                "mode": row["label"],
+                **kept,
+                **shares,
+                "confidence": float(node.confidence[b]),
+                "refined": int(not node.requested),
+            }
+        )
+    return rows

@@ -1,0 +1,238 @@
+"""The command line: parses, calls, prints."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from inspect import Parameter, Signature, signature
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rotfem.commands.console import Session
+from rotfem.commands.printed import campbell_report, explain_report, modes_report, run_report
+from rotfem.errors import ComputationError, SceneError
+from rotfem.scene import Scene, load_scene
+
+app = typer.Typer(
+    name="rotfem",
+    help="Rotating beams and plates with FEniCSx. A scene is a TOML file; docs/scene.md lists its keys.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+@app.callback()
+def _root() -> None:
+    """Rotating beams and plates with FEniCSx."""
+
+
+@dataclass
+class Job:
+    """What every command works on.
+
+    Attributes:
+        scene: the scene, with the changes of --set.
+        folder: where its results go; it is there.
+        session: who speaks.
+        plots: whether figures are wanted.
+        hint: what tells advice; None where none is wanted.
+    """
+
+    scene: Scene
+    folder: Path
+    session: Session
+    plots: bool
+    hint: Callable[[str], None] | None
+
+    def progress(self, what: str = "") -> Any:
+        """Return the progress bar of the computation."""
+        return self.session.progress(f"{self.scene.name}: {what or self.scene.model.theory}")
+
+    def finish(self, result: Any, lines: Callable[[dict[str, Any], Path], list[str]]) -> None:
+        """Write a result and print its report."""
+        self.session.write(result, self.folder, self.plots)
+        self.session.say(lines(result.summary, self.folder))
+
+
+@contextmanager
+def job(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="scene file (TOML)", show_default=False)],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="result folder [results/<scene name>]")] = None,
+    overrides: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="change a scene key, repeatable")
+    ] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="print the summary as JSON, and nothing else, on stdout")
+    ] = False,
+    no_plots: Annotated[bool, typer.Option("--no-plots", help="write no figures")] = False,
+    no_advice: Annotated[bool, typer.Option("--no-advice", help="give no hints at the start")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False,
+) -> Iterator[Job]:
+    """Give a command its job; these are the options of all commands."""
+    with Session(as_json, quiet, debug) as session:
+        loaded = load_scene(scene, overrides or ())
+        folder = session.folder(output or Path("results") / loaded.name)
+        yield Job(loaded, folder, session, not no_plots, session.hint(no_advice))
+
+
+def command(advice: bool = True) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Make a command of a function of a job and its own options; `advice` says whether it gives any."""
+
+    def decorate(work: Callable[..., None]) -> Callable[..., None]:
+        shared = [p for name, p in signature(job, eval_str=True).parameters.items() if advice or name != "no_advice"]
+        own = list(signature(work, eval_str=True).parameters.values())[1:]
+
+        def call(**given: Any) -> None:
+            options = {p.name: given.pop(p.name) for p in own}
+            with job(**given) as todo:
+                work(todo, **options)
+
+        ordered = [shared[0], *own, *shared[1:]]
+        call.__name__, call.__doc__ = work.__name__, work.__doc__
+        call.__signature__ = Signature(  # type: ignore[attr-defined]
+            [p.replace(kind=Parameter.KEYWORD_ONLY) for p in ordered]
+        )
+        app.command()(call)
+        return work
+
+    return decorate
+
+
+@command()
+def run(todo: Job) -> None:
+    """Compute the steady state or the time history of SCENE."""
+    from rotfem.commands.run import run as simulate
+
+    try:
+        with todo.progress() as progress:
+            result = simulate(todo.scene, progress=progress, hint=todo.hint)
+    except (ComputationError, KeyboardInterrupt) as error:
+        partial = getattr(error, "result", None)
+        if partial is not None:
+            todo.session.write(partial, todo.folder, todo.plots)
+        raise
+    todo.finish(result, run_report)
+
+
+@command()
+def modes(
+    todo: Job,
+    sensitivities: Annotated[
+        bool, typer.Option("--sensitivities", help="derivatives to section, hub and speed")
+    ] = False,
+    state_space: Annotated[bool, typer.Option("--state-space", help="write the modal model state_space.npz")] = False,
+    matrices: Annotated[bool, typer.Option("--matrices", help="write M, C, K as Matrix Market and npz")] = False,
+    animate: Annotated[int | None, typer.Option("--animate", metavar="MODE", help="animate a mode of a plate")] = None,
+) -> None:
+    """Compute the gyroscopic eigenmodes of SCENE at its speed."""
+    from rotfem.commands.modes import modes as analyse
+
+    result = analyse(todo.scene, sensitivities=sensitivities, hint=todo.hint)
+    if state_space or matrices:
+        from rotfem.analysis.state_space import state_space as reduce
+        from rotfem.analysis.state_space import write_matrices
+
+        if state_space:
+            model = reduce(result.analysis, result.spinning, todo.scene.modes.count)
+            model.write(todo.folder / "state_space.npz")
+        if matrices:
+            write_matrices(result.analysis, result.spinning, todo.folder)
+    if animate is not None:
+        todo.session.animate(result, animate, todo.folder)
+    todo.finish(result, modes_report)
+
+
+@command()
+def campbell(
+    todo: Job,
+    speeds: Annotated[str, typer.Option("--speeds", metavar="RANGE", help="first:last:number or s1,s2,… in rad/s")],
+    per_rev: Annotated[int | None, typer.Option("--per-rev", min=0, help="per-rev lines 1Ω … NΩ to cross")] = None,
+) -> None:
+    """Follow the modes of SCENE over a range of speeds."""
+    from rotfem.commands.campbell import campbell as sweep
+
+    with todo.progress() as progress:
+        result = sweep(todo.scene, speeds, orders=per_rev, progress=progress, hint=todo.hint)
+    todo.finish(result, campbell_report)
+
+
+@command(advice=False)
+def explain(
+    todo: Job,
+    check: Annotated[bool, typer.Option("--check", help="run the full models too: truth beside the estimates")] = False,
+) -> None:
+    """Say which effects and which theory SCENE calls for, and what each of them changes."""
+    from rotfem.commands.explain import explain as estimate
+
+    with todo.progress() as progress:
+        result = estimate(todo.scene, check, progress=progress)
+    todo.finish(result, explain_report)
+
+
+@command(advice=False)
+def cost(
+    todo: Job,
+    quick: Annotated[bool, typer.Option("--quick", help="a small grid")] = False,
+    accuracy: Annotated[float, typer.Option("--accuracy", help="relative error wanted, the model's included")] = 1e-4,
+    write: Annotated[Path | None, typer.Option("--write", metavar="FILE", help="write the tuned scene there")] = None,
+    of: Annotated[str | None, typer.Option("--of", metavar="OUTPUT", help="tip or frequencies")] = None,
+    theories: Annotated[str | None, typer.Option("--theories", metavar="A,B,…", help="theories to try")] = None,
+    elements: Annotated[str | None, typer.Option("--elements", metavar="N,…", help="numbers of elements")] = None,
+    degrees: Annotated[str | None, typer.Option("--degrees", metavar="K,…", help="polynomial degrees")] = None,
+    steps: Annotated[str | None, typer.Option("--steps", metavar="H,…", help="time steps (s)")] = None,
+    schemes: Annotated[str | None, typer.Option("--schemes", metavar="A,B,…", help="time-stepping schemes")] = None,
+    repeat: Annotated[int, typer.Option("--repeat", min=1, help="repetitions; times are medians")] = 3,
+    resume: Annotated[bool, typer.Option("--resume/--fresh", help="go on with what is in the result folder")] = True,
+) -> None:
+    """Measure what accuracy costs: error and time of SCENE over theory, mesh, degree, step and scheme."""
+    from rotfem.commands.cost.report import cost_report
+    from rotfem.commands.cost.study import cost as study
+
+    if write is not None:
+        todo.session.check_writable("--write", write)
+    with todo.progress("cost") as progress:
+        result = study(
+            todo.scene,
+            quick=quick,
+            accuracy=accuracy,
+            output=of,
+            repeat=repeat,
+            folder=todo.folder,
+            resume=resume,
+            theories=listed("--theories", theories, str),
+            elements=listed("--elements", elements, int),
+            degrees=listed("--degrees", degrees, int),
+            steps=listed("--steps", steps, float),
+            schemes=listed("--schemes", schemes, str),
+            progress=progress,
+        )
+    todo.finish(result, lambda summary, folder: cost_report(summary, result.rows, folder))
+    if write is not None and todo.session.first:
+        result.write_tuned(write)
+        todo.session.say([f"tuned scene in {write}"])
+
+
+def listed(option: str, text: str | None, kind: Callable[[str], Any]) -> list[Any] | None:
+    """Return the values of an option such as "2,3"; None where it is not given.
+
+    Raises:
+        SceneError: they are not of the kind.
+    """
+    if text is None:
+        return None
+    try:
+        return [kind(part.strip()) for part in text.split(",")]
+    except ValueError:
+        what = "integers" if kind is int else "numbers"
+        raise SceneError("command line", option, text, f"must be {what} separated by commas") from None
+
+
+def main() -> None:
+    """Run the command line."""
+    app(prog_name="rotfem")

@@ -1,0 +1,195 @@
+"""One command from its start to its exit status: who speaks, where results go, what an error prints.
+
+Exit status 0 done, 2 bad input, 3 the computation failed, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NoReturn
+
+from rotfem.errors import ComputationError, OutputError, SceneError
+
+
+class Session:
+    """One command under one set of flags: speaks on rank 0 only, and turns errors into messages and exit status.
+
+    Args:
+        as_json: print the summary on stdout as JSON and nothing else there.
+        quiet: print errors only.
+        debug: let tracebacks through.
+    """
+
+    def __init__(self, as_json: bool, quiet: bool, debug: bool):
+        from mpi4py import MPI
+
+        self.comm = MPI.COMM_WORLD
+        self.as_json, self.quiet, self.debug = as_json, quiet, debug
+        self.first = self.comm.rank == 0
+        self._made: list[Path] = []
+
+    def __enter__(self) -> Session:
+        signal.signal(signal.SIGTERM, _interrupt)
+        return self
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        if error is not None:
+            self._tidy()
+        if error is None or (self.debug and not isinstance(error, SystemExit)):
+            return
+        if isinstance(error, SceneError | OutputError):
+            self._end(str(error), 2)
+        if isinstance(error, ComputationError):
+            self._end(f"the computation failed: {error}", 3)
+        if isinstance(error, KeyboardInterrupt):
+            self._end("interrupted", 130)
+        if self.comm.size > 1 and not isinstance(error, SystemExit):
+            # A rank that fails alone would leave the others waiting for it.
+            import traceback
+
+            traceback.print_exception(kind, error, trace)
+            self.comm.Abort(1)
+
+    def _end(self, message: str, status: int) -> NoReturn:
+        if self.first:
+            print(f"rotfem: {message}", file=sys.stderr)
+        raise SystemExit(status) from None
+
+    def _tidy(self) -> None:
+        """Remove the folders that this command made, the innermost first, as far as they are empty."""
+        for made in self._made:
+            try:
+                made.rmdir()
+            except OSError:
+                return
+
+    def folder(self, path: Path) -> Path:
+        """Return the result folder, made by rank 0.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        from rotfem.results.files import prepare_folder
+
+        problem = None
+        if self.first:
+            self._made = [p for p in (path, *path.parents) if not os.path.exists(p)]  # Path.exists may raise
+            try:
+                prepare_folder(path)
+            except OutputError as error:
+                problem = error
+        problem = self.comm.bcast(problem)
+        if problem is not None:
+            raise problem
+        return path
+
+    def check_writable(self, option: str, path: Path) -> None:
+        """See that the file of an option can be written, before anything is computed.
+
+        Raises:
+            SceneError: it cannot.
+        """
+        from rotfem.results.files import unwritable
+
+        reason = self.comm.bcast(unwritable(path) if self.first else None)
+        if reason:
+            raise SceneError("command line", option, str(path), reason)
+
+    def progress(self, title: str) -> ProgressBar:
+        """Return the progress bar: on a terminal only, and only where the command may speak."""
+        return ProgressBar(title, self.first and not self.quiet and not self.as_json and sys.stderr.isatty())
+
+    def hint(self, unwanted: bool) -> Callable[[str], None] | None:
+        """Return what prints advice on stderr, rank 0 only; None where it is not wanted."""
+        if unwanted or self.quiet:
+            return None
+        return lambda line: print(f"hint: {line}", file=sys.stderr) if self.first else None
+
+    def write(self, result: Any, folder: Path, plots: bool) -> None:
+        """Write a result and its figures from rank 0, its fields from all; print its summary if --json asks for it."""
+        fields = getattr(result, "fields", None)
+        if fields is not None:
+            fields(folder)
+        if not self.first:
+            return
+        result.write(folder)
+        if plots:
+            if result.summary["command"] == "cost":
+                from rotfem.commands.cost.plot import plot_cost
+
+                plot_cost(result, folder)
+            else:
+                from rotfem.results.plots import plot
+
+                plot(result, folder)
+        if self.as_json:
+            from rotfem.results.files import json_text
+
+            sys.stdout.write(json_text(result.summary))
+        for warning in result.summary["warnings"]:
+            if not self.quiet:
+                print(f"warning: {warning}", file=sys.stderr)
+
+    def animate(self, result: Any, mode: int, folder: Path) -> None:
+        """Write the picture and the animation of a plate's mode from rank 0.
+
+        Raises:
+            SceneError: there is no such mode, or the structure is no plate.
+            OutputError: they cannot be written.
+        """
+        if result.triangles is None:
+            raise SceneError("command line", "--animate", mode, 'needs structure.type = "plate"')
+        from rotfem.results.plots_plate import animate
+
+        problem: Exception | None = None
+        if self.first:
+            try:
+                animate(result, mode, folder)
+            except (SceneError, OutputError) as error:
+                problem = error
+        problem = self.comm.bcast(problem)
+        if problem is not None:
+            raise problem
+
+    def say(self, lines: list[str]) -> None:
+        """Print what was done."""
+        if self.first and not (self.quiet or self.as_json):
+            print("\n".join(lines))
+
+
+class ProgressBar:
+    """Progress on stderr; calls are free where it is off.
+
+    Args:
+        title: text before the bar.
+        on: whether to draw it.
+    """
+
+    def __init__(self, title: str, on: bool):
+        self._bar: Any = None
+        self._title = title
+        self._on = on
+
+    def __enter__(self) -> Callable[[float], None]:
+        if not self._on:
+            return lambda share: None
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+        columns = (TextColumn(self._title), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+        self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
+        self._bar.start()
+        task = self._bar.add_task("", total=1.0)
+        return lambda share: self._bar.update(task, completed=share)
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+
+def _interrupt(signum: int, frame: object) -> NoReturn:
+    raise KeyboardInterrupt

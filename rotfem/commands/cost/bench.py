@@ -1,0 +1,120 @@
+"""One setting of a work–precision study, computed and timed."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable
+from time import perf_counter, process_time
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from rotfem.analysis.equilibrium import check_steady
+from rotfem.analysis.modal import ModalAnalysis
+from rotfem.commands.cost.record import Measurement
+from rotfem.commands.cost.reference import Samples
+from rotfem.commands.cost.settings import Setting
+from rotfem.commands.modes import final_speed
+from rotfem.commands.run import Simulation
+from rotfem.errors import ComputationError, SceneError
+from rotfem.scene import Scene
+
+#: Steps of the run that warms up: the first ones load compiled forms and touch every library once.
+WARM_STEPS = 3
+
+
+class Bench:
+    """Measures settings of one scene.
+
+    Args:
+        scene: validated scene.
+        output: "tip" or "frequencies".
+        comm: MPI communicator.
+    """
+
+    def __init__(self, scene: Scene, output: str, comm: MPI.Comm = MPI.COMM_WORLD):
+        self.scene, self.output, self.comm = scene, output, comm
+        self._warm: set[tuple[str, int]] = set()
+        self.compiling = 0.0
+
+    def measure(self, setting: Setting, repeat: int) -> Measurement:
+        """Return the output of a setting with its timings, or the reason why there is none.
+
+        Forms are compiled once for each theory and degree, in a run of a few steps that is not timed.
+        """
+        out = Measurement()
+        try:
+            variant = self.scene.replace(setting.changes(self.scene))
+            self._warm_up(variant)
+            for _ in range(repeat):
+                gc.collect()  # the last system is large and full of cycles; its end is not this one's cost
+                self._once(variant, out)
+        except (ComputationError, SceneError) as error:
+            out.status, out.reason, out.samples = "failed", str(error), None
+        if out.samples is not None and not np.all(np.isfinite(out.samples.values)):
+            out.status, out.reason, out.samples = "failed", "the output is not finite", None
+        return out
+
+    def _warm_up(self, variant: Scene) -> None:
+        """Compile the forms of a theory and degree."""
+        key = (variant.model.theory, variant.mesh.degree)
+        if key in self._warm:
+            return
+        started = perf_counter()
+        short = variant
+        if self.output == "tip" and variant.time is not None and variant.time.step is not None:
+            end = min(WARM_STEPS * variant.time.step, variant.time.end)
+            short = variant.replace({"time.end": end, "time.output_every": 1})
+        self._start(short)() if self.output == "tip" and variant.time is not None else self._start(short)
+        self._warm.add(key)
+        self.compiling += perf_counter() - started
+
+    def _once(self, variant: Scene, out: Measurement) -> None:
+        clock = perf_counter(), process_time()
+        go = self._start(variant)
+        ready = perf_counter(), process_time()
+        try:
+            samples, counts = go()
+        finally:
+            end = perf_counter(), process_time()
+            out.setup.append(ready[0] - clock[0])
+            out.wall.append(end[0] - ready[0])
+            out.cpu.append(end[1] - ready[1])
+        out.samples = samples
+        out.dofs, out.steps, out.iterations = counts
+
+    def _start(self, variant: Scene) -> Callable[[], tuple[Samples, tuple[int, int, int]]]:
+        """Return what computes the output once everything is set up."""
+        return self._modal(variant) if self.output == "frequencies" else self._motion(variant)
+
+    def _motion(self, variant: Scene) -> Callable[[], tuple[Samples, tuple[int, int, int]]]:
+        variant.check_run()
+        if variant.time is None or variant.initial.state == "steady":
+            check_steady(variant)
+        simulation = Simulation(variant, self.comm)
+
+        def go() -> tuple[Samples, tuple[int, int, int]]:
+            result = simulation.run()
+            columns = [name for name in ("tip_u1", "tip_u2", "tip_u3") if name in result.history]
+            values = np.column_stack([result.history[name] for name in columns])
+            times = result.history["t"] if variant.time is not None else np.empty(0)
+            s = result.summary
+            return Samples(values, times), (s["dofs"], s["steps"], s["newton_iterations"])
+
+        return go
+
+    def _modal(self, variant: Scene) -> Callable[[], tuple[Samples, tuple[int, int, int]]]:
+        if variant.modes.about == "steady":
+            check_steady(variant)
+        analysis = ModalAnalysis(variant, self.comm)
+        V = analysis.system.V
+
+        def go() -> tuple[Samples, tuple[int, int, int]]:
+            spinning = analysis.at(final_speed(analysis), variant.modes.count)
+            values: Any = spinning.pairs.values[: variant.modes.count]
+            dofs = V.dofmap.index_map.size_global * V.dofmap.index_map_bs
+            samples = Samples(np.column_stack([values.imag, values.real]), np.empty(0))
+            return samples, (dofs, 0, analysis.newton.iterations)
+
+        return go

@@ -1,0 +1,263 @@
+"""The settings a work–precision study tries, and the finer ones its references come from. No dolfinx in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from rotfem.errors import SceneError
+from rotfem.scene import THEORIES, ConstantMotion, Scene
+from rotfem.scene.values import did_you_mean
+
+Elements = int | tuple[int, int] | None
+
+OUTPUTS = ("tip", "frequencies")
+SCHEMES = ("generalised_alpha", "newmark")
+
+#: The theory whose converged result stands for the truth.
+RICHEST = THEORIES[-1]
+
+#: Steps tried, as multiples of the scene's own; a step is never longer than this part of the interval.
+STEPS_FULL, STEPS_QUICK, LONGEST = (0.45, 10.5), (1.9, 10.5), 1 / 20
+
+#: Tolerances of adaptive steps tried, as multiples of the scene's own.
+TOLERANCES_FULL, TOLERANCES_QUICK = (1000.0, 100.0, 10.0, 1.0, 0.1), (100.0, 10.0, 1.0)
+
+#: Numbers of elements tried, as multiples of the scene's own.
+MESHES_FULL, MESHES_QUICK = (0.25, 0.5, 1.0, 2.0), (0.5, 1.0)
+
+#: Theories of a quick study, besides the scene's own.
+QUICK = ("linear", "consistent_linear", RICHEST)
+
+HIGHEST_DEGREE = 6
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One way to compute a scene.
+
+    Attributes:
+        theory: order of the strains.
+        elements: number of elements, (nx, ny) of a plate, or None where a mesh file says it.
+        degree: polynomial degree.
+        scheme: time stepping, or None outside a time history.
+        step: fixed time step, s, or None.
+        tolerance: of adaptive steps, or None.
+        every: steps from one sample of the history to the next.
+    """
+
+    theory: str
+    elements: Elements
+    degree: int
+    scheme: str | None = None
+    step: float | None = None
+    tolerance: float | None = None
+    every: int = 1
+
+    def key(self) -> dict[str, Any]:
+        """Return what tells settings apart, JSON-able."""
+        elements = list(self.elements) if isinstance(self.elements, tuple) else self.elements
+        return {**asdict(self), "elements": elements}
+
+    def changes(self, scene: Scene) -> dict[str, Any]:
+        """Return dotted key ↦ value that make a scene of this setting; keys it says nothing about stay."""
+        out: dict[str, Any] = {"model.theory": self.theory, "mesh.degree": self.degree}
+        if self.elements is not None:
+            out["mesh.elements"] = list(self.elements) if isinstance(self.elements, tuple) else self.elements
+        if self.scheme is None or scene.time is None:
+            return out
+        out |= {"time.step": self.step, "time.tolerance": self.tolerance, "time.output_every": self.every}
+        if self.tolerance is None:
+            out |= {"time.max_step": None, "time.min_step": None}
+        if self.scheme != scene.time.scheme:
+            out |= {"time.scheme": self.scheme, "time.spectral_radius": None, "time.beta": None, "time.gamma": None}
+        return out
+
+    def refined(self, mesh: int = 0, time: int = 0) -> Setting:
+        """Return the setting with mesh and step halved so many times; the samples stay where they are.
+
+        A mesh from a file cannot be refined: its degree is raised instead.
+        """
+        new = self
+        for _ in range(mesh):
+            if new.elements is None:
+                new = replace(new, degree=min(new.degree + 1, HIGHEST_DEGREE))
+            else:
+                new = replace(new, elements=scaled(new.elements, 2.0))
+        if time and new.step is not None:
+            new = replace(new, step=new.step / 2**time, every=new.every * 2**time)
+        return new
+
+
+def cells(elements: Elements) -> int:
+    """Return the number of cells."""
+    return elements[0] * elements[1] if isinstance(elements, tuple) else elements or 0
+
+
+def scaled(elements: Elements, factor: float) -> Elements:
+    """Return a number of elements times a factor, at least 1 in each direction."""
+    if isinstance(elements, tuple):
+        return max(1, round(elements[0] * factor)), max(1, round(elements[1] * factor))
+    return None if elements is None else max(1, round(elements * factor))
+
+
+def own_setting(scene: Scene) -> Setting:
+    """Return the setting of the scene itself."""
+    elements = getattr(scene.mesh, "elements", None)
+    if getattr(scene.structure, "mesh", None) is not None:
+        elements = None
+    model, time = scene.model, scene.time
+    if time is None:
+        return Setting(model.theory, elements, scene.mesh.degree)
+    every = time.output_every if time.tolerance is None else 1
+    return Setting(model.theory, elements, scene.mesh.degree, time.scheme, time.step, time.tolerance, every)
+
+
+def default_output(scene: Scene) -> str:
+    """Return "tip" for a history or a steady state that the scene asks for, "frequencies" otherwise."""
+    if scene.time is not None:
+        return "tip"
+    steady = isinstance(scene.motion, ConstantMotion) and not scene.modes.model_fields_set
+    return "tip" if steady and (scene.motion.is_spinning or scene.loads.model_fields_set) else "frequencies"
+
+
+def grid(
+    scene: Scene, output: str, quick: bool, base_step: float | None, chosen: Mapping[str, Sequence[Any] | None]
+) -> list[Setting]:
+    """Return the settings of a study around the scene's own, which is among them unless the choice leaves it out.
+
+    Args:
+        scene: validated scene.
+        output: "tip" or "frequencies".
+        quick: a small grid.
+        base_step: a fixed step (s) of about the scene's accuracy; its own where it has one.
+        chosen: `theories`, `elements`, `degrees`, `steps`, `schemes` that replace the default ones, or None each.
+
+    Raises:
+        SceneError: a choice is not allowed.
+    """
+    own = own_setting(scene)
+    check_choice(scene, chosen)
+    theories = list(chosen.get("theories") or default_theories(scene, quick))
+    factors = MESHES_QUICK if quick else MESHES_FULL
+    meshes = list(chosen.get("elements") or unique([scaled(own.elements, factor) for factor in factors]))
+    lower = [] if quick or own.degree == 1 else [own.degree - 1]
+    degrees = list(chosen.get("degrees") or [*lower, own.degree])
+    ways = [(None, None, None, 1)] if output != "tip" or scene.time is None else _ways(scene, quick, base_step, chosen)
+    out = []
+    for theory in theories:
+        for scheme, step, tolerance, every in ways:
+            # Another scheme changes nothing in space: one mesh shows what it does.
+            other = scheme is not None and not chosen.get("schemes") and scheme != own.scheme
+            pairs = [(meshes[-1] if own.elements not in meshes else own.elements, degrees[-1])]
+            pairs = pairs if other else [(n, k) for n in meshes for k in degrees]
+            out += [Setting(theory, n, k, scheme, step, tolerance, every) for n, k in pairs]
+    return unique(out)
+
+
+def _ways(
+    scene: Scene, quick: bool, base_step: float | None, chosen: Mapping[str, Sequence[Any] | None]
+) -> list[tuple[str | None, float | None, float | None, int]]:
+    """Return (scheme, step, tolerance, samples every) of a time history, schemes × steps."""
+    time = scene.time
+    assert time is not None and base_step is not None
+    interval = sample_interval(scene, base_step)
+    steps = list(chosen.get("steps") or ladder(base_step, interval, time.end, *(STEPS_QUICK if quick else STEPS_FULL)))
+    factors = TOLERANCES_QUICK if quick else TOLERANCES_FULL
+    own = time.tolerance if not chosen.get("steps") else None
+    tolerances = [] if own is None else [own * factor for factor in factors]
+    others = [] if quick else [name for name in SCHEMES if name != time.scheme]
+    schemes = chosen.get("schemes") or [time.scheme, *others]
+    fixed = [(scheme, h, None, max(1, round(interval / h))) for scheme in schemes for h in steps]
+    return [*fixed, *((scheme, None, tolerance, 1) for scheme in schemes for tolerance in tolerances)]
+
+
+def default_theories(scene: Scene, quick: bool) -> list[str]:
+    """Return the theories that the scene allows, few of them for a quick study, poorest first."""
+    if scene.model.frame == "inertial":
+        return [scene.model.theory]
+    return [name for name in THEORIES if not quick or name in QUICK or name == scene.model.theory]
+
+
+def ladder(own: float, interval: float, end: float, low: float, high: float) -> list[float]:
+    """Return steps between low·own and high·own, largest first, and the own one.
+
+    All but that are the interval between samples times a power of two, so that the samples of one are those of others.
+    """
+    steps = [interval * 2.0**k for k in range(-40, 41)]
+    steps = [h for h in steps if low * own <= h <= high * own and h <= LONGEST * end and abs(h / own - 1) > 0.05]
+    return sorted([*steps, own], reverse=True)
+
+
+def sample_interval(scene: Scene, base_step: float) -> float:
+    """Return the time (s) between rows of history.csv that the scene asks for."""
+    assert scene.time is not None
+    return base_step * (scene.time.output_every if scene.time.tolerance is None else 1)
+
+
+def reference_settings(settings: Sequence[Setting], own: Setting, theory: str, interval: float | None) -> list[Setting]:
+    """Return the settings a theory's reference is made of.
+
+    The finest mesh and step of the grid halved 0, 1 and 2 times in what converges slowest: in time for a history, whose
+    mesh is then halved once at the longest of these steps; in space otherwise.
+    """
+    finest = max((s.elements for s in settings), key=cells)
+    first = Setting(theory, finest, max(s.degree for s in settings))
+    steps = [s.step for s in settings if s.step is not None]
+    if interval is None:
+        return [first.refined(mesh=i) for i in range(3)]
+    h = min(steps)
+    first = replace(first, scheme=own.scheme, step=h, every=max(1, round(interval / h)))
+    return [*(first.refined(time=i) for i in range(3)), first.refined(mesh=1)]
+
+
+def check_choice(scene: Scene, chosen: Mapping[str, Sequence[Any] | None]) -> None:
+    """Check the values that are to replace the default grid.
+
+    Raises:
+        SceneError: one is of the wrong kind, or has no meaning for this scene.
+    """
+    for name, allowed in (("theories", THEORIES), ("schemes", SCHEMES)):
+        for value in chosen.get(name) or ():
+            if value not in allowed:
+                reason = f"{did_you_mean(value, allowed)}allowed: {', '.join(allowed)}"
+                raise SceneError(scene.file, f"cost --{name}", value, reason)
+    for name, kind in (("elements", int), ("degrees", int), ("steps", float)):
+        for value in chosen.get(name) or ():
+            parts = value if isinstance(value, tuple | list) else (value,)
+            if not all(isinstance(v, int | kind) and not isinstance(v, bool) and v > 0 for v in parts):
+                what = "numbers greater than 0 (s)" if kind is float else "integers greater than 0"
+                raise SceneError(scene.file, f"cost --{name}", value, f"must be {what}")
+    if scene.time is None and (chosen.get("steps") or chosen.get("schemes")):
+        raise SceneError(scene.file, "time", None, "missing; steps and schemes have a meaning only with [time]")
+    end = scene.time.end if scene.time is not None else 0.0
+    too_long = [h for h in chosen.get("steps") or () if h > end]
+    if too_long:
+        raise SceneError(scene.file, "cost --steps", too_long[0], f"must be at most time.end = {end:g}")
+    for name, values in chosen.items():
+        for value in values or ():
+            _check_value(scene, name, value)
+
+
+def _check_value(scene: Scene, name: str, value: Any) -> None:
+    """Check that the scene allows a value on its own.
+
+    Raises:
+        SceneError: it does not.
+    """
+    own = own_setting(scene)
+    if name == "elements" and own.elements is None:
+        raise SceneError(scene.file, "cost --elements", value, "has no meaning with structure.mesh; leave it out")
+    fields = {"theories": "theory", "elements": "elements", "degrees": "degree", "schemes": "scheme", "steps": "step"}
+    change: dict[str, Any] = {fields[name]: tuple(value) if isinstance(value, list) else value}
+    change |= {"tolerance": None} if name == "steps" else {}
+    try:
+        scene.replace(replace(own, **change).changes(scene))
+    except SceneError as error:
+        raise SceneError(scene.file, f"cost --{name}", value, error.allowed) from None
+
+
+def unique(values: Sequence[Any]) -> list[Any]:
+    """Return the values without repetitions, in order."""
+    return list(dict.fromkeys(values))

@@ -1,0 +1,92 @@
+"""The floating frame as the forms see it: constants for its angular velocity, acceleration and gravity."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import default_scalar_type, fem, mesh
+
+from rotfem.mechanics.motion import Motion
+
+Array = npt.NDArray[np.float64]
+
+
+class Frame:
+    """The constants of the floating frame in the forms: w, dw (its rate), a_o and gravity, all frame components.
+
+    A constant comes into being when a form first asks for it, so an effect that is off leaves none behind.
+
+    Args:
+        domain: the mesh the constants live on.
+        planar: motion in the plane (a_1, a_2) only; w then has one unknown component and the cross products of the
+            forms lose their zero terms symbolically.
+        fixed: the frame translates with the hub but does not rotate (the inertial-frame form).
+        gravity: inertial components, m/s^2.
+    """
+
+    def __init__(self, domain: mesh.Mesh, planar: bool, fixed: bool = False, gravity: npt.ArrayLike = (0, 0, 0)):
+        self._domain, self.planar, self.fixed = domain, planar, fixed
+        self._gravity = np.asarray(gravity, dtype=float)
+        self.constants: dict[str, fem.Constant] = {}
+        turn, plane = (slice(2, 3), slice(0, 2)) if planar else (slice(0, 3), slice(0, 3))
+        self._slices = {"w": turn, "dw": turn, "a_o": plane, "gravity": plane}
+
+    def _constant(self, name: str, size: int) -> fem.Constant:
+        if name not in self.constants:
+            self.constants[name] = fem.Constant(self._domain, np.zeros(size, dtype=default_scalar_type))
+        return self.constants[name]
+
+    def _spin(self, name: str) -> Any:
+        if self.planar:
+            return ufl.as_vector((0, 0, self._constant(name, 1)[0]))
+        return self._constant(name, 3)
+
+    def _translation(self, name: str) -> Any:
+        if self.planar:
+            c = self._constant(name, 2)
+            return ufl.as_vector((c[0], c[1], 0))
+        return self._constant(name, 3)
+
+    @property
+    def w(self) -> Any:
+        """Angular velocity, rad/s."""
+        return self._spin("w")
+
+    @property
+    def dw(self) -> Any:
+        """Rate of the angular velocity, rad/s^2."""
+        return self._spin("dw")
+
+    @property
+    def a_o(self) -> Any:
+        """Absolute acceleration of the origin, m/s^2."""
+        return self._translation("a_o")
+
+    @property
+    def gravity(self) -> Any:
+        """Acceleration of gravity, m/s^2."""
+        return self._translation("gravity")
+
+    def values(self, motion: Motion, t: float) -> dict[str, Array]:
+        """Return the value of every constant in use at time t (s), as arrays of the constants' sizes."""
+        out: dict[str, Array] = {}
+        for name in self.constants:
+            if name == "w":
+                value = motion.speed(t) * motion.axis
+            elif name == "dw":
+                value = motion.rate(t) * motion.axis
+            elif name == "a_o":
+                value = motion.base_acceleration(t)
+                value = motion.rotation(t) @ value if self.fixed else value
+            else:
+                value = self._gravity if self.fixed else motion.rotation(t).T @ self._gravity
+            out[name] = value[self._slices[name]]
+        return out
+
+    def set(self, values: dict[str, Array]) -> None:
+        """Write values (from `values`) into the constants."""
+        for name, value in values.items():
+            self.constants[name].value[...] = value

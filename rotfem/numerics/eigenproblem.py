@@ -1,0 +1,264 @@
+"""The quadratic eigenproblem (λ² M + λ C + K) x = 0 with its left vectors, by SLEPc PEP; no physics.
+
+Left vectors satisfy y^H (λ² M + λ C + K) = 0, and two pairs of one pencil are bi-orthogonal,
+
+    y_i^H [(λ_i + λ_j) M + C] x_j = 0   (λ_i ≠ λ_j),
+
+which follows from the two linearised problems; see Tisseur & Meerbergen 2001, sections 3.4 and 3.6.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy.sparse import csr_array
+from slepc4py import SLEPc
+
+from rotfem.errors import ComputationError
+from rotfem.numerics.linear import SMALL, use_direct_solver
+
+Array = npt.NDArray[Any]
+
+#: Largest accepted backward error of an eigenpair; one above it is an error, not a row.
+BACKWARD_TOLERANCE = 1e-8
+
+#: Backward error below which a solution need not be done again in a better unit of time.
+GOOD = 1e-10
+
+#: Random vectors by which the asymmetry of a large matrix is estimated.
+PROBES = 4
+
+#: Part of the median |λ| below which an eigenvalue counts as zero where zero is an eigenvalue.
+ZERO = 1e-3
+
+#: Relative distance at which two eigenvalues count as equal, or a real part as zero.
+SAME = 1e-6
+
+
+def transposed(A: Any) -> Any:
+    """Return Aᵀ as a new matrix (without an argument PETSc would transpose A itself)."""
+    return A.transpose(PETSc.Mat())
+
+
+@dataclass
+class Eigenpairs:
+    """Eigenvalues with right and left vectors, one column each, of the locally owned unknowns.
+
+    Attributes:
+        values: λ, shape (m,), 1/s; of a conjugate pair the one with positive imaginary part.
+        right: x, shape (n_local, m), complex.
+        left: y, shape (n_local, m), complex.
+        errors: normwise backward errors, shape (m,).
+    """
+
+    values: Array
+    right: Array
+    left: Array
+    errors: Array
+
+    def select(self, index: Array) -> Eigenpairs:
+        """Return the pairs of an index array, in its order."""
+        return Eigenpairs(self.values[index], self.right[:, index], self.left[:, index], self.errors[index])
+
+
+class Pencil:
+    """M, C and K of small motions about an equilibrium (PETSc matrices, clamped unknowns 0, 0 and 1).
+
+    Args:
+        M: mass, C: gyroscopic and damping, K: stiffness matrix.
+
+    Attributes:
+        owner: kept alive with the matrices.
+    """
+
+    def __init__(self, M: Any, C: Any, K: Any):
+        self.M, self.C, self.K = M, C, K
+        self.owner: Any = None
+        self.comm: MPI.Comm = M.comm.tompi4py()
+        self._x, self._y = K.createVecs()
+        self._smallest = 1.0
+        #: Unit of λ in the eigensolver, 1/s, a power of two: numbers of order one keep all digits.
+        self.unit = 1.0
+        #: Time of factorisations, s.
+        self.factored = 0.0
+        self.spectrum_error: float | None = None
+
+    def apply(self, A: Any, X: Array) -> Array:
+        """Return A X for complex columns X of locally owned unknowns."""
+        if self.comm.size == 1:
+            indptr, indices, data = A.getValuesCSR()
+            return np.asarray(csr_array((data, indices, indptr), shape=A.getSize()) @ X)
+        out = np.empty(X.shape, dtype=complex)
+        for j in range(X.shape[1]):
+            for part, factor in ((X[:, j].real, 1.0), (X[:, j].imag, 1j)):
+                self._x.array[:] = part
+                A.mult(self._x, self._y)
+                out[:, j] = factor * self._y.array if factor == 1.0 else out[:, j] + factor * self._y.array
+        return out
+
+    def gram(self, Y: Array, lam: Array, X: Array, mu: Array) -> Array:
+        """Return y_i^H [(λ_i + μ_j) M + C] x_j for all i, j, over all ranks."""
+        local = np.stack([Y.conj().T @ self.apply(self.M, X), Y.conj().T @ self.apply(self.C, X)])
+        mass, gyroscopic = self.comm.allreduce(local) if self.comm.size > 1 else local
+        return np.asarray((lam[:, None] + mu[None, :]) * mass + gyroscopic)
+
+    def asymmetries(self) -> dict[str, float]:
+        """Return relative ‖M − Mᵀ‖, ‖C + Cᵀ‖ and ‖K − Kᵀ‖ (Frobenius).
+
+        Of large matrices they are estimates from a few random signs r: the mean of ‖A r‖² is the norm's square.
+        """
+        out = {}
+        for name, A, sign in (("M", self.M, -1.0), ("C", self.C, 1.0), ("K", self.K, -1.0)):
+            size = A.norm()
+            out[name] = self._distance_from_transpose(A, sign) / size if size > 0 else 0.0
+        return out
+
+    def _distance_from_transpose(self, A: Any, sign: float) -> float:
+        """Return ‖Aᵀ + sign A‖."""
+        if A.getSize()[0] <= SMALL:
+            D = transposed(A)
+            D.axpy(sign, A)
+            return float(D.norm())
+        r, total, random = self._x.duplicate(), 0.0, np.random.default_rng(self.comm.rank)
+        for _ in range(PROBES):
+            r.array[:] = random.choice([-1.0, 1.0], r.getLocalSize())
+            A.mult(r, self._x)
+            A.multTranspose(r, self._y)
+            self._y.axpy(sign, self._x)
+            total += self._y.norm() ** 2
+        return float(np.sqrt(total / PROBES))
+
+    @cached_property
+    def conservative(self) -> bool:
+        """Whether M and K are symmetric and C skew to round-off, so that left vectors are right vectors of −λ̄."""
+        return all(value < 1e-10 for value in self.asymmetries().values())
+
+    def scale(self) -> float:
+        """Return the least |λ|."""
+        return float(np.min(np.abs(self._right(self.M, self.C, self.K, 1, 0.0)[0])))
+
+    def solve(self, count: int, target: float = 0.0) -> Eigenpairs:
+        """Return at least `count` pairs (fewer if there are no more) of smallest |λ|, sorted by |λ|.
+
+        Args:
+            count: number of pairs; of conjugate ones, one counts.
+            target: where to aim, beside zero where zero is an eigenvalue (1/s).
+
+        Raises:
+            ComputationError: the solver did not converge, or a pair's backward error is above BACKWARD_TOLERANCE.
+        """
+        try:
+            return self._solve(count, target)
+        except ComputationError:
+            # K is singular or nearly so (a critical speed, a rigid-body mode): aim beside zero.
+            return self._solve(count, 0.1 * self._smallest)
+
+    def _solve(self, count: int, target: float) -> Eigenpairs:
+        values, right, errors = self._right(self.M, self.C, self.K, count, target)
+        unit = 2.0 ** np.round(np.log2(max(float(np.median(np.abs(values))), 1e-300)))
+        if float(np.max(errors)) > GOOD and not 0.25 <= unit / self.unit <= 4.0:
+            self.unit = unit
+            values, right, errors = self._right(self.M, self.C, self.K, count, target)
+        self._smallest = float(np.median(np.abs(values)))
+        conservative = self.conservative
+        if conservative:
+            left = self._mirrored(values, right)
+            self.spectrum_error = self._mirror_error(values)
+        else:
+            M, C, K = (transposed(A) for A in (self.M, self.C, self.K))
+            left = self._matched(values, *self._right(M, C, K, count, target)[:2])
+        pairs = Eigenpairs(values, right, left, errors)
+        # A double zero eigenvalue (a rigid-body mode) is known beforehand, and never met to full accuracy.
+        trusted = np.abs(values) > (ZERO * np.median(np.abs(values)) if target > 0.0 else 0.0)
+        worst = float(np.max(pairs.errors[trusted], initial=0.0))
+        if worst > BACKWARD_TOLERANCE:
+            raise ComputationError(
+                f"an eigenpair has the backward error {worst:.1e}, above {BACKWARD_TOLERANCE:.0e}",
+                advice="fewer modes.count or another mesh",
+            )
+        # Of ± pairs of real eigenvalues of a conservative pencil, the growing one tells all.
+        upper = np.flatnonzero(
+            (values.imag > 0.0) | ((values.imag == 0.0) & ((values.real >= 0.0) | (not conservative)))
+        )
+        order = upper[np.argsort(np.abs(values[upper]), kind="stable")]
+        return pairs.select(order)
+
+    def _right(self, M: Any, C: Any, K: Any, count: int, target: float) -> tuple[Array, Array, Array]:
+        """Return (λ, x, backward error) of the pairs nearest to the target, both signs of the imaginary part."""
+        unit = self.unit
+        C.scale(unit)
+        M.scale(unit**2)
+        try:
+            values, right, errors = self._nearest(M, C, K, count, target / unit)
+        finally:  # exact, as the unit is a power of two
+            C.scale(1 / unit)
+            M.scale(1 / unit**2)
+        return unit * values, right, errors
+
+    def _nearest(self, M: Any, C: Any, K: Any, count: int, target: float) -> tuple[Array, Array, Array]:
+        """Return (λ, x, backward error) nearest to the target, of matrices in the unit of λ."""
+        n = K.getSize()[0]
+        wanted = min(2 * count + 2, 2 * n - 2)
+        pep = SLEPc.PEP().create(K.comm)
+        pep.setOperators([K, C, M])
+        pep.setProblemType(SLEPc.PEP.ProblemType.GENERAL)
+        pep.setType(SLEPc.PEP.Type.TOAR)
+        pep.setDimensions(wanted, min(max(3 * wanted, wanted + 20), 2 * n))
+        pep.setTarget(target)
+        pep.setWhichEigenpairs(SLEPc.PEP.Which.TARGET_MAGNITUDE)
+        pep.setTolerances(1e-11, 300)
+        st = pep.getST()
+        st.setType(SLEPc.ST.Type.SINVERT)
+        symmetric = target == 0.0 and self.conservative
+        if symmetric:
+            K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        use_direct_solver(st.getKSP(), n, symmetric)
+        started = perf_counter()
+        try:
+            pep.setUp()
+            self.factored += perf_counter() - started
+            pep.solve()
+        except Exception as error:
+            raise ComputationError(f"the eigensolver failed: {error}", advice="a slightly different speed") from None
+        found = pep.getConverged()
+        if found < min(count, wanted):
+            raise ComputationError(
+                f"the eigensolver found {found} of {wanted} eigenvalues", advice="fewer modes.count or another mesh"
+            )
+        values, vectors, errors = [], [], []
+        real, imaginary = K.createVecs()
+        for i in range(found):
+            lam = pep.getEigenpair(i, real, imaginary)
+            vector = real.array + 1j * imaginary.array
+            values.append(complex(lam))
+            vectors.append(vector)
+            errors.append(pep.computeError(i, SLEPc.PEP.ErrorType.BACKWARD))
+        pep.destroy()
+        return np.array(values), np.array(vectors).T.copy(), np.array(errors)
+
+    def _mirrored(self, values: Array, right: Array) -> Array:
+        """Return the left vectors of a conservative pencil: y(λ) = x(−λ̄)."""
+        return self._pick(right, values, -values.conj())
+
+    def _matched(self, values: Array, others: Array, vectors: Array) -> Array:
+        """Return the left vectors from the right ones of the transposed pencil: y(λ) = conj of its vector at λ."""
+        return self._pick(vectors, others, values).conj()
+
+    @staticmethod
+    def _mirror_error(values: Array) -> float:
+        """Return the largest relative distance of −λ̄ from the spectrum, over the inner half of the computed λ."""
+        inner = values[np.abs(values) <= np.median(np.abs(values))]
+        distance = np.abs(values[None, :] + inner.conj()[:, None]).min(axis=1)
+        return float(np.max(distance / np.abs(inner), initial=0.0))
+
+    @staticmethod
+    def _pick(vectors: Array, values: Array, wanted: Array) -> Array:
+        index = np.array([int(np.argmin(np.abs(values - w))) for w in wanted], dtype=int)
+        return vectors[:, index]

@@ -1,0 +1,87 @@
+"""Newton's method, judged by its increments; no physics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rotfem.errors import ComputationError
+
+#: Part of the tolerance up to which iterations with an old factor go on. Newton's last increment leaves an error of its
+#: square; theirs leave a part of themselves, the same way in every step, which adds up.
+CHORD = 1e-2
+
+
+#: Increment, in the units of the unknowns, that round-off lets an old factor reach.
+SMALLEST = 1e-12
+
+
+@dataclass
+class Newton:
+    """Newton iteration that is judged by its increments.
+
+    A residual tolerance would lie below round-off where axial and bending stiffness differ by ten orders; the size of
+    the increment, in the units of the unknowns, does not. Once the quadratic constant kappa = |d_1|/|d_0|^2 is known
+    from an earlier solve, an iteration whose predicted successor is below tolerance is the last.
+
+    Attributes:
+        tolerance: largest accepted increment, relative to the scale of each unknown.
+        max_iterations: iterations before failure.
+        monotone: whether an increment that grows is a failure. A time step starts close to its solution; where the
+            increments grow there, Newton is on its way to another root, and a shorter step is the remedy.
+        iterations: total over all solves.
+        roundoff: largest increment accepted because it had stopped shrinking at round-off level.
+    """
+
+    tolerance: float = 1e-9
+    max_iterations: int = 25
+    monotone: bool = False
+    iterations: int = 0
+    roundoff: float = 0.0
+    _kappa: float = field(default=np.inf, repr=False)
+
+    def solve(self, increment: Callable[[], float], size: Callable[[], float], chord: bool = False) -> int:
+        """Repeat `increment` (solve, apply, return the scaled increment) until it is small; return the iterations.
+
+        Args:
+            increment: one linear solve; applies it and returns its scaled maximum norm.
+            size: scaled maximum norm of the unknown, against which round-off is judged.
+            chord: whether the factor is an old one; increments then shrink by a constant rate only, and nothing is
+                predicted from the first.
+
+        Raises:
+            ComputationError: not finite, growing, or too many iterations; says which.
+        """
+        previous, first, stalled = np.inf, np.inf, 0
+        for k in range(1, self.max_iterations + 1):
+            d = increment()
+            self.iterations += 1
+            if not np.isfinite(d):
+                raise ComputationError(f"Newton iteration {k} gave an increment that is not finite")
+            if k == 1:
+                first = d
+            if k == 2 and first > 0 and not chord:
+                self._kappa = max(0.5 * self._kappa if np.isfinite(self._kappa) else 0.0, d / first**2)
+            if chord:
+                enough = max(CHORD * self.tolerance, min(self.tolerance, SMALLEST))
+                if d <= enough or (d <= self.tolerance and d > 0.3 * previous):
+                    return k
+            elif d <= self.tolerance or (k == 1 and 4 * self._kappa * d**2 <= self.tolerance):
+                return k
+            stalled = stalled + 1 if d > 0.3 * previous else 0
+            if chord and stalled >= 2:
+                raise ComputationError(f"the old factor gives increments that stay at {d:.1e} (scaled)")
+            if stalled >= 3 and d <= 1e-4 * max(size(), self.tolerance):
+                self.roundoff = max(self.roundoff, d)
+                return k
+            if self.monotone and k > 1 and d > previous and d > 1e-6 * size():
+                raise ComputationError(f"Newton's increments grew from {previous:.1e} to {d:.1e} (scaled)")
+            if k > 4 and d > 10 * first and d > 1:
+                raise ComputationError(f"Newton diverged: increments grew from {first:.1e} to {d:.1e} (scaled)")
+            previous = d
+        raise ComputationError(
+            f"Newton did not converge in {self.max_iterations} iterations: last increment {previous:.1e} (scaled), "
+            f"wanted {self.tolerance:.0e}"
+        )

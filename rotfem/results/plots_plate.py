@@ -1,0 +1,145 @@
+"""Figures of plates: fields over the mid-surface by Matplotlib, pictures and animations in space by PyVista."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.tri import Triangulation
+
+from rotfem.errors import OutputError, SceneError
+from rotfem.results.results import ModesResult, RunResult
+
+Array = npt.NDArray[Any]
+
+#: Largest displacement in a picture, part of the plate's size; frames of an animation and their number a second.
+WARP, FRAMES, RATE = 0.15, 24, 24
+
+
+def panels(count: int, aspect: float) -> tuple[Figure, list[Any]]:
+    """Return a figure and its `count` axes, for maps whose height is `aspect` times their width."""
+    columns = min(count, 3 if aspect > 0.4 else 1)
+    rows = -(-count // columns)
+    width = 10.0 / columns
+    height = float(np.clip((0.55 if columns > 1 else 0.9) * width * aspect, 0.9, 6.0)) + 0.9  # bars take room
+    figure = Figure(figsize=(10.0, rows * height), layout="constrained")
+    return figure, [figure.add_subplot(rows, columns, i + 1) for i in range(count)]
+
+
+def map_of(figure: Figure, axis: Any, mesh: Triangulation, values: Array, title: str, unit: str) -> None:
+    """Draw a field over the mid-surface with its nodal lines and a colour bar."""
+    peak = max(float(np.max(np.abs(values))), 1e-300)
+    drawn = axis.tripcolor(mesh, values, shading="gouraud", cmap="RdBu_r", norm=Normalize(-peak, peak))
+    if np.min(values) < -1e-9 * peak and np.max(values) > 1e-9 * peak:
+        axis.tricontour(mesh, values, levels=[0.0], colors="0.2", linewidths=0.8)
+    axis.set(xlim=(mesh.x.min(), mesh.x.max()), ylim=(mesh.y.min(), mesh.y.max()), aspect="equal")
+    axis.set_title(title, fontsize=9)
+    axis.set_xlabel("x (m)", fontsize=8)
+    axis.set_ylabel("y (m)", fontsize=8)
+    axis.tick_params(labelsize=7)
+    figure.colorbar(drawn, ax=axis, shrink=0.8, label=unit).ax.tick_params(labelsize=7)
+
+
+def leading(columns: dict[str, Array]) -> str:
+    """Return which displacement of a shape is the largest."""
+    sizes = {n: float(np.max(np.hypot(columns[n], columns.get(f"{n}_imag", 0.0)))) for n in ("u1", "u2", "u3")}
+    return max(sizes, key=lambda name: sizes[name])
+
+
+def modes_figure(result: ModesResult) -> Figure:
+    """Return a map of the leading displacement of every mode, largest component 1."""
+    shapes, triangles = result.shapes, result.triangles
+    rows = result.rows[len(result.rows) - len(shapes) :]
+    first = next(iter(shapes.values()))
+    mesh = Triangulation(first["x"], first["y"], triangles)
+    aspect = float(np.ptp(first["y"]) / np.ptp(first["x"]))
+    figure, axes = panels(len(shapes), aspect)
+    for axis, (title, columns), row in zip(axes, shapes.items(), rows, strict=True):
+        name = leading(columns)
+        turning = row.get("turning", 0.0)
+        wave = "" if abs(turning) < 0.5 else (", forward wave" if turning > 0 else ", backward wave")
+        caption = f"{title}{wave}\n{row['frequency']:.5g} rad/s"
+        map_of(figure, axis, mesh, columns[name], caption, f"{name} (–)")
+    return figure
+
+
+def shape_figure(result: RunResult, title: str) -> Figure:
+    """Return maps of the displacements of the final shape."""
+    s = result.shape
+    mesh = Triangulation(s["x"], s["y"], result.triangles)
+    figure, axes = panels(3, float(np.ptp(s["y"]) / np.ptp(s["x"])))
+    for axis, name in zip(axes, ("u1", "u2", "u3"), strict=True):
+        map_of(figure, axis, mesh, s[name], name, f"{name} (m)")
+    figure.suptitle(title, fontsize=10)
+    return figure
+
+
+def surface(columns: dict[str, Array], triangles: Array) -> Any:
+    """Return the undeformed mid-surface as a PyVista mesh."""
+    import pyvista
+
+    points = np.column_stack([columns["x"], columns["y"], np.zeros_like(columns["x"])])
+    faces = np.column_stack([np.full(len(triangles), 3), triangles]).ravel()
+    return pyvista.PolyData(points, faces)
+
+
+def animate(result: ModesResult, mode: int, folder: Path) -> list[Path]:
+    """Write mode_N.png and mode_N.gif: a mode at its largest and through one period, in space; return their paths.
+
+    Args:
+        result: modes of a plate.
+        mode: number of the mode, 1 for the first.
+        folder: where the files go.
+
+    Raises:
+        SceneError: there is no such mode.
+        OutputError: PyVista is not installed, or a file cannot be written.
+    """
+    titles = list(result.shapes)
+    if not 1 <= mode <= len(titles):
+        raise SceneError("command line", "--animate", mode, f"must be a mode from 1 to {len(titles)}")
+    title, columns = titles[mode - 1], result.shapes[titles[mode - 1]]
+    try:
+        import pyvista
+        from PIL import Image
+    except ImportError:
+        raise OutputError(folder / f"mode_{mode}.gif", "PyVista is not installed (pip install rotfem[plots])") from None
+    assert result.triangles is not None
+    mesh = surface(columns, result.triangles)
+    z = np.column_stack([columns[n] + 1j * columns[f"{n}_imag"] for n in ("u1", "u2", "u3")])
+    size = float(np.max(np.ptp(mesh.points, axis=0)))
+    scale = WARP * size / float(np.max(np.linalg.norm(np.abs(z), axis=1)))
+    rest = mesh.points.copy()
+    name = leading(columns)
+    bar = {"title": f"{name} (–)", "n_labels": 3}
+    plotter = pyvista.Plotter(off_screen=True, window_size=(800, 600))
+    plotter.add_mesh(mesh.copy(), style="wireframe", color="lightgray", opacity=0.3)
+    moving, peak = mesh.copy(), float(np.max(np.abs(columns[name])))
+    moving[name] = z[:, ["u1", "u2", "u3"].index(name)].real
+    plotter.add_mesh(moving, scalars=name, cmap="RdBu_r", clim=(-peak, peak), scalar_bar_args=bar)
+    plotter.add_text(title, font_size=10)
+    plotter.show_bounds(grid="back", xtitle="x (m)", ytitle="y (m)", ztitle=" ", font_size=9, show_zlabels=False)
+    moving.points = rest + scale * z.real
+    plotter.camera_position = [(1.6 * size, -1.8 * size, 1.3 * size), mesh.center, (0, 0, 1)]
+    plotter.reset_camera(bounds=np.array(mesh.bounds) + WARP * size * np.array([-1, 1] * 3))
+    plotter.camera.zoom(1.3)
+    paths = [folder / f"mode_{mode}.png", folder / f"mode_{mode}.gif"]
+    try:
+        plotter.screenshot(str(paths[0]))
+        frames = []
+        for turn in np.linspace(0.0, 2 * np.pi, FRAMES, endpoint=False):
+            now = np.real(z * np.exp(1j * turn))
+            moving.points = rest + scale * now
+            moving[name] = now[:, ["u1", "u2", "u3"].index(name)]
+            plotter.render()
+            frames.append(Image.fromarray(plotter.screenshot(return_img=True)).quantize(64))
+        frames[0].save(paths[1], save_all=True, append_images=frames[1:], duration=1000 // RATE, loop=0)
+    except OSError as error:
+        raise OutputError(paths[1], error.strerror or str(error)) from None
+    finally:
+        plotter.close()
+    return paths

@@ -1,0 +1,28 @@
+"""What a user says: the scene, validated once. No dolfinx in it."""
+
+from rotfem.scene.scene import (
+    EFFECTS,
+    THEORIES,
+    BeamMesh,
+    CallableMotion,
+    ConstantMotion,
+    Initial,
+    Load,
+    Loads,
+    Model,
+    Modes,
+    MomentLoad,
+    PlanarBeamStructure,
+    PlateMesh,
+    PlateStructure,
+    Scene,
+    Signal,
+    Solver,
+    SpatialBeamStructure,
+    SpinUpMotion,
+    TableMotion,
+    Time,
+    TorqueMotion,
+    as_scene,
+    load_scene,
+)

@@ -1,0 +1,150 @@
+"""Hints at the start of a computation: settings that will disappoint, seen beforehand. No dolfinx in it.
+
+Frequencies are those of a uniform Euler–Bernoulli cantilever and rod with the mean section, raised by the spin; what is
+said of them is rounded to what that is good for.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rotfem.listeners import Hint
+from rotfem.scene.scene import ConstantMotion, PlateStructure, Scene, SpatialBeamStructure, SpinUpMotion, TableMotion
+
+#: Steps a period, below which the first mode's frequency is off by more than 1 %, and those to be advised.
+FEW_STEPS, GOOD_STEPS = 18, 40
+
+#: Nodes a half wave, below which a mode is not resolved to 1 %.
+FEW_NODES = 2.5
+
+#: β₁L … β₄L of a clamped–free beam; (n − ½)π above.
+CANTILEVER = (1.8751040687, 4.6940911330, 7.8547574382, 10.9955407349)
+
+
+class Estimate(NamedTuple):
+    """A mode of the mean beam: family, half waves along the beam, frequency (rad/s)."""
+
+    family: str
+    half_waves: float
+    frequency: float
+
+
+def estimates(scene: Scene, speed: float, count: int) -> list[Estimate]:
+    """Return the lowest modes of a beam at a speed (rad/s), roughly, lowest first; none for a plate.
+
+    The spin raises the square of a bending frequency across the plane of rotation by about (n(2n − 1) + 0.2) Ω², and by
+    1.5 n(2n − 1) Ω² R/L more with a hub; in the plane by Ω² less. For a chain without hub n(2n − 1) is exact.
+    """
+    structure = scene.structure
+    if isinstance(structure, PlateStructure):
+        return []
+    x = np.linspace(0.0, structure.length, 33)
+    L, hub = structure.length, structure.hub_radius
+    if isinstance(structure, SpatialBeamStructure):
+        if structure.section.given.keys() & {"stiffness", "mass"}:
+            return []
+        s = {name: float(np.mean(values)) for name, values in structure.section.central(x).items()}
+        bending = {"flap": (s["EI2"], 1.0), "lag": (s["EI3"], 0.0)}
+    else:
+        s = {name: float(np.mean(values)) for name, values in structure.section.at(x).items()}
+        bending = {"lag": (s["EI"], 0.0)}
+    mass = s["mass_per_length"] + structure.tip_mass / L
+    out = [
+        Estimate("axial", n - 0.5, float((n - 0.5) * np.pi / L * np.sqrt(s["EA"] / mass))) for n in range(1, count + 1)
+    ]
+    for family, (EI, across) in bending.items():
+        for n in range(1, count + 1):
+            beta = CANTILEVER[n - 1] if n <= len(CANTILEVER) else (n - 0.5) * np.pi
+            at_rest = beta**4 * EI / (mass * L**4)
+            spin = (n * (2 * n - 1) * (1 + 1.5 * hub / L) - 0.8 + across) * speed**2
+            out.append(Estimate(family, n - 0.5, float(np.sqrt(at_rest + spin))))
+    return sorted(out, key=lambda mode: mode.frequency)[:count]
+
+
+def top_speed(scene: Scene) -> float:
+    """Return the largest |Ω| a scene prescribes, rad/s; of a free hub or a Python function 0, which is not known."""
+    motion = scene.motion
+    if isinstance(motion, ConstantMotion):
+        return abs(motion.speed)
+    if isinstance(motion, SpinUpMotion):
+        reached = 1.0 if scene.time is None else min(1.0, scene.time.end / motion.duration)
+        return abs(motion.speed) * (reached - np.sin(2 * np.pi * reached) / (2 * np.pi))
+    return max(abs(row[1]) for row in motion.table) if isinstance(motion, TableMotion) else 0.0
+
+
+def advise(
+    scene: Scene, command: str, hint: Hint | None, speed: float | None = None, critical: float | None = None
+) -> list[str]:
+    """Return hints, one line each, for `run`, `modes` or `campbell`, and hand them on.
+
+    Args:
+        scene: validated scene.
+        command: the verb.
+        hint: called with every line; None asks for no advice.
+        speed: the largest speed of the computation, rad/s; what the scene prescribes if None.
+        critical: the speed at which the stiffness of a linear theory is singular, rad/s; None if there is none.
+    """
+    if hint is None:
+        return []
+    speed = top_speed(scene) if speed is None else abs(speed)
+    out = []
+    if command == "run":
+        out += _step(scene, speed)
+    if command != "run" or scene.modes.model_fields_set:
+        out += _elements(scene, speed)
+    if critical is not None and speed > critical and scene.model.theory == "linear":
+        out.append(
+            f'model.theory = "linear" loses its stiffness at {critical:.3g} rad/s and the scene reaches {speed:.3g}: '
+            '"consistent_linear" costs the same and does not'
+        )
+    for line in out:
+        hint(line)
+    return out
+
+
+def _step(scene: Scene, speed: float) -> list[str]:
+    """Return a hint where a fixed step is long for the highest mode wanted: the first, or the last of [modes]."""
+    time = scene.time
+    if time is None or time.step is None:
+        return []
+    wanted = scene.modes.count if scene.modes.model_fields_set else 1
+    bending = [m for m in estimates(scene, speed, max(wanted, 8)) if m.family != "axial"][:wanted]
+    if not bending:
+        return []
+    period = 2 * np.pi / bending[-1].frequency
+    if period / time.step >= FEW_STEPS:
+        return []
+    # Of the trapezoidal rule: ω h is replaced by 2 arctan(ω h / 2).
+    half = np.pi * time.step / period
+    low = 1 - np.arctan(half) / half
+    return [
+        f"time.step = {time.step:g} s is {period / time.step:.1f} steps a period of mode {len(bending)} (about "
+        f"{period:.2g} s): its frequency comes out {100 * low:.2g} % low; {_rounded(period / GOOD_STEPS):g} s would be "
+        f"{GOOD_STEPS} steps"
+    ]
+
+
+def _elements(scene: Scene, speed: float) -> list[str]:
+    """Return a hint where the mesh has too few nodes for the shortest wave among the modes wanted."""
+    modes = estimates(scene, speed, scene.modes.count)
+    elements = getattr(scene.mesh, "elements", None)
+    if not modes or not isinstance(elements, int):
+        return []
+    shortest = max(modes, key=lambda mode: mode.half_waves)
+    nodes = elements * scene.mesh.degree
+    if nodes >= FEW_NODES * shortest.half_waves:
+        return []
+    enough = int(np.ceil(2 * FEW_NODES * shortest.half_waves / scene.mesh.degree))
+    return [
+        f"mesh.elements = {elements} of degree {scene.mesh.degree} has {nodes} nodes for the {shortest.half_waves:g} "
+        f"half waves of {shortest.family} {shortest.half_waves + 0.5:g}, among the {scene.modes.count} modes wanted: "
+        f"{enough} elements would do"
+    ]
+
+
+def _rounded(value: float) -> float:
+    """Return 1, 2 or 5 times a power of ten, not above the value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(power * max(m for m in (1, 2, 5) if m * power <= value * (1 + 1e-9)))

@@ -1,0 +1,174 @@
+"""The ``[structure]`` table: planar beam or spatial beam here, plate in its own module."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, PlainValidator, model_validator
+from pydantic_core import PydanticCustomError
+
+from rotfem.scene.clamp_and_damping import Damping, check_one_hub
+from rotfem.scene.plates import PlateStructure
+from rotfem.scene.section import PlanarSection
+from rotfem.scene.section_spatial import SpatialSection
+from rotfem.scene.values import (
+    AnyProfile,
+    Array,
+    Bounds,
+    Matrix,
+    NonNegative,
+    Number,
+    Positive,
+    Profile,
+    SceneModel,
+    Vector,
+    as_rows,
+    as_symmetric_matrix,
+    check_profile_length,
+    problem,
+)
+
+
+def _as_inertia(value: Any) -> float | Matrix:
+    if isinstance(value, list | tuple):
+        return as_symmetric_matrix(value, 3, definite=False)
+    return Bounds(ge=0.0).number(value)
+
+
+def _as_sweep(value: Any) -> Profile:
+    """Returns a number or rows (x, angle); linear between, and a jump where one x stands in two rows."""
+    if not isinstance(value, list | tuple):
+        return Bounds().profile(value)
+    rows = as_rows(value, (2,), "a profile [[x, angle], …]")
+    x = [row[0] for row in rows]
+    if len(x) < 2 or x[0] != 0.0 or sorted(x) != x or any(x.count(v) > (1 if v in (x[0], x[-1]) else 2) for v in x):
+        raise problem("", value, "must be [[x, angle], …] from x = 0, x not decreasing; two rows of one x are a kink")
+    return tuple((row[0], row[1]) for row in rows)
+
+
+class PlanarBeamStructure(SceneModel):
+    """A beam that moves in the plane (1, 2) of the rotating frame, clamped at X = 0.
+
+    Attributes:
+        type: ``planar_beam``.
+        length: L (m).
+        hub_radius: Distance of the clamp from the axis of rotation (m).
+        tip_mass: Mass at the free end (kg).
+        tip_inertia: Its moment of inertia about axis 3 (kg·m²).
+        section: Cross-section.
+        damping: Damping coefficients.
+    """
+
+    type: Literal["planar_beam"]
+    length: Positive = Field(description="a number greater than 0 (m)")
+    hub_radius: NonNegative = 0.0
+    tip_mass: NonNegative = 0.0
+    tip_inertia: NonNegative = 0.0
+    section: PlanarSection = Field(description="a table of section properties")
+    damping: Damping = Damping()
+
+    @property
+    def has_tip_mass(self) -> bool:
+        """Whether there is anything at the tip that has inertia."""
+        return self.tip_mass > 0.0 or self.tip_inertia > 0.0
+
+    @property
+    def has_rotary_inertia(self) -> bool:
+        """Whether the sections have rotary inertia."""
+        return self.section.has_rotary_inertia
+
+    @model_validator(mode="after")
+    def _check_tapers(self) -> Self:
+        _check_section_length(self.section, self.length)
+        return self
+
+
+class SpatialBeamStructure(SceneModel):
+    """A beam in space, its axis along direction 1 of the rotating frame (before precone), clamped at X = 0.
+
+    Attributes:
+        type: ``spatial_beam``.
+        length: L (m).
+        hub_radius: Distance of the clamp from the origin of the frame along direction 1 (m).
+        hub_offset: Position of the clamp in the frame (m), instead of the hub radius; ``None`` if not given.
+        tip_mass: Mass at the free end (kg).
+        tip_inertia: Its inertia tensor (kg·m²) as 3×3 rows, or a number for an isotropic one.
+        tip_offset: Position of its center relative to the end of the axis, in section axes (m).
+        section: Cross-section.
+        pretwist: Angle of the section axes about the beam axis (rad), a number or a taper. May also stand in the
+            section table.
+        sweep: Angle of the axis in the plane (1, 2), towards direction 2 (rad), over the length of arc: a number, or
+            rows (x, angle), which are arcs between, and a kink where one x stands twice.
+        precone: Angle of the beam axis out of the plane (1, 2), towards direction 3 (rad). May also stand in the
+            section table.
+        damping: Damping coefficients.
+    """
+
+    type: Literal["spatial_beam"]
+    length: Positive = Field(description="a number greater than 0 (m)")
+    hub_radius: NonNegative = 0.0
+    hub_offset: Vector | None = None
+    tip_mass: NonNegative = 0.0
+    tip_inertia: Annotated[float | Matrix, PlainValidator(_as_inertia)] = 0.0
+    tip_offset: Vector = (0.0, 0.0, 0.0)
+    section: SpatialSection = Field(description="a table of section properties")
+    pretwist: AnyProfile = 0.0
+    sweep: Annotated[Profile, PlainValidator(_as_sweep)] = 0.0
+    precone: Number = 0.0
+    damping: Damping = Damping()
+
+    @property
+    def tip_inertia_matrix(self) -> Array:
+        """Inertia tensor of the tip mass (kg·m²), shape (3, 3)."""
+        return self.tip_inertia * np.eye(3) if isinstance(self.tip_inertia, float) else np.array(self.tip_inertia)
+
+    @property
+    def root_position(self) -> tuple[float, float, float]:
+        """Position of the clamp in the frame (m): the hub offset, or (hub radius, 0, 0)."""
+        return self.hub_offset if self.hub_offset is not None else (self.hub_radius, 0.0, 0.0)
+
+    @property
+    def has_tip_mass(self) -> bool:
+        """Whether there is anything at the tip that has inertia."""
+        return self.tip_mass > 0.0 or bool(np.any(self.tip_inertia_matrix != 0.0))
+
+    @property
+    def has_rotary_inertia(self) -> bool:
+        """Whether the sections have rotary inertia."""
+        return self.section.has_rotary_inertia
+
+    @model_validator(mode="before")
+    @classmethod
+    def _lift_from_section(cls, data: Any) -> Any:
+        """Moves pretwist and precone, which describe the beam, out of a section table that holds them."""
+        section = data.get("section") if isinstance(data, dict) else None
+        if not isinstance(section, dict):
+            return data
+        lifted = {}
+        for key, read in {"pretwist": Bounds().profile, "precone": Bounds().number}.items():
+            if key not in section:
+                continue
+            if key in data:
+                raise problem(f"section.{key}", section[key], f"given twice; structure.{key} is also set")
+            try:
+                lifted[key] = read(section[key])
+            except PydanticCustomError as error:
+                raise problem(f"section.{key}", section[key], error.message()) from None
+        return data | lifted | {"section": {key: value for key, value in section.items() if key not in lifted}}
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _check_section_length(self.section, self.length)
+        check_profile_length("pretwist", self.pretwist, self.length)
+        check_profile_length("sweep", self.sweep, self.length)
+        check_one_hub(self.hub_radius, self.hub_offset)
+        return self
+
+
+Structure = Annotated[PlanarBeamStructure | SpatialBeamStructure | PlateStructure, Field(discriminator="type")]
+
+
+def _check_section_length(section: PlanarSection | SpatialSection, length: float) -> None:
+    for name, taper in section.tapers.items():
+        check_profile_length(f"section.{name}", taper, length)

@@ -1,0 +1,93 @@
+"""Checks of what the tables of a scene say together. Each raises a problem that names the key to change."""
+
+from __future__ import annotations
+
+from rotfem.scene.beams import PlanarBeamStructure, SpatialBeamStructure
+from rotfem.scene.loads import Loads
+from rotfem.scene.motion import ConstantMotion, Motion, TorqueMotion
+from rotfem.scene.plates import PlateStructure, locking
+from rotfem.scene.settings import FRAME_EFFECTS, BeamMesh, Initial, Model, PlateMesh
+from rotfem.scene.values import problem
+
+AnyStructure = PlanarBeamStructure | SpatialBeamStructure | PlateStructure
+
+
+def check_planar(motion: Motion, loads: Loads) -> None:
+    """Raises a problem if anything would move a planar beam out of its plane."""
+    if motion.axis[0] != 0.0 or motion.axis[1] != 0.0:
+        raise problem("motion.axis", list(motion.axis), "must be [0, 0, 1] or [0, 0, -1] for a planar_beam")
+    vectors = {
+        "motion.base_acceleration": motion.base_acceleration,
+        "loads.tip_force": loads.tip_force,
+        "loads.distributed": loads.distributed,
+    }
+    for key, signal in vectors.items():
+        if signal is not None and not signal.is_planar:
+            value = list(signal.value) if signal.value is not None else None
+            raise problem(key, value, "the third component must be 0 for a planar_beam")
+    if loads.gravity[2] != 0.0:
+        raise problem("loads.gravity", list(loads.gravity), "the third component must be 0 for a planar_beam")
+
+
+def check_loads(structure: AnyStructure, loads: Loads) -> None:
+    """Raises a problem if the structure cannot bear a moment of that kind at its tip."""
+    moment = loads.tip_moment
+    if moment is None:
+        return
+    if isinstance(structure, PlanarBeamStructure) and moment.components != 1 and moment.function is None:
+        raise problem("loads.tip_moment", None, "must have one component, about axis 3, for a planar_beam")
+    if not isinstance(structure, PlanarBeamStructure) and moment.components != 3:
+        raise problem("loads.tip_moment", None, f"must have three components for a {structure.type}")
+
+
+def check_mesh(structure: AnyStructure, mesh: BeamMesh | PlateMesh) -> None:
+    """Raises a problem if the mesh is given both as a file and by numbers of elements, or of elements that lock."""
+    if isinstance(structure, PlateStructure) and isinstance(mesh, PlateMesh) and structure.mesh is None:
+        why = locking(mesh.cell, mesh.degree_on(mesh.cell), mesh.integration)
+        if why is not None:
+            raise problem("mesh.degree", mesh.degree_on(mesh.cell), why)
+    if isinstance(structure, PlateStructure) and structure.mesh is not None:
+        for key in ("elements", "cell"):
+            if key in mesh.model_fields_set:
+                raise problem(f"mesh.{key}", getattr(mesh, key), "has no meaning with structure.mesh")
+
+
+def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:
+    """Raises a problem if the inertial-frame form is asked for where there is none."""
+    if model.frame != "inertial":
+        return
+    if not isinstance(structure, PlanarBeamStructure) or model.theory != "reissner":
+        raise problem(
+            "model.frame",
+            model.frame,
+            'needs structure.type = "planar_beam" and model.theory = "reissner": displacements relative to the '
+            "inertial frame are large, which only the exact strains allow",
+        )
+    if isinstance(motion, TorqueMotion):
+        raise problem("model.frame", model.frame, 'is not available with motion.type = "torque"; use "rotating"')
+    if structure.damping.rayleigh[0] > 0.0:
+        raise problem(
+            "structure.damping.rayleigh",
+            list(structure.damping.rayleigh),
+            'the mass-proportional part must be 0 with frame = "inertial", where it would brake the revolution itself',
+        )
+    for name in FRAME_EFFECTS:
+        if model.effects != "auto" and name in model.effects:
+            raise problem(
+                "model.effects",
+                list(model.effects),
+                f'"{name}" is not a separate effect with frame = "inertial"; it comes from the motion of the clamp',
+            )
+
+
+def check_initial(structure: AnyStructure, motion: Motion, initial: Initial) -> None:
+    """Raises a problem if the scene has no such initial state."""
+    displacement = initial.tip_displacement
+    if displacement is not None:
+        if not isinstance(structure, PlanarBeamStructure):
+            raise problem("initial.tip_displacement", displacement, "is allowed only for a planar_beam")
+        if abs(displacement) >= structure.length:
+            reason = f"must be less than the length {structure.length:g} in size"
+            raise problem("initial.tip_displacement", displacement, reason)
+    if initial.state == "steady" and not isinstance(motion, ConstantMotion):
+        raise problem("initial.state", initial.state, 'needs motion.type = "constant"')

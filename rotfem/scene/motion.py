@@ -1,0 +1,179 @@
+"""The ``[motion]`` table: how the hub turns and moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, PlainValidator, ValidationInfo, model_validator
+
+from rotfem.scene.files import as_time_table
+from rotfem.scene.loads import Signal, as_function
+from rotfem.scene.values import Matrix, NonNegative, Number, Positive, SceneModel, Vector3, as_rows, as_vector3, problem
+
+
+def _as_axis(value: Any) -> Vector3:
+    axis = as_vector3(value)
+    if not any(axis):
+        raise problem("", value, "must be a direction; not all three components can be 0")
+    return axis
+
+
+def _as_speed_table(value: Any, info: ValidationInfo) -> Matrix:
+    return as_time_table(value, info, (2,), "a table [[t, speed], …]")
+
+
+def _as_torque_table(value: Any, info: ValidationInfo) -> Matrix:
+    return as_time_table(value, info, (2,), "a table [[t, torque], …]")
+
+
+def _as_pulses(value: Any) -> Matrix:
+    rows = as_rows(value, (3,), "a list of pulses [[start, end, torque], …]")
+    for i, (start, end, _) in enumerate(rows, start=1):
+        if end <= start:
+            raise problem("", value, f"pulse {i} must end after it starts; it runs from {start:g} to {end:g} s")
+    return rows
+
+
+class Motion(SceneModel):
+    """What all motions share.
+
+    Attributes:
+        axis: Direction of the angular velocity in the frame, of any length.
+        base_acceleration: Absolute acceleration of the frame's origin in frame components (m/s²), or ``None``.
+    """
+
+    axis: Annotated[Vector3, PlainValidator(_as_axis)] = (0.0, 0.0, 1.0)
+    base_acceleration: Signal | None = None
+
+    @property
+    def unit_axis(self) -> Vector3:
+        """Unit vector of the axis."""
+        scale = max(abs(component) for component in self.axis)
+        a, b, c = (component / scale for component in self.axis)
+        norm = math.sqrt(a * a + b * b + c * c)
+        return a / norm, b / norm, c / norm
+
+    @property
+    def is_spinning(self) -> bool:
+        """Whether the speed is not identically zero (as far as can be known beforehand)."""
+        return True
+
+    @property
+    def changes_speed(self) -> bool:
+        """Whether the spin rate changes (as far as can be known beforehand)."""
+        return True
+
+    @property
+    def is_accelerated(self) -> bool:
+        """Whether the origin has an acceleration."""
+        return self.base_acceleration is not None and not self.base_acceleration.is_zero
+
+
+class ConstantMotion(Motion):
+    """Steady rotation at the given speed (rad/s)."""
+
+    type: Literal["constant"]
+    speed: Number = Field(description="a number (rad/s)")
+
+    @property
+    def is_spinning(self) -> bool:
+        return self.speed != 0.0
+
+    @property
+    def changes_speed(self) -> bool:
+        return False
+
+
+class SpinUpMotion(Motion):
+    """Smooth spin-up from rest, Ω(t) = speed (t/T − sin(2πt/T)/2π), then constant.
+
+    Attributes:
+        speed: Final speed (rad/s).
+        duration: T (s).
+    """
+
+    type: Literal["spin_up"]
+    speed: Number = Field(description="a number (rad/s)")
+    duration: Positive = Field(description="a number greater than 0 (s)")
+
+    @property
+    def is_spinning(self) -> bool:
+        return self.speed != 0.0
+
+    @property
+    def changes_speed(self) -> bool:
+        return self.speed != 0.0
+
+
+class TableMotion(Motion):
+    """Speed interpolated in a table.
+
+    Attributes:
+        table: Rows (t, Ω) in s and rad/s.
+        interpolation: ``pchip``, ``cubic`` or ``linear``.
+    """
+
+    type: Literal["table"]
+    table: Annotated[Matrix, PlainValidator(_as_speed_table)] = Field(
+        description="a table [[t, speed], …] or the path of a CSV file"
+    )
+    interpolation: Literal["pchip", "cubic", "linear"] = "pchip"
+
+    @property
+    def is_spinning(self) -> bool:
+        return any(speed != 0.0 for _, speed in self.table)
+
+    @property
+    def changes_speed(self) -> bool:
+        return len({speed for _, speed in self.table}) > 1
+
+
+class TorqueMotion(Motion):
+    """Free hub under a torque; the hub angle is an unknown.
+
+    Attributes:
+        hub_inertia: I_R (kg·m²).
+        pulses: Rows (start, end, torque) in s, s, N·m; they add up where they overlap. ``None`` if not given.
+        table: Rows (t, torque), instead of pulses, or ``None``.
+        coupled: Whether the hub feels the structure's elastic motion.
+        hub_damping: Viscous damping of the hub (N·m·s).
+        speed: Initial speed of the hub (rad/s).
+    """
+
+    type: Literal["torque"]
+    hub_inertia: Positive = Field(description="a number greater than 0 (kg·m²)")
+    pulses: Annotated[Matrix, PlainValidator(_as_pulses)] | None = None
+    table: Annotated[Matrix, PlainValidator(_as_torque_table)] | None = None
+    coupled: Annotated[bool, Field(strict=True)] = True
+    hub_damping: NonNegative = 0.0
+    speed: Number = 0.0
+
+    @model_validator(mode="after")
+    def _check_one(self) -> Self:
+        if self.pulses is not None and self.table is not None:
+            raise problem("table", self.table, "give either pulses or table")
+        return self
+
+
+class CallableMotion(Motion):
+    """Speed given by a Python function; not available in a file.
+
+    Attributes:
+        speed: t (s) ↦ Ω (rad/s).
+        rate: t (s) ↦ dΩ/dt (rad/s²), or ``None``.
+        angle: t (s) ↦ ψ (rad), or ``None``.
+    """
+
+    type: Literal["callable"]
+    speed: Annotated[Callable[[float], float], PlainValidator(as_function)] = Field(
+        description="a Python function of the time t (s)"
+    )
+    rate: Annotated[Callable[[float], float], PlainValidator(as_function)] | None = None
+    angle: Annotated[Callable[[float], float], PlainValidator(as_function)] | None = None
+
+
+AnyMotion = Annotated[
+    ConstantMotion | SpinUpMotion | TableMotion | TorqueMotion | CallableMotion, Field(discriminator="type")
+]

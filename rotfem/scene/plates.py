@@ -1,0 +1,214 @@
+"""The ``[structure]`` table of a plate."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy.typing as npt
+from pydantic import Field, PlainValidator, ValidationInfo, model_validator
+from pydantic_core import PydanticCustomError
+
+from rotfem.scene.alternatives import Way, choose_way
+from rotfem.scene.clamp_and_damping import Damping, check_one_hub
+from rotfem.scene.files import existing_file
+from rotfem.scene.values import (
+    Array,
+    Bounds,
+    Matrix,
+    NonNegative,
+    Number,
+    PoissonRatio,
+    Positive,
+    Profile,
+    SceneModel,
+    ShearCorrection,
+    Taper,
+    Vector,
+    as_rows,
+    as_taper,
+    check_profile_length,
+    evaluate,
+    problem,
+)
+
+
+def _as_thickness(value: Any) -> Profile | dict[str, float]:
+    positive = Bounds(gt=0.0)
+    if isinstance(value, dict):
+        if not value:
+            raise problem("", value, "must give a thickness for every region")
+        for region, thickness in value.items():
+            try:
+                positive.number(thickness)
+            except PydanticCustomError as error:
+                raise problem(str(region), thickness, error.message()) from None
+        return {str(region): float(thickness) for region, thickness in value.items()}
+    if isinstance(value, list | tuple):
+        # Whether it must start at x = 0 depends on the geometry: a mesh may lie anywhere.
+        taper = as_taper(value)
+        for x, thickness in taper:
+            if thickness <= 0.0:
+                raise problem("", value, f"the thickness {thickness:g} at x = {x:g} must be greater than 0")
+        return taper
+    return positive.number(value)
+
+
+def _as_point_masses(value: Any) -> Matrix:
+    if isinstance(value, list | tuple) and not value:
+        return ()
+    rows = as_rows(value, (3,), "a list of point masses [[x, y, m], …]")
+    for i, (_, _, mass) in enumerate(rows, start=1):
+        if mass <= 0.0:
+            raise problem("", value, f"the mass of row {i} must be greater than 0")
+    return rows
+
+
+def _as_line_masses(value: Any) -> dict[str, float]:
+    if not isinstance(value, dict):
+        raise problem("", value, "must be a table edge = mass per length (kg/m)")
+    for edge, mass in value.items():
+        try:
+            Bounds(gt=0.0).number(mass)
+        except PydanticCustomError as error:
+            raise problem(str(edge), mass, error.message()) from None
+    return {str(edge): float(mass) for edge, mass in value.items()}
+
+
+def locking(cell: str, degree: int, integration: str) -> str | None:
+    """Returns why elements of a degree (with reduced or full integration) are refused; ``None`` if they are good.
+
+    Args:
+        cell: ``triangle`` or ``quadrilateral``.
+        degree: Polynomial degree.
+        integration: ``reduced`` or ``full`` membrane and shear integration.
+    """
+    least = {("quadrilateral", "reduced"): 2, ("quadrilateral", "full"): 3, ("triangle", "reduced"): 3}
+    needed = least.get((cell, integration), 4)
+    if degree >= needed:
+        return None
+    return (
+        f"{cell}s of degree {degree} with {integration} integration lock: thin plates come out far too stiff; must be "
+        f"at least {needed} here (defaults: quadrilaterals of degree 2, triangles of degree 3, reduced integration)"
+    )
+
+
+def _as_mesh_file(value: Any, info: ValidationInfo) -> str:
+    return str(existing_file(value, info))
+
+
+class PlateStructure(SceneModel):
+    """A plate in the plane (1, 2) of the rotating frame: a rectangle clamped at x = 0, or a mesh file.
+
+    Attributes:
+        type: ``plate``.
+        length: Side along x (m); ``None`` with a mesh.
+        width: Side along y (m); ``None`` with a mesh.
+        mesh: Absolute path of a gmsh file with the physical groups ``clamped`` and ``plate``, or ``None``.
+        thickness: Number (m), taper ((x, thickness), …), or with a mesh a dictionary region → thickness.
+        E: Young's modulus (Pa), isotropic.
+        nu: Poisson's ratio, isotropic.
+        E1: Young's modulus in direction 1 (Pa), orthotropic; so are E2, nu12, G12.
+        G13: Transverse shear modulus (Pa), orthotropic; G12 if not given. So is G23.
+        rho: Density (kg/m³).
+        shear_correction: Shear correction factor.
+        hub_radius: Distance of the clamped edge from the origin of the frame along direction 1 (m).
+        hub_offset: Position of the plate's origin in the frame (m), instead of the hub radius; ``None`` if not given.
+        point_masses: Rows (x, y, m) in m, m, kg.
+        line_masses: Named edge → mass per length (kg/m); a rectangle has clamped, tip, lower and upper.
+        damping: Damping coefficients.
+    """
+
+    WAYS: ClassVar[tuple[Way, ...]] = (
+        Way("rectangle", ("length", "width")),
+        Way("mesh", ("mesh",)),
+    )
+    MATERIALS: ClassVar[tuple[Way, ...]] = (
+        Way("isotropic", ("E", "nu")),
+        Way("orthotropic", ("E1", "E2", "nu12", "G12"), ("G13", "G23")),
+    )
+
+    type: Literal["plate"]
+    length: Positive | None = None
+    width: Positive | None = None
+    mesh: Annotated[str, PlainValidator(_as_mesh_file)] | None = None
+    thickness: Annotated[float | Taper | dict[str, float], PlainValidator(_as_thickness)] = Field(
+        description="a number greater than 0 (m), a taper [[x, thickness], …], or with a mesh a table of regions"
+    )
+    E: Positive | None = None
+    nu: PoissonRatio | None = None
+    E1: Positive | None = None
+    E2: Positive | None = None
+    nu12: Number | None = None
+    G12: Positive | None = None
+    G13: Positive | None = None
+    G23: Positive | None = None
+    rho: Positive = Field(description="a number greater than 0 (kg/m³)")
+    shear_correction: ShearCorrection = 5.0 / 6.0
+    hub_radius: NonNegative = 0.0
+    hub_offset: Vector | None = None
+    point_masses: Annotated[Matrix, PlainValidator(_as_point_masses)] = ()
+    line_masses: Annotated[dict[str, float], PlainValidator(_as_line_masses)] = Field(default_factory=dict)
+    damping: Damping = Damping()
+
+    @property
+    def is_orthotropic(self) -> bool:
+        """Whether the material is given by E1, E2, nu12, G12 rather than E, nu."""
+        return self.E1 is not None
+
+    @property
+    def root_position(self) -> tuple[float, float, float]:
+        """Position of the plate's origin in the frame (m): the hub offset, or (hub radius, 0, 0)."""
+        return self.hub_offset if self.hub_offset is not None else (self.hub_radius, 0.0, 0.0)
+
+    @property
+    def has_tip_mass(self) -> bool:
+        """Whether there are point or line masses."""
+        return bool(self.point_masses or self.line_masses)
+
+    @property
+    def has_rotary_inertia(self) -> bool:
+        """Whether the sections have rotary inertia; a plate of any thickness has."""
+        return True
+
+    def thickness_at(self, x: npt.ArrayLike) -> Array:
+        """Thickness at positions along the plate.
+
+        Args:
+            x: Coordinate from the clamped edge (m), or of the mesh, any shape.
+
+        Returns:
+            Thickness (m), shape of x.
+
+        Raises:
+            TypeError: If the thickness is given by region.
+        """
+        if isinstance(self.thickness, dict):
+            raise TypeError("the thickness is given by region of the mesh, not along x")
+        return evaluate(self.thickness, x)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        geometry = self._way(self.WAYS)
+        material = self._way(self.MATERIALS)
+        check_one_hub(self.hub_radius, self.hub_offset)
+        if isinstance(self.thickness, dict) and geometry.name != "mesh":
+            raise problem("thickness", self.thickness, "thickness by region needs a mesh")
+        if isinstance(self.thickness, tuple) and self.length is not None:
+            if self.thickness[0][0] != 0.0:
+                raise problem("thickness", self.thickness, "the taper must start at x = 0")
+            check_profile_length("thickness", self.thickness, self.length)
+        if self.length is not None:
+            for x, _, _ in self.point_masses:
+                if not 0.0 <= x <= self.length:
+                    reason = f"x = {x:g} is not on the plate, which runs from 0 to {self.length:g}"
+                    raise problem("point_masses", self.point_masses, reason)
+        if material.name == "orthotropic" and self.E1 is not None and self.E2 is not None and self.nu12 is not None:
+            limit = math.sqrt(self.E1 / self.E2)
+            if abs(self.nu12) >= limit:
+                raise problem("nu12", self.nu12, f"must be less than √(E1/E2) = {limit:g} in size, else not stable")
+        return self
+
+    def _way(self, ways: tuple[Way, ...]) -> Way:
+        names = dict.fromkeys(key for way in ways for key in (*way.required, *way.optional))
+        return choose_way({name: value for name in names if (value := getattr(self, name)) is not None}, ways)

@@ -1,0 +1,285 @@
+"""The scene: everything a computation needs to know, validated once.
+
+A scene is a TOML file or the same nested tables in Python, in SI units. What passes here is complete and
+consistent; what does not raises one `SceneError` that names the key, its value and what is allowed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import BaseModel, Discriminator, Field, PrivateAttr, Tag, ValidationError, model_validator
+
+from rotfem.errors import SceneError
+from rotfem.scene.beams import PlanarBeamStructure, SpatialBeamStructure, Structure
+from rotfem.scene.consistency import check_frame, check_initial, check_loads, check_mesh, check_planar
+from rotfem.scene.loads import Load, Loads, MomentLoad, Signal
+from rotfem.scene.motion import (
+    AnyMotion,
+    CallableMotion,
+    ConstantMotion,
+    SpinUpMotion,
+    TableMotion,
+    TorqueMotion,
+)
+from rotfem.scene.plates import PlateStructure
+from rotfem.scene.settings import (
+    EFFECTS,
+    FRAME_EFFECTS,
+    THEORIES,
+    BeamMesh,
+    Initial,
+    Model,
+    Modes,
+    PlateMesh,
+    Solver,
+    Time,
+)
+from rotfem.scene.toml import apply_overrides, read_toml, scene_error, set_key, to_builtin
+from rotfem.scene.values import SceneModel
+
+__all__ = [
+    "EFFECTS",
+    "THEORIES",
+    "BeamMesh",
+    "CallableMotion",
+    "ConstantMotion",
+    "Initial",
+    "Load",
+    "Loads",
+    "Model",
+    "Modes",
+    "MomentLoad",
+    "PlanarBeamStructure",
+    "PlateMesh",
+    "PlateStructure",
+    "Scene",
+    "Signal",
+    "Solver",
+    "SpatialBeamStructure",
+    "SpinUpMotion",
+    "TableMotion",
+    "Time",
+    "TorqueMotion",
+    "load_scene",
+]
+
+
+class _PlateTable(dict[str, Any]):
+    """Marks the mesh table of a plate, whose keys differ from those of a beam."""
+
+
+def _mesh_tag(value: Any) -> str:
+    return "plate" if isinstance(value, _PlateTable | PlateMesh) else "beam"
+
+
+class Scene(SceneModel):
+    """A validated scene. Immutable; `replace` makes variants.
+
+    Attributes:
+        structure: What moves: planar beam, spatial beam or plate.
+        motion: How the hub turns and moves.
+        model: Theory, effects and frame.
+        initial: Initial state.
+        loads: Gravity and applied loads.
+        mesh: Discretisation, `BeamMesh` or `PlateMesh`.
+        time: Time interval and scheme, or ``None``.
+        modes: What modes to compute.
+        solver: Settings of Newton's method.
+    """
+
+    structure: Structure = Field(description="a table [structure]")
+    motion: AnyMotion = Field(description="a table [motion]")
+    model: Model = Model()
+    initial: Initial = Initial()
+    loads: Loads = Loads()
+    mesh: Annotated[Annotated[BeamMesh, Tag("beam")] | Annotated[PlateMesh, Tag("plate")], Discriminator(_mesh_tag)]
+    time: Time | None = None
+    modes: Modes = Modes()
+    solver: Solver = Solver()
+
+    _name: str = PrivateAttr("scene")
+    _file: str = PrivateAttr("scene")
+    _directory: str = PrivateAttr(".")
+    _tables: dict[str, Any] = PrivateAttr(default_factory=dict)
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], name: str = "scene", directory: str | Path = ".") -> Self:
+        """Makes a scene from nested tables.
+
+        Args:
+            data: The tables as in a TOML file; NumPy arrays and Python functions are welcome.
+            name: Name of the scene, used in errors and for the folder of results.
+            directory: Where relative paths in the scene start.
+
+        Returns:
+            The validated scene.
+
+        Raises:
+            SceneError: If anything in it is not valid.
+        """
+        return cls._validate(to_builtin(data), name, name, str(directory))
+
+    @classmethod
+    def _validate(cls, tables: dict[str, Any], name: str, file: str, directory: str) -> Self:
+        try:
+            scene = cls.model_validate(tables, context={"directory": directory})
+        except ValidationError as error:
+            raise scene_error(file, error) from None
+        scene._name, scene._file, scene._directory, scene._tables = name, file, directory, tables
+        return scene
+
+    @property
+    def name(self) -> str:
+        """Name of the scene: its file without folder and ending."""
+        return self._name
+
+    @property
+    def file(self) -> str:
+        """Name of the file as errors show it."""
+        return self._file
+
+    @property
+    def directory(self) -> str:
+        """Folder where relative paths in the scene start."""
+        return self._directory
+
+    @property
+    def tables(self) -> dict[str, Any]:
+        """Nested tables of what was set, without defaults; not to be changed."""
+        return self._tables
+
+    def replace(self, changes: Mapping[str, Any]) -> Self:
+        """Makes a variant of the scene.
+
+        Args:
+            changes: Dotted key → new value, e.g. ``{"model.theory": "linear"}``; ``None`` removes what was set.
+
+        Returns:
+            A new scene, validated from what the user set, with the changes and fresh defaults.
+
+        Raises:
+            SceneError: If the result is not valid.
+        """
+        tables = self._tables
+        for key, value in changes.items():
+            tables = set_key(self._file, tables, key, to_builtin(value))
+        return type(self)._validate(tables, self._name, self._file, self._directory)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Tables of everything that was set and all defaults, fit for JSON and TOML; functions become their names."""
+        tables: dict[str, Any] = _plain(self)
+        if isinstance(self.structure, PlateStructure) and self.structure.mesh is not None:
+            without = {"elements", "cell"} | ({"degree"} - self.mesh.model_fields_set)
+            tables["mesh"] = {key: value for key, value in tables["mesh"].items() if key not in without}
+        return tables
+
+    def is_dead(self, load: str) -> bool:
+        """Returns whether a load (``tip_force``, ``tip_moment``, ``distributed``) is given and is a dead one."""
+        applied: Load | None = getattr(self.loads, load)
+        return applied is not None and applied.kind == "dead"
+
+    def effective_effects(self, spinning: bool | None = None) -> tuple[str, ...]:
+        """Effects that this scene includes.
+
+        With ``effects = "auto"`` these are all for which the scene has data (a speed, a tip mass, …); with a list,
+        those of the list for which it has.
+
+        Args:
+            spinning: Whether the structure spins; by default what the motion says. A speed sweep, which does not use
+                the scene's own speed, says True.
+
+        Returns:
+            Names in the order of `EFFECTS`.
+        """
+        motion, structure = self.motion, self.structure
+        spins = motion.is_spinning if spinning is None else spinning
+        present = {
+            "coriolis": spins,
+            "centrifugal": spins,
+            "euler": motion.changes_speed,
+            "rotary_inertia": structure.has_rotary_inertia,
+            "base": motion.is_accelerated,
+            "gravity": any(self.loads.gravity),
+            "damping": not structure.damping.is_zero,
+            "tip_mass": structure.has_tip_mass,
+            "hub_coupling": isinstance(motion, TorqueMotion) and motion.coupled,
+        }
+        excluded = FRAME_EFFECTS if self.model.frame == "inertial" else ()
+        wanted = EFFECTS if self.model.effects == "auto" else self.model.effects
+        return tuple(name for name in EFFECTS if name in wanted and present[name] and name not in excluded)
+
+    def check_run(self) -> None:
+        """Checks that the scene can be run: a time history needs times, a steady state a constant speed.
+
+        Raises:
+            SceneError: If there is no ``[time]`` table though the motion is not constant.
+        """
+        if self.time is None and not isinstance(self.motion, ConstantMotion):
+            raise SceneError(
+                self._file,
+                "time",
+                None,
+                f'missing; with motion.type = "{self.motion.type}" a run is a time history: give [time] with end and '
+                "step (or tolerance). Only constant motion has a steady state to run without it",
+            )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _mark_mesh(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        structure, mesh = data.get("structure"), data.get("mesh", {})
+        is_plate = structure.get("type") == "plate" if isinstance(structure, Mapping) else False
+        return {**data, "mesh": _PlateTable(mesh) if is_plate and isinstance(mesh, Mapping) else mesh}
+
+    @model_validator(mode="after")
+    def _check_combinations(self) -> Self:
+        if isinstance(self.structure, PlanarBeamStructure):
+            check_planar(self.motion, self.loads)
+        check_loads(self.structure, self.loads)
+        check_mesh(self.structure, self.mesh)
+        check_frame(self.structure, self.motion, self.model)
+        check_initial(self.structure, self.motion, self.initial)
+        return self
+
+
+def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
+    """Reads a scene from a TOML file.
+
+    Args:
+        path: The file; relative paths inside it start at its folder.
+        overrides: Changes such as ``"model.theory=linear"``, applied in order. The value is read as TOML where
+            possible and as a string otherwise.
+
+    Returns:
+        The validated scene.
+
+    Raises:
+        SceneError: If the file cannot be read, an override is malformed, or anything in the scene is not valid.
+    """
+    path = Path(path)
+    tables = apply_overrides(path.name, read_toml(path), overrides)
+    return Scene._validate(tables, path.stem, path.name, str(path.parent))
+
+
+def as_scene(scene: Scene | str | Path | Mapping[str, Any]) -> Scene:
+    """Returns a validated scene from a scene, the path of a file or nested tables."""
+    if isinstance(scene, Scene):
+        return scene
+    return Scene.from_dict(scene) if isinstance(scene, Mapping) else load_scene(scene)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, BaseModel):
+        fields = {name: getattr(value, name) for name in type(value).model_fields}
+        return {name: _plain(entry) for name, entry in fields.items() if entry is not None}
+    if isinstance(value, Mapping):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    if callable(value):
+        return f"<callable {getattr(value, '__name__', type(value).__name__)}>"
+    return value

@@ -1,0 +1,184 @@
+"""Cross-section of a planar beam, and what all beam sections share.
+
+A section is given in exactly one of several ways (stiffnesses, or material with geometry); every property may be a
+number or a taper. Dimensions are interpolated first and properties computed from them, so a wedge has the cubic EI
+of a wedge.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import PlainValidator, model_validator
+
+from rotfem.scene import section_shapes as shapes
+from rotfem.scene.alternatives import Way, choose_way, shape_ways
+from rotfem.scene.values import (
+    Array,
+    Bounds,
+    NonNegativeProfile,
+    PositiveProfile,
+    Profile,
+    SceneModel,
+    Taper,
+    evaluate,
+    problem,
+)
+
+Shape = Literal["rectangle", "circle", "tube"]
+PoissonProfile = Annotated[Profile, PlainValidator(Bounds(gt=-1.0, le=0.5).profile)]
+ShearProfile = Annotated[Profile, PlainValidator(Bounds(gt=0.0, le=1.0).profile)]
+
+DEFAULT_SHEAR_CORRECTION = 5.0 / 6.0
+
+
+class Section(SceneModel):
+    """What planar and spatial beam sections share: material, shape, tapers.
+
+    Attributes:
+        E: Young's modulus (Pa).
+        nu: Poisson's ratio.
+        rho: Density (kg/m³).
+        area: Cross-section area (m²).
+        shape: ``rectangle``, ``circle`` or ``tube``, with its dimensions (m) below.
+        shear_correction: Shear correction factor; Cowper's for a shape, else 5/6.
+    """
+
+    WAYS: ClassVar[tuple[Way, ...]] = ()
+
+    E: PositiveProfile | None = None
+    nu: PoissonProfile | None = None
+    rho: PositiveProfile | None = None
+    area: PositiveProfile | None = None
+    shape: Shape | None = None
+    width: PositiveProfile | None = None
+    height: PositiveProfile | None = None
+    radius: PositiveProfile | None = None
+    outer_radius: PositiveProfile | None = None
+    inner_radius: PositiveProfile | None = None
+    wall: PositiveProfile | None = None
+    shear_correction: ShearProfile | None = None
+
+    @property
+    def given(self) -> dict[str, object]:
+        """The keys that are set, with their values."""
+        return {name: value for name in type(self).model_fields if (value := getattr(self, name)) is not None}
+
+    @property
+    def way(self) -> Way:
+        """The set of keys by which the section is given."""
+        return choose_way(self.given, self.WAYS)
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Interior knots of all tapers (m), increasing; a mesh should have a node at each."""
+        return tuple(sorted({x for taper in self.tapers.values() for x, _ in taper[1:-1]}))
+
+    @property
+    def uniform(self) -> bool:
+        """Whether all properties are the same along the beam."""
+        return all(len({value for _, value in taper}) == 1 for taper in self.tapers.values())
+
+    @property
+    def tapers(self) -> dict[str, Taper]:
+        """The properties given as tapers, by name."""
+        return {
+            name: value
+            for name, value in self.given.items()
+            if isinstance(value, tuple) and isinstance(value[0], tuple) and len(value[0]) == 2
+        }
+
+    def _at(self, name: str, x: Array) -> Array:
+        """Returns the profile of that name at x; the caller knows from `way` that it is set."""
+        profile: Profile = getattr(self, name)
+        return evaluate(profile, x)
+
+    def _geometry(self, x: Array) -> shapes.Geometry:
+        nu = self._at("nu", x)
+        if self.shape == "rectangle":
+            return shapes.rectangle(self._at("width", x), self._at("height", x), nu)
+        if self.shape == "circle":
+            return shapes.circle(self._at("radius", x), nu)
+        outer = self._at("outer_radius", x)
+        inner = self._at("inner_radius", x) if self.wall is None else outer - self._at("wall", x)
+        return shapes.tube(outer, inner, nu)
+
+    @model_validator(mode="after")
+    def _check_way(self) -> Self:
+        way = choose_way(self.given, self.WAYS)
+        if way.shape == "tube":
+            key = "wall" if self.wall is not None else "inner_radius"
+            knots = np.array(sorted({x for taper in self.tapers.values() for x, _ in taper} | {0.0}))
+            # All dimensions are linear between knots, so it is enough to look at the knots.
+            if np.any(self._at(key, knots) >= self._at("outer_radius", knots)):
+                raise problem(key, getattr(self, key), "must be less than outer_radius everywhere")
+        return self
+
+
+class PlanarSection(Section):
+    """Cross-section of a planar beam.
+
+    Attributes:
+        EA: Axial stiffness (N).
+        GA: Effective shear stiffness GA_s, shear correction included (N).
+        EI: Bending stiffness (N·m²).
+        mass_per_length: A_ρ (kg/m).
+        rotary_inertia: I_ρ (kg·m).
+        second_moment: Second moment of area for bending in the plane (m⁴).
+    """
+
+    WAYS: ClassVar[tuple[Way, ...]] = (
+        Way("stiffness", ("EA", "GA", "EI", "mass_per_length"), ("rotary_inertia",)),
+        Way("material", ("E", "nu", "rho", "area", "second_moment"), ("shear_correction",)),
+        *shape_ways(("shear_correction",)),
+    )
+
+    EA: PositiveProfile | None = None
+    GA: PositiveProfile | None = None
+    EI: PositiveProfile | None = None
+    mass_per_length: PositiveProfile | None = None
+    rotary_inertia: NonNegativeProfile | None = None
+    second_moment: PositiveProfile | None = None
+
+    @property
+    def has_rotary_inertia(self) -> bool:
+        """Whether the rotary inertia is positive anywhere."""
+        if self.way.name != "stiffness":
+            return True
+        profile = self.rotary_inertia or 0.0
+        return any(value > 0.0 for _, value in profile) if isinstance(profile, tuple) else profile > 0.0
+
+    def at(self, x: npt.ArrayLike) -> dict[str, Array]:
+        """Section properties at positions along the beam.
+
+        Args:
+            x: Positions from the clamp (m), any shape.
+
+        Returns:
+            ``EA`` (N), ``GA`` (N), ``EI`` (N·m²), ``mass_per_length`` (kg/m) and ``rotary_inertia`` (kg·m), each of
+            the shape of x.
+        """
+        x = np.asarray(x, dtype=np.float64)
+        way = self.way
+        if way.name == "stiffness":
+            rotary_inertia = np.zeros(x.shape) if self.rotary_inertia is None else self._at("rotary_inertia", x)
+            return {key: self._at(key, x) for key in way.required} | {"rotary_inertia": rotary_inertia}
+        if way.name == "shape":
+            geometry = self._geometry(x)
+            area, second_moment, k = geometry.area, geometry.second_moment2, geometry.shear_correction
+        else:
+            area, second_moment = self._at("area", x), self._at("second_moment", x)
+            k = np.full(x.shape, DEFAULT_SHEAR_CORRECTION)
+        if self.shear_correction is not None:
+            k = self._at("shear_correction", x)
+        E, rho = self._at("E", x), self._at("rho", x)
+        G = E / (2.0 * (1.0 + self._at("nu", x)))
+        return {
+            "EA": E * area,
+            "GA": k * G * area,
+            "EI": E * second_moment,
+            "mass_per_length": rho * area,
+            "rotary_inertia": rho * second_moment,
+        }

@@ -1,0 +1,178 @@
+"""Cross-section of a spatial beam: full 6×6 stiffness and mass matrices along the axis.
+
+Section axes: 1 along the beam, 2 and 3 across it. Strains are ordered (Γ₁, Γ₂, Γ₃, K₁, K₂, K₃), conjugate to the
+axial force, the shear forces V₂, V₃, the torque and the moments M₂, M₃. A point (y, z) of the section has the
+axial strain Γ₁ + z K₂ − y K₃; bending about axis 2 is therefore flap in direction 3.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import PlainValidator
+
+from rotfem.scene.alternatives import Way, shape_ways
+from rotfem.scene.section import DEFAULT_SHEAR_CORRECTION, Section
+from rotfem.scene.values import (
+    Array,
+    Matrix,
+    NonNegativeProfile,
+    PositiveProfile,
+    as_symmetric_matrix,
+    as_vector,
+)
+
+
+def _as_point(value: Any) -> tuple[float, float]:
+    y, z = as_vector(value, (2,))
+    return y, z
+
+
+def _as_stiffness(value: Any) -> Matrix:
+    return as_symmetric_matrix(value, 6, definite=True)
+
+
+def _as_mass(value: Any) -> Matrix:
+    return as_symmetric_matrix(value, 6, definite=False)
+
+
+Point = Annotated[tuple[float, float], PlainValidator(_as_point)]
+
+_CENTERS = ("mass_center", "shear_center", "tension_center")
+_STIFFNESSES = ("EA", "GA2", "GA3", "GJ", "EI2", "EI3")
+_INERTIAS = ("mass_per_length", "rotary_inertia2", "rotary_inertia3")
+
+
+class SpatialSection(Section):
+    """Cross-section of a spatial beam.
+
+    For a rectangle the width is along axis 2 and the height along axis 3.
+
+    Attributes:
+        EA: Axial stiffness (N).
+        GA2: Effective shear stiffness in direction 2 (N).
+        GA3: Effective shear stiffness in direction 3 (N).
+        GJ: Torsional stiffness (N·m²), about the shear center.
+        EI2: Bending stiffness about axis 2 through the tension center (N·m²).
+        EI3: Bending stiffness about axis 3 through the tension center (N·m²).
+        mass_per_length: Mass per length (kg/m).
+        rotary_inertia2: ∫ρz² dA about axis 2 through the mass center (kg·m).
+        rotary_inertia3: ∫ρy² dA about axis 3 through the mass center (kg·m). The polar one is the sum.
+        second_moment2: ∫z² dA (m⁴).
+        second_moment3: ∫y² dA (m⁴).
+        torsion_constant: Saint-Venant's J (m⁴).
+        mass_center: Position (y, z) in the section (m).
+        shear_center: Position (y, z) in the section (m).
+        tension_center: Position (y, z) in the section (m).
+        stiffness: Full 6×6 stiffness matrix.
+        mass: Full 6×6 mass matrix of (velocity, angular velocity) in section axes.
+    """
+
+    WAYS: ClassVar[tuple[Way, ...]] = (
+        Way("stiffness", (*_STIFFNESSES, "mass_per_length"), ("rotary_inertia2", "rotary_inertia3", *_CENTERS)),
+        Way("matrix", ("stiffness", "mass")),
+        Way(
+            "material",
+            ("E", "nu", "rho", "area", "second_moment2", "second_moment3", "torsion_constant"),
+            ("shear_correction", *_CENTERS),
+        ),
+        *shape_ways(("shear_correction", *_CENTERS)),
+    )
+
+    EA: PositiveProfile | None = None
+    GA2: PositiveProfile | None = None
+    GA3: PositiveProfile | None = None
+    GJ: PositiveProfile | None = None
+    EI2: PositiveProfile | None = None
+    EI3: PositiveProfile | None = None
+    mass_per_length: PositiveProfile | None = None
+    rotary_inertia2: NonNegativeProfile | None = None
+    rotary_inertia3: NonNegativeProfile | None = None
+    second_moment2: PositiveProfile | None = None
+    second_moment3: PositiveProfile | None = None
+    torsion_constant: PositiveProfile | None = None
+    mass_center: Point | None = None
+    shear_center: Point | None = None
+    tension_center: Point | None = None
+    stiffness: Annotated[Matrix, PlainValidator(_as_stiffness)] | None = None
+    mass: Annotated[Matrix, PlainValidator(_as_mass)] | None = None
+
+    @property
+    def has_rotary_inertia(self) -> bool:
+        """Whether the mass matrix has any rotary part."""
+        knots = [0.0] + [x for taper in self.tapers.values() for x, _ in taper]
+        return bool(np.any(self.at(knots)["mass"][..., 3:, 3:] != 0.0))
+
+    def at(self, x: npt.ArrayLike) -> dict[str, Array]:
+        """Section matrices at positions along the beam.
+
+        Args:
+            x: Positions from the clamp (m), any shape (…).
+
+        Returns:
+            ``stiffness`` and ``mass``, each of shape (…, 6, 6), in SI units and section axes.
+        """
+        x = np.asarray(x, dtype=np.float64)
+        if self.stiffness is not None and self.mass is not None:
+            shape = (*x.shape, 6, 6)
+            return {
+                "stiffness": np.broadcast_to(np.array(self.stiffness), shape).copy(),
+                "mass": np.broadcast_to(np.array(self.mass), shape).copy(),
+            }
+        central = self.central(x)
+        stiffnesses = np.stack([central[key] for key in _STIFFNESSES], axis=-1)
+        m, J2, J3 = (central[key] for key in _INERTIAS)
+        B = _offset(axial=self.tension_center, transverse=self.shear_center)
+        B_mass = _offset(axial=self.mass_center, transverse=self.mass_center)
+        masses = np.stack([m, m, m, J2 + J3, J2, J3], axis=-1)
+        return {
+            "stiffness": B.T @ (stiffnesses[..., None] * B),
+            "mass": B_mass.T @ (masses[..., None] * B_mass),
+        }
+
+    def central(self, x: npt.ArrayLike) -> dict[str, Array]:
+        """Section properties about their own centers, where both matrices are diagonal; not for full matrices.
+
+        Args:
+            x: Positions from the clamp (m), any shape.
+
+        Returns:
+            ``EA``, ``GA2``, ``GA3`` (N), ``GJ``, ``EI2``, ``EI3`` (N·m²), ``mass_per_length`` (kg/m),
+            ``rotary_inertia2`` and ``rotary_inertia3`` (kg·m), each of the shape of x.
+        """
+        x = np.asarray(x, dtype=np.float64)
+        return dict(zip((*_STIFFNESSES, *_INERTIAS), self._stiffnesses_and_inertias(x), strict=True))
+
+    def _stiffnesses_and_inertias(self, x: Array) -> tuple[Array, ...]:
+        if self.way.name == "stiffness":
+            zero = np.zeros(x.shape)
+            J2 = zero if self.rotary_inertia2 is None else self._at("rotary_inertia2", x)
+            J3 = zero if self.rotary_inertia3 is None else self._at("rotary_inertia3", x)
+            return *(self._at(key, x) for key in _STIFFNESSES), self._at("mass_per_length", x), J2, J3
+        if self.way.name == "shape":
+            geometry = self._geometry(x)
+            area, k = geometry.area, geometry.shear_correction
+            I2, I3, J = geometry.second_moment2, geometry.second_moment3, geometry.torsion_constant
+        else:
+            area, k = self._at("area", x), np.full(x.shape, DEFAULT_SHEAR_CORRECTION)
+            I2, I3, J = (self._at(key, x) for key in ("second_moment2", "second_moment3", "torsion_constant"))
+        if self.shear_correction is not None:
+            k = self._at("shear_correction", x)
+        E, rho = self._at("E", x), self._at("rho", x)
+        G = E / (2.0 * (1.0 + self._at("nu", x)))
+        return E * area, k * G * area, k * G * area, G * J, E * I2, E * I3, rho * area, rho * I2, rho * I3
+
+
+def _offset(axial: tuple[float, float] | None, transverse: tuple[float, float] | None) -> Array:
+    """Returns B (6, 6): motion (v, ω) of the reference axis ↦ axial motion at one center, transverse at another.
+
+    It is v + ω×(0, y, z) row by row; the same map holds for strains, with (Γ, K) for (v, ω).
+    """
+    B = np.eye(6)
+    y, z = axial or (0.0, 0.0)
+    B[0, 4], B[0, 5] = z, -y
+    y, z = transverse or (0.0, 0.0)
+    B[1, 3], B[2, 3] = -z, y
+    return B

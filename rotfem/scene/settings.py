@@ -1,0 +1,220 @@
+"""The tables that say how to compute: model, initial state, mesh, time, modes, solver."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self, get_args
+
+from pydantic import Field, PlainValidator, model_validator
+
+from rotfem.errors import show
+from rotfem.scene.values import Bounds, Count, Number, Positive, SceneModel, did_you_mean, problem
+
+Theory = Literal["linear", "consistent_linear", "von_karman_linear", "second_order", "von_karman", "reissner"]
+THEORIES: tuple[str, ...] = get_args(Theory)
+
+# The order in which effects are always listed.
+EFFECTS: tuple[str, ...] = (
+    "coriolis",
+    "centrifugal",
+    "euler",
+    "rotary_inertia",
+    "base",
+    "gravity",
+    "damping",
+    "tip_mass",
+    "hub_coupling",
+)
+# In the inertial frame these are not terms of the equations but follow from the motion of the clamp.
+FRAME_EFFECTS: tuple[str, ...] = ("coriolis", "centrifugal", "euler")
+
+
+def _as_effects(value: Any) -> str | tuple[str, ...]:
+    if value == "auto":
+        return "auto"
+    allowed = f'allowed: "auto" or a list of {", ".join(EFFECTS)}'
+    if not isinstance(value, list | tuple):
+        raise problem("", value, allowed)
+    for name in value:
+        if name not in EFFECTS:
+            raise problem("", value, f"{show(name)} is not an effect; {did_you_mean(name, EFFECTS)}{allowed}")
+        if list(value).count(name) > 1:
+            raise problem("", value, f"{show(name)} is listed twice")
+    return tuple(value)
+
+
+def _as_plate_elements(value: Any) -> tuple[int, int]:
+    entries = list(value) if isinstance(value, list | tuple) else [value, value]
+    if len(entries) != 2 or any(type(n) is not int or not 1 <= n <= 10**6 for n in entries):
+        raise problem("", value, "must be an integer at least 1, or two of them [nx, ny]")
+    return entries[0], entries[1]
+
+
+Degree = Annotated[int, PlainValidator(Bounds(ge=1, le=6).integer)]
+Integration = Literal["reduced", "full"]
+
+
+class Model(SceneModel):
+    """The ``[model]`` table.
+
+    Attributes:
+        theory: Order of the strain measure.
+        effects: ``"auto"``, or the names of the effects to include.
+        frame: Frame to which displacements refer.
+        tolerance: Relative model error up to which effects are left out and the theory may be poorer, or ``None``.
+        on_exceed: What a run does that leaves the range its model was chosen for.
+    """
+
+    theory: Theory = "reissner"
+    effects: Annotated[str | tuple[str, ...], PlainValidator(_as_effects)] = "auto"
+    frame: Literal["rotating", "inertial"] = "rotating"
+    tolerance: Positive | None = None
+    on_exceed: Literal["upgrade", "stop", "warn"] = "upgrade"
+
+    @model_validator(mode="after")
+    def _check_choice(self) -> Self:
+        if self.tolerance is not None and self.effects != "auto":
+            reason = 'needs effects = "auto": it says which effects may be left out'
+            raise problem("tolerance", self.tolerance, reason)
+        if self.tolerance is not None and self.frame == "inertial":
+            reason = 'needs frame = "rotating": only there can effects be left out one by one'
+            raise problem("tolerance", self.tolerance, reason)
+        return self
+
+
+class Initial(SceneModel):
+    """The ``[initial]`` table.
+
+    Attributes:
+        tip_displacement: u₂ of the tip (m) of the static shape from which a planar beam is released, or ``None``.
+        state: ``undeformed``, or ``steady`` to start from the equilibrium at the (constant) speed.
+    """
+
+    tip_displacement: Number | None = None
+    state: Literal["undeformed", "steady"] = "undeformed"
+
+    @model_validator(mode="after")
+    def _check_one(self) -> Self:
+        if self.state == "steady" and self.tip_displacement is not None:
+            raise problem("tip_displacement", self.tip_displacement, 'cannot be combined with state = "steady"')
+        return self
+
+
+class BeamMesh(SceneModel):
+    """The ``[mesh]`` table of a beam.
+
+    Attributes:
+        elements: Number of elements.
+        degree: Polynomial degree, 1 to 6.
+        integration: Quadrature of the elastic terms; ``reduced`` avoids locking.
+    """
+
+    elements: Count = 16
+    degree: Degree = 3
+    integration: Integration = "reduced"
+
+
+class PlateMesh(SceneModel):
+    """The ``[mesh]`` table of a plate.
+
+    Attributes:
+        elements: (nx, ny) of a rectangle; without meaning if the structure has a mesh file.
+        degree: Polynomial degree, 1 to 6; if not given, 2 on quadrilaterals and 3 on triangles (see `degree_on`).
+        cell: Cell shape of a rectangle; without meaning if the structure has a mesh file.
+        integration: Quadrature of the membrane and shear terms; ``reduced`` avoids locking.
+    """
+
+    elements: Annotated[tuple[int, int], PlainValidator(_as_plate_elements)] = (8, 8)
+    degree: Degree = 2
+    cell: Literal["quadrilateral", "triangle"] = "quadrilateral"
+    integration: Integration = "reduced"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_degree(cls, data: Any) -> Any:
+        """Adds the degree that does not lock on triangles."""
+        triangles = isinstance(data, Mapping) and data.get("cell") == "triangle"
+        return {"degree": 3, **data} if triangles else data
+
+    def degree_on(self, cell: str) -> int:
+        """Polynomial degree on cells of a shape: as given, else 2 on quadrilaterals and 3 on triangles."""
+        return 3 if cell == "triangle" and "degree" not in self.model_fields_set else self.degree
+
+
+class Time(SceneModel):
+    """The ``[time]`` table. Either step or tolerance is given.
+
+    Attributes:
+        end: Final time (s).
+        step: Time step (s), or ``None`` for adaptive steps.
+        tolerance: Error of all adaptive steps together, relative to the largest displacement, or ``None``.
+        max_step: Longest adaptive step (s), or ``None``.
+        min_step: Shortest adaptive step (s), or ``None``.
+        scheme: ``generalised_alpha`` or ``newmark``.
+        spectral_radius: ρ∞ of generalised-α; ``None`` for Newmark.
+        beta: Newmark's β; ``None`` for generalised-α.
+        gamma: Newmark's γ; ``None`` for generalised-α.
+        output_every: Number of steps from one output to the next.
+    """
+
+    end: Positive = Field(description="a number greater than 0 (s)")
+    step: Positive | None = None
+    tolerance: Positive | None = None
+    max_step: Positive | None = None
+    min_step: Positive | None = None
+    scheme: Literal["newmark", "generalised_alpha"] = "generalised_alpha"
+    spectral_radius: Annotated[float, PlainValidator(Bounds(ge=0.0, le=1.0).number)] | None = None
+    beta: Positive | None = None
+    gamma: Annotated[float, PlainValidator(Bounds(ge=0.5).number)] | None = None
+    output_every: Count = 1
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_scheme(cls, data: Any) -> Any:
+        """Adds the parameters of the chosen scheme only, so that those of the other one stay absent."""
+        if not isinstance(data, Mapping):
+            return data
+        defaults = {"beta": 0.25, "gamma": 0.5} if data.get("scheme") == "newmark" else {"spectral_radius": 0.9}
+        return defaults | {key: value for key, value in data.items() if value is not None}
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if (self.step is None) == (self.tolerance is None):
+            reason = "give exactly one of step (fixed steps, s) and tolerance (adaptive steps)"
+            raise problem("step", self.step, reason)
+        if self.step is not None and self.step > self.end:
+            raise problem("step", self.step, f"must be at most time.end = {self.end:g}")
+        foreign = ("beta", "gamma") if self.scheme == "generalised_alpha" else ("spectral_radius",)
+        for key in foreign:
+            if getattr(self, key) is not None:
+                raise problem(key, getattr(self, key), f'has no meaning with scheme = "{self.scheme}"')
+        for key in ("max_step", "min_step"):
+            if self.tolerance is None and getattr(self, key) is not None:
+                raise problem(key, getattr(self, key), "has a meaning only with tolerance (adaptive steps)")
+        if self.max_step is not None and self.min_step is not None and self.min_step > self.max_step:
+            raise problem("min_step", self.min_step, f"must be at most max_step = {self.max_step:g}")
+        return self
+
+
+class Modes(SceneModel):
+    """The ``[modes]`` table.
+
+    Attributes:
+        count: Number of modes.
+        about: State about which the motion is small: ``steady`` (deformed equilibrium) or ``undeformed``.
+    """
+
+    count: Count = 6
+    about: Literal["steady", "undeformed"] = "steady"
+
+
+class Solver(SceneModel):
+    """The ``[solver]`` table.
+
+    Attributes:
+        increment_tolerance: Newton's method stops at this relative size of the increment.
+        max_iterations: Most Newton iterations per solve.
+    """
+
+    increment_tolerance: Positive = 1e-9
+    max_iterations: Count = 25

@@ -1,0 +1,225 @@
+"""A gmsh file as the mesh of a plate: read and checked on one process, and reduced to what the plate is made of."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.structures.meshes.checks import FLAT, Array, BadMesh, Cells, Integers, at
+
+#: gmsh's number of a kind of cells ↦ corners of a cell, and the kind of its edges. (Of second-order quadrilaterals
+#: those with a node in the middle: dolfinx has no others.)
+KINDS = {2: (3, 1), 9: (3, 8), 3: (4, 1), 10: (4, 8)}
+
+#: The head of a mesh file: text, or binary with the integer 1 in either order of bytes. Version 2.0 gave the names of
+#: groups no dimension. gmsh knows a mesh by its first characters alone, and runs what does not begin like one as a
+#: script.
+HEAD = re.compile(
+    rb"\$MeshFormat(\r?\n)[ \t]*(?:2\.[12]|3|4|4\.[01])[ \t]+"
+    rb"(?:0[ \t]+8[ \t]*\1|1[ \t]+8[ \t]*\1(?:\x01\0\0\0|\0\0\0\x01)(?:\1)?)\$EndMeshFormat\1"
+)
+
+#: Names of physical groups ↦ tag, by dimension.
+Groups = dict[int, dict[str, int]]
+
+
+def read(gmsh: Any, path: Path, surfaces: Sequence[str]) -> Groups:
+    """Load a file into gmsh, check it, and leave there a model of the plate alone, its nodes numbered from 1.
+
+    Args:
+        gmsh: the module; it is initialised here.
+        path: the file.
+        surfaces: names of the physical surfaces that must make up the plate.
+
+    Returns:
+        The physical curves and surfaces of that model.
+
+    Raises:
+        BadMesh: the file is not the mesh of a plate.
+    """
+    gmsh.initialize([], False, False, False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    if path.suffix != ".msh":
+        raise BadMesh("must be a mesh file of gmsh, with the ending .msh")
+    _check_head(path)
+    _merge(gmsh, path)
+    groups: Groups = {0: {}, 1: {}, 2: {}, 3: {}}
+    for dimension, tag in gmsh.model.getPhysicalGroups():
+        groups[dimension][gmsh.model.getPhysicalName(dimension, tag) or f"{tag}"] = tag
+    numbers, x, _ = gmsh.model.mesh.getNodes()
+    if len(numbers) == 0:
+        raise BadMesh("it holds no mesh")
+    if groups[3] or len(gmsh.model.mesh.getElements(3)[0]):
+        raise BadMesh("it holds cells of dimension 3; a plate is a mesh of triangles or quadrilaterals in a plane")
+    _check_names(groups, surfaces)
+    x = x.reshape(-1, 3)
+    rows = np.full(int(numbers.max()) + 1, -1, dtype=np.int64)  # of x, by the number of a node in the file
+    rows[numbers.astype(np.int64)] = np.arange(len(numbers))
+    kind, found, nodes = _cells(gmsh, {name: groups[2][name] for name in surfaces}, rows)
+    used = np.unique(np.concatenate([part.ravel() for part in nodes.values()]))
+    _check_flat(x[used])
+    corners = np.concatenate(list(nodes.values()))[:, : KINDS[kind][0]]
+    cells = Cells(np.concatenate(list(found.values())), corners, x[:, :2])
+    cells.check()
+    curves = {name: _edges(gmsh, name, tag, KINDS[kind][1], rows) for name, tag in groups[1].items()}
+    for name, edges in curves.items():
+        cells.check_curve(name, edges, used)
+    _check_apart(cells, curves)
+    cells.check_held(curves["clamped"][:, :2])
+    _replace(gmsh, x[used], {1: (KINDS[kind][1], curves), 2: (kind, nodes)}, used)
+    return {1: _tags(curves), 2: _tags(nodes)}
+
+
+def _check_head(path: Path) -> None:
+    """Refuse what gmsh would not read as a mesh: a script would be run, with all that it asks of the system."""
+    with path.open("rb") as file:
+        head = file.read(512)
+    if HEAD.match(head):
+        return
+    lines = [line.decode("utf-8", "backslashreplace").strip("\r")[:60] for line in head.rstrip().split(b"\n")[:3]]
+    raise BadMesh(
+        f"is no mesh of gmsh: it begins with {' | '.join(lines)!r}; must be $MeshFormat, without anything before, then "
+        "version (2.1, 2.2, 3, 4, 4.0 or 4.1), file type (0 text, 1 binary) and data size (8), then $EndMeshFormat"
+    )
+
+
+def _merge(gmsh: Any, path: Path) -> None:
+    """Load the file under another name: gmsh runs a script "<name>.opt" that lies beside what it reads."""
+    with TemporaryDirectory(prefix="rotfem-") as folder:
+        link = Path(folder) / "plate.msh"
+        link.symlink_to(path.resolve())
+        try:
+            gmsh.merge(str(link))
+        except Exception as error:
+            raise BadMesh(f"gmsh cannot read it: {str(error).replace(str(link), path.name)}") from None
+
+
+def _check_names(groups: Groups, surfaces: Sequence[str]) -> None:
+    if "clamped" not in groups[1]:
+        raise BadMesh(f'has no physical curve "clamped" (physical curves: {_listed(groups[1])})')
+    missing = [name for name in surfaces if name not in groups[2]]
+    if missing:
+        raise BadMesh(f'has no physical surface "{missing[0]}" (physical surfaces: {_listed(groups[2])})')
+    others = [name for name in groups[2] if name not in surfaces]
+    if others:
+        raise BadMesh(
+            f'its physical surface "{others[0]}" is not part of the plate; with several surfaces give '
+            'structure.thickness as a table of all of them, and with one call it "plate"'
+        )
+
+
+def _listed(names: dict[str, int]) -> str:
+    return ", ".join(f'"{name}"' for name in names) or "none"
+
+
+def _elements(gmsh: Any, dimension: int, tag: int) -> list[tuple[int, npt.NDArray[Any], Integers]]:
+    """Return (kind; numbers, (n,); nodes, (n, …)) of the elements of a physical group, entity by entity."""
+    out = []
+    for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, tag):
+        for kind, numbers, nodes in zip(*gmsh.model.mesh.getElements(dimension, entity), strict=True):
+            if len(numbers):
+                out.append((int(kind), numbers, nodes.astype(np.int64).reshape(len(numbers), -1)))
+    return out
+
+
+def _called(gmsh: Any, kind: int) -> str:
+    return f'"{gmsh.model.mesh.getElementProperties(kind)[0]}"'
+
+
+def _cells(
+    gmsh: Any, groups: dict[str, int], rows: Integers
+) -> tuple[int, dict[str, npt.NDArray[Any]], dict[str, Integers]]:
+    """Return the kind of the cells, and by surface their numbers in the file, (n,), and their nodes, (n, …)."""
+    numbers, nodes, kinds = {}, {}, set()
+    for name, tag in groups.items():
+        parts = _elements(gmsh, 2, tag)
+        if not parts:
+            raise BadMesh(f'its physical surface "{name}" has no cells')
+        kinds |= {kind for kind, _, _ in parts}
+        if kinds - KINDS.keys():
+            what = _called(gmsh, min(kinds - KINDS.keys()))
+            raise BadMesh(f"has cells {what}; can be {' or '.join(_called(gmsh, kind) for kind in KINDS)}")
+        if len(kinds) > 1:
+            what = " and ".join(sorted(_called(gmsh, kind) for kind in kinds))
+            raise BadMesh(f"mixes cells ({what}); all must be of one kind")
+        numbers[name] = np.concatenate([part for _, part, _ in parts])
+        nodes[name] = rows[np.concatenate([part for _, _, part in parts])]
+    grouped = np.concatenate(list(numbers.values()))
+    if len(np.unique(grouped)) < len(grouped):
+        raise BadMesh("has cells that belong to two physical surfaces")
+    others = sum(map(len, gmsh.model.mesh.getElements(2)[1])) - len(grouped)
+    if others:
+        raise BadMesh(
+            f"has {others} cells in no physical surface; all must be in one, or left out of the file (Mesh.SaveAll=0)"
+        )
+    return kinds.pop(), numbers, nodes
+
+
+def _edges(gmsh: Any, name: str, tag: int, kind: int, rows: Integers) -> Integers:
+    """Return the nodes of the edges of a curve, the two ends first, (n, 2) or with a node between them (n, 3)."""
+    parts = _elements(gmsh, 1, tag)
+    if not parts:
+        raise BadMesh(f'its physical curve "{name}" has no edges')
+    others = [part for part, _, _ in parts if part != kind]
+    if others:
+        what = f"{_called(gmsh, others[0])}; those of its cells are {_called(gmsh, kind)}"
+        raise BadMesh(f'its physical curve "{name}" has edges {what}')
+    nodes = rows[np.concatenate([part for _, _, part in parts])]
+    _, once = np.unique(np.sort(nodes[:, :2], axis=1), axis=0, return_index=True)
+    return np.asarray(nodes[np.sort(once)])
+
+
+def _check_flat(x: Array) -> None:
+    """Refuse nodes outside the plane x_3 = 0."""
+    if not np.all(np.isfinite(x)):
+        raise BadMesh("has nodes whose coordinates are not finite")
+    away = np.max(np.abs(x[:, 2]))
+    if away > FLAT * np.max(np.ptp(x, axis=0)):
+        raise BadMesh(f"it leaves the plane x₃ = 0 (by {away:.3g} m); a plate lies in it")
+
+
+def _check_apart(cells: Cells, curves: dict[str, Integers]) -> None:
+    """Refuse an edge of two curves: an edge has one tag."""
+    names = list(curves)
+    owner = np.concatenate([np.full(len(edges), i) for i, edges in enumerate(curves.values())])
+    ends = np.concatenate([edges[:, :2] for edges in curves.values()])
+    keys, first, count = np.unique(cells.key(ends), return_index=True, return_counts=True)
+    if np.any(count > 1):
+        bad = int(np.flatnonzero(count > 1)[0])
+        both = " and ".join(f'"{names[i]}"' for i in owner[cells.key(ends) == keys[bad]])
+        where = at(cells.x[ends[first[bad]]])
+        raise BadMesh(f"its physical curves {both} share an edge at {where}; an edge can be in one only")
+
+
+def _tags(parts: dict[str, Integers]) -> dict[str, int]:
+    return {name: tag for tag, name in enumerate(parts, start=1)}
+
+
+def _replace(gmsh: Any, x: Array, parts: dict[int, tuple[int, dict[str, Integers]]], used: Integers) -> None:
+    """Put a model in the place of what was read: the nodes x, and curves and surfaces as one entity and group each.
+
+    What else the file holds (nodes of no cell, gaps in the numbers, surfaces in no group) is no part of it.
+
+    Args:
+        gmsh: the module.
+        x: the nodes, shape (m, 3), m.
+        parts: dimension ↦ kind of the elements, and name ↦ nodes of the elements (n, …), as rows of the file.
+        used: rows of x in the file, in increasing order.
+    """
+    gmsh.clear()
+    gmsh.model.add("plate")
+    for dimension, (_, groups) in parts.items():
+        for name, tag in _tags(groups).items():
+            gmsh.model.addDiscreteEntity(dimension, tag)
+            gmsh.model.addPhysicalGroup(dimension, [tag], tag, name)
+    mesh = gmsh.model.mesh
+    mesh.addNodes(2, 1, np.arange(1, len(x) + 1), x.ravel())
+    for kind, groups in parts.values():
+        for name, tag in _tags(groups).items():
+            mesh.addElementsByType(tag, kind, [], 1 + np.searchsorted(used, groups[name].ravel()))

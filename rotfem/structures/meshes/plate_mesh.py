@@ -1,0 +1,122 @@
+"""Meshes of plates: a rectangle, or a gmsh file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import mesh
+from mpi4py import MPI
+
+from rotfem.errors import SceneError, shown
+from rotfem.numerics import compat
+from rotfem.scene import PlateMesh, PlateStructure, Scene
+from rotfem.structures.beam import beam_nodes
+from rotfem.structures.meshes.checks import BadMesh
+from rotfem.structures.meshes.gmsh_file import read
+
+Array = npt.NDArray[np.float64]
+
+#: Edges of a rectangle, where a coordinate equals an end of its range: (axis, end).
+EDGES = {"clamped": (0, 0), "tip": (0, 1), "lower": (1, 0), "upper": (1, 1)}
+
+
+@dataclass
+class PlateGrid:
+    """A mesh of cells in the plane (1, 2) with its named parts.
+
+    Attributes:
+        mesh: triangles or quadrilaterals, geometric dimension 2.
+        curves: edges with tags, and curve_names: name ↦ tag ("clamped" is one).
+        regions: cells with tags, and region_names: name ↦ tag; None where the plate is one region.
+    """
+
+    mesh: Any
+    curves: Any
+    curve_names: dict[str, int]
+    regions: Any = None
+    region_names: dict[str, int] = field(default_factory=dict)
+
+    def edges(self, name: str) -> npt.NDArray[np.int32]:
+        """Return the local edges of a named curve."""
+        return np.asarray(self.curves.find(self.curve_names[name]), dtype=np.int32)
+
+    def along(self, name: str) -> Any:
+        """Return the measure of a named curve, on the boundary or inside."""
+        return ufl.ds(self.curve_names[name], domain=self.mesh, subdomain_data=self.curves)
+
+
+def plate_grid(scene: Scene, data: PlateStructure, comm: MPI.Comm) -> PlateGrid:
+    """Return the mesh of a scene's plate.
+
+    Raises:
+        SceneError: a mesh file that is no mesh of a plate; on every process the same.
+    """
+    if data.mesh is None:
+        return rectangle(data, scene.mesh, comm)
+    wanted = tuple(data.thickness) if isinstance(data.thickness, dict) else ()
+    return from_file(scene.file, Path(data.mesh), wanted, comm)
+
+
+def rectangle(data: PlateStructure, grid: Any, comm: MPI.Comm) -> PlateGrid:
+    """Return 0 ≤ x ≤ length, |y| ≤ width/2 with even cells; the knots of a tapered thickness are mesh lines."""
+    assert isinstance(grid, PlateMesh) and data.length is not None and data.width is not None
+    cell = mesh.CellType.quadrilateral if grid.cell == "quadrilateral" else mesh.CellType.triangle
+    knots = tuple(x for x, _ in data.thickness[1:-1]) if isinstance(data.thickness, tuple) else ()
+    stations = beam_nodes(data.length, grid.elements[0], knots)
+    half = data.width / 2
+    corners = [np.array([0.0, -half]), np.array([data.length, half])]
+    cells = (len(stations) - 1, grid.elements[1])
+    out = mesh.create_rectangle(comm, corners, cells, cell, diagonal=mesh.DiagonalType.left_right)
+    x = out.geometry.x
+    x[:, 0] = np.interp(x[:, 0], np.linspace(0.0, data.length, len(stations)), stations)
+    out.topology.create_connectivity(1, 2)
+    names = {name: i for i, name in enumerate(EDGES, start=1)}
+    edges, tags = [], []
+    for name, (axis, end) in EDGES.items():
+        at = (corners[0][axis], corners[1][axis])[end]
+        found = mesh.locate_entities_boundary(out, 1, lambda p, axis=axis, at=at: np.isclose(p[axis], at))
+        edges.append(found)
+        tags.append(np.full(len(found), names[name], dtype=np.int32))
+    flat, order = np.unique(np.concatenate(edges), return_index=True)
+    return PlateGrid(out, mesh.meshtags(out, 1, flat, np.concatenate(tags)[order]), names)
+
+
+def from_file(scene: str, path: Path, regions: Sequence[str], comm: MPI.Comm) -> PlateGrid:
+    """Return the mesh of a gmsh file: physical curves (one is "clamped") and the physical surface "plate" or regions.
+
+    Args:
+        scene: name of the scene file, for errors.
+        path: the file.
+        regions: names of the surfaces that must make up the plate; if empty, "plate" does.
+        comm: MPI communicator; the file is read on rank 0.
+
+    Raises:
+        SceneError: the file is no such mesh; on every process the same.
+    """
+    import gmsh
+
+    groups: dict[int, dict[str, int]] = {}
+    why: str | None = None
+    if comm.rank == 0:
+        try:
+            groups = read(gmsh, path, tuple(regions) or ("plate",))
+            compat.extract(gmsh.model)
+        except BadMesh as error:
+            why = str(error)
+        except Exception as error:  # the others wait for rank 0: whatever happens there must be told
+            why = f"cannot be used as the mesh of a plate ({type(error).__name__}: {' '.join(str(error).split())})"
+    why, groups = comm.bcast((why, groups))
+    try:
+        if why is not None:
+            raise SceneError(scene, "structure.mesh", shown(path), why)
+        out, cell_tags, edge_tags = compat.model_to_mesh(gmsh.model, comm)
+    finally:
+        if comm.rank == 0 and gmsh.isInitialized():
+            gmsh.finalize()
+    return PlateGrid(out, edge_tags, groups[1], cell_tags, groups[2])
