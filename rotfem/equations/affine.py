@@ -19,7 +19,7 @@ from ufl.algorithms import expand_derivatives
 
 from rotfem.equations.model import integral_count
 from rotfem.equations.system import System
-from rotfem.mechanics.effects import ACCELERATIONS
+from rotfem.mechanics.accelerations import ACCELERATIONS
 from rotfem.mechanics.motion import Motion
 from rotfem.numerics import compat, forms
 from rotfem.numerics.linear import DirectSolver, combine

@@ -24,7 +24,7 @@ from ufl.algorithms import expand_derivatives
 
 from rotfem.equations.affine import AffineSystem
 from rotfem.equations.system import System
-from rotfem.mechanics.effects import ACCELERATIONS
+from rotfem.mechanics.accelerations import ACCELERATIONS
 from rotfem.mechanics.motion import Motion
 from rotfem.numerics import compat, forms
 from rotfem.scene import TorqueMotion

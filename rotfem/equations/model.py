@@ -11,7 +11,7 @@ from dolfinx import fem
 from mpi4py import MPI
 from ufl.algorithms import expand_derivatives
 
-from rotfem.mechanics.effects import ACCELERATIONS, damping, load_work, virtual_work
+from rotfem.mechanics.accelerations import ACCELERATIONS, damping, load_work, virtual_work
 from rotfem.mechanics.frame import Frame
 from rotfem.mechanics.motion import Motion, motion_of
 from rotfem.mechanics.strains import THEORIES

@@ -19,8 +19,8 @@ from rotfem.equations.affine import AffineSystem
 from rotfem.equations.hub import Hub
 from rotfem.equations.model import Model
 from rotfem.equations.system import System, compile_system
+from rotfem.mechanics.accelerations import ACCELERATIONS, damping, load_work, virtual_work
 from rotfem.mechanics.bodies import Body
-from rotfem.mechanics.effects import ACCELERATIONS, damping, load_work, virtual_work
 from rotfem.scene import Scene, TorqueMotion
 
 #: Effects that bring bodies of their own, which feel all others.

@@ -1,94 +1,153 @@
-"""Inertia effects as accelerations of a material vector in a moving frame, and the virtual work they do.
+"""Effects: what acts on the bodies of a structure, each in the equations or not.
 
-The absolute acceleration of a point x of the frame is (theory section 1)
-
-    ẍ + 2 w×ẋ + w×(w×x) + ẇ×x + a_o,
-
-and each term is an effect of its own, switched on or off. A director (a vector that does not move with the origin)
-feels all but a_o and gravity; that is its rotary inertia.
+An effect says its virtual work for a free variation: that of the unknowns gives the equations of motion, a rigid turn
+about the axis gives the row of a free hub. Effects without work of their own bring bodies, which feel all others, or
+couple the hub. Nothing here loads UFL: what an effect computes with is loaded when a form is made of it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
-import ufl
-from ufl import cross
+from rotfem.registry import Registry, register, resolved
 
-from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, Strain
-from rotfem.mechanics.frame import Frame
+#: (mechanics, variation) ↦ term of the residual, a UFL form (0 if there is none); see `rotfem.mechanics.work`.
+Work = str | Callable[..., Any]
 
-Acceleration = Callable[[Body, Kinematics, Frame], Any]
-
-
-def inertia(body: Body, k: Kinematics, frame: Frame) -> Any:
-    """ẍ, the acceleration relative to the frame."""
-    return body.second_rate(k)
+#: mechanics ↦ potential energy, a UFL form.
+Potential = str | Callable[..., Any]
 
 
-def coriolis(body: Body, k: Kinematics, frame: Frame) -> Any:
-    """2 w×ẋ."""
-    return 2 * cross(body.resolve(frame.w), body.rate(k))
+@dataclass(frozen=True)
+class Effect:
+    """One effect.
 
-
-def centrifugal(body: Body, k: Kinematics, frame: Frame) -> Any:
-    """w×(w×x)."""
-    w = body.resolve(frame.w)
-    return cross(w, cross(w, body.x))
-
-
-def euler(body: Body, k: Kinematics, frame: Frame) -> Any:
-    """ẇ×x."""
-    return cross(body.resolve(frame.dw), body.x)
-
-
-def base(body: Body, k: Kinematics, frame: Frame) -> Any:
-    """a_o, felt by positions only."""
-    return frame.a_o if body.is_position else None
-
-
-def gravity(body: Body, k: Kinematics, frame: Frame) -> Any:
-    """−g, felt by positions only."""
-    return -frame.gravity if body.is_position else None
-
-
-#: Effects that act on every body, with the frame constant they contain and its power: the key to affine pieces.
-ACCELERATIONS: dict[str, tuple[Acceleration, str | None, int]] = {
-    "inertia": (inertia, None, 0),
-    "coriolis": (coriolis, "w", 1),
-    "centrifugal": (centrifugal, "w", 2),
-    "euler": (euler, "dw", 1),
-    "base": (base, "a_o", 1),
-    "gravity": (gravity, "gravity", 1),
-}
-
-
-def virtual_work(name: str, bodies: list[Body], k: Kinematics, frame: Frame) -> Any:
-    """Return Σ ∫ ρ a·δx over the bodies for the effect `name`, a UFL form in k.dq (0 where no body feels it)."""
-    acceleration = ACCELERATIONS[name][0]
-    work: Any = 0
-    for body in bodies:
-        a = acceleration(body, k, frame)
-        if a is not None:
-            work += body.density * ufl.inner(a, body.variation(k)) * body.measure
-    return work
-
-
-def damping(strains: list[Strain], bodies: list[Body], k: Kinematics, coefficients: Damping) -> Any:
-    """Return the virtual work of Kelvin–Voigt stress C η Γ̇ and of Rayleigh damping a0 M + a1 K, a UFL form in k.dq.
-
-    The mass part acts on the velocity relative to the frame; the stiffness part a1 adds to η.
+    Attributes:
+        name: what a scene calls it.
+        work: (mechanics, variation) ↦ its term of the residual F = 0 for a variation of the motion: + ∫ ρ a·δx of an
+            acceleration, − ∫ f·δx of a force. None where the effect only brings bodies, or couples the hub.
+        present: problem ↦ whether there are data for it; `model.effects = "auto"` takes all that are present.
+        reasons: why it is in a model, and why not, in a few words.
+        constants: names of the constants of the frame ("w", "dw", "a_o", "gravity") that its work is a product of;
+            () if it has none of them, None if it may be any polynomial of second degree in them.
+        of_rotation: whether it comes of the rotation of the frame, so that a frame that does not rotate has it not.
+        internal: whether its forces act between structure and frame, so that they do no work in a rigid turn.
+        momentum: whether its work in a rigid turn is a change of angular momentum; the moments of all others are the
+            impulse that hub and structure are given.
+        kinetic: the part "T1" or "T0" of the kinetic energy that belongs to it.
+        potential: mechanics ↦ its potential energy (J), a UFL form; None if it has none.
     """
-    work: Any = 0
-    eta, a0 = coefficients.stiffness, coefficients.mass
-    if eta is not None:
-        work += sum(ufl.inner(eta * s.force(k.rate(s.value)), k.variation(s.value)) * s.measure for s in strains)
-    if a0 is not None:
-        work += sum(a0 * b.density * ufl.inner(b.rate(k), b.variation(k)) * b.measure for b in bodies)
-    return work
+
+    registry: ClassVar[Registry[Effect]] = Registry("effect", "rotfem.mechanics.effects")
+
+    name: str
+    work: Work | None = None
+    present: Callable[[Any], bool] = lambda problem: True
+    reasons: tuple[str, str] = ("it is registered", "there are no data for it")
+    constants: tuple[str, ...] | None = None
+    of_rotation: bool = False
+    internal: bool = False
+    momentum: bool = False
+    kinetic: str = ""
+    potential: Potential | None = None
+
+    def term(self, mechanics: Any, variation: Any) -> Any:
+        """Return its term of the residual for a variation; 0 if it has none."""
+        if self.work is None or (self.internal and not variation.within_frame):
+            return 0
+        return resolved(self.work)(mechanics, variation)
 
 
-def load_work(point_loads: list[AppliedLoad], k: Kinematics) -> Any:
-    """Return −Σ ∫ (force · δx) over applied forces and moments, a UFL form in k.dq."""
-    return -sum(ufl.inner(load.force, load.variation(k)) * load.measure for load in point_loads)
+def effects() -> tuple[Effect, ...]:
+    """Return all effects in the order they are listed."""
+    return tuple(Effect.registry)
+
+
+def present_effects(problem: Any) -> tuple[str, ...]:
+    """Return the effects that a scene or problem has data for."""
+    rotates = problem.frame == "rotating"
+    return tuple(e.name for e in effects() if e.present(problem) and (rotates or not e.of_rotation))
+
+
+def _work(name: str) -> str:
+    return f"rotfem.mechanics.work:{name}"
+
+
+# What every model has.
+INTERNAL = Effect("internal", _work("internal"), constants=(), internal=True)
+INERTIA = Effect("inertia", _work("inertia"), constants=(), momentum=True)
+LOADS = Effect("loads", _work("loads"), constants=None, potential=_work("potential_of_loads"))
+
+for _effect in (
+    Effect(
+        "coriolis",
+        _work("coriolis"),
+        lambda problem: problem.motion.is_spinning,
+        ("the structure spins", "nothing spins"),
+        ("w",),
+        of_rotation=True,
+        momentum=True,
+        kinetic="T1",
+    ),
+    Effect(
+        "centrifugal",
+        _work("centrifugal"),
+        lambda problem: problem.motion.is_spinning,
+        ("the structure spins", "nothing spins"),
+        ("w", "w"),
+        of_rotation=True,
+        momentum=True,
+        kinetic="T0",
+    ),
+    Effect(
+        "euler",
+        _work("euler"),
+        lambda problem: problem.motion.changes_speed,
+        ("the speed changes", "the speed is constant"),
+        ("dw",),
+        of_rotation=True,
+        momentum=True,
+    ),
+    Effect(
+        "rotary_inertia",
+        present=lambda problem: problem.structure.has_rotary_inertia,
+        reasons=("the section has rotary inertia", "the section has no rotary inertia"),
+    ),
+    Effect(
+        "base",
+        _work("base"),
+        lambda problem: problem.motion.is_accelerated,
+        ("the origin is accelerated", "no base_acceleration"),
+        ("a_o",),
+        potential=_work("potential_of_base"),
+    ),
+    Effect(
+        "gravity",
+        _work("gravity"),
+        lambda problem: any(problem.loads.gravity),
+        ("loads.gravity is not zero", "no gravity"),
+        ("gravity",),
+        potential=_work("potential_of_gravity"),
+    ),
+    Effect(
+        "damping",
+        _work("damping"),
+        lambda problem: not problem.structure.damping.is_zero,
+        ("there is a damping coefficient", "no damping"),
+        (),
+        internal=True,
+    ),
+    Effect(
+        "tip_mass",
+        present=lambda problem: problem.structure.has_tip_mass,
+        reasons=("there is a tip mass", "no tip mass"),
+    ),
+    Effect(
+        "hub_coupling",
+        present=lambda problem: problem.motion.is_coupled,
+        reasons=("the hub is free and coupled", "the hub does not feel the structure"),
+    ),
+):
+    register(_effect)

@@ -1,0 +1,125 @@
+"""Generalised-α and Newmark: one step as update maps.
+
+One step from t_n to t_{n+1} = t_n + h satisfies F(q, v, q̈) = 0 at t_{n+1}, with (Arnold & Brüls 2007, eqs. 2–3)
+
+    q_{n+1} = q_n + h v_n + h² (½ − β) a_n + h² β a_{n+1}
+    v_{n+1} = v_n + h (1 − γ) a_n + h γ a_{n+1}
+    (1 − α_m) a_{n+1} + α_m a_n = (1 − α_f) q̈_{n+1} + α_f q̈_n
+
+where a is an auxiliary acceleration, the memory of the scheme; Newmark is α_m = α_f = 0.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+from rotfem.analysis.schemes import Array, Scheme, Stage, State
+from rotfem.registry import register
+
+
+class AlphaFamily(Scheme):
+    """What generalised-α and Newmark share; second-order accurate when γ = ½ + α_f − α_m."""
+
+    order: ClassVar[int] = 2
+
+    @property
+    @abstractmethod
+    def coefficients(self) -> tuple[float, float, float, float]:
+        """α_m, α_f, β, γ."""
+
+    def start(self, state: State) -> State:
+        """Return the state with the auxiliary acceleration q̈."""
+        return state.changed(memory=state.a.copy())
+
+    def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
+        """Return the step that keeps q̈, which is free of residual when the acceleration is constant."""
+        alpha_m, alpha_f, beta, gamma = self.coefficients
+        old = state.memory
+        a = (state.a - alpha_m * old) / (1 - alpha_m)
+        q = state.q + h * state.v + h * h * ((0.5 - beta) * old + beta * a)
+        v = state.v + h * ((1 - gamma) * old + gamma * a)
+        c_a = 1 / (beta * h * h)
+        return Stage(end, q, v, state.a.copy(), gamma * h * c_a, (1 - alpha_m) / (1 - alpha_f) * c_a)
+
+    def finish(self, state: State, h: float, done: Sequence[Stage]) -> State:
+        """Return the state of the one stage; the auxiliary acceleration follows from its definition."""
+        s, (alpha_m, alpha_f, _, _) = done[0], self.coefficients
+        mean = (1 - alpha_f) * s.a + alpha_f * state.a
+        return State(s.t, s.q, s.v, s.a, (mean - alpha_m * state.memory) / (1 - alpha_m))
+
+    def local_error(self, new: State, old: State) -> Array:
+        """Return |β − 1/6| h² |a_{n+1} − a_n|.
+
+        Zienkiewicz & Xie 1991, eq. (14): the term of the Taylor series that Newmark's β does not match.
+        """
+        h, beta = new.t - old.t, self.coefficients[2]
+        return abs(beta - 1 / 6) * h * h * (new.memory - old.memory)
+
+    def resized(self, new: State, old: State, h: float) -> State:
+        """Return the state with the auxiliary acceleration moved to where the next step takes it.
+
+        It stands for q̈ at t + h (α_m − α_f), so it moves when h does; without this a change of step would cost an
+        order.
+        """
+        last, (alpha_m, alpha_f, _, _) = new.t - old.t, self.coefficients
+        lag = (alpha_m - alpha_f) * (h - last)
+        return new.changed(memory=new.memory + lag / last * (new.memory - old.memory))
+
+
+@dataclass(frozen=True)
+class GeneralisedAlpha(AlphaFamily):
+    """Generalised-α (Chung & Hulbert 1993, eqs. 17, 25).
+
+    Attributes:
+        spectral_radius: ρ∞ at infinite frequency, between 0 (annihilates) and 1 (conserves).
+    """
+
+    name: ClassVar[str] = "generalised_alpha"
+
+    spectral_radius: float = 0.9
+
+    @cached_property
+    def coefficients(self) -> tuple[float, float, float, float]:
+        """α_m, α_f, β, γ."""
+        rho = self.spectral_radius
+        alpha_m, alpha_f = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
+        return alpha_m, alpha_f, (1 - alpha_m + alpha_f) ** 2 / 4, 0.5 - alpha_m + alpha_f
+
+    @classmethod
+    def check(cls, parameters: dict[str, Any]) -> dict[str, str]:
+        """Return what is allowed of a spectral radius that is not."""
+        inside = 0.0 <= parameters.get("spectral_radius", 0.0) <= 1.0
+        return {} if inside else {"spectral_radius": "must be at least 0 and at most 1"}
+
+
+@dataclass(frozen=True)
+class Newmark(AlphaFamily):
+    """Newmark's scheme; (1/4, 1/2) is the trapezoidal rule.
+
+    Attributes:
+        beta, gamma: its parameters; of second order with gamma = ½.
+    """
+
+    name: ClassVar[str] = "newmark"
+
+    beta: float = 0.25
+    gamma: float = 0.5
+
+    @property
+    def coefficients(self) -> tuple[float, float, float, float]:
+        """α_m, α_f, β, γ."""
+        return 0.0, 0.0, self.beta, self.gamma
+
+    @classmethod
+    def check(cls, parameters: dict[str, Any]) -> dict[str, str]:
+        """Return what is allowed of values that are not."""
+        out = {} if parameters.get("beta", 1.0) > 0.0 else {"beta": "must be greater than 0"}
+        return out if parameters.get("gamma", 0.5) >= 0.5 else out | {"gamma": "must be at least 0.5"}
+
+
+register(GeneralisedAlpha)
+register(Newmark)

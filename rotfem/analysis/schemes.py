@@ -1,0 +1,123 @@
+"""What a time-stepping scheme is: stages, update maps, the history it keeps, its order and its error estimate.
+
+The equations of motion F(q, v, a, t) = 0 are met at every stage. A stage says where (t), predicts q, v and a there, and
+by which maps a correction dq of q changes v and a; the scheme makes the state at the end of a step of its stages. So F
+never knows the scheme, what solves a stage never knows its coefficients, and whatever stands in q, the angle of a free
+hub too, is one unknown among others.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.registry import Registry
+
+Array = npt.NDArray[np.float64]
+
+#: (∂q/∂q, ∂v/∂q, ∂a/∂q) of a stage: the factors of K, C and M in its tangent.
+Shifts = tuple[float, float, float]
+
+
+@dataclass
+class State:
+    """The motion at one instant.
+
+    Attributes:
+        t: time, s.
+        q, v, a: the unknowns (m, rad), q̇ and q̈; local dof arrays, of a free hub with its angle as last entry.
+        memory: what the scheme keeps of the steps before.
+        given: work (J) and angular impulse (N·m·s) that a free hub and its structure were given since t = 0, and the
+            moment (N·m) of the forces from outside now; None where the hub is not free.
+    """
+
+    t: float
+    q: Array
+    v: Array
+    a: Array
+    memory: Any = None
+    given: Array | None = None
+
+    def changed(self, **changes: Any) -> State:
+        """Return a copy with other values."""
+        return replace(self, **changes)
+
+
+@dataclass
+class Stage:
+    """An instant at which F = 0 is to be met: a prediction of q, v, a, and how v and a change with q.
+
+    Attributes:
+        t: time, s.
+        q, v, a: the prediction, then the solution; overwritten by `correct`.
+        c_v, c_a: ∂v/∂q (1/s) and ∂a/∂q (1/s²).
+    """
+
+    t: float
+    q: Array
+    v: Array
+    a: Array
+    c_v: float
+    c_a: float
+    shifts: Shifts = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.shifts = (1.0, self.c_v, self.c_a)
+
+    def correct(self, dq: Array) -> None:
+        """Add a correction of q, and what follows from it to v and a."""
+        self.q += dq
+        self.v += self.c_v * dq
+        self.a += self.c_a * dq
+
+
+class Scheme(ABC):
+    """One time-stepping scheme; its dataclass fields are its parameters, keys of a scene's [time] table.
+
+    A scheme is registered as a class. It has a name, the order that is observed of it in q, and the number of stages;
+    it says its stages by `stage` and the state they end in by `finish`.
+    """
+
+    registry: ClassVar[Registry[Any]] = Registry("scheme", "rotfem.analysis.alpha_family")
+
+    name: ClassVar[str]
+    order: ClassVar[int]
+    stages: ClassVar[int] = 1
+
+    @abstractmethod
+    def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
+        """Return stage i of a step.
+
+        Args:
+            i: number of the stage, from 0.
+            state: where the step starts.
+            h: its length, s.
+            end: its last instant, state.t + h but for rounding.
+            done: the stages before, solved.
+        """
+
+    @abstractmethod
+    def finish(self, state: State, h: float, done: Sequence[Stage]) -> State:
+        """Return the state at the end of a step, all its stages solved."""
+
+    def start(self, state: State) -> State:
+        """Return a first state, or one after a jump, with the memory that a step from it needs."""
+        return state
+
+    def local_error(self, new: State, old: State) -> Array | None:
+        """Return an estimate of the error of q that the step from old to new made; None if there is none."""
+        return None
+
+    def resized(self, new: State, old: State, h: float) -> State:
+        """Return a state after which steps of another length h (s) follow than the one that led there from old."""
+        return new
+
+    @classmethod
+    def check(cls, parameters: dict[str, Any]) -> dict[str, str]:
+        """Return name ↦ what is allowed, for every parameter whose value (a finite number) is not."""
+        return {}

@@ -1,0 +1,99 @@
+"""The registries: theories, effects, schemes, section shapes and outputs, by name.
+
+They are the only lists. What a scene may say, the ladder of theories, the reasons of `explain`, the energies and the
+hub's row follow from their entries. The package's own entries come into being when a registry is first asked for one; a
+user's script adds others with `register`, and their names are then valid values of a scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from typing import Any, ClassVar, Generic, Protocol, TypeVar, cast
+
+
+class Entry(Protocol):
+    """What can be registered: it has a name, and its class says where it belongs."""
+
+    registry: ClassVar[Registry[Any]]
+
+    @property
+    def name(self) -> str:
+        """What a scene calls it."""
+
+
+E = TypeVar("E", bound=Entry)
+
+
+class Registry(Generic[E]):
+    """Entries of one kind by name, in the order they are listed.
+
+    Args:
+        kind: what an entry is, for messages.
+        home: module that registers the package's own entries when it is imported.
+    """
+
+    def __init__(self, kind: str, home: str):
+        self.kind, self._home = kind, home
+        self._entries: dict[str, E] = {}
+
+    def add(self, entry: E) -> None:
+        """Add an entry.
+
+        Raises:
+            ValueError: its name is taken, or no name.
+        """
+        self._load()
+        if not isinstance(entry.name, str) or not entry.name.isidentifier():
+            raise ValueError(f"{entry.name!r} cannot be the name of a {self.kind}: letters, digits and _ only")
+        if entry.name in self._entries:
+            raise ValueError(f"there is a {self.kind} called {entry.name!r} already")
+        self._entries[entry.name] = entry
+
+    def remove(self, name: str) -> None:
+        """Take an entry out again, as a test does with its own."""
+        del self._entries[name]
+
+    def _load(self) -> None:
+        home, self._home = self._home, ""
+        if home:
+            import_module(home)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All names, in order."""
+        self._load()
+        return tuple(self._entries)
+
+    def __getitem__(self, name: str) -> E:
+        self._load()
+        return self._entries[name]
+
+    def __contains__(self, name: object) -> bool:
+        self._load()
+        return name in self._entries
+
+    def __iter__(self) -> Iterator[E]:
+        self._load()
+        return iter(tuple(self._entries.values()))
+
+
+def register(entry: Entry | type[Entry]) -> None:
+    """Add a `Theory`, `Effect`, `Shape` or `Output`, or a class of `Scheme`: its name is then a valid value of a scene.
+
+    Raises:
+        TypeError: it is none of these.
+        ValueError: its name is taken, or no name.
+    """
+    registry = getattr(entry, "registry", None)
+    if not isinstance(registry, Registry):
+        raise TypeError(f"{entry!r} is no Theory, Effect, Scheme, Shape or Output, so it cannot be registered")
+    registry.add(entry)
+
+
+def resolved(function: str | Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function, or the one that "module:name" stands for, so that entries need not load what they call."""
+    if not isinstance(function, str):
+        return function
+    module, _, name = function.partition(":")
+    return cast(Callable[..., Any], getattr(import_module(module), name))
