@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -32,7 +33,44 @@ class Problem(NamedTuple):
         return f"{self.key} = {show(self.value)}: {self.allowed}"
 
 
-class SceneError(ValueError):
+class InputError(ValueError):
+    """Something a user gave cannot be computed with.
+
+    Attributes:
+        key: Dotted path of what is meant, as a scene calls it.
+        value: What was given there; ``None`` if there is nothing to show.
+        allowed: What is wrong with it and what is allowed.
+    """
+
+    def __init__(self, key: str, value: Any, allowed: str) -> None:
+        super().__init__(key, value, allowed)
+        self.key = key
+        self.value = value
+        self.allowed = allowed
+
+    def __str__(self) -> str:
+        return str(Problem(self.key, self.value, self.allowed))
+
+
+@contextmanager
+def input_of(file: str) -> Iterator[None]:
+    """Say of which scene file an `InputError` is.
+
+    Args:
+        file: Name of the file as errors show it.
+
+    Raises:
+        SceneError: In the place of an `InputError` that names no file.
+    """
+    try:
+        yield
+    except SceneError:
+        raise
+    except InputError as error:
+        raise SceneError(file, error.key, error.value, error.allowed) from None
+
+
+class SceneError(InputError):
     """A scene, or an override of it, is not valid.
 
     Attributes:
@@ -47,7 +85,7 @@ class SceneError(ValueError):
         self, file: str, key: str = "", value: Any = None, allowed: str = "", others: Sequence[Problem] = ()
     ) -> None:
         # All arguments go to the base class so that the error survives pickling (between MPI ranks).
-        super().__init__(file, key, value, allowed, tuple(others))
+        Exception.__init__(self, file, key, value, allowed, tuple(others))
         self.file = file
         self.key = key
         self.value = value

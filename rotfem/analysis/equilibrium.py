@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
-from rotfem.equations.affine import AffineSystem
-from rotfem.equations.model import Model
-from rotfem.equations.system import System, compile_system
-from rotfem.errors import ComputationError, SceneError
+from rotfem.equations.compiled import compile_system
+from rotfem.equations.system import System
+from rotfem.errors import ComputationError, InputError
+from rotfem.mechanics.loads import ConstantLoad, Loads
+from rotfem.mechanics.motion import Motion
+from rotfem.mechanics.problem import Problem
 from rotfem.numerics.linear import DirectSolver, Increment, use_direct_solver
 from rotfem.numerics.newton import Newton
-from rotfem.scene import Scene
 
 Array = npt.NDArray[np.float64]
 
@@ -21,12 +24,7 @@ Array = npt.NDArray[np.float64]
 SMALLEST_SHARE = 1e-3
 
 
-def newton_for(scene: Scene, monotone: bool = False) -> Newton:
-    """Return the Newton control a scene asks for; monotone for time steps."""
-    return Newton(scene.solver.increment_tolerance, scene.solver.max_iterations, monotone)
-
-
-def steady_state(system: System, omega: float, newton: Newton, start: Array | None = None) -> Array:
+def steady_state(system: Any, omega: float, newton: Newton, start: Array | None = None) -> Array:
     """Return q (local dof array) with F(q, 0, 0) = 0 at constant speed: the equilibrium in the rotating frame.
 
     Speed and loads are raised together, in one step where Newton allows and in smaller ones where not; the state is
@@ -41,7 +39,8 @@ def steady_state(system: System, omega: float, newton: Newton, start: Array | No
     Raises:
         ComputationError: no equilibrium was reached; says how far the load got.
     """
-    q = np.zeros_like(system.q.x.array) if start is None else start.copy()
+    system = system.held
+    q = system.zeros() if start is None else start.copy()
     if start is not None:
         try:
             return _balance(system, omega, 1.0, q, newton)
@@ -72,16 +71,14 @@ def _balance(system: System, omega: float, share: float, guess: Array, newton: N
     motion = system.motion.at_speed(np.sqrt(share) * omega)
     system.set_time(0.0, motion, share)
     q, dx = guess.copy(), Increment(system.V)
-    system.v.x.array[:] = 0.0
-    system.a.x.array[:] = 0.0
 
     def increment() -> float:
-        system.q.x.array[:] = q
+        system.set_state(q)
         b = system.residual()
         A, _ = system.tangent(1.0, 0.0, 0.0)
         q[:] += dx.solve(DirectSolver(A), b)
-        system.q.x.array[:] = q
-        return system.size(dx.function.x.array)
+        system.set_state(q)
+        return float(system.size(dx.function.x.array))
 
     if system.linear:
         if not np.isfinite(increment()):
@@ -94,75 +91,65 @@ def _balance(system: System, omega: float, share: float, guess: Array, newton: N
     return q
 
 
-def check_steady(scene: Scene) -> None:
+def check_steady(problem: Problem) -> None:
     """Refuse what has no steady state in the rotating frame: gravity that turns with it.
 
     Raises:
-        SceneError: gravity has a component across the spin axis while the frame spins.
+        InputError: gravity has a component across the spin axis while the frame spins.
     """
-    across = np.cross(scene.loads.gravity, scene.motion.unit_axis)
-    spinning = scene.motion.is_spinning
-    if spinning and np.any(np.abs(across) > 0) and "gravity" in scene.effective_effects():
-        raise SceneError(
-            scene.file,
+    across = np.cross(problem.loads.gravity, problem.motion.axis)
+    if problem.motion.is_spinning and np.any(np.abs(across) > 0) and "gravity" in problem.effective_effects():
+        raise InputError(
             "loads.gravity",
-            list(scene.loads.gravity),
+            list(problem.loads.gravity),
             "gravity across the spin axis turns in the rotating frame, so there is no steady state; give [time], or "
             "gravity along motion.axis, or leave gravity out of model.effects",
         )
 
 
-def static_tip_shape(scene: Scene, displacement: float, newton: Newton) -> Array:
+def static_tip_shape(problem: Problem, displacement: float, newton: Newton) -> Array:
     """Return q (local dof array) of the beam at rest under the tip force F_2 that gives u_2(L) = displacement (m).
 
     Raises:
         ComputationError: no equilibrium with this displacement was found.
     """
-    changes = {
-        "model.frame": "rotating",
-        "model.effects": [],
-        "motion": {"type": "constant", "speed": 0.0},
-        "initial": {},
-        "loads": {"tip_force": [0.0, 1.0]},
-    }
-    system = compile_system(Model(scene.replace(changes)))
-    force = system.structure.load_constants["tip_force"][0]
-    system.set_time(0.0)
-    probe, q, F = system.structure.probe, np.zeros_like(system.q.x.array), [0.0]
+    still, force = Motion.constant_speed(0.0), Loads(tip_force=ConstantLoad((0.0, 1.0, 0.0)))
+    resting = problem.replace(frame="rotating", effects=(), motion=still, loads=force, terms={}, outputs={})
+    system = compile_system(resting, moving=False)
+    tip, q, F = system.structure.tip_values, system.zeros(), 0.0
     under_load, under_residual = Increment(system.V), Increment(system.V)
 
     def increment() -> float:
-        system.q.x.array[:] = q
-        _set_force(system, force, F[0] + 1.0)
+        nonlocal F
+        system.set_state(q)
+        system.set_time(0.0, load_factor=F + 1.0)
         loaded = system.residual().copy()
-        _set_force(system, force, F[0])
+        system.set_time(0.0, load_factor=F)
         residual = system.residual()
         loaded.axpy(-1.0, residual)
         solver = DirectSolver(system.tangent(1.0, 0.0, 0.0)[0])
-        solver.refresh()
         dq, per_force = under_residual.solve(solver, residual), under_load.solve(solver, loaded)
-        dF = (displacement - probe(q)[1] - probe(dq)[1]) / probe(per_force)[1]
-        F[0] += dF
+        dF = (displacement - tip(q)[1] - tip(dq)[1]) / tip(per_force)[1]
+        F += dF
         q[:] += dq + dF * per_force
-        return system.size(dq + dF * per_force)
+        return float(system.size(dq + dF * per_force))
 
-    newton.solve(increment, lambda: system.size(q))
-    return q
-
-
-def _set_force(system: System, force: object, value: float) -> None:
-    system.structure.load_constants["tip_force"] = (force, lambda t: np.array([0.0, value]))
-    system.set_time(0.0)
+    newton.solve(increment, lambda: float(system.size(q)))
+    return np.asarray(q)
 
 
-def critical_speed(system: AffineSystem) -> float | None:
+def critical_speed(system: Any) -> float | None:
     """Return the lowest speed (rad/s) at which the stiffness of a linear theory is singular; None if there is none.
+
+    Of a nonlinear theory there is none: its stiffness is that of each equilibrium.
 
     Raises:
         ComputationError: the eigensolver did not converge.
 
     K = K_1 + Omega² K_2: the least positive Omega² of K_1 x = −Omega² K_2 x.
     """
+    if not system.linear:
+        return None
     K_1, K_2 = system.stiffness_pieces()
     if K_2.norm() == 0.0:
         return None

@@ -14,17 +14,12 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.equilibrium import critical_speed, newton_for, steady_state
-from rotfem.equations.affine import AffineSystem
-from rotfem.equations.hub import Hub
-from rotfem.equations.model import Model
-from rotfem.equations.system import System, compile_system
-from rotfem.errors import SceneError
-from rotfem.listeners import Hint
+from rotfem.analysis.equilibrium import steady_state
+from rotfem.equations.compiled import compile_system
+from rotfem.errors import InputError
+from rotfem.mechanics.problem import Problem
 from rotfem.numerics.eigenproblem import SAME, ZERO, Eigenpairs, Pencil
 from rotfem.numerics.newton import Newton
-from rotfem.scene import Scene, TorqueMotion
-from rotfem.scene.advice import advise
 
 Array = npt.NDArray[Any]
 
@@ -61,45 +56,47 @@ class ModalAnalysis:
     """Compiled once, solved at any speed.
 
     Args:
-        scene: validated scene; its own speed is only a default.
+        problem: what is to be computed; its own speed is only a default.
+        about: the state that modes are about: "steady" or "undeformed".
+        newton: iteration control of the equilibria.
         comm: MPI communicator.
-        sweep: whether the speed will change.
 
     Raises:
-        SceneError: more modes are asked for than the mesh has, or it cannot be shared by the processes.
+        InputError: the mesh cannot be shared by the processes, or a mesh or section that cannot be computed with.
+
+    Attributes:
+        free: whether the hub is free, so that its angle is one more unknown.
     """
 
-    def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD, sweep: bool = False):
+    def __init__(
+        self,
+        problem: Problem,
+        about: str = "steady",
+        newton: Newton | None = None,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+    ):
         started = perf_counter()
-        rotating = scene.replace({"model.frame": "rotating"}) if scene.model.frame == "inertial" else scene
-        self.scene, self.comm = rotating, comm
-        self.model = Model(rotating, comm, rotating.effective_effects(spinning=True) if sweep else None)
-        self.model.structure.check_shared()  # SLEPc waits for ever where a process has no unknowns
-        self._check_count()
-        self.system: System = compile_system(self.model)
-        motion = rotating.motion
-        coupled = "hub_coupling" in self.model.effects
-        self.hub = Hub(self.system, motion, coupled) if isinstance(motion, TorqueMotion) else None
-        self.newton: Newton = newton_for(rotating)
+        self.problem, self.about, self.comm = problem.replace(frame="rotating"), about, comm
+        self.system: Any = compile_system(self.problem, comm, moving=False)
+        self.model, self.structure = self.system.model, self.system.structure
+        self.structure.check_shared()  # SLEPc waits for ever where a process has no unknowns
+        self.free = self.system.hub is not None
+        self.newton = newton or Newton()
         self._unit = 1.0
         assembled = self.system.assembled
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
         self.seconds |= {"equilibrium": 0.0, "factor": 0.0, "eigen": 0.0}
 
-    def _check_count(self) -> None:
-        """Refuse more modes than there are unknowns; a count that was not asked for is only an upper limit."""
-        modes = self.scene.modes
-        allowed = self.model.structure.free_unknowns() + int(isinstance(self.scene.motion, TorqueMotion))
-        if "count" in modes.model_fields_set and modes.count > allowed:
-            why = f"must be at most {allowed}, the number of unknowns that are free on this mesh"
-            raise SceneError(self.scene.file, "modes.count", modes.count, why)
+    def check_count(self, count: int) -> None:
+        """Refuse more modes than there are unknowns.
 
-    def advise(self, command: str, hint: Hint | None, speed: float) -> list[str]:
-        """Return hints about the computation ahead, up to a speed (rad/s), and hand them on."""
-        critical = None
-        if hint is not None and isinstance(self.system, AffineSystem) and self.scene.model.theory == "linear":
-            critical = critical_speed(self.system)
-        return advise(self.scene, command, hint, speed, critical)
+        Raises:
+            InputError: says how many there are.
+        """
+        allowed = self.structure.free_unknowns() + int(self.free)
+        if count > allowed:
+            why = f"must be at most {allowed}, the number of unknowns that are free on this mesh"
+            raise InputError("modes.count", count, why)
 
     def at(self, speed: float, count: int, start: Array | None = None, keep: bool = True) -> Spinning:
         """Return equilibrium and eigenpairs at a speed (rad/s).
@@ -118,10 +115,10 @@ class ModalAnalysis:
         t1 = perf_counter()
         matrices = self.system.mass_damping_stiffness(keep)
         clamped = Pencil(*matrices)
-        pencil = clamped if self.hub is None else Pencil(*self.hub.bordered(*matrices))
+        pencil = Pencil(*self.system.with_hub(matrices)) if self.free else clamped
         t2 = perf_counter()
         clamped.unit = pencil.unit = self._unit
-        pairs = pencil.solve(count, clamped.scale() if self.hub is not None else 0.0)
+        pairs = pencil.solve(count, clamped.scale() if self.free else 0.0)
         self._unit = pencil.unit
         t3 = perf_counter()
         factored = pencil.factored
@@ -131,7 +128,7 @@ class ModalAnalysis:
         # A PETSc matrix must not outlive the mesh it was made on: their communicator goes with the mesh.
         clamped.owner = pencil.owner = self
         finite = massed(clamped.M)
-        if self.hub is None:
+        if not self.free:
             return Spinning(speed, q, pencil, pairs.select(np.arange(len(pairs.values))[:finite]), clamped)
         flexible = np.flatnonzero(np.abs(pairs.values) > ZERO * np.median(np.abs(pairs.values)))
         rigid = len(flexible) < len(pairs.values)
@@ -141,19 +138,18 @@ class ModalAnalysis:
         """Refuse what is not there for a free hub.
 
         Raises:
-            SceneError: the hub is free.
+            InputError: the hub is free.
         """
-        if self.hub is not None:
-            raise SceneError(self.scene.file, "motion.type", "torque", f"{what} cannot be computed for a free hub yet")
+        if self.free:
+            raise InputError("motion.type", "torque", f"{what} cannot be computed for a free hub yet")
 
     def equilibrium(self, speed: float, start: Array | None = None) -> Array:
         """Return the state the modes are about, left in the system's functions: steady, or undeformed."""
-        s = self.system
-        zero = np.zeros_like(s.q.x.array)
-        if self.scene.modes.about == "undeformed" or s.linear:
+        s = self.system.held
+        if self.about == "undeformed" or s.linear:
             s.set_time(0.0, s.motion.at_speed(speed))
-            s.set_state(zero, zero, zero)
-            return zero
+            s.set_state(zero := s.zeros())
+            return np.asarray(zero)
         return steady_state(s, speed, self.newton, start)
 
     def right(self, spinning: Spinning) -> Array:
@@ -171,19 +167,19 @@ class ModalAnalysis:
         X, MX = self.right(spinning), self.mass_times(spinning)
         bs = self.system.V.dofmap.index_map_bs
         owned = self.system.V.dofmap.index_map.size_local * bs
-        along = [self.model.structure.oriented(Y[:owned].reshape(-1, bs, X.shape[1])) for Y in (X, MX)]
+        along = [self.structure.oriented(Y[:owned].reshape(-1, bs, X.shape[1])) for Y in (X, MX)]
         local = np.real(along[0].conj() * along[1]).sum(axis=0)
         hub = np.real(X[owned:].conj() * MX[owned:]).sum(axis=0, keepdims=True)  # on the last rank, if it is free
         energy = np.concatenate([local, hub])
         energy = self.comm.allreduce(energy) if self.comm.size > 1 else energy
         total = energy.sum(axis=0)
-        families = self.model.structure.families
+        families = self.structure.families
         shares = {name: energy[list(components)].sum(axis=0) / total for name, (components, _) in families.items()}
-        return shares if self.hub is None else {**shares, "hub": energy[-1] / total}
+        return {**shares, "hub": energy[-1] / total} if self.free else shares
 
     def names(self, spinning: Spinning) -> list[str]:
         """Return "kind n" for every mode, as its structure counts them; mixed ones name both families."""
-        shares, structure = self.shares(spinning), self.model.structure
+        shares, structure = self.shares(spinning), self.structure
         families = [name for name in shares if name != "hub"]
         table, right = np.array([shares[name] for name in families]), self.right(spinning)
         out = []
@@ -203,7 +199,7 @@ class ModalAnalysis:
         sign = -1.0 if spinning.speed * axis[2] < 0.0 else 1.0
         out, right = [], self.right(spinning)
         for j in range(right.shape[1]):
-            part = self.model.structure.turning(*self.shape(right[:, j]))
+            part = self.structure.turning(*self.shape(right[:, j]))
             if part is None:
                 return []
             out.append(sign * part)
@@ -211,8 +207,8 @@ class ModalAnalysis:
 
     def shape(self, x: Array) -> tuple[dict[str, Array], Array]:
         """Return (coordinates of the nodes, m; complex components (n, bs) of a mode), on every rank."""
-        coordinates, real = self.model.structure.nodes(x.real)
-        _, imaginary = self.model.structure.nodes(x.imag)
+        coordinates, real = self.structure.nodes(x.real)
+        _, imaginary = self.structure.nodes(x.imag)
         return coordinates, real + 1j * imaginary
 
 

@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy.linalg import block_diag, eig
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
-from rotfem.equations.affine import AffineSystem
 from rotfem.errors import ComputationError
 from rotfem.numerics.eigenproblem import Eigenpairs, Pencil
 
@@ -35,8 +35,9 @@ DEPENDENT = 1e-13
 
 def worth_while(analysis: ModalAnalysis, speeds: Sequence[float]) -> bool:
     """Return whether a basis is possible (a linear theory, a fixed hub) and saves time."""
-    possible = isinstance(analysis.system, AffineSystem) and analysis.hub is None
-    return possible and analysis.system.A.getSize()[0] >= LARGE and len(speeds) >= MANY
+    return (
+        analysis.system.linear and not analysis.free and analysis.system.A.getSize()[0] >= LARGE and len(speeds) >= MANY
+    )
 
 
 class SmallPencil(Pencil):
@@ -52,11 +53,9 @@ class SmallPencil(Pencil):
         n = len(k)
         unit = np.sqrt(max(float(np.trace(k)) / max(float(np.trace(m)), 1e-300), 1e-300))
         shifted = [k + target * c + target**2 * m, unit * (c + 2 * target * m), unit**2 * m]
-        try:
-            right_side = np.linalg.solve(shifted[0], np.hstack(shifted[1:]))
-        except np.linalg.LinAlgError:
-            raise ComputationError("the stiffness matrix is singular", advice="a slightly different speed") from None
-        nu, vectors = np.linalg.eig(np.vstack([-right_side, np.eye(n, 2 * n)]))
+        nu, vectors = eig(np.block([[-shifted[1], -shifted[2]], [np.eye(n, 2 * n)]]), block_diag(shifted[0], np.eye(n)))
+        if not np.all(np.isfinite(nu)):
+            raise ComputationError("the stiffness matrix is singular", advice="a slightly different speed")
         order = np.argsort(-np.abs(nu), kind="stable")[: min(2 * count + 2, 2 * n - 2)]
         values = target + unit / nu[order]
         x = vectors[n:, order]
@@ -78,8 +77,10 @@ class ReducedAnalysis(ModalAnalysis):
     """
 
     def __init__(self, full: ModalAnalysis):
-        self.__dict__.update(full.__dict__)
         self.full = full
+        self.problem, self.about, self.comm, self.newton = full.problem, full.about, full.comm, full.newton
+        self.system, self.model, self.structure, self.free = full.system, full.model, full.structure, full.free
+        self.seconds, self._unit = full.seconds, full._unit
         self.checks: list[dict[str, float]] = []
         self._columns: list[Array] = []
 
@@ -123,7 +124,6 @@ class ReducedAnalysis(ModalAnalysis):
     def _project(self) -> None:
         """Make the columns M-orthonormal and project every piece."""
         system = self.system
-        assert isinstance(system, AffineSystem)
         V = np.array([c / max(np.sqrt(self._sum(c @ c)), 1e-300) for c in self._columns]).T
         self._index = [i for i, p in enumerate(system.pieces) if p.kind in "MCK"]
         pieces = [system.pieces[i] for i in self._index]
@@ -156,8 +156,7 @@ class ReducedAnalysis(ModalAnalysis):
     def at(self, speed: float, count: int, start: Array | None = None, keep: bool = True) -> Spinning:
         """Return the eigenpairs of the basis at a speed (see `ModalAnalysis.at`), with errors in the full system."""
         system = self.system
-        assert isinstance(system, AffineSystem)
-        zero = np.zeros_like(system.q.x.array)
+        zero = system.zeros()
         c = system.coefficients(system.motion.at_speed(speed))[self._index]
         small = {kind: np.zeros((self.V.shape[1],) * 2) for kind in "MCK"}
         for ci, (p, matrix) in zip(c, self._pieces, strict=True):

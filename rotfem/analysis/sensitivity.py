@@ -22,7 +22,6 @@ from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms import expand_derivatives
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
-from rotfem.equations.affine import AffineSystem
 from rotfem.numerics import compat, forms
 from rotfem.numerics.linear import DirectSolver
 
@@ -55,12 +54,12 @@ class Sensitivity:
     def __init__(self, analysis: ModalAnalysis, spinning: Spinning):
         self.analysis, self.spinning = analysis, spinning
         self.system, self.model = analysis.system, analysis.model
-        self.structure, self.V = analysis.model.structure, analysis.system.V
+        self.structure, self.V = analysis.structure, analysis.system.V
         k = self.structure.k
         self.base = k.q
         self.vectors = {name: fem.Function(self.V) for name in "yx"}
         self.factors = {name: self.structure.constant(0.0) for name in "KCM"}
-        if isinstance(self.system, AffineSystem):
+        if self.system.linear:
             self._prepare_linear(self.system)
         else:
             self.equation = self.model.residual
@@ -69,28 +68,26 @@ class Sensitivity:
         self.s = self._bilinear()
         self._stiffness: Any = None
 
-    def _prepare_linear(self, system: AffineSystem) -> None:
+    def _prepare_linear(self, system: Any) -> None:
         """Write the linear theory as a residual: its base state q̄ is the linear response that carries N⁰."""
         k, model = self.structure.k, self.model
         internal = model.terms["internal"]
         loads = sum(t for name, t in model.terms.items() if name not in ("internal", "damping"))
-        at_rest = {k.q: fem.Function(self.V), k.v: fem.Function(self.V), k.a: fem.Function(self.V)}
         # f(p) is the residual of the undeformed structure; K q̄ = −f defines N⁰.
-        self.equation = internal + (ufl.replace(loads, at_rest) if not isinstance(loads, int) else 0)
+        self.equation = internal + (forms.without(loads, k.q, k.v, k.a) if not isinstance(loads, int) else 0)
         self.pencil_form = model.residual
         self.base_state = self._static(system)
 
-    def _static(self, system: AffineSystem) -> Array:
+    def _static(self, system: Any) -> Array:
         zero = np.zeros_like(self.spinning.q)
         system.set_time(0.0, system.motion.at_speed(self.spinning.speed))
-        system.set_state(zero, zero, zero)
-        if system.model.theory.prestressed is None:
+        system.set_state(zero)
+        if not system.model.theory.prestress:
             return zero
         solution = fem.Function(self.V)
         x = compat.wrap(solution.x)
         b = system.residual().copy()
-        material = next(p.operator for p in system.pieces if p.kind == "K" and p.key == ())
-        DirectSolver(material).solve(b, x)
+        DirectSolver(system.material).solve(b, x)
         solution.x.scatter_forward()
         return solution.x.array.copy()
 
@@ -104,37 +101,20 @@ class Sensitivity:
         def tangent(variable: Any) -> Any:
             return lambda u, w: ufl.replace(ufl.derivative(F, variable, w), {k.dq: u})
 
-        if not isinstance(self.system, AffineSystem):
+        if not self.system.linear:
             return {"K": tangent(k.q), "C": tangent(k.v), "M": tangent(k.a)}
 
         # Linear theory: tangents at the undeformed state, and the geometric stiffness of the base state.
-        rest = fem.Function(self.V)
-
         def at_rest(variable: Any) -> Any:
             def form(u: Any, w: Any) -> Any:
-                expanded = expand_derivatives(ufl.derivative(F, variable, w))
-                return ufl.replace(expanded, {k.dq: u, k.q: rest})
+                return ufl.replace(forms.without(ufl.derivative(F, variable, w), k.q, k.v, k.a), {k.dq: u})
 
             return form
 
         def stiffness(u: Any, w: Any) -> Any:
-            return at_rest(k.q)(u, w) + self._geometric(u, w, rest)
+            return at_rest(k.q)(u, w) + self.system.geometric(u, w, self.base)
 
         return {"K": stiffness, "C": at_rest(k.v), "M": at_rest(k.a)}
-
-    def _geometric(self, u: Any, w: Any, rest: Any) -> Any:
-        """∫ N⁰ D²Γ₁[u, w] with N⁰ of the base state in k.q (0 without a prestressed theory)."""
-        theory, structure, k = self.model.theory, self.structure, self.structure.k
-        if theory.prestressed is None:
-            return 0
-        second = structure.strains(theory.prestress_measures(structure.type))
-        out: Any = 0
-        for first, higher in zip(self.model.strains, second, strict=True):
-            if first.name in structure.prestressing:
-                curvature = expand_derivatives(ufl.derivative(ufl.derivative(higher.value, k.q, u), k.q, w))
-                curvature = ufl.replace(curvature, {k.q: rest})
-                out += ufl.inner(first.force(first.value), curvature) * higher.measure
-        return out
 
     def _bilinear(self) -> Any:
         """Return y·(k K + c C + m M) x as a form of real vectors, the base state and the constants k, c, m.
@@ -198,12 +178,11 @@ class Sensitivity:
             pencils[p.name] = self._compiled_diff(self.s, p, variable)
         gradient = forms.form(ufl.derivative(self.s, self.base))
         system = self.system
-        zero = np.zeros_like(self.base_state)
         system.set_time(0.0, system.motion.at_speed(self.spinning.speed))
         solver = DirectSolver(self._base_tangent())
         out = []
         for j in modes:
-            system.set_state(self.base_state, zero, zero)
+            system.set_state(self.base_state)
             direct = dict.fromkeys(pencils, 0j)
             force = np.zeros(len(self._vector(gradient).array), dtype=complex)
             for factor in self._combinations(j):
@@ -228,10 +207,9 @@ class Sensitivity:
     def _base_tangent(self) -> Any:
         """Return K_Rᵀ of the base equation, clamped rows 1."""
         system = self.system
-        zero = np.zeros_like(self.base_state)
-        if isinstance(system, AffineSystem):
-            return next(p.operator for p in system.pieces if p.kind == "K" and p.key == ())
-        system.set_state(self.base_state, zero, zero)
+        if system.linear:
+            return system.material
+        system.set_state(self.base_state)
         from rotfem.numerics.eigenproblem import transposed
 
         return transposed(system.matrix(1.0, 0.0, 0.0, 1.0))
@@ -269,7 +247,7 @@ def sensitivities(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str,
     `relative`.
 
     Raises:
-        SceneError: the hub is free.
+        InputError: the hub is free.
     """
     analysis.needs_fixed_hub("sensitivities")
     study = Sensitivity(analysis, spinning)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from scipy.io import mmwrite
+from scipy.linalg import block_diag
 from scipy.sparse import csr_array, save_npz
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
@@ -71,9 +72,9 @@ def state_space(analysis: ModalAnalysis, spinning: Spinning, count: int) -> Stat
         SceneError: the analysis is distributed over several processes.
     """
     serial(analysis, "the state-space model")
-    structure, pencil = analysis.model.structure, spinning.pencil
+    structure, pencil = analysis.structure, spinning.pencil
     pairs = spinning.pairs.select(np.arange(min(count, len(spinning.pairs.values))))
-    tip = np.arange(structure.probe.dofs.start, structure.probe.dofs.stop)
+    tip = np.arange(structure.tip_values.dofs.start, structure.tip_values.dofs.stop)
     n = np.diag(pencil.gram(pairs.left, pairs.values, pairs.right, pairs.values))
     blocks, rows, columns = [], [], []
     for j, lam in enumerate(pairs.values):
@@ -86,7 +87,7 @@ def state_space(analysis: ModalAnalysis, spinning: Spinning, count: int) -> Stat
             blocks.append(np.array([[lam.real]]))
             rows.append(gain.real)
             columns.append(shape.real)
-    A = block_diagonal(blocks)
+    A = block_diag(*blocks)
     B, C = np.array(rows), np.array(columns).T
     D = tip_flexibility(analysis, spinning, tip) + C @ np.linalg.solve(A, B)
     components = structure.components
@@ -106,16 +107,6 @@ def tip_flexibility(analysis: ModalAnalysis, spinning: Spinning, tip: Array) -> 
     return out
 
 
-def block_diagonal(blocks: list[Array]) -> Array:
-    """Return the matrix with these square blocks on its diagonal."""
-    size = sum(len(block) for block in blocks)
-    out, at = np.zeros((size, size)), 0
-    for block in blocks:
-        out[at : at + len(block), at : at + len(block)] = block
-        at += len(block)
-    return out
-
-
 def write_matrices(analysis: ModalAnalysis, spinning: Spinning, folder: Path) -> list[Path]:
     """Write M, C and K without the clamped unknowns as Matrix Market and npz, and what each unknown is; return paths.
 
@@ -124,7 +115,7 @@ def write_matrices(analysis: ModalAnalysis, spinning: Spinning, folder: Path) ->
         SceneError: the analysis is distributed over several processes.
     """
     serial(analysis, "the export of matrices")
-    structure = analysis.model.structure
+    structure = analysis.structure
     free = np.setdiff1d(np.arange(len(spinning.q)), analysis.system.clamped)
     paths = []
     try:

@@ -1,15 +1,17 @@
-"""Fixed and adaptive steps through a time history: every jump of a torque is met, and there it goes on afresh."""
+"""The march: fixed or adaptive steps through a time history. Every jump is met, and there it goes on afresh."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from rotfem.analysis.hub_stepper import HubStepper
-from rotfem.analysis.stepper import State, Stepper
+from rotfem.analysis.schemes import Array, Scheme, State
+from rotfem.analysis.stepper import Stepper
 from rotfem.errors import ComputationError
-from rotfem.scene import Time
+from rotfem.numerics.newton import Newton
 
 #: A linear theory has lost its meaning when a displacement exceeds the structure's own length, or a rotation 1 rad.
 LARGEST_LINEAR_DEFLECTION = 1.0
@@ -18,21 +20,70 @@ LARGEST_LINEAR_DEFLECTION = 1.0
 SAFETY, SHRINK, GROW, KEEP, FLOOR = 0.9, 0.2, 2.0, (0.95, 1.3), 1e-6
 
 
-def fixed_steps(
-    stepper: Stepper, state: State, end: float, step: float, parts: Sequence[int] | None = None
-) -> Iterator[State]:
-    """Yield the states at step, 2 step, … and end (s).
+@dataclass(frozen=True)
+class Steps:
+    """When a history ends, and how it is stepped: by a fixed step or to a tolerance.
+
+    Attributes:
+        end: last time, s.
+        step: fixed step, s; None for adaptive ones.
+        tolerance: error of all adaptive steps together, relative to the largest displacement; None for fixed ones.
+        max_step, min_step: bounds of an adaptive step, s; None for those of the program.
+        parts: in how many equal steps each fixed step is gone; in one, if None.
+    """
+
+    end: float
+    step: float | None = None
+    tolerance: float | None = None
+    max_step: float | None = None
+    min_step: float | None = None
+    parts: Sequence[int] | None = None
+
+    @classmethod
+    def of(cls, time: Any) -> Steps:
+        """Return the steps of anything with these attributes but the parts, as a scene's [time] table."""
+        return cls(time.end, time.step, time.tolerance, time.max_step, time.min_step)
+
+
+class March:
+    """A time history, state after state.
 
     Args:
-        stepper: what advances the state.
-        state: where to start.
-        end: last time, s.
-        step: distance of the states, s; the last one may be closer.
-        parts: in how many equal steps each of these distances is gone; in one, if not given.
+        system: equations of motion.
+        scheme: time-stepping scheme.
+        steps: end and length of the steps.
+        newton: iteration control of the steps.
+        q: shape at t = 0, at rest in the turning frame, local dof array of the structure; undeformed if None.
+
+    Attributes:
+        stepper: what advances the system, with its counts.
+    """
+
+    def __init__(self, system: Any, scheme: Scheme, steps: Steps, newton: Newton, q: Array | None = None):
+        self.system, self.steps = system, steps
+        self.stepper = Stepper(system, scheme, newton)
+        self._q = np.zeros_like(system.q.x.array) if q is None else q
+
+    def __iter__(self) -> Iterator[State]:
+        """Yield the state at t = 0 and at the end of every step.
+
+        Raises:
+            ComputationError: a step failed, however short.
+        """
+        state = self.stepper.start(0.0, *self.system.start(self._q))
+        yield state
+        steps = fixed_steps if self.steps.step is not None else adaptive_steps
+        yield from steps(self.stepper, state, self.steps)
+
+
+def fixed_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[State]:
+    """Yield the states at step, 2 step, … and end (s); the last distance may be shorter.
 
     Raises:
         ComputationError: a step failed, however short.
     """
+    assert steps.step is not None
+    end, step, parts = steps.end, steps.step, steps.parts
     n = int(np.ceil(end / step - 1e-9))
     close = 1e-9 * step
     jumps = jumps_of(stepper, end + close)
@@ -46,7 +97,7 @@ def fixed_steps(
             if abs(h - length) <= close:
                 h = length  # of one length to the last digit, so that the matrix stays
             state = stepper.advance(state, h, stop)
-            if isinstance(stepper, HubStepper) and stop in jumps:
+            if stop in jumps:
                 state = stepper.restart(state)
         yield state
 
@@ -57,33 +108,28 @@ def stops(times: Sequence[float], jumps: Sequence[float], close: float) -> list[
     return sorted({*snapped, *jumps})
 
 
-def adaptive_steps(stepper: Stepper, state: State, time: Time) -> Iterator[State]:
+def adaptive_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[State]:
     """Yield states whose local errors add up to the tolerance, relative to the largest displacement so far.
-
-    Args:
-        stepper: what advances the state; it counts the steps that are taken back.
-        state: where to start.
-        time: end, tolerance and bounds of the step.
 
     Raises:
         ComputationError: a step failed, or would have to be shorter than allowed.
     """
-    assert time.tolerance is not None
-    longest = time.max_step or time.end / 20
-    shortest = time.min_step or 1e-9 * time.end
-    h, largest = min(longest, 1e-4 * time.end), FLOOR
-    close = 1e-12 * time.end
-    jumps = jumps_of(stepper, time.end + close)
-    while state.t < time.end - close:
-        stop = min((j for j in jumps if j > state.t), default=time.end)
+    assert steps.tolerance is not None
+    longest = steps.max_step or steps.end / 20
+    shortest = steps.min_step or 1e-9 * steps.end
+    h, largest = min(longest, 1e-4 * steps.end), FLOOR
+    close = 1e-12 * steps.end
+    jumps = jumps_of(stepper, steps.end + close)
+    while state.t < steps.end - close:
+        stop = min((j for j in jumps if j > state.t), default=steps.end)
         left = stop - state.t
         wanted = min(h, longest)
         h = left if wanted >= left * (1 - 1e-9) else (left / 2 if wanted > 0.6 * left else wanted)
         new = stepper.advance(state, h, stop if h == left else None)
         largest = max(largest, stepper.system.size(new.q))
-        allowed = time.tolerance * largest * h / time.end  # so that the errors of all steps add up to the tolerance
+        allowed = steps.tolerance * largest * h / steps.end  # so that the errors of all steps add up to the tolerance
         error = stepper.local_error(new, state) / allowed
-        factor = float(np.clip(SAFETY * max(error, 1e-12) ** (-1 / 2), SHRINK, GROW))
+        factor = float(np.clip(SAFETY * max(error, 1e-12) ** (-1 / stepper.scheme.order), SHRINK, GROW))
         if error > 1.0:
             stepper.rejected += 1
             h *= min(factor, 0.9)
@@ -94,16 +140,16 @@ def adaptive_steps(stepper: Stepper, state: State, time: Time) -> Iterator[State
                     advice="a looser time.tolerance, a smaller time.min_step, or some damping",
                 )
             continue
-        if isinstance(stepper, HubStepper) and new.t in jumps:
+        if new.t in jumps:
             new = stepper.restart(new)
-            h = min(h, 1e-4 * time.end)
+            h = min(h, 1e-4 * steps.end)
         elif not KEEP[0] <= factor <= KEEP[1]:
-            stepper.resize(new, state, h * factor)
+            new = stepper.scheme.resized(new, state, h * factor)
             h *= factor
         state = new
         yield state
 
 
 def jumps_of(stepper: Stepper, end: float) -> list[float]:
-    """Return the times (s) up to the end at which the torque on a free hub jumps."""
-    return [t for t in stepper.hub.torque.jumps if 0.0 < t <= end] if isinstance(stepper, HubStepper) else []
+    """Return the times (s) up to the end at which what drives the system jumps."""
+    return [t for t in stepper.system.jumps if 0.0 < t <= end]

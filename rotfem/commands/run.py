@@ -241,7 +241,7 @@ class Simulation:
             self.hub.values[:] = state.hub[:3]
         system.set_time(t)
         system.set_state(state.q, state.v, state.a)
-        tip = self.model.structure.probe(state.q)
+        tip = self.model.structure.tip_values(state.q)
         if system.clamp is not None:
             tip = system.clamp.relative(tip[None, :], self.model.structure.length, t)[0]
         energy = system.energies()

@@ -1,118 +1,149 @@
-"""The residual as named terms, before anything is compiled."""
+"""The residual of a problem as named terms, before anything is compiled."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
-import basix
 import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
-from ufl.algorithms import expand_derivatives
 
-from rotfem.mechanics.accelerations import ACCELERATIONS, damping, load_work, virtual_work
+from rotfem.equations.hub_angle import HubAngle
+from rotfem.mechanics import work
+from rotfem.mechanics.effects import INERTIA, INTERNAL, LOADS, Effect
 from rotfem.mechanics.frame import Frame
-from rotfem.mechanics.motion import Motion, motion_of
-from rotfem.mechanics.strains import THEORIES
+from rotfem.mechanics.motion import Motion
+from rotfem.mechanics.problem import Problem
+from rotfem.mechanics.work import Mechanics, RigidTurn, Variation
 from rotfem.numerics import forms
-from rotfem.scene import Scene
+from rotfem.registry import resolved
 from rotfem.structures import build
+from rotfem.structures.structure import Structure
 
-
-def quadrature_points(domain: Any, number: int) -> Any:
-    """Return the points of the Gauss rule that has `number` of them in each direction, reference cell coordinates."""
-    return basix.make_quadrature(domain.basix_cell(), 2 * number - 1)[0]
-
-
-def integral_count(form: Any) -> int:
-    """Return the number of integrals of a UFL form after differentiation."""
-    expanded = expand_derivatives(form)
-    return 0 if expanded.empty() else len(expanded.integrals())
+#: Name of the switch of the bodies that are always there.
+STRUCTURE = "structure"
 
 
 class Model:
-    """The residual of a scene as named terms, before anything is compiled.
+    """The terms of a problem, each the virtual work of an effect.
+
+    Every effect has a switch: a constant, 1 or 0, that multiplies its work and the densities of the bodies it brings.
+    To try a model without an effect its switch is set; an effect that is not in the model leaves no term, no constant
+    and no kernel behind. In the linear theories all terms have switches, so that each can be assembled by itself.
 
     Args:
-        scene: validated scene.
+        problem: what is to be computed.
         comm: MPI communicator.
-        effects: names of the effects to include; the scene's own choice if None.
 
     Attributes:
         structure: mesh, space, bodies.
+        effects: names of the effects that are in.
+        motion: of the frame; that of a free hub reads its unknown.
+        hub: angle of a free hub; None if the rotation is prescribed.
         frame: constants w, dw, a_o, gravity in use.
-        motion: prescribed motion.
-        strains: strain measures that make the stored energy.
+        mechanics: bodies, strains and loads.
+        acting: the effects that have a term, by its name.
+        switches: name ↦ constant factor.
         terms: name ↦ virtual work, a UFL form.
-        switches: effect ↦ constant factor of its terms, where they can be switched without a new compilation.
     """
 
-    def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD, effects: tuple[str, ...] | None = None):
-        self.scene, self.comm = scene, comm
-        self.effects = scene.effective_effects() if effects is None else effects
-        self.theory = THEORIES[scene.model.theory]
-        self.motion: Motion = motion_of(scene)
-        self.structure = s = build(scene, comm)
-        self.fixed = scene.model.frame == "inertial"
-        self.frame = Frame(s.mesh, s.planar, self.fixed, scene.loads.gravity)
-        self.strains = s.strains(self.theory.measures(s.type))
-        self.bodies = s.bodies(self.effects)
-        self.applied = s.loads()
+    def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):
+        self.problem, self.comm, self.theory = problem, comm, problem.theory
+        self.effects = problem.effective_effects()
+        self.hub = HubAngle(problem.motion) if problem.motion.hub is not None else None
+        self.motion: Motion = problem.motion if self.hub is None else self.hub.motion
+        self.structure: Structure = build(problem, comm)
+        self.frame = Frame(
+            self.structure.mesh, self.structure.planar, problem.frame == "inertial", problem.loads.gravity
+        )
         self.switches: dict[str, fem.Constant] = {}
-        self.terms = self._terms()
+        self.mechanics = self._mechanics()
+        further = {name: Effect(name, term) for name, term in problem.terms.items()}
+        self.acting = {
+            effect.name: effect
+            for effect in (
+                INTERNAL,
+                INERTIA,
+                *(Effect.registry[name] for name in self.effects),
+                *further.values(),
+                LOADS,
+            )
+        }
+        self.terms = self.work(Variation(self.structure.k))
         self._stretch: Any = None
 
-    def _terms(self) -> dict[str, Any]:
-        k = self.structure.k
-        terms = {"internal": sum(ufl.derivative(s.energy, k.q, k.dq) for s in self.strains)}
-        for name in ("inertia", *self.effects):
-            if name in ACCELERATIONS:
-                terms[name] = virtual_work(name, self.bodies, k, self.frame)
-        if "damping" in self.effects:
-            terms["damping"] = damping(self.strains, self.bodies, k, self.structure.damping())
-        if self.applied:
-            terms["loads"] = load_work(self.applied, k)
-        return {name: term for name, term in terms.items() if not isinstance(term, int)}
+    @property
+    def fixed(self) -> bool:
+        """Whether the frame does not rotate."""
+        return self.frame.fixed
 
-    def inside_out(self) -> bool:
-        """Return whether the structure is anywhere compressed to less than nothing at the state in q: none real is."""
-        mesh = self.structure.mesh
-        if self._stretch is None:
-            points = quadrature_points(mesh, self.structure.V.element.basix_element.degree)
-            self._stretch = forms.expression(self.structure.stretch(self.strains), points, self.comm)
-        cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local)
-        lowest = float(self._stretch.eval(mesh, cells).min()) if len(cells) else 1.0
-        return self.comm.allreduce(lowest, op=MPI.MIN) <= 0.0
+    def _mechanics(self) -> Mechanics:
+        s, theory = self.structure, self.theory
+        bodies = [
+            replace(b, density=self._switched(b.effect or STRUCTURE, bool(b.effect), b.density))
+            for b in s.bodies(self.effects)
+        ]
+        strains = s.strains(theory.measures(s.type))
+        return Mechanics(bodies, strains, s.loads(), s.k, self.frame, s.damping(), s)
+
+    def _switched(self, name: str, effect: bool, factor: Any) -> Any:
+        """Return the switch of an effect, or of what a linear theory assembles by itself, times a factor."""
+        if not (effect or self.theory.linear):
+            return factor
+        if name not in self.switches:
+            self.switches[name] = self.structure.constant(1.0)
+        return self.switches[name] * factor
+
+    def work(self, variation: Any) -> dict[str, Any]:
+        """Return name ↦ virtual work of every effect for a variation, each times its switch; UFL forms."""
+        out = {}
+        for name, effect in self.acting.items():
+            term = effect.term(self.mechanics, variation)
+            if not isinstance(term, int):
+                out[name] = self._switched(name, name in self.effects, term)
+        return out
 
     @property
     def residual(self) -> Any:
         """F(q, v, a; δq), a UFL form."""
         return sum(self.terms.values())
 
+    @cached_property
+    def turn(self) -> RigidTurn:
+        """A rigid turn about the axis of the motion."""
+        return RigidTurn(ufl.as_vector([float(c) for c in self.motion.axis]))
+
     def energies(self) -> dict[str, Any]:
         """Return UFL forms of degree 0, 1, 2 of the kinetic energy in the velocities, and of the strain energy (J).
 
-        T = T2 + T1 + T0 = ∫ ½ρ |ẋ + w×x|². In a frame that does not rotate T1 is missing and `momentum` is the
+        T = T2 + T1 + T0 = ∫ ½ρ |ẋ + w×x|². In a frame that does not rotate T1 and T0 are missing and `momentum` is the
         angular momentum about the hub (kg·m²/s) that the Jacobi integral needs there.
         """
-        k, frame = self.structure.k, self.frame
-        forms: dict[str, Any] = {"strain": sum(s.energy for s in self.strains)}
-        forms["T2"] = sum(b.density * ufl.inner(b.rate(k), b.rate(k)) / 2 * b.measure for b in self.bodies)
+        m = self.mechanics
+        kinetic, acting = work.kinetic_parts(m), self.acting.values()
+        out: dict[str, Any] = {"strain": work.strain_energy(m), "T2": kinetic["T2"]()}
         if self.fixed:
-            forms["momentum"] = sum(b.density * ufl.cross(b.x, b.rate(k))[2] * b.measure for b in self.bodies)
-        if "coriolis" in self.effects:
-            forms["T1"] = sum(
-                b.density * ufl.inner(b.rate(k), ufl.cross(b.resolve(frame.w), b.x)) * b.measure for b in self.bodies
-            )
-        if "centrifugal" in self.effects:
-            wx = [(b, ufl.cross(b.resolve(frame.w), b.x)) for b in self.bodies]
-            forms["T0"] = sum(b.density * ufl.inner(s, s) / 2 * b.measure for b, s in wx)
-        potentials = [-ufl.inner(load.force, load.x) * load.measure for load in self.applied if load.dead]
-        for name, field in (("base", 1), ("gravity", -1)):
-            if name in self.effects:
-                a = frame.a_o if name == "base" else frame.gravity
-                potentials += [field * b.density * ufl.inner(a, b.x) * b.measure for b in self.bodies if b.is_position]
+            out["momentum"] = work.momentum(m, RigidTurn(ufl.as_vector((0.0, 0.0, 1.0))))
+        out |= {effect.kinetic: kinetic[effect.kinetic]() for effect in acting if effect.kinetic}
+        potentials = [resolved(effect.potential)(m) for effect in acting if effect.potential is not None]
+        potentials = [potential for potential in potentials if not isinstance(potential, int)]
         if potentials:
-            forms["potential"] = sum(potentials)
-        return forms
+            out["potential"] = sum(potentials)
+        return out
+
+    def outputs(self) -> dict[str, Any]:
+        """Return name ↦ UFL form of the functionals that are to be recorded."""
+        return {name: resolved(form)(self.mechanics) for name, form in self.problem.outputs.items()}
+
+    def inside_out(self) -> bool:
+        """Return whether the structure is anywhere compressed to less than nothing at the state in q: none real is."""
+        mesh = self.structure.mesh
+        if self._stretch is None:
+            points = forms.quadrature_points(mesh, self.structure.V.element.basix_element.degree)
+            self._stretch = forms.expression(self.structure.stretch(self.mechanics.strains), points, self.comm)
+        cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local)
+        lowest = float(self._stretch.eval(mesh, cells).min()) if len(cells) else 1.0
+        return self.comm.allreduce(lowest, op=MPI.MIN) <= 0.0

@@ -1,87 +1,153 @@
-"""The equations of motion F(q, v, a; δq) = 0 of a scene, and their tangents.
+"""The equations of motion F(q, v, a; δq) = 0 of a problem, and their tangents, compiled.
 
 F = Σ virtual work of inertia, effects, stress, damping and loads; M = ∂F/∂a, C = ∂F/∂v, K = ∂F/∂q by `ufl.derivative`.
+What all systems share is here; the nonlinear one is in `nonlinear`, that of the linear theories in `affine`, and one with
+the angle of a free hub as one more unknown in `bordered`.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Collection
+from functools import cached_property
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import ufl
 from dolfinx import fem, la
-from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
+from petsc4py import PETSc
 
-from rotfem.equations.model import Model, integral_count
+from rotfem.equations.model import Model
+from rotfem.errors import ComputationError
 from rotfem.mechanics.motion import IDENTITY, Motion
 from rotfem.numerics import compat, forms
+from rotfem.numerics.linear import DirectSolver, Increment
 from rotfem.structures.turning_clamp import TurningClamp
 
 Array = npt.NDArray[np.float64]
 
+#: Part of K, relative to M in norm, that makes a singular M regular.
+TRACE = 1e-9
 
-class System:
-    """A compiled nonlinear system: residual and tangent at (q, v, a, t).
+#: Unknowns from which a factor is kept over steps, by the dimension of the mesh: a plate's matrix is dear to factorise.
+KEPT_FROM = {1: 5000, 2: 300}
+
+
+class System(ABC):
+    """A compiled system: residual and tangent at (q, v, a, t), and solutions with its tangent.
+
+    Args:
+        model: the terms.
+        moving: whether velocities and accelerations will be set, as in a history. A system that is not moving has
+            forms of its own at v = a = 0, which compile in a fraction of the time.
 
     Attributes:
         q, v, a: dolfinx functions that hold the state the forms are evaluated at.
-        linear: False; the affine system of a linear theory says True.
+        linear: whether its theory is linear in q.
+        solved_at_once: whether one solution of a step is exact.
         settled: whether M, C and K are those of the time before; a linear theory may know they are.
         scale: size of each local unknown (m or 1), by which increments are judged.
+        clamp: motion of the clamp, where the frame does not rotate with it.
+        jumps: times (s) at which what drives the system jumps.
+        seconds: time spent on assembly and solution of steps.
+        assembled: time spent on assembly while compiling, s.
     """
 
     linear = False
+    solved_at_once = False
     settled = False
+    hub: Any = None
+    jumps: tuple[float, ...] = ()
 
-    def __init__(self, model: Model):
-        self.model, self.structure, self.motion = model, model.structure, model.motion
+    def __init__(self, model: Model, moving: bool = True):
+        self.model, self.structure, self.motion, self.moving = model, model.structure, model.motion, moving
+        self.comm = model.comm
         k = self.structure.k
         self.q, self.v, self.a, self.V = k.q, k.v, k.a, self.structure.V
         self._state = tuple(x.x.array for x in (self.q, self.v, self.a))
         self.scale = self.structure.scales()
-        self.time = 0.0
-        #: Time spent on assembly while compiling, s.
-        self.assembled = 0.0
+        self.time = self.assembled = 0.0
+        self.seconds = {"assemble": 0.0, "solve": 0.0}
         self.bcs = [fem.dirichletbc(fem.Function(self.V), self.structure.clamped)]
         owned = self.V.dofmap.index_map.size_local
         nodes = self.structure.clamped[self.structure.clamped < owned]
         bs = self.V.dofmap.index_map_bs
         self.clamped = (nodes[:, None] * bs + np.arange(bs)).ravel()
-        self._shift_values: tuple[float, ...] = (1.0, 0.0, 1.0)
-        self._shifts = [self.structure.constant(c) for c in self._shift_values]
         self.clamp = TurningClamp(self.structure, self.motion) if model.fixed else None
-        self._energies = {name: forms.form(form) for name, form in model.energies().items()}
         self._b = la.vector(self.V.dofmap.index_map, self.V.dofmap.index_map_bs)
         self._b_array = self._b.array
         self.b = compat.wrap(self._b)
-        self._compile()
+        self._solver: DirectSolver | None = None
+        self._dx = Increment(self.V)
+        self.A = self._compile()
+        #: Whether a factor is kept for the steps that follow, where factorising is dear.
+        self.keeps_factor = self.A.getSize()[0] > KEPT_FROM[self.structure.mesh.topology.dim]
 
-    def _compile(self) -> None:
-        F, du = self.model.residual, ufl.TrialFunction(self.V)
-        parts = (ufl.derivative(F, x, du) for x in (self.q, self.v, self.a))
-        J = sum(c * form for c, form in zip(self._shifts, parts, strict=True))
-        self.integrals = {"F": integral_count(F), "J": integral_count(J)}
-        self._F, self._J = forms.form(F), forms.form(J)
-        self.A = fem_petsc.create_matrix(self._J)
+    # --- what kinds of systems differ in -----------------------------------------------------------------------------
+
+    @abstractmethod
+    def _compile(self) -> Any:
+        """Compile the forms; return a matrix of the pattern of all tangents."""
+
+    @abstractmethod
+    def residual(self) -> Any:
+        """Return −F at the state in q, v, a as a PETSc vector (reused), zero at clamped unknowns."""
+
+    @abstractmethod
+    def tangent(self, c_k: float, c_v: float, c_m: float) -> tuple[Any, bool]:
+        """Return (c_k K + c_v C + c_m M at the state, whether it changed); clamped rows are identity rows."""
+
+    @abstractmethod
+    def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
+        """Return a new matrix c_k K + c_v C + c_m M at the state with `diagonal` at clamped unknowns."""
+
+    @abstractmethod
+    def spin_derivative(self, c_v: float, c_m: float) -> Any:
+        """Return c_v ∂F/∂Omega + c_m ∂F/∂Omega' at the state: the speed along the axis varies; a PETSc vector."""
+
+    @property
+    @abstractmethod
+    def integrals(self) -> dict[str, int]:
+        """Number of integrals in F and J."""
 
     @property
     def current(self) -> bool:
         """Whether the last tangent is that of this time, but for its shifts; a linear theory may know it is."""
         return False
 
-    def set_state(self, q: Array, v: Array, a: Array) -> None:
-        """Write local dof arrays into the functions q, v, a that the forms are evaluated at."""
+    def leave_out(self, effects: Collection[str]) -> None:
+        """Switch effects off, all others on."""
+        for name, switch in self.model.switches.items():
+            switch.value = 0.0 if name in effects else 1.0
+
+    # --- state -------------------------------------------------------------------------------------------------------
+
+    @property
+    def held(self) -> System:
+        """The system of the structure alone, its hub held."""
+        return self
+
+    def zeros(self) -> Array:
+        """Return unknowns that are all zero."""
+        return np.zeros_like(self.q.x.array)
+
+    def start(self, q: Array) -> tuple[Array, Array]:
+        """Return (q, v) at t = 0 of a shape, given in the turning frame, that rests there."""
+        return (q, np.zeros_like(q)) if self.clamp is None else self.clamp.rigid(q, 0.0)
+
+    def set_state(self, q: Array, v: Array | None = None, a: Array | None = None) -> None:
+        """Write local dof arrays into the functions q, v, a that the forms are evaluated at; zero where None."""
         for target, value in zip(self._state, (q, v, a), strict=True):
-            target[:] = value
+            target[:] = 0.0 if value is None else value
 
     def set_time(self, t: float, motion: Motion | None = None, load_factor: float = 1.0) -> None:
-        """Write the frame and load constants of time t (s), for the scene's motion unless another is given.
+        """Write the frame and load constants of time t (s), for the problem's motion unless another is given.
 
         Args:
             t: time, s.
-            motion: another motion than the scene's.
+            motion: another motion than the problem's.
             load_factor: multiplies loads, gravity and base acceleration (not the spin).
         """
         motion = motion or self.motion
@@ -96,7 +162,7 @@ class System:
         if not self.structure.load_constants:
             return {}
         Q = motion.rotation(t) if self.model.fixed else IDENTITY
-        turning = {load.name for load in self.model.applied if load.dead and self.model.fixed}
+        turning = {load.name for load in self.model.mechanics.loads if load.dead and self.model.fixed}
         values = {}
         for name, (_, at) in self.structure.load_constants.items():
             value = np.atleast_1d(np.asarray(at(t), dtype=float))
@@ -104,38 +170,82 @@ class System:
             values[name] = Q[:n, :n] @ value if name in turning and n > 1 else value
         return values
 
-    def residual(self) -> Any:
-        """Return −F at the state in q, v, a as a PETSc vector (reused), zero at clamped unknowns."""
-        b = self._b_array
-        b[:] = 0.0
-        fem.assemble_vector(b, self._F)
-        if self.model.comm.size > 1:
-            self._b.scatter_reverse(la.InsertMode.add)
-        np.negative(b, out=b)
-        b[self.clamped] = 0.0
-        return self.b
+    def prescribe(self, t: float, q: Array, v: Array, a: Array) -> None:
+        """Write the motion of the clamp at time t (s), exact in q, v and a, where the frame does not turn with it."""
+        if self.clamp is not None:
+            dofs = self.clamp.dofs
+            q[dofs], v[dofs], a[dofs] = self.clamp.at(t)
 
-    def tangent(self, c_k: float, c_v: float, c_m: float) -> tuple[Any, bool]:
-        """Return (c_k K + c_v C + c_m M at the state, whether it changed); clamped rows are identity rows."""
-        self._set_shifts(c_k, c_v, c_m)
-        self.A.zeroEntries()
-        fem_petsc.assemble_matrix(self.A, self._J, self.bcs)
-        self.A.assemble()
-        return self.A, True
+    # --- solutions ---------------------------------------------------------------------------------------------------
 
-    def _set_shifts(self, *shifts: float) -> None:
-        if shifts != self._shift_values:
-            for constant, value in zip(self._shifts, shifts, strict=True):
-                constant.value = value
-            self._shift_values = shifts
+    def correction(self, shifts: tuple[float, float, float]) -> Array:
+        """Return −(c_k K + c_v C + c_m M)⁻¹ F at the state, Newton's correction of q (a local array, reused)."""
+        started = perf_counter()
+        b = self.residual()
+        A, changed = self.tangent(*shifts)
+        assembled = perf_counter()
+        dq = self._dx.solve(self.factor(A, changed), b)
+        self.seconds["assemble"] += assembled - started
+        self.seconds["solve"] += perf_counter() - assembled
+        return dq
 
-    def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
-        """Return a new matrix c_k K + c_v C + c_m M at the state with `diagonal` at clamped unknowns."""
-        self._set_shifts(c_k, c_v, c_m)
-        A = fem_petsc.create_matrix(self._J)
-        fem_petsc.assemble_matrix(A, self._J, self.bcs, diagonal)
-        A.assemble()
-        return A
+    def chord(self) -> Array:
+        """Return the correction of q at the state with the factor at hand."""
+        started = perf_counter()
+        b = self.residual()
+        assembled = perf_counter()
+        assert self._solver is not None
+        dq = self._dx.solve(self._solver, b)
+        self.seconds["assemble"] += assembled - started
+        self.seconds["solve"] += perf_counter() - assembled
+        return dq
+
+    def factor(self, A: Any, changed: bool = True) -> DirectSolver:
+        """Return the solver of the system's tangent, with a new factor where it has changed."""
+        if self._solver is None:
+            self._solver = DirectSolver(A)
+        elif changed:
+            self._solver.refresh()
+        return self._solver
+
+    @property
+    def factorisations(self) -> int:
+        """Number of matrix factorisations so far."""
+        return self._solver.factorisations if self._solver else 0
+
+    def acceleration(self, t: float) -> Array:
+        """Return what is to be added to a so that F = 0 at the state, M δa = −F; `set_time` has been called for t.
+
+        Unknowns without inertia (the rotation, where rotary inertia is absent or off) follow the others at once: their
+        acceleration keeps their equation in balance, K δa = 0 in their rows.
+        """
+        solver, massless = self.mass_solver()
+        b = self.residual()
+        b.array[massless] = 0.0
+        return self._dx.solve(solver, b)
+
+    def mass_solver(self) -> tuple[DirectSolver, Array]:
+        """Return a solver with M, where it has to be completed with K, and which owned unknowns have no inertia.
+
+        A tip mass beside the axis can leave a rotation without inertia in a direction that is no unknown of its own;
+        then so little of K is added to all of M that no motion with inertia feels it.
+        """
+        M = self.matrix(0.0, 0.0, 1.0, 1.0)
+        none = M.getDiagonal()
+        none.array[:] = none.array == 0.0
+        massless = np.asarray(none.array > 0.0)
+        if none.norm() > 0.0:
+            K = self.matrix(1.0, 0.0, 0.0, 1.0)
+            K.diagonalScale(none)
+            M.axpy(1.0, K, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        solver = DirectSolver(M)
+        try:
+            self._dx.solve(solver, self.residual())
+        except ComputationError:
+            K = self.matrix(1.0, 0.0, 0.0, 1.0)
+            M.axpy(TRACE * M.norm() / K.norm(), K, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            solver = DirectSolver(M)
+        return solver, massless
 
     def mass_damping_stiffness(self, keep: bool = True) -> tuple[Any, Any, Any]:
         """Return (M, C, K) at the state and time set; clamped unknowns have 1 in K, 0 in M and C.
@@ -145,17 +255,32 @@ class System:
         """
         return self.matrix(0, 0, 1, 0.0), self.matrix(0, 1, 0, 0.0), self.matrix(1, 0, 0, 1.0)
 
+    def with_hub(self, matrices: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
+        """Return M, C, K with the angle of a free hub as last unknown; there is none here."""
+        return matrices
+
+    # --- what is read of a state -------------------------------------------------------------------------------------
+
     def size(self, x: Array) -> float:
         """Return the largest entry of a local dof array in units of `scale`, over all ranks."""
         here = float(np.max(np.abs(x) / self.scale)) if x.size else 0.0
-        return here if self.model.comm.size == 1 else self.model.comm.allreduce(here, op=MPI.MAX)
+        return here if self.comm.size == 1 else self.comm.allreduce(here, op=MPI.MAX)
+
+    def increment_size(self, dq: Array) -> float:
+        """Return the size of a correction by which Newton is judged."""
+        return self.size(dq)
 
     def sizes(self, x: Array) -> Array:
         """Return the largest entry of each component in units of `scale`, over all ranks, shape (components,)."""
         here = (np.abs(x) / self.scale).reshape(-1, self.V.dofmap.index_map_bs).max(axis=0, initial=0.0)
-        if self.model.comm.size > 1:
-            self.model.comm.Allreduce(MPI.IN_PLACE, here, op=MPI.MAX)
+        if self.comm.size > 1:
+            self.comm.Allreduce(MPI.IN_PLACE, here, op=MPI.MAX)
         return np.asarray(here)
+
+    def tip(self, q: Array, t: float) -> Array:
+        """Return the values of the unknowns at the tip, relative to the turning frame, shape (components,)."""
+        tip = self.structure.tip_values(q)
+        return tip if self.clamp is None else self.clamp.relative(tip[None, :], self.structure.length, t)[0]
 
     def shape(self) -> dict[str, Array]:
         """Return the deflected structure at the state: position x (m), u1, u2 (m), alpha, … in the turning frame."""
@@ -164,17 +289,36 @@ class System:
             q = self.clamp.relative(q, coordinates["x"], self.time)
         return {**coordinates, **{name: q[:, i] for i, name in enumerate(self.structure.components)}}
 
+    @cached_property
+    def _energies(self) -> dict[str, Any]:
+        return {name: forms.form(form) for name, form in self.model.energies().items()}
+
+    @cached_property
+    def _outputs(self) -> dict[str, Any]:
+        return {name: forms.form(form) for name, form in self.model.outputs().items()}
+
+    def total(self, form: Any) -> float:
+        """Return the value of a compiled functional over all ranks; 0 of None."""
+        if form is None:
+            return 0.0
+        here = float(fem.assemble_scalar(form))
+        return here if self.comm.size == 1 else float(self.comm.allreduce(here))
+
+    def outputs(self) -> dict[str, float]:
+        """Return the functionals of the problem at the state and time set."""
+        return {name: self.total(form) for name, form in self._outputs.items()}
+
     def energies(self) -> dict[str, float]:
         """Return kinetic and strain energy and the Jacobi integral T2 − T0 + W + V, J.
 
         V is the potential of dead loads, gravity and base acceleration; the integral is constant while these and the
         spin are constant in the frame and nothing dissipates.
         """
-        comm = self.model.comm
-        e = {name: comm.allreduce(float(fem.assemble_scalar(form))) for name, form in self._energies.items()}
+        e = {name: self.total(form) for name, form in self._energies.items()}
         kinetic = e["T2"] + e.get("T1", 0.0) + e.get("T0", 0.0)
         if "momentum" in e:
-            jacobi = kinetic - self._spin() * e["momentum"] + e["strain"]
+            spin = self.motion.speed(self.time) * float(self.motion.axis[2])
+            jacobi = kinetic - spin * e["momentum"] + e["strain"]
         else:
             jacobi = e["T2"] - e.get("T0", 0.0) + e["strain"]
         potential = e.get("potential", 0.0)
@@ -183,12 +327,6 @@ class System:
             potential += float(self.structure.load_constants["tip_moment"][0].value[0]) * self.clamp.angle(self.time)
         return {"kinetic": kinetic, "strain": e["strain"], "jacobi": jacobi + potential}
 
-    def _spin(self) -> float:
-        return self.motion.speed(self.time) * float(self.motion.axis[2])
-
-
-def compile_system(model: Model) -> System:
-    """Return the affine system of a linear theory, the nonlinear one otherwise."""
-    from rotfem.equations.affine import AffineSystem
-
-    return AffineSystem(model) if model.theory.linear else System(model)
+    def given(self, new: Any, old: Any = None) -> Array | None:
+        """Return work, impulse and moment at the end of a step from an old to a new state; see the bordered system."""
+        return None

@@ -17,12 +17,14 @@ class Body:
         density: mass per measure (kg/m, kg) for a position, second moment of mass (kg·m, kg·m^2) for a director.
         measure: UFL measure the body lives on.
         is_position: whether x moves with the origin of the frame (positions do, directors do not).
+        effect: the effect that brings it, "" where it is always there.
     """
 
     x: Any
     density: Any
     measure: Any
     is_position: bool = True
+    effect: str = ""
 
     def rate(self, k: Kinematics) -> Any:
         """Return ẋ relative to the frame."""
@@ -35,6 +37,10 @@ class Body:
     def variation(self, k: Kinematics) -> Any:
         """Return δx."""
         return k.variation(self.x)
+
+    def turn(self, e: Any) -> Any:
+        """Return the change of x in a unit rigid turn about the axis e, e×x."""
+        return ufl.cross(self.resolve(e), self.x)
 
     def resolve(self, v: Any) -> Any:
         """Return a vector of the frame in the axes that x and its rates are given in, here those of the frame."""

@@ -1,4 +1,4 @@
-"""Prescribed motion of the floating frame, and the constants through which every form sees it.
+"""Prescribed motion of the floating frame.
 
 The frame {o; a_i} turns with angular velocity w(t) = Omega(t) e about the unit axis e, which is fixed in the frame,
 and its origin has the absolute acceleration a_o(t), both resolved in the frame (Simo & Vu-Quoc 1986, section 4).
@@ -7,18 +7,29 @@ and its origin has the absolute acceleration a_o(t), both resolved in the frame 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.scene import Scene
+from rotfem.mechanics.free_hub import FreeHub
 
 Scalar = Callable[[float], float]
 Array = npt.NDArray[np.float64]
 
 IDENTITY = np.eye(3)
+
+
+def no_acceleration(t: float) -> Array:
+    """Return a_o = 0."""
+    return np.zeros(3)
+
+
+def about(axis: npt.ArrayLike) -> Array:
+    """Return the unit vector along an axis of any length, shape (3,)."""
+    e = np.asarray(axis, dtype=float)
+    return np.asarray(e / np.linalg.norm(e))
 
 
 @dataclass(frozen=True)
@@ -32,14 +43,78 @@ class Motion:
         axis: unit vector e, frame components.
         base_acceleration: a_o(t), shape (3,), frame components, m/s^2.
         constant: whether Omega and a_o do not change with time.
+        is_spinning: whether Omega is anything but zero, as far as is known.
+        changes_speed: whether Omega changes, as far as is known.
+        is_accelerated: whether a_o is anything but zero.
+        knots: times (s) between which Omega is smooth.
+        smooth: whether it is known to be smooth between them.
+        settled: time (s) from which on Omega stays as it is, 0 if that is not known.
+        hub: what turns freely where the rotation is an unknown; its speed is then only that of the start.
     """
 
     speed: Scalar
     rate: Scalar
     angle: Scalar
     axis: Array
-    base_acceleration: Callable[[float], Array]
-    constant: bool
+    base_acceleration: Callable[[float], Array] = no_acceleration
+    constant: bool = False
+    is_spinning: bool = True
+    changes_speed: bool = True
+    is_accelerated: bool = False
+    knots: tuple[float, ...] = ()
+    smooth: bool = True
+    settled: float = 0.0
+    hub: FreeHub | None = None
+
+    @classmethod
+    def constant_speed(cls, speed: float, axis: npt.ArrayLike = (0, 0, 1), **more: Any) -> Motion:
+        """Return steady rotation at a speed (rad/s)."""
+        turning = (lambda t: speed), (lambda t: 0.0), (lambda t: speed * t)
+        state = {"constant": True, "is_spinning": speed != 0.0, "changes_speed": False}
+        return cls(*turning, about(axis), **(state | more))
+
+    @classmethod
+    def spin_up(cls, speed: float, duration: float, axis: npt.ArrayLike = (0, 0, 1), **more: Any) -> Motion:
+        """Return the smooth spin-up from rest to a speed (rad/s) in a time (s); see `smooth_spin_up`."""
+        turns = speed != 0.0
+        state = {"is_spinning": turns, "changes_speed": turns, "settled": duration}
+        return cls(*smooth_spin_up(speed, duration), about(axis), **(state | more))
+
+    @classmethod
+    def from_table(
+        cls, table: npt.ArrayLike, kind: str = "pchip", axis: npt.ArrayLike = (0, 0, 1), **more: Any
+    ) -> Motion:
+        """Return rotation at a tabulated speed; see `tabulated`."""
+        t, speeds = np.asarray(table, dtype=float).T
+        state = {
+            "is_spinning": bool(np.any(speeds != 0.0)),
+            "changes_speed": len(set(speeds)) > 1,
+            "knots": tuple(t),
+        }
+        return cls(*tabulated(table, kind), about(axis), **(state | more))
+
+    @classmethod
+    def from_functions(
+        cls,
+        speed: Scalar,
+        rate: Scalar | None = None,
+        angle: Scalar | None = None,
+        axis: npt.ArrayLike = (0, 0, 1),
+        **more: Any,
+    ) -> Motion:
+        """Return rotation at the speed that a function of time gives; see `from_callable`."""
+        return cls(*from_callable(speed, rate, angle), about(axis), **({"smooth": False} | more))
+
+    @classmethod
+    def free(cls, hub: FreeHub, axis: npt.ArrayLike = (0, 0, 1), **more: Any) -> Motion:
+        """Return the rotation of a free hub, an unknown; what is prescribed of it is its initial speed."""
+        state = {"is_spinning": True, "changes_speed": True, "constant": False, "hub": hub}
+        return replace(cls.constant_speed(hub.speed, axis), **(state | more))
+
+    @property
+    def is_coupled(self) -> bool:
+        """Whether a hub is free and feels the structure's motion."""
+        return self.hub is not None and self.hub.coupled
 
     def rotation(self, t: float) -> Array:
         """Return Q(t), shape (3, 3): inertial components = Q(t) · frame components (Rodrigues' formula)."""
@@ -49,7 +124,16 @@ class Motion:
 
     def at_speed(self, omega: float) -> Motion:
         """Return the same frame spinning at the constant speed omega (rad/s)."""
-        return Motion(lambda t: omega, lambda t: 0.0, lambda t: omega * t, self.axis, self.base_acceleration, True)
+        still = Motion.constant_speed(omega, self.axis)
+        return replace(still, base_acceleration=self.base_acceleration, is_accelerated=self.is_accelerated)
+
+    def with_changing_base(self) -> Motion:
+        """Return the motion, known to have an acceleration of its origin that changes with time."""
+        return replace(self, constant=False)
+
+    def final_speed(self, end: float) -> float:
+        """Return the speed (rad/s) at the end of a history (s), or when the motion has settled if that is later."""
+        return self.speed(max(end, self.settled))
 
 
 def smooth_spin_up(speed: float, duration: float) -> tuple[Scalar, Scalar, Scalar]:
@@ -124,23 +208,3 @@ def from_callable(speed: Scalar, rate: Scalar | None, angle: Scalar | None) -> t
         return last[1]
 
     return (lambda t: float(speed(t)), rate or difference, angle or quadrature)
-
-
-def motion_of(scene: Scene) -> Motion:
-    """Return the Motion a scene prescribes; a free hub (type "torque") starts from its initial speed."""
-    m = scene.motion
-    constant = False
-    if m.type == "spin_up":
-        omega, rate, angle = smooth_spin_up(m.speed, m.duration)
-    elif m.type == "table":
-        omega, rate, angle = tabulated(m.table, m.interpolation)
-    elif m.type == "callable":
-        omega, rate, angle = from_callable(m.speed, m.rate, m.angle)
-    else:
-        speed, constant = m.speed, True
-        omega, rate, angle = (lambda t: speed), (lambda t: 0.0), (lambda t: speed * t)
-    base = m.base_acceleration
-    acceleration: Callable[[float], Array] = base.at if base is not None else lambda t: np.zeros(3)
-    axis = np.asarray(m.axis, dtype=float)
-    steady_base = base is None or base.constant
-    return Motion(omega, rate, angle, axis / np.linalg.norm(axis), acceleration, constant and steady_base)

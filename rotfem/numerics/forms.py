@@ -16,9 +16,12 @@ from hashlib import sha1
 from pathlib import Path
 from typing import Any
 
+import basix
 import numpy.typing as npt
+import ufl
 from dolfinx import fem
 from dolfinx import jit as dolfinx_jit
+from ufl.algorithms import expand_derivatives
 
 #: What FFCx says when it has waited in vain, with the file that is in the way; what dolfinx says on the other ranks.
 IN_VAIN, ELSEWHERE = re.compile(r"remove (.*\.c)\)"), "Compilation failed on root node"
@@ -27,14 +30,24 @@ IN_VAIN, ELSEWHERE = re.compile(r"remove (.*\.c)\)"), "Compilation failed on roo
 PATIENCE = 1
 
 
-def form(f: Any) -> Any:
+#: Flags of the C compiler for what is assembled often, and for what is assembled a few times on a few cells.
+OFTEN, SELDOM = ["-O2", "-g0"], ["-O0", "-g0"]
+
+
+def form(f: Any, once: bool = False) -> Any:
     """Return a UFL form compiled, over the communicator of its mesh.
+
+    Args:
+        f: the form.
+        once: whether it is assembled a few times only; on lines that is compiled in haste.
 
     Raises:
         RuntimeError: the compiler failed.
     """
-    comm = f.ufl_domains()[0].ufl_cargo().comm
-    return _compiled(lambda options: fem.form(f, jit_options=options), comm, f.signature())
+    domain = f.ufl_domains()[0].ufl_cargo()
+    flags = SELDOM if once and domain.topology.dim == 1 else OFTEN
+    more = {"cffi_extra_compile_args": flags}
+    return _compiled(lambda options: fem.form(f, jit_options=options | more), domain.comm, f.signature())
 
 
 def expression(e: Any, points: npt.NDArray[Any], comm: Any) -> fem.Expression:
@@ -44,6 +57,25 @@ def expression(e: Any, points: npt.NDArray[Any], comm: Any) -> fem.Expression:
         RuntimeError: the compiler failed.
     """
     return _compiled(lambda options: fem.Expression(e, points, jit_options=options), comm, "expression")
+
+
+def without(f: Any, *functions: Any) -> Any:
+    """Return a UFL form or expression with these functions set to zero: what vanishes with them is not compiled."""
+    expanded = expand_derivatives(f)
+    if isinstance(expanded, ufl.Form) and expanded.empty():
+        return expanded
+    return ufl.replace(expanded, {u: ufl.as_vector([0] * u.ufl_shape[0]) for u in functions})
+
+
+def quadrature_points(domain: Any, number: int) -> Any:
+    """Return the points of the Gauss rule that has `number` of them in each direction, reference cell coordinates."""
+    return basix.make_quadrature(domain.basix_cell(), 2 * number - 1)[0]
+
+
+def integral_count(f: Any) -> int:
+    """Return the number of integrals of a UFL form after differentiation."""
+    expanded = expand_derivatives(f)
+    return 0 if expanded.empty() else len(expanded.integrals())
 
 
 def _compiled(compile_it: Callable[[dict[str, int]], Any], comm: Any, name: str) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -41,6 +42,11 @@ class Newton:
     iterations: int = 0
     roundoff: float = 0.0
     _kappa: float = field(default=np.inf, repr=False)
+
+    @classmethod
+    def of(cls, settings: Any, monotone: bool = False) -> Newton:
+        """Return the control that settings (`increment_tolerance`, `max_iterations`) ask for; monotone for steps."""
+        return cls(settings.increment_tolerance, settings.max_iterations, monotone)
 
     def solve(self, increment: Callable[[], float], size: Callable[[], float], chord: bool = False) -> int:
         """Repeat `increment` (solve, apply, return the scaled increment) until it is small; return the iterations.

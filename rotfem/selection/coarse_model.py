@@ -313,7 +313,7 @@ class Trial:
         return np.zeros_like(system.q.x.array)
 
     def _tip(self, switched: SwitchedSystem, q: Array) -> Array:
-        return np.asarray(switched.model.structure.probe(q))
+        return np.asarray(switched.model.structure.tip_values(q))
 
     def _sample(self, switched: SwitchedSystem, tips: list[Array], out: Outputs) -> None:
         out.tip = np.array(tips)[:, self._moved(switched)]

@@ -7,7 +7,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from rotfem.scene import Scene
+from rotfem.mechanics.problem import Problem
 from rotfem.structures.planar_beam import PlanarBeam
 from rotfem.structures.plate import Plate
 from rotfem.structures.spatial_beam import SpatialBeam
@@ -20,10 +20,10 @@ STRUCTURES: dict[str, Callable[..., Structure]] = {
 }
 
 
-def build(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Any:
-    """Return the discretised structure of a scene.
+def build(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD) -> Any:
+    """Return the discretised structure of a problem.
 
     Raises:
-        SceneError: a mesh or a section that cannot be computed with.
+        InputError: a mesh or a section that cannot be computed with.
     """
-    return STRUCTURES[scene.structure.type](scene, comm)
+    return STRUCTURES[problem.structure.type](problem, comm)

@@ -11,10 +11,10 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 from rotfem.mechanics.bodies import Strain
-from rotfem.scene import BeamMesh, PlanarBeamStructure, Scene, SpatialBeamStructure
+from rotfem.mechanics.problem import Problem
 from rotfem.structures.mode_names import in_phase, sign_changes
 from rotfem.structures.structure import Array, Structure
-from rotfem.structures.tip_values import Probe
+from rotfem.structures.tip_values import TipValues
 
 #: Polynomial degree that holds any section property of linearly tapered dimensions (I of a tube: fourth degree).
 TAPER_DEGREE = 4
@@ -42,8 +42,7 @@ class Beam(Structure):
     keeps shear and membrane locking away in the thin limit, inertia with k + 1.
 
     Args:
-        scene: a validated scene.
-        structure: its [structure] table.
+        problem: what is to be computed; its structure is a beam.
         comm: communicator the mesh is distributed over.
         knots: places along the beam that must be nodes, m.
     """
@@ -52,17 +51,10 @@ class Beam(Structure):
     #: Family ↦ the components whose kinetic energy counts, and the one whose nodes are counted.
     families: ClassVar[dict[str, tuple[tuple[int, ...], int]]]
 
-    def __init__(
-        self,
-        scene: Scene,
-        structure: PlanarBeamStructure | SpatialBeamStructure,
-        comm: MPI.Comm,
-        knots: tuple[float, ...],
-    ):
-        grid = scene.mesh
-        assert isinstance(grid, BeamMesh)
-        super().__init__(scene, structure.damping, comm)
-        self.length, self.hub_radius, self._section = structure.length, structure.hub_radius, structure.section
+    def __init__(self, problem: Problem, comm: MPI.Comm, knots: tuple[float, ...]):
+        super().__init__(problem, comm)
+        grid, s = problem.mesh, self.data
+        self.length, self.hub_radius, self._section = s.length, s.hub_radius, s.section
         nodes = beam_nodes(self.length, grid.elements, knots)
         interval = mesh.create_interval(comm, len(nodes) - 1, [0.0, self.length])
         x = interval.geometry.x
@@ -77,7 +69,7 @@ class Beam(Structure):
         self.tip = ufl.ds(1, domain=self.mesh, subdomain_data=tags)
         root = mesh.locate_entities_boundary(self.mesh, 0, lambda p: np.isclose(p[0], 0.0))
         self.clamped = fem.locate_dofs_topological(self.V, 0, root)
-        self.probe = Probe(self.V, np.array([self.length, 0.0, 0.0]))
+        self.tip_values = TipValues(self.V, np.array([self.length, 0.0, 0.0]))
 
     def stretch(self, strains: list[Strain]) -> Any:
         """1 + Γ₁, Γ₁ the axial strain."""

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import partial
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar
 
 import numpy as np
 import ufl
 from mpi4py import MPI
 
 from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
-from rotfem.scene import PlanarBeamStructure, Scene
+from rotfem.mechanics.problem import Problem
 from rotfem.structures.beam import Array, Beam
 
 
 class PlanarBeam(Beam):
-    """Discretised planar beam of a scene; all vectors are in frame components with a zero third one.
+    """Discretised planar beam; all vectors are in frame components with a zero third one.
 
     Args:
-        scene: a validated scene whose structure is a planar beam.
+        problem: what is to be computed; its structure is a planar beam.
         comm: communicator the mesh is distributed over.
     """
 
@@ -32,9 +32,9 @@ class PlanarBeam(Beam):
     #: Mode families: the components whose kinetic energy counts, and the one whose nodes are counted.
     families: ClassVar = {"axial": ((0,), 0), "lag": ((1, 2), 1)}
 
-    def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD):
-        self.data = s = cast(PlanarBeamStructure, scene.structure)
-        super().__init__(scene, s, comm, s.section.breakpoints)
+    def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):
+        s = problem.structure
+        super().__init__(problem, comm, s.section.breakpoints)
         for name in s.section.at(np.zeros(1)):
             self.section[name] = self.profile(name, partial(self._property, name))
         self.scalar("hub_radius", s.hub_radius)
@@ -66,22 +66,22 @@ class PlanarBeam(Beam):
         names = ("axial", "shear", "bending")
         return [Strain(n, g, c, self.dx_elastic) for n, g, c in zip(names, values, stiffness, strict=True)]
 
-    def bodies(self, effects: tuple[str, ...]) -> list[Body]:
-        """Return the bodies the effects call for: axis, section director, tip mass and its director."""
+    def bodies(self, effects: Collection[str]) -> list[Body]:
+        """Return axis, section director, tip mass and its director, as the effects call for them."""
         s, q = self.data, self.k.q
         r, director = self.position(q), self.triad(q)[1]
         bodies = [Body(r, self.section["mass_per_length"], self.dx)]
         if "rotary_inertia" in effects:
-            bodies.append(Body(director, self.section["rotary_inertia"], self.dx, is_position=False))
+            bodies.append(Body(director, self.section["rotary_inertia"], self.dx, False, "rotary_inertia"))
         if "tip_mass" in effects and s.tip_mass > 0:
-            bodies.append(Body(r, self.scalar("tip_mass", s.tip_mass), self.tip))
+            bodies.append(Body(r, self.scalar("tip_mass", s.tip_mass), self.tip, True, "tip_mass"))
         if "tip_mass" in effects and s.tip_inertia > 0:
-            bodies.append(Body(director, self.scalar("tip_inertia", s.tip_inertia), self.tip, is_position=False))
+            bodies.append(Body(director, self.scalar("tip_inertia", s.tip_inertia), self.tip, False, "tip_mass"))
         return bodies
 
     def loads(self) -> list[AppliedLoad]:
-        """Return the scene's non-zero loads; dead ones keep their direction in the frame, followers turn with t_i."""
-        moment, out = self.scene.loads.tip_moment, self.forces()
+        """Return the problem's non-zero loads; dead ones keep their direction in the frame, followers turn with t_i."""
+        moment, out = self.problem.loads.tip_moment, self.forces()
         if moment is not None and not moment.is_zero:
             m = self.add_load("tip_moment", 1, lambda t: np.ravel(moment.at(t))[-1:])
             out.append(AppliedLoad("tip_moment", m[0], self.k.q[2], self.tip))

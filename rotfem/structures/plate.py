@@ -6,9 +6,9 @@ shear energy are integrated with 2k − 1, bending and inertia fully: the elemen
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import cached_property, partial
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -17,19 +17,18 @@ from dolfinx import fem
 from mpi4py import MPI
 from scipy.spatial import Delaunay
 
-from rotfem.errors import ComputationError, SceneError
+from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
+from rotfem.mechanics.loads import Load
 from rotfem.mechanics.mindlin import PlateGradients, director, triad
-from rotfem.mechanics.strains import THEORIES
+from rotfem.mechanics.problem import Problem
 from rotfem.numerics import forms
-from rotfem.scene import MomentLoad, PlateMesh, PlateStructure, Scene
-from rotfem.scene.plates import locking
 from rotfem.structures.meshes.plate_mesh import PlateGrid, plate_grid
 from rotfem.structures.mode_names import plate_mode_name, turning
 from rotfem.structures.plate_loads import EdgeMoment, PointPlace, locate, point_measure
 from rotfem.structures.plate_section import constants, plane_stress, shear_moduli, thickness_field
 from rotfem.structures.structure import Array, Structure
-from rotfem.structures.tip_values import Probe
+from rotfem.structures.tip_values import TipValues
 
 #: Largest |alpha_2|, rad: at π/2 the two angles of the director meet their pole.
 LARGEST_TILT = 1.5
@@ -41,7 +40,7 @@ SEEN = 0.1
 SAME_PLACE = 1e-7
 
 
-def _moment(load: MomentLoad, t: float) -> Array:
+def _moment(load: Load, t: float) -> Array:
     return np.ravel(load.at(t))
 
 
@@ -51,14 +50,14 @@ def _voigt(tensor: Any) -> Any:
 
 
 class Plate(Structure):
-    """Discretised plate of a scene.
+    """Discretised plate.
 
     Args:
-        scene: a validated scene whose structure is a plate.
+        problem: what is to be computed; its structure is a plate.
         comm: communicator the mesh is distributed over.
 
     Raises:
-        SceneError: a mesh file that is no mesh of a plate, elements that lock on it, masses beside it, more processes
+        InputError: a mesh file that is no mesh of a plate, elements that lock on it, masses beside it, more processes
             than the mesh can be shared by.
     """
 
@@ -71,16 +70,14 @@ class Plate(Structure):
     #: Mode families: the components whose kinetic energy counts, and the one whose shape is looked at.
     families: ClassVar = {"bending": ((2, 3, 4), 2), "in-plane": ((0, 1), 1)}
 
-    def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD):
-        self.data = s = cast(PlateStructure, scene.structure)
-        super().__init__(scene, s.damping, comm)
-        settings = scene.mesh
-        assert isinstance(settings, PlateMesh)
-        self.grid: PlateGrid = plate_grid(scene, s, comm)
+    def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):
+        super().__init__(problem, comm)
+        s, settings = self.data, problem.mesh
+        self.grid: PlateGrid = plate_grid(problem, comm)
         cell = self.grid.mesh.topology.cell_name()
         k = settings.degree_on(cell)
-        if (why := locking(cell, k, settings.integration)) is not None:
-            raise SceneError(scene.file, "mesh.degree", k, why)
+        if (why := settings.locking_on(cell)) is not None:
+            raise InputError("mesh.degree", k, why)
         self.discretise(self.grid.mesh, k)
         self.check_shared()
         self._places = [self._place(row) for row in s.point_masses]
@@ -93,7 +90,7 @@ class Plate(Structure):
         self.length = float(np.max(high - low))
         self._has_tip = "tip" in self.grid.curve_names
         self.tip = self.grid.along("tip") if self._has_tip else None
-        self.probe = Probe(self.V, self._tip_point(low, high))
+        self.tip_values = TipValues(self.V, self._tip_point(low, high))
         self._properties()
 
     # --- mesh -------------------------------------------------------------------------------------------------------
@@ -142,7 +139,7 @@ class Plate(Structure):
 
     def director(self, q: Any) -> Any:
         """t, to second order in linear theories, exact in the others."""
-        return director(PlateGradients(q).alpha, exact=not THEORIES[self.scene.model.theory].linear)
+        return director(PlateGradients(q).alpha, exact=not self.problem.theory.linear)
 
     def turned(self, q: Any, v: Any) -> Any:
         """v_1 t_1 + v_2 t_2 + v_3 t."""
@@ -162,14 +159,14 @@ class Plate(Structure):
         part is, and in all of them a part of the shear by u_3 that the bending stiffness bounds.
         """
         membrane, shear, curvature = measures(self.k.q)
-        linear, p = THEORIES[self.scene.model.theory].linear, PlateGradients(self.k.q)
+        linear, p = self.problem.theory.linear, PlateGradients(self.k.q)
         h, Q, kG = self.section["thickness"], plane_stress(self.section), shear_moduli(self.section)
         strains = [
             Strain("membrane", _voigt(membrane), h * Q, self.dx if linear else self.dx_elastic),
             Strain("shear", shear, h * kG, self.dx_elastic),
             Strain("bending", _voigt(curvature), h**3 / 12 * Q, self.dx),
         ]
-        if self.scene.mesh.integration == "full":
+        if self.problem.mesh.integration == "full":
             return strains
         bounded = SEEN * h**3 / (h**2 + abs(ufl.JacobianDeterminant(self.mesh)))
         unseen = [] if linear else [("membrane", _voigt(ufl.sym(p.du)), SEEN * h * Q)]
@@ -178,54 +175,54 @@ class Plate(Structure):
             strains.append(Strain(f"{name}, reduced", value, -stiffness, self.dx_elastic))
         return strains
 
-    def bodies(self, effects: tuple[str, ...]) -> list[Body]:
-        """Return the bodies the effects call for: mid-surface, director, point and line masses."""
+    def bodies(self, effects: Collection[str]) -> list[Body]:
+        """Return mid-surface, director, point and line masses, as the effects call for them."""
         h, rho, r = self.section["thickness"], self.section["rho"], self.position(self.k.q)
         bodies = [Body(r, rho * h, self.dx)]
         if "rotary_inertia" in effects:
-            bodies.append(Body(self.director(self.k.q), rho * h**3 / 12, self.dx, is_position=False))
-        if "tip_mass" in effects:
-            for i, ((_, _, mass), place) in enumerate(zip(self.data.point_masses, self._places, strict=True), start=1):
-                at = point_measure(self.mesh, self._subdomains, i, place)
-                bodies.append(Body(r, self.scalar(f"point_mass_{i}", mass), at))
-            for name, mass in self.data.line_masses.items():
-                bodies.append(Body(r, self.scalar(f"line_mass_{name}", mass), self._on_curve(name)))
+            bodies.append(Body(self.director(self.k.q), rho * h**3 / 12, self.dx, False, "rotary_inertia"))
+        if "tip_mass" not in effects:
+            return bodies
+        for i, ((_, _, mass), place) in enumerate(zip(self.data.point_masses, self._places, strict=True), start=1):
+            at = point_measure(self.mesh, self._subdomains, i, place)
+            bodies.append(Body(r, self.scalar(f"point_mass_{i}", mass), at, True, "tip_mass"))
+        for name, mass in self.data.line_masses.items():
+            bodies.append(Body(r, self.scalar(f"line_mass_{name}", mass), self._on_curve(name), True, "tip_mass"))
         return bodies
 
     def _place(self, row: tuple[float, ...]) -> PointPlace:
         place = locate(self.mesh, (row[0], row[1]))
         if place is None:
             why = f"({row[0]:g}, {row[1]:g}) is not on the plate"
-            raise SceneError(self.scene.file, "structure.point_masses", list(row), why)
+            raise InputError("structure.point_masses", list(row), why)
         return place
 
     def _on_curve(self, name: str) -> Any:
         key, known = "structure.line_masses", self.grid.curve_names
         if name not in known:
-            raise SceneError(self.scene.file, key, name, f"is no named edge of the plate; there are {', '.join(known)}")
+            raise InputError(key, name, f"is no named edge of the plate; there are {', '.join(known)}")
         measure = self.grid.along(name)
         self.mesh.topology.create_connectivity(1, 2)
         edges = self.grid.edges(name)
         cells = self.mesh.topology.connectivity(1, 2)
         inner = sum(len(cells.links(e)) > 1 for e in edges)
         if self.comm.allreduce(inner) > 0:
-            raise SceneError(self.scene.file, key, name, "must be an edge of the plate's boundary")
+            raise InputError(key, name, "must be an edge of the plate's boundary")
         return measure
 
     # --- loads ------------------------------------------------------------------------------------------------------
 
     def loads(self) -> list[AppliedLoad]:
-        """Return the scene's non-zero loads: tip force and moment are spread over the edge "tip".
+        """Return the problem's non-zero loads: tip force and moment are spread over the edge "tip".
 
         A director has no rotation about itself: the third component of the moment is a couple of forces in the plane,
         e_3×(X − X_c) in direction and growing with the distance from the middle X_c of the edge.
         """
-        loads = self.scene.loads
+        loads = self.problem.loads
         for name in ("tip_force", "tip_moment"):
             load = getattr(loads, name)
             if load is not None and not load.is_zero and not self._has_tip:
-                raise SceneError(
-                    self.scene.file,
+                raise InputError(
                     f"loads.{name}",
                     None,
                     'needs a physical curve "tip" in the mesh, which it works on',

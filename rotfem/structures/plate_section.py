@@ -8,18 +8,17 @@ from typing import Any
 import ufl
 from dolfinx import fem
 
-from rotfem.scene import PlateStructure
 from rotfem.structures.meshes.plate_mesh import PlateGrid
 
 
-def constants(data: PlateStructure) -> dict[str, float]:
+def constants(data: Any) -> dict[str, float]:
     """Return name ↦ value of the material: moduli (Pa), Poisson's ratio, density (kg/m³), shear correction."""
     names = ("E1", "E2", "nu12", "G12", "G13", "G23") if data.is_orthotropic else ("E", "nu")
     values: dict[str, Any] = {name: getattr(data, name) for name in (*names, "rho", "shear_correction")}
     return {name: values["G12"] if value is None else value for name, value in values.items()}
 
 
-def thickness_field(data: PlateStructure, grid: PlateGrid) -> fem.Function:
+def thickness_field(data: Any, grid: PlateGrid) -> fem.Function:
     """Return the thickness (m) given by region, or along x; of a rectangle exactly, as the knots are mesh lines."""
     if isinstance(data.thickness, dict):
         h = fem.Function(fem.functionspace(grid.mesh, ("DG", 0)), name="thickness")

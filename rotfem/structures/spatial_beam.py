@@ -13,9 +13,9 @@ does not matter whether the axis is straight: sweep turns e about t_3⁰ by an a
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import partial
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar
 
 import numpy as np
 import ufl
@@ -24,32 +24,31 @@ from mpi4py import MPI
 
 from rotfem.errors import ComputationError
 from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
+from rotfem.mechanics.loads import Load
+from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.rotations import FULL_TURN
-from rotfem.mechanics.strains import THEORIES
-from rotfem.scene import MomentLoad, Scene, SpatialBeamStructure
-from rotfem.scene.values import evaluate
 from rotfem.structures.beam import Array, Beam
 from rotfem.structures.spatial_section import SectionForms, euler_tensor
 from rotfem.structures.swept_axis import swept_axis
 from rotfem.structures.turning_bodies import AppliedMoment, Director, OffsetMass, SectionTurn, rotation_part
 
 
-def _moment(load: MomentLoad, t: float) -> Array:
+def _moment(load: Load, t: float) -> Array:
     return np.ravel(load.at(t))
 
 
 class SpatialBeam(Beam):
-    """Discretised spatial beam of a scene.
+    """Discretised spatial beam.
 
     Directors and centres of mass turn with Λ of second order in θ in linear theories, which is all that enters there,
     and with the exact Λ in the others.
 
     Args:
-        scene: a validated scene whose structure is a spatial beam.
+        problem: what is to be computed; its structure is a spatial beam.
         comm: communicator the mesh is distributed over.
 
     Raises:
-        SceneError: a 6×6 mass matrix that no section has.
+        InputError: a 6×6 mass matrix that no section has.
     """
 
     type = "spatial_beam"
@@ -61,13 +60,13 @@ class SpatialBeam(Beam):
     #: Mode families: the components whose kinetic energy counts, and the one whose nodes are counted.
     families: ClassVar = {"axial": ((0,), 0), "lag": ((1, 5), 1), "flap": ((2, 4), 2), "torsion": ((3,), 3)}
 
-    def __init__(self, scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD):
-        self.data = s = cast(SpatialBeamStructure, scene.structure)
+    def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):
+        s = problem.structure
         knots = {x for x, _ in s.pretwist[1:-1]} if isinstance(s.pretwist, tuple) else set()
         bends = {x for x, _ in s.sweep[1:-1]} if isinstance(s.sweep, tuple) else set()
-        super().__init__(scene, s, comm, tuple(sorted(knots | bends | set(s.section.breakpoints))))
-        self._turn = SectionTurn(rotation_part(self.k.q), exact=not THEORIES[scene.model.theory].linear)
-        self._forms = SectionForms(self, s.section, scene.file)
+        super().__init__(problem, comm, tuple(sorted(knots | bends | set(s.section.breakpoints))))
+        self._turn = SectionTurn(rotation_part(self.k.q), exact=not problem.theory.linear)
+        self._forms = SectionForms(self, s.section)
         if s.hub_offset is None:
             self._root = ufl.as_vector((self.scalar("hub_radius", s.hub_radius), 0, 0))
         else:
@@ -92,7 +91,7 @@ class SpatialBeam(Beam):
             e_1, e_2 = ufl.cos(chi) * e_1 + ufl.sin(chi) * e_2, ufl.cos(chi) * e_2 - ufl.sin(chi) * e_1
         if isinstance(twist, tuple) and any(angle != 0.0 for _, angle in twist):
             angle = fem.Function(fem.functionspace(self.mesh, ("Lagrange", 1)), name="pretwist")
-            angle.interpolate(lambda x: evaluate(twist, x[0]))  # exact: the knots are nodes
+            angle.interpolate(lambda x: np.interp(x[0], *np.array(twist).T))  # exact: the knots are nodes
             self.section["pretwist"] = angle
         elif isinstance(twist, float) and twist != 0.0:
             angle = self.scalar("pretwist", twist)
@@ -133,42 +132,43 @@ class SpatialBeam(Beam):
         Gamma, K = measures(du, rotation_part(q), rotation_part(dq), self._triad[0])
         return self._forms.strains(self._along_triad(Gamma), self._along_triad(K), self.dx_elastic)
 
-    def bodies(self, effects: tuple[str, ...]) -> list[Body]:
-        """Return the bodies the effects call for: mass-centre line, section directors, tip body and its directors."""
+    def bodies(self, effects: Collection[str]) -> list[Body]:
+        """Return mass-centre line, section directors, tip body and its directors, as the effects call for them."""
         forms = self._forms
         bodies = [self._mass(forms.mass, forms.mass_center, self.dx)]
         if "rotary_inertia" in effects:
-            bodies += [self._director(axis, moment, self.dx) for axis, moment in forms.directors]
+            bodies += [self._director(axis, moment, self.dx, "rotary_inertia") for axis, moment in forms.directors]
         return bodies + self._tip_bodies() if "tip_mass" in effects else bodies
 
-    def _mass(self, density: Any, center: tuple[Any, ...], measure: Any) -> Body:
+    def _mass(self, density: Any, center: tuple[Any, ...], measure: Any, effect: str = "") -> Body:
         """Mass at r + Λ c; c has these components along t_i⁰."""
         r = self.position(self.k.q)
         if all(isinstance(c, int) for c in center):
-            return Body(r, density, measure)
+            return Body(r, density, measure, effect=effect)
         arm = self._from_triad(center)
-        return OffsetMass(r + self._turn.rotate(arm), density, measure, axis=r, arm=arm, turn=self._turn)
+        x = r + self._turn.rotate(arm)
+        return OffsetMass(x, density, measure, effect=effect, axis=r, arm=arm, turn=self._turn)
 
-    def _director(self, axis: tuple[Any, ...], density: Any, measure: Any) -> Body:
-        return Director(self._from_triad(axis), density, measure, turn=self._turn)
+    def _director(self, axis: tuple[Any, ...], density: Any, measure: Any, effect: str) -> Body:
+        return Director(self._from_triad(axis), density, measure, effect=effect, turn=self._turn)
 
     def _tip_bodies(self) -> list[Body]:
         s, out = self.data, []
         if s.tip_mass > 0:
             pairs = enumerate(s.tip_offset, start=1)
             center = tuple(self.scalar(f"tip_offset_{i}", c) if c != 0.0 else 0 for i, c in pairs)
-            out.append(self._mass(self.scalar("tip_mass", s.tip_mass), center, self.tip))
+            out.append(self._mass(self.scalar("tip_mass", s.tip_mass), center, self.tip, "tip_mass"))
         for i, (moment, axis) in enumerate(euler_tensor(s.tip_inertia_matrix), start=1):
             if isinstance(s.tip_inertia, float):  # isotropic: each director has half of it
                 density = self.scalar("tip_inertia", s.tip_inertia) / 2
             else:
                 density = self.scalar(f"tip_director_inertia_{i}", moment)
-            out.append(self._director(tuple(axis), density, self.tip))
+            out.append(self._director(tuple(axis), density, self.tip, "tip_mass"))
         return out
 
     def loads(self) -> list[AppliedLoad]:
-        """Return the scene's non-zero loads; dead ones keep their direction in the frame, followers turn with Λ."""
-        moment, out = self.scene.loads.tip_moment, self.forces()
+        """Return the problem's non-zero loads; dead ones keep their direction in the frame, followers turn with Λ."""
+        moment, out = self.problem.loads.tip_moment, self.forces()
         if moment is not None and not moment.is_zero:
             m, dead = self.add_load("tip_moment", 3, partial(_moment, moment)), moment.kind == "dead"
             M = m if dead else self._turn.rotate(m)

@@ -1,6 +1,6 @@
 """Stiffness and mass of a spatial beam's section as constants or fields of the forms.
 
-Where the scene gives stiffnesses and centres, axial strain and bending are those of the tension centre, shear those of
+Where stiffnesses are given with centres, axial strain and bending are those of the tension centre, shear those of
 the shear centre, and rotary inertia that of the mass centre: there both matrices are diagonal. Full 6×6 matrices are
 brought as near to that as they allow.
 """
@@ -14,9 +14,8 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 
-from rotfem.errors import SceneError
+from rotfem.errors import InputError
 from rotfem.mechanics.bodies import Strain
-from rotfem.scene.section_spatial import SpatialSection
 from rotfem.structures.beam import Array, Beam
 
 #: Strains in the order of the section matrices, and the stiffness of each.
@@ -53,8 +52,7 @@ class SectionForms:
 
     Args:
         beam: the beam; receives the constants.
-        section: section of its scene.
-        file: name of the scene, for errors.
+        section: its section; `central(x)` or full matrices `stiffness` and `mass` (see `rotfem.scene`).
 
     Attributes:
         mass: mass per length (kg/m).
@@ -62,13 +60,13 @@ class SectionForms:
         directors: (components along t_i⁰, second moment of mass in kg·m) of each director.
 
     Raises:
-        SceneError: a mass matrix that no section has.
+        InputError: a mass matrix that no section has.
     """
 
-    def __init__(self, beam: Beam, section: SpatialSection, file: str):
+    def __init__(self, beam: Beam, section: Any):
         self._beam, self._data = beam, section
         matrix = section.stiffness is not None
-        self._read_full(file) if matrix else self._read_central()
+        self._read_full() if matrix else self._read_central()
 
     def _read_central(self) -> None:
         beam, data = self._beam, self._data
@@ -84,7 +82,7 @@ class SectionForms:
     def _central(self, name: str, x: Array) -> Array:
         return self._data.central(x)[name]
 
-    def _read_full(self, file: str) -> None:
+    def _read_full(self) -> None:
         beam, data = self._beam, self._data
         for i, j in zip(*np.triu_indices(6), strict=True):
             if (value := np.array(data.stiffness)[i, j]) != 0.0:
@@ -94,7 +92,7 @@ class SectionForms:
         rigid = np.allclose(M[:3, :3], m * np.eye(3), rtol=0, atol=NEGLIGIBLE * m)
         if m <= 0.0 or not rigid or not np.allclose(coupling, -coupling.T, rtol=0, atol=1e-9 * np.max(np.abs(M))):
             reason = "must be that of rigid mass: m 1 with m > 0 for velocities, m times a skew matrix beside it"
-            raise SceneError(file, "structure.section.mass", [list(row) for row in M], reason)
+            raise InputError("structure.section.mass", [list(row) for row in M], reason)
         y, z = coupling[2, 0] / m, coupling[0, 1] / m
         c = np.array([coupling[1, 2] / m, y, z])
         self.mass = beam.section["mass_per_length"] = beam.constant(m)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import partial
 from typing import Any, ClassVar
 
@@ -13,11 +13,11 @@ from basix.ufl import element
 from dolfinx import default_scalar_type, fem
 from mpi4py import MPI
 
-from rotfem.errors import SceneError, shown
-from rotfem.mechanics.bodies import AppliedLoad, Damping, Kinematics, Strain
-from rotfem.scene import Load, Scene
-from rotfem.scene import clamp_and_damping as scene_common
-from rotfem.structures.tip_values import Probe
+from rotfem.errors import InputError, shown
+from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, Strain
+from rotfem.mechanics.loads import Load
+from rotfem.mechanics.problem import Problem
+from rotfem.structures.tip_values import TipValues
 
 Array = npt.NDArray[np.float64]
 
@@ -32,8 +32,7 @@ class Structure:
     A subclass makes the mesh, calls `discretise`, and gives positions, strains, bodies and loads.
 
     Args:
-        scene: a validated scene.
-        damping: [structure.damping] of the scene.
+        problem: what is to be computed; of it the structure reads its own data, mesh, loads and theory.
         comm: communicator the mesh is distributed over.
 
     Attributes:
@@ -41,7 +40,7 @@ class Structure:
         dx, dx_elastic: measures of full integration, and of that which keeps locking away.
         tip: measure of the end of the structure that tip forces work on; tip_size is its extent (m, or 1 of a point).
         clamped: local numbers of the clamped nodes.
-        probe: reads the values at the tip.
+        tip_values: reads the values at the tip.
     """
 
     type: ClassVar[str]
@@ -63,11 +62,11 @@ class Structure:
     dx_elastic: Any
     tip: Any
     clamped: npt.NDArray[np.int32]
-    probe: Probe
+    tip_values: TipValues
     length: float
 
-    def __init__(self, scene: Scene, damping: scene_common.Damping, comm: MPI.Comm):
-        self.scene, self.comm, self._damping = scene, comm, damping
+    def __init__(self, problem: Problem, comm: MPI.Comm):
+        self.problem, self.comm, self.data = problem, comm, problem.structure
         self.size = len(self.components)
         #: Section properties by name: a constant each where the section is uniform, a field each where it is not.
         self.section: dict[str, Any] = {}
@@ -86,16 +85,15 @@ class Structure:
         """Refuse a mesh that leaves a process without cells or unknowns, where it would fail or wait for ever.
 
         Raises:
-            SceneError: says how many cells there are; on every process the same.
+            InputError: says how many cells there are; on every process the same.
         """
         cells, nodes = self.mesh.topology.index_map(self.mesh.topology.dim), self.V.dofmap.index_map
         idle = self.comm.allreduce(int(min(cells.size_local, nodes.size_local) == 0))
         if idle == 0:
             return
-        file = getattr(self.scene.structure, "mesh", None)
-        key, value = ("structure.mesh", shown(file)) if file else ("mesh.elements", self.scene.mesh.elements)
-        raise SceneError(
-            self.scene.file,
+        file = getattr(self.data, "mesh", None)
+        key, value = ("structure.mesh", shown(file)) if file else ("mesh.elements", self.problem.mesh.elements)
+        raise InputError(
             key,
             value,
             f"the mesh (cells: {cells.size_global}) cannot be shared by {self.comm.size} processes: {idle} would have "
@@ -120,6 +118,18 @@ class Structure:
         """Return an expression that is 1 where the structure is undeformed and at most 0 where it is inside out."""
         raise NotImplementedError
 
+    def strains(self, measures: Callable[..., tuple[Any, ...]]) -> list[Strain]:
+        """Return the strains of one theory's measures with the stiffness of the structure."""
+        raise NotImplementedError
+
+    def bodies(self, effects: Collection[str]) -> list[Body]:
+        """Return all mass that is always there or that one of these effects brings, which it then names."""
+        raise NotImplementedError
+
+    def loads(self) -> list[AppliedLoad]:
+        """Return the problem's non-zero loads."""
+        raise NotImplementedError
+
     # --- constants and fields -----------------------------------------------------------------------------------
 
     def constant(self, value: npt.ArrayLike) -> fem.Constant:
@@ -127,20 +137,20 @@ class Structure:
         return fem.Constant(self.mesh, np.asarray(value, dtype=default_scalar_type))
 
     def scalar(self, name: str, value: float) -> fem.Constant:
-        """Return the constant of a named number of the scene, one and the same at every call."""
+        """Return the constant of a named number, one and the same at every call."""
         return self.scalars.setdefault(name, self.constant(value))
 
     # --- damping and loads --------------------------------------------------------------------------------------
 
     def damping(self) -> Damping:
         """Return Kelvin–Voigt plus stiffness-proportional viscosity, and the mass-proportional rate."""
-        d = self._damping
+        d = self.data.damping
         eta, a0 = d.kelvin_voigt + d.rayleigh[1], d.rayleigh[0]
         return Damping(self.constant(eta) if eta > 0 else None, self.constant(a0) if a0 > 0 else None)
 
     def forces(self) -> list[AppliedLoad]:
-        """Return the scene's non-zero forces; dead ones keep their direction in the frame, followers turn."""
-        loads, q = self.scene.loads, self.k.q
+        """Return the problem's non-zero forces; dead ones keep their direction in the frame, followers turn."""
+        loads, q = self.problem.loads, self.k.q
         out = []
         for name, load, measure in (
             ("tip_force", loads.tip_force, self.tip),

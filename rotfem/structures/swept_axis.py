@@ -9,14 +9,13 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from rotfem.scene.values import Profile
 from rotfem.structures.beam import Array, Beam
 
 #: Degree of the polynomials the axis of an arc is held in; strains see its exact angle, only inertia sees these.
 AXIS_DEGREE = 5
 
 
-def swept_axis(beam: Beam, sweep: Profile) -> tuple[Any, Any, Any]:
+def swept_axis(beam: Beam, sweep: Any) -> tuple[Any, Any, Any]:
     """Return (χ, ∫ cos χ dX, ∫ sin χ dX) of a sweep profile: angle (rad) and position of the axis (m) over X.
 
     Args:

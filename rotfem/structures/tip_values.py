@@ -1,4 +1,4 @@
-"""Values of a field at a node, known on every rank."""
+"""Values of the unknowns at the tip, known on every rank."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy.typing as npt
 from dolfinx import fem
 
 
-class Probe:
+class TipValues:
     """Reads a blocked Lagrange function at the node nearest to a point.
 
     Args:

@@ -13,9 +13,9 @@ import ufl
 from dolfinx import mesh
 from mpi4py import MPI
 
-from rotfem.errors import SceneError, shown
+from rotfem.errors import InputError, shown
+from rotfem.mechanics.problem import Problem
 from rotfem.numerics import compat
-from rotfem.scene import PlateMesh, PlateStructure, Scene
 from rotfem.structures.beam import beam_nodes
 from rotfem.structures.meshes.checks import BadMesh
 from rotfem.structures.meshes.gmsh_file import read
@@ -51,21 +51,21 @@ class PlateGrid:
         return ufl.ds(self.curve_names[name], domain=self.mesh, subdomain_data=self.curves)
 
 
-def plate_grid(scene: Scene, data: PlateStructure, comm: MPI.Comm) -> PlateGrid:
-    """Return the mesh of a scene's plate.
+def plate_grid(problem: Problem, comm: MPI.Comm) -> PlateGrid:
+    """Return the mesh of a plate.
 
     Raises:
-        SceneError: a mesh file that is no mesh of a plate; on every process the same.
+        InputError: a mesh file that is no mesh of a plate; on every process the same.
     """
+    data = problem.structure
     if data.mesh is None:
-        return rectangle(data, scene.mesh, comm)
+        return rectangle(data, problem.mesh, comm)
     wanted = tuple(data.thickness) if isinstance(data.thickness, dict) else ()
-    return from_file(scene.file, Path(data.mesh), wanted, comm)
+    return from_file(Path(data.mesh), wanted, comm)
 
 
-def rectangle(data: PlateStructure, grid: Any, comm: MPI.Comm) -> PlateGrid:
+def rectangle(data: Any, grid: Any, comm: MPI.Comm) -> PlateGrid:
     """Return 0 ≤ x ≤ length, |y| ≤ width/2 with even cells; the knots of a tapered thickness are mesh lines."""
-    assert isinstance(grid, PlateMesh) and data.length is not None and data.width is not None
     cell = mesh.CellType.quadrilateral if grid.cell == "quadrilateral" else mesh.CellType.triangle
     knots = tuple(x for x, _ in data.thickness[1:-1]) if isinstance(data.thickness, tuple) else ()
     stations = beam_nodes(data.length, grid.elements[0], knots)
@@ -87,17 +87,16 @@ def rectangle(data: PlateStructure, grid: Any, comm: MPI.Comm) -> PlateGrid:
     return PlateGrid(out, mesh.meshtags(out, 1, flat, np.concatenate(tags)[order]), names)
 
 
-def from_file(scene: str, path: Path, regions: Sequence[str], comm: MPI.Comm) -> PlateGrid:
+def from_file(path: Path, regions: Sequence[str], comm: MPI.Comm) -> PlateGrid:
     """Return the mesh of a gmsh file: physical curves (one is "clamped") and the physical surface "plate" or regions.
 
     Args:
-        scene: name of the scene file, for errors.
         path: the file.
         regions: names of the surfaces that must make up the plate; if empty, "plate" does.
         comm: MPI communicator; the file is read on rank 0.
 
     Raises:
-        SceneError: the file is no such mesh; on every process the same.
+        InputError: the file is no such mesh; on every process the same.
     """
     import gmsh
 
@@ -114,7 +113,7 @@ def from_file(scene: str, path: Path, regions: Sequence[str], comm: MPI.Comm) ->
     why, groups = comm.bcast((why, groups))
     try:
         if why is not None:
-            raise SceneError(scene, "structure.mesh", shown(path), why)
+            raise InputError("structure.mesh", shown(path), why)
         out, cell_tags, edge_tags = compat.model_to_mesh(gmsh.model, comm)
     finally:
         if comm.rank == 0 and gmsh.isInitialized():

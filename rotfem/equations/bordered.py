@@ -1,0 +1,282 @@
+"""A system with the angle psi of a free hub as one more unknown, the last (Yigit, Scott & Ulsoy 1988).
+
+Its equation is the virtual work of all effects in a rigid turn δx = e×x δpsi about the axis e,
+
+    I_R psi'' + c psi' + (work in the turn) = M(t),
+
+so it holds the angular momentum of hub and structure, exactly and for every theory. Together with F(q, …) = 0 it is
+solved by block elimination, one factorisation for both right-hand sides.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from petsc4py import PETSc
+
+from rotfem.equations.nonlinear import assembled, by_spin
+from rotfem.equations.system import System
+from rotfem.errors import ComputationError
+from rotfem.mechanics import work
+from rotfem.mechanics.motion import Motion
+from rotfem.numerics import compat, forms
+from rotfem.numerics.linear import Increment
+
+Array = npt.NDArray[np.float64]
+
+
+class HubRow:
+    """The hub's equation at the state that is written into a system, and its derivatives.
+
+    Args:
+        system: equations of motion of the structure.
+    """
+
+    def __init__(self, system: System):
+        self.system, self.model = system, system.model
+        assert system.model.hub is not None
+        self.angle, self.hub = system.model.hub, system.model.hub.hub
+        self.coupled = "hub_coupling" in self.model.effects
+        moments = self.model.work(self.model.turn)
+        self._moment = forms.form(sum(moments.values()))
+        outside = [term for name, term in moments.items() if not self.model.acting[name].momentum]
+        self._outside = forms.form(sum(outside)) if outside else None
+        self._work = sum(moments.values())
+        self._vector = compat.create_vector(system.V)
+
+    @cached_property
+    def _momentum(self) -> Any:
+        return forms.form(work.momentum(self.model.mechanics, self.model.turn))
+
+    @cached_property
+    def _by_spin(self) -> list[Any]:
+        return [by_spin(self.model, self._work, name) for name in ("w", "dw")]
+
+    @cached_property
+    def _row(self) -> tuple[list[Any], Any]:
+        k = self.system.structure.k
+        shifts = [self.system.structure.constant(0.0) for _ in range(3)]
+        parts = (ufl.derivative(self._work, x, k.dq) for x in (k.q, k.v, k.a))
+        return shifts, forms.form(sum(c * part for c, part in zip(shifts, parts, strict=True)))
+
+    def _value(self, form: Any) -> float:
+        """Evaluate a functional; of an uncoupled hub with the structure undeformed and at rest in the frame."""
+        system = self.system
+        if self.coupled:
+            return system.total(form)
+        state = [x.x.array.copy() for x in (system.q, system.v, system.a)]
+        system.set_state(np.zeros_like(state[0]))
+        value = system.total(form)
+        system.set_state(*state)
+        return value
+
+    def residual(self, t: float, after: bool = False) -> float:
+        """Return I_R psi'' + c psi' + (work in the turn) − M(t), N·m; after a jump of the torque, or before."""
+        _, speed, rate = self.angle.values
+        own = self.hub.inertia * rate + self.hub.damping * speed
+        return float(own + self._value(self._moment) - self.hub.torque.at(t, after))
+
+    def diagonal(self, c_v: float, c_m: float) -> float:
+        """Return ∂(residual)/∂psi: c_v ∂/∂psi' + c_m ∂/∂psi''."""
+        by_speed = self._value(self._by_spin[0]) + self.hub.damping
+        by_rate = self._value(self._by_spin[1]) + self.hub.inertia
+        return c_v * by_speed + c_m * by_rate
+
+    def row(self, shifts: tuple[float, float, float]) -> Any:
+        """Return ∂(residual)/∂q as a PETSc vector (reused); zero if uncoupled."""
+        if not self.coupled:
+            self._vector.zeroEntries()
+            return self._vector
+        constants, form = self._row
+        for constant, value in zip(constants, shifts, strict=True):
+            constant.value = value
+        return assembled(form, self.system.V, self.system.clamped, self._vector)
+
+    def outside(self) -> float:
+        """Return the moment of all forces that are no change of momentum, with torque and brake left out (N·m)."""
+        return -self._value(self._outside) if self._outside is not None else 0.0
+
+    def angular_momentum(self) -> float:
+        """Return the angular momentum of hub and structure about the axis, kg·m²/s (rigid structure if uncoupled)."""
+        return self.hub.inertia * float(self.angle.values[1]) + self._value(self._momentum)
+
+    def kinetic(self) -> float:
+        """Return ½ I_R psi'², J."""
+        return 0.5 * self.hub.inertia * float(self.angle.values[1]) ** 2
+
+
+class BorderedSystem:
+    """A system of a structure, bordered by the angle of its hub; unknowns are those of the structure, then psi.
+
+    What it does not say itself is that of the structure's system.
+
+    Args:
+        inner: equations of motion of the structure, its model with a free hub.
+    """
+
+    solved_at_once = False
+    keeps_factor = False  # the border changes with the speed
+    clamp = None
+
+    def __init__(self, inner: System):
+        self.inner, self.row = inner, HubRow(inner)
+        self.angle = self.row.angle
+        self.hub = self.row.hub
+        self.jumps = self.hub.torque.jumps
+        self._dz = Increment(inner.V)
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "inner":
+            raise AttributeError(name)
+        return getattr(self.inner, name)
+
+    # --- state -------------------------------------------------------------------------------------------------------
+
+    @property
+    def held(self) -> System:
+        """The system of the structure alone, its hub held."""
+        return self.inner
+
+    def zeros(self) -> Array:
+        """Return unknowns that are all zero."""
+        return np.append(self.inner.zeros(), 0.0)
+
+    def start(self, q: Array) -> tuple[Array, Array]:
+        """Return (q, v) of a structure at rest in the frame, with angle and speed that the hub starts with."""
+        self.angle.start()
+        psi, speed, _ = self.angle.values
+        return np.append(q, psi), np.append(np.zeros_like(q), speed)
+
+    def set_state(self, q: Array, v: Array | None = None, a: Array | None = None) -> None:
+        """Write unknowns and their rates, and with them the speed of the frame; without rates that is left as it is."""
+        if v is None or a is None:
+            self.inner.set_state(q[: len(self.inner.q.x.array)])
+            return
+        self.angle.values[:] = q[-1], v[-1], a[-1]
+        self.inner.set_state(q[:-1], v[:-1], a[:-1])
+        self.inner.set_time(self.inner.time)
+
+    def set_time(self, t: float, motion: Motion | None = None, load_factor: float = 1.0) -> None:
+        """Write the frame and load constants of time t (see `System.set_time`)."""
+        self.inner.set_time(t, motion, load_factor)
+
+    def leave_out(self, effects: Any) -> None:
+        """Switch effects off, all others on, and put the hub back to its start."""
+        self.inner.leave_out(effects)
+        self.row.coupled = "hub_coupling" in self.inner.model.effects and "hub_coupling" not in effects
+        self.angle.start()
+
+    # --- solutions ---------------------------------------------------------------------------------------------------
+
+    def correction(self, shifts: tuple[float, float, float]) -> Array:
+        """Return Newton's correction of (q, psi): A y = R, A z = b, dpsi = (r − c·y)/(d − c·z)."""
+        s, row, (_, c_v, c_m) = self.inner, self.row, shifts
+        started = perf_counter()
+        R = s.residual()
+        A, changed = s.tangent(*shifts)
+        b, c = s.spin_derivative(c_v, c_m), row.row(shifts)
+        r, d = -row.residual(s.time), row.diagonal(c_v, c_m)
+        assembled_at = perf_counter()
+        out = self._eliminated(s.factor(A, changed), (R, b), c, r, d)
+        s.seconds["assemble"] += assembled_at - started
+        s.seconds["solve"] += perf_counter() - assembled_at
+        return out
+
+    def acceleration(self, t: float) -> Array:
+        """Return what is to be added to a so that the equations hold at the state (after a jump of the torque)."""
+        s, row, shifts = self.inner, self.row, (0.0, 0.0, 1.0)
+        solver, massless = s.mass_solver()
+        R, b = s.residual(), s.spin_derivative(0.0, 1.0)
+        R.array[massless] = 0.0
+        b.array[massless] = 0.0
+        return self._eliminated(solver, (R, b), row.row(shifts), -row.residual(t, after=True), row.diagonal(0.0, 1.0))
+
+    def _eliminated(self, solver: Any, right: tuple[Any, Any], c: Any, r: float, d: float) -> Array:
+        y, z = self.inner._dx.solve(solver, right[0]), self._dz.solve(solver, right[1])
+        n, comm = len(c.array), self.inner.comm
+        sums = np.array([c.array @ y[:n], c.array @ z[:n]])
+        cy, cz = comm.allreduce(sums) if comm.size > 1 else sums
+        if d == cz:
+            raise ComputationError("the hub equation is singular")
+        dpsi = float((r - cy) / (d - cz))
+        return np.append(y - z * dpsi, dpsi)
+
+    def with_hub(self, matrices: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
+        """Return M, C, K of the structure with the angle of the hub as last unknown, about the state and speed set."""
+        out = []
+        for A, shifts, factors in zip(
+            matrices,
+            ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)),
+            ((0.0, 1.0), (1.0, 0.0), (0.0, 0.0)),
+            strict=True,
+        ):
+            row, column = self.row.row(shifts).array.copy(), self.inner.spin_derivative(*factors).array.copy()
+            out.append(bordered(A, row, column, self.row.diagonal(*factors)))
+        return out[0], out[1], out[2]
+
+    # --- what is read of a state -------------------------------------------------------------------------------------
+
+    def size(self, x: Array) -> float:
+        """Return the largest entry of the structure's unknowns in units of their scale, over all ranks."""
+        return self.inner.size(x[:-1])
+
+    def increment_size(self, dq: Array) -> float:
+        """Return the size of a correction by which Newton is judged, the angle's among them."""
+        return max(self.inner.size(dq[:-1]), abs(float(dq[-1])))
+
+    def sizes(self, x: Array) -> Array:
+        """Return the largest entry of each component of the structure's unknowns (see `System.sizes`)."""
+        return self.inner.sizes(x[: len(self.inner.q.x.array)])
+
+    def given(self, new: Any, old: Any = None) -> Array:
+        """Return (work, impulse, moment) at the end of a step, by the trapezoidal rule over it, or of a first state.
+
+        Work (J) is that of torque and brake; the angular impulse (N·m·s) has the moment (N·m) of all forces from
+        outside in it too, which is kept for the next step.
+        """
+        if old is None:
+            return np.array([0.0, 0.0, self.moment(new)])
+        turn, h = new.q[-1] - old.q[-1], new.t - old.t
+        speed, before = 0.5 * (new.v[-1] + old.v[-1]), old.given
+        mean = 0.5 * (self.hub.torque.at(old.t, after=True) + self.hub.torque.at(new.t))
+        brake, moment = self.hub.damping, self.moment(new)
+        work_done = before[0] + mean * turn - brake * speed**2 * h
+        impulse = before[1] + (mean + 0.5 * (before[2] + moment)) * h - brake * turn
+        return np.array([work_done, impulse, moment])
+
+    def moment(self, state: Any) -> float:
+        """Return the moment of all forces from outside but torque and brake at a state (N·m)."""
+        if self.row._outside is None:
+            return 0.0
+        self.set_time(state.t)
+        self.set_state(state.q, state.v, state.a)
+        return self.row.outside()
+
+
+def bordered(A: Any, row: Array, column: Array, corner: float) -> Any:
+    """Return [[A, column], [row, corner]] as a new PETSc matrix; the last rank holds the new row.
+
+    Args:
+        A: square PETSc matrix.
+        row, column: owned parts of the vectors.
+        corner: the last diagonal entry.
+    """
+    comm = A.comm.tompi4py()
+    size, last = A.getSize()[0], comm.rank == comm.size - 1
+    indptr, indices, data = A.getValuesCSR()
+    ends = indptr[1:]
+    data, indices = np.insert(data, ends, column), np.insert(indices, ends, size)
+    indptr = indptr + np.arange(len(indptr), dtype=indptr.dtype)
+    whole = np.concatenate(comm.allgather(row))
+    if last:
+        data = np.concatenate([data, whole, [corner]])
+        indices = np.concatenate([indices, np.arange(size + 1)]).astype(indptr.dtype)
+        indptr = np.append(indptr, indptr[-1] + size + 1).astype(indptr.dtype)
+    local = len(row) + int(last)
+    shape = ((local, size + 1), (local, size + 1))
+    return PETSc.Mat().createAIJ(shape, csr=(indptr, indices.astype(indptr.dtype), data), comm=A.comm)

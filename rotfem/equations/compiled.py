@@ -1,0 +1,29 @@
+"""A problem's equations, compiled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mpi4py import MPI
+
+from rotfem.equations.affine import AffineSystem
+from rotfem.equations.bordered import BorderedSystem
+from rotfem.equations.model import Model
+from rotfem.equations.nonlinear import NonlinearSystem
+from rotfem.mechanics.problem import Problem
+
+
+def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bool = True) -> Any:
+    """Return the system of a problem: affine for a linear theory, bordered where the hub is free.
+
+    Args:
+        problem: what is to be computed.
+        comm: communicator the structure is distributed over.
+        moving: whether it will be stepped in time; a steady state and its modes do without what only that needs.
+
+    Raises:
+        InputError: a mesh or a section that cannot be computed with.
+    """
+    model = Model(problem, comm)
+    system = (AffineSystem if problem.theory.linear else NonlinearSystem)(model, moving)
+    return system if model.hub is None else BorderedSystem(system)

@@ -1,0 +1,141 @@
+"""The system of a nonlinear theory: residual and tangent are assembled at every state."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem, la
+from dolfinx.fem import petsc as fem_petsc
+from ufl.algorithms import expand_derivatives
+
+from rotfem.equations.system import System
+from rotfem.numerics import compat, forms
+
+
+class NonlinearSystem(System):
+    """Residual F and tangent J = c_k K + c_v C + c_m M of a history; at rest F(q, 0, 0), K, C and M one by one."""
+
+    def _compile(self) -> Any:
+        self._shift_values: tuple[float, ...] = (1.0, 0.0, 1.0)
+        self._shifts = [self.structure.constant(c) for c in self._shift_values]
+        if self.moving:
+            self._F = forms.form(self.model.residual)
+            self._pattern = self._J = forms.form(self._tangent_form)
+        else:
+            self._F = forms.form(self._at_rest(self.model.residual), once=True)
+            self._pattern = self._parts["K"]
+        return fem_petsc.create_matrix(self._pattern)
+
+    @cached_property
+    def _tangent_form(self) -> Any:
+        F, du = self.model.residual, ufl.TrialFunction(self.V)
+        parts = (ufl.derivative(F, x, du) for x in (self.q, self.v, self.a))
+        return sum(c * form for c, form in zip(self._shifts, parts, strict=True))
+
+    def _at_rest(self, form: Any) -> Any:
+        return forms.without(form, self.v, self.a)
+
+    @cached_property
+    def _parts(self) -> dict[str, Any]:
+        """K, C and M at v = a = 0, compiled; None where one vanishes."""
+        F, du = self.model.residual, ufl.TrialFunction(self.V)
+        out = {}
+        for name, x in (("K", self.q), ("C", self.v), ("M", self.a)):
+            form = self._at_rest(ufl.derivative(F, x, du))
+            out[name] = None if form.empty() else forms.form(form, once=True)
+        return out
+
+    @property
+    def integrals(self) -> dict[str, int]:
+        """Number of integrals in F and J."""
+        return {"F": forms.integral_count(self.model.residual), "J": forms.integral_count(self._tangent_form)}
+
+    def residual(self) -> Any:
+        """Return −F at the state in q, v, a as a PETSc vector (reused), zero at clamped unknowns."""
+        return self._negative(self._F)
+
+    def residual_in_motion(self) -> Any:
+        """Return −F as `residual` does, of a system that is not moving with velocities and accelerations too."""
+        return self._negative(self._F_in_motion)
+
+    @cached_property
+    def _F_in_motion(self) -> Any:
+        return self._F if self.moving else forms.form(self.model.residual, once=True)
+
+    def _negative(self, form: Any) -> Any:
+        b = self._b_array
+        b[:] = 0.0
+        fem.assemble_vector(b, form)
+        if self.comm.size > 1:
+            self._b.scatter_reverse(la.InsertMode.add)
+        np.negative(b, out=b)
+        b[self.clamped] = 0.0
+        return self.b
+
+    def tangent(self, c_k: float, c_v: float, c_m: float) -> tuple[Any, bool]:
+        """Return (c_k K + c_v C + c_m M at the state, True); clamped rows are identity rows."""
+        self.A.zeroEntries()
+        self._assemble(self.A, (c_k, c_v, c_m), 1.0)
+        return self.A, True
+
+    def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
+        """Return a new matrix c_k K + c_v C + c_m M at the state with `diagonal` at clamped unknowns."""
+        A = fem_petsc.create_matrix(self._pattern)
+        self._assemble(A, (c_k, c_v, c_m), diagonal)
+        return A
+
+    def _assemble(self, A: Any, shifts: tuple[float, float, float], diagonal: float) -> None:
+        if self.moving:
+            if shifts != self._shift_values:
+                for constant, value in zip(self._shifts, shifts, strict=True):
+                    constant.value = value
+                self._shift_values = shifts
+            fem_petsc.assemble_matrix(A, self._J, self.bcs, diagonal)
+            A.assemble()
+            return
+        wanted = [name for name, c in zip("KCM", shifts, strict=True) if c != 0.0]
+        assert shifts == tuple(float(name in wanted) for name in "KCM") and len(wanted) == 1
+        if self._parts[wanted[0]] is not None:
+            fem_petsc.assemble_matrix(A, self._parts[wanted[0]], self.bcs, 0.0)
+        A.assemble()
+        d = A.getDiagonal()
+        d.array[self.clamped] = diagonal
+        A.setDiagonal(d)
+
+    @cached_property
+    def _by_spin(self) -> list[Any]:
+        return [by_spin(self.model, self.model.residual, name) for name in ("w", "dw")]
+
+    def spin_derivative(self, c_v: float, c_m: float) -> Any:
+        """Return c_v ∂F/∂Omega + c_m ∂F/∂Omega' at the state, a PETSc vector, zero at clamped unknowns."""
+        out = compat.create_vector(self.V)
+        for form, factor in zip(self._by_spin, (c_v, c_m), strict=True):
+            if form is not None and factor != 0.0:
+                out.axpy(factor, assembled(form, self.V, self.clamped))
+        return out
+
+
+def by_spin(model: Any, form: Any, name: str) -> Any:
+    """Compile ∂form/∂s where the constant w (or its rate) is w + s e; None if it is not in the form."""
+    constant = model.frame.constants.get(name)
+    if constant is None:
+        return None
+    s = ufl.variable(model.structure.constant(0.0))
+    axis = model.motion.axis[-constant.value.size :]
+    shifted = ufl.as_vector([constant[i] + s * float(e) for i, e in enumerate(axis)])
+    derivative = expand_derivatives(ufl.diff(ufl.replace(form, {constant: shifted}), s))
+    return None if derivative.empty() else forms.form(derivative)
+
+
+def assembled(form: Any, V: fem.FunctionSpace, clamped: Any, b: Any = None) -> Any:
+    """Return a linear form as a PETSc vector (b if given, overwritten), zero at clamped unknowns."""
+    b = compat.create_vector(V) if b is None else b
+    with b.localForm() as local:
+        local.set(0.0)
+    fem_petsc.assemble_vector(b, form)
+    b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
+    b.array[clamped] = 0.0
+    return b

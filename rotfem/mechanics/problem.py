@@ -1,0 +1,74 @@
+"""The problem: what is to be computed, between what a user says and the equations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import Any, Self
+
+from rotfem.errors import InputError
+from rotfem.mechanics.effects import Effect, Work, present_effects
+from rotfem.mechanics.loads import Applied, Loads
+from rotfem.mechanics.motion import Motion
+from rotfem.mechanics.outputs import Functional
+from rotfem.mechanics.theories import Theory
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem:
+    """A structure with a theory, effects, a motion, and loads. Immutable; `replace` makes variants.
+
+    Attributes:
+        structure: what moves: its type, dimensions, section and damping (`PlanarBeam`, `SpatialBeam`, `Plate`).
+        motion: how the frame turns and moves.
+        mesh: elements, degree and integration.
+        theory: strain measures; a name of the registry or a `Theory`.
+        effects: names of the effects that may be in; None for all. Those without data are left out.
+        loads: gravity and applied loads.
+        frame: "rotating", or "inertial" (translates with the hub, does not rotate).
+        terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form, as of an `Effect`.
+        outputs: functionals that are recorded, by name, mechanics ↦ UFL form, as of an `Output`.
+    """
+
+    structure: Any
+    motion: Motion
+    mesh: Any
+    theory: Theory = "reissner"  # type: ignore[assignment]
+    effects: tuple[str, ...] | None = None
+    loads: Applied = field(default_factory=Loads)
+    frame: str = "rotating"
+    terms: Mapping[str, Work] = field(default_factory=dict)
+    outputs: Mapping[str, Functional] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if isinstance(self.theory, str):
+            object.__setattr__(self, "theory", Theory.registry[self.theory])
+        for name in ("terms", "outputs"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+        if not self.theory.holds_for(self.structure.type):
+            kinds = ", ".join(self.theory.strains)
+            why = f"has no strains for a {self.structure.type}; it has them for {kinds}"
+            raise InputError("model.theory", self.theory.name, why)
+        for name in self.effects or ():
+            if name not in Effect.registry:
+                raise InputError("model.effects", name, f"is no effect; allowed: {', '.join(Effect.registry.names)}")
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a variant with other values of some attributes."""
+        return replace(self, **changes)
+
+    def effective_effects(self) -> tuple[str, ...]:
+        """Return the names of the effects that are in the equations: wanted, and with data."""
+        present = present_effects(self)
+        return present if self.effects is None else tuple(name for name in present if name in self.effects)
+
+    def all_effects(self) -> Self:
+        """Return the problem with all effects that it has data for."""
+        return self.replace(effects=None)
+
+    @property
+    def spins(self) -> Self:
+        """The problem of a structure that spins at a speed to be given, as in a sweep over speeds."""
+        motion = replace(self.motion, is_spinning=True)
+        return self.replace(motion=motion)

@@ -1,0 +1,199 @@
+"""The virtual work of every effect, stated once for a free variation of the motion.
+
+The absolute acceleration of a point x of the frame is (theory section 1)
+
+    ẍ + 2 w×ẋ + w×(w×x) + ẇ×x + a_o,
+
+and each term is an effect of its own. A director (a vector that does not move with the origin) feels all but a_o and
+gravity; that is its rotary inertia. With `Variation` δx = δ(x(q)) the work is that of the equations of motion, with
+`RigidTurn` δx = e×x δψ it is the moment about the axis e, the hub's row. Momentum and energies are sums over the same
+bodies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import ufl
+from ufl import cross
+
+from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, Strain
+from rotfem.mechanics.frame import Frame
+
+
+@dataclass(frozen=True)
+class Variation:
+    """The variation δq of the unknowns."""
+
+    k: Kinematics
+    within_frame = True
+
+    def of(self, moving: Body | AppliedLoad) -> Any:
+        """Return δx of a body, or of what a load works on."""
+        return moving.variation(self.k)
+
+
+@dataclass(frozen=True)
+class RigidTurn:
+    """The variation δψ = 1 of a turn of the frame with all that is in it about the unit axis e."""
+
+    e: Any
+    within_frame = False
+
+    def of(self, moving: Body | AppliedLoad) -> Any:
+        """Return e×x of a body, or of what a load works on."""
+        return moving.turn(self.e)
+
+
+@dataclass(frozen=True)
+class Mechanics:
+    """What effects act on.
+
+    Attributes:
+        bodies: all mass, part by part.
+        strains: what stores the energy.
+        loads: applied forces and moments.
+        k: the unknowns and their rates.
+        frame: w, dw, a_o and gravity.
+        damping: coefficients.
+        structure: the discretised structure, for what else an effect wants of it (measures, fields, the position).
+    """
+
+    bodies: list[Body]
+    strains: list[Strain]
+    loads: list[AppliedLoad]
+    k: Kinematics
+    frame: Frame
+    damping: Damping
+    structure: Any
+
+    def carried(self, body: Body) -> Any:
+        """Return w×x, the velocity of a point that rests in the frame, in the axes of the body."""
+        return cross(body.resolve(self.frame.w), body.x)
+
+    def velocity(self, body: Body) -> Any:
+        """Return ẋ + w×x (ẋ in a frame that does not rotate), the origin's apart, in the axes of the body."""
+        rate = body.rate(self.k)
+        return rate if self.frame.fixed else rate + self.carried(body)
+
+    def positions(self) -> list[Body]:
+        """Return the bodies of the structure itself that are points of it, not directors: its axis or mid-surface."""
+        return [body for body in self.bodies if body.is_position and not body.effect]
+
+
+# --- terms of the residual --------------------------------------------------------------------------------------------
+
+
+def _of_acceleration(m: Mechanics, delta: Any, acceleration: Callable[[Body], Any]) -> Any:
+    """Return Σ ∫ ρ a·δx over the bodies that feel an acceleration."""
+    work: Any = 0
+    for body in m.bodies:
+        a = acceleration(body)
+        if a is not None:
+            work += body.density * ufl.inner(a, delta.of(body)) * body.measure
+    return work
+
+
+def inertia(m: Mechanics, delta: Any) -> Any:
+    """ẍ, the acceleration relative to the frame."""
+    return _of_acceleration(m, delta, lambda body: body.second_rate(m.k))
+
+
+def coriolis(m: Mechanics, delta: Any) -> Any:
+    """2 w×ẋ."""
+    return _of_acceleration(m, delta, lambda body: 2 * cross(body.resolve(m.frame.w), body.rate(m.k)))
+
+
+def centrifugal(m: Mechanics, delta: Any) -> Any:
+    """w×(w×x)."""
+    return _of_acceleration(m, delta, lambda body: cross(body.resolve(m.frame.w), m.carried(body)))
+
+
+def euler(m: Mechanics, delta: Any) -> Any:
+    """ẇ×x."""
+    return _of_acceleration(m, delta, lambda body: cross(body.resolve(m.frame.dw), body.x))
+
+
+def base(m: Mechanics, delta: Any) -> Any:
+    """a_o, felt by positions only."""
+    return _of_acceleration(m, delta, lambda body: m.frame.a_o if body.is_position else None)
+
+
+def gravity(m: Mechanics, delta: Any) -> Any:
+    """−g, felt by positions only."""
+    return _of_acceleration(m, delta, lambda body: -m.frame.gravity if body.is_position else None)
+
+
+def internal(m: Mechanics, delta: Variation) -> Any:
+    """δ(∫ ½ Γ·C Γ): the work of the stresses is the derivative of the stored energy."""
+    return sum(ufl.derivative(s.energy, m.k.q, m.k.dq) for s in m.strains)
+
+
+def damping(m: Mechanics, delta: Variation) -> Any:
+    """Kelvin–Voigt stress C η Γ̇ and Rayleigh damping a0 M + a1 K.
+
+    The mass part acts on the velocity relative to the frame; the stiffness part a1 adds to η.
+    """
+    work: Any = 0
+    k, eta, a0 = m.k, m.damping.stiffness, m.damping.mass
+    if eta is not None:
+        work += sum(ufl.inner(eta * s.force(k.rate(s.value)), k.variation(s.value)) * s.measure for s in m.strains)
+    if a0 is not None:
+        work += sum(a0 * b.density * ufl.inner(b.rate(k), delta.of(b)) * b.measure for b in m.bodies)
+    return work
+
+
+def loads(m: Mechanics, delta: Any) -> Any:
+    """−Σ ∫ (force · δx) over applied forces and moments."""
+    return -sum(ufl.inner(load.force, delta.of(load)) * load.measure for load in m.loads)
+
+
+# --- momentum and energies --------------------------------------------------------------------------------------------
+
+
+def momentum(m: Mechanics, delta: Any) -> Any:
+    """Return Σ ∫ ρ (ẋ + w×x)·δx, a UFL form: of a rigid turn the angular momentum about its axis."""
+    return sum(b.density * ufl.inner(delta.of(b), m.velocity(b)) * b.measure for b in m.bodies)
+
+
+def strain_energy(m: Mechanics) -> Any:
+    """Return ∫ ½ Γ·C Γ (J), a UFL form."""
+    return sum(s.energy for s in m.strains)
+
+
+def kinetic_parts(m: Mechanics) -> dict[str, Callable[[], Any]]:
+    """Return T2, T1, T0 of T = ∫ ½ρ |ẋ + w×x|², by degree in the velocities relative to the frame (J), as UFL forms."""
+
+    def product(first: Callable[[Body], Any], second: Callable[[Body], Any]) -> Any:
+        return sum(b.density * ufl.inner(first(b), second(b)) * b.measure for b in m.bodies)
+
+    def relative(body: Body) -> Any:
+        return body.rate(m.k)
+
+    return {
+        "T2": lambda: 0.5 * product(relative, relative),
+        "T1": lambda: product(relative, m.carried),
+        "T0": lambda: 0.5 * product(m.carried, m.carried),
+    }
+
+
+def _potential_in(m: Mechanics, field: Any) -> Any:
+    """Return −∫ ρ field·x over the positions, field an acceleration (m/s²)."""
+    return -sum(b.density * ufl.inner(field, b.x) * b.measure for b in m.bodies if b.is_position)
+
+
+def potential_of_base(m: Mechanics) -> Any:
+    """∫ ρ a_o·x."""
+    return _potential_in(m, -m.frame.a_o)
+
+
+def potential_of_gravity(m: Mechanics) -> Any:
+    """−∫ ρ g·x."""
+    return _potential_in(m, m.frame.gravity)
+
+
+def potential_of_loads(m: Mechanics) -> Any:
+    """−Σ ∫ force·x over the dead loads."""
+    return -sum(ufl.inner(load.force, load.x) * load.measure for load in m.loads if load.dead)
