@@ -24,7 +24,7 @@ from rotfem.scene import Scene, as_scene
 
 
 class Problem(ProblemData):
-    """A problem and the verbs of a script: `march`, `steady`, `system`. See `rotfem.mechanics.problem` for its parts."""
+    """A problem and the verbs of a script: `march`, `steady`, `system` (its parts: `rotfem.mechanics.problem`)."""
 
     @classmethod
     def of(
