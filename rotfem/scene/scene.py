@@ -12,37 +12,33 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, Discriminator, Field, PrivateAttr, Tag, ValidationError, model_validator
 
+from rotfem import registry
 from rotfem.errors import SceneError
 from rotfem.scene.beams import PlanarBeamStructure, SpatialBeamStructure, Structure
-from rotfem.scene.consistency import check_frame, check_initial, check_loads, check_mesh, check_planar
+from rotfem.scene.consistency import (
+    check_frame,
+    check_initial,
+    check_loads,
+    check_mesh,
+    check_planar,
+    check_theory,
+)
 from rotfem.scene.loads import Load, Loads, MomentLoad, Signal
 from rotfem.scene.motion import (
     AnyMotion,
     CallableMotion,
     ConstantMotion,
     SpinUpMotion,
+    Swept,
     TableMotion,
     TorqueMotion,
 )
 from rotfem.scene.plates import PlateStructure
-from rotfem.scene.settings import (
-    EFFECTS,
-    FRAME_EFFECTS,
-    THEORIES,
-    BeamMesh,
-    Initial,
-    Model,
-    Modes,
-    PlateMesh,
-    Solver,
-    Time,
-)
+from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh, Solver, Time
 from rotfem.scene.toml import apply_overrides, read_toml, scene_error, set_key, to_builtin
 from rotfem.scene.values import SceneModel
 
 __all__ = [
-    "EFFECTS",
-    "THEORIES",
     "BeamMesh",
     "CallableMotion",
     "ConstantMotion",
@@ -181,6 +177,11 @@ class Scene(SceneModel):
         applied: Load | None = getattr(self.loads, load)
         return applied is not None and applied.kind == "dead"
 
+    @property
+    def frame(self) -> str:
+        """Frame to which displacements refer: ``rotating`` or ``inertial``."""
+        return self.model.frame
+
     def effective_effects(self, spinning: bool | None = None) -> tuple[str, ...]:
         """Effects that this scene includes.
 
@@ -192,24 +193,16 @@ class Scene(SceneModel):
                 the scene's own speed, says True.
 
         Returns:
-            Names in the order of `EFFECTS`.
+            Names in the order in which effects are registered.
         """
-        motion, structure = self.motion, self.structure
-        spins = motion.is_spinning if spinning is None else spinning
-        present = {
-            "coriolis": spins,
-            "centrifugal": spins,
-            "euler": motion.changes_speed,
-            "rotary_inertia": structure.has_rotary_inertia,
-            "base": motion.is_accelerated,
-            "gravity": any(self.loads.gravity),
-            "damping": not structure.damping.is_zero,
-            "tip_mass": structure.has_tip_mass,
-            "hub_coupling": isinstance(motion, TorqueMotion) and motion.coupled,
-        }
-        excluded = FRAME_EFFECTS if self.model.frame == "inertial" else ()
-        wanted = EFFECTS if self.model.effects == "auto" else self.model.effects
-        return tuple(name for name in EFFECTS if name in wanted and present[name] and name not in excluded)
+        seen = self if spinning is None else self.model_copy(update={"motion": Swept(self.motion, spinning)})
+        listed, rotates = self.model.effects, self.frame == "rotating"
+        return tuple(
+            effect.name
+            for effect in registry.effects
+            if (listed == "auto" or effect.name in listed) and (rotates or not effect.of_rotation)
+            if effect.present(seen)
+        )
 
     def check_run(self) -> None:
         """Checks that the scene can be run: a time history needs times, a steady state a constant speed.
@@ -241,6 +234,7 @@ class Scene(SceneModel):
             check_planar(self.motion, self.loads)
         check_loads(self.structure, self.loads)
         check_mesh(self.structure, self.mesh)
+        check_theory(self.structure, self.model)
         check_frame(self.structure, self.motion, self.model)
         check_initial(self.structure, self.motion, self.initial)
         return self

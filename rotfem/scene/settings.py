@@ -3,44 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PlainValidator, model_validator
 
-from rotfem.errors import show
-from rotfem.scene.values import Bounds, Count, Number, Positive, SceneModel, did_you_mean, problem
+from rotfem import registry
+from rotfem.scene.names import as_name, as_names
+from rotfem.scene.values import Bounds, Count, Number, Positive, SceneModel, problem
 
-Theory = Literal["linear", "consistent_linear", "von_karman_linear", "second_order", "von_karman", "reissner"]
-THEORIES: tuple[str, ...] = get_args(Theory)
 
-# The order in which effects are always listed.
-EFFECTS: tuple[str, ...] = (
-    "coriolis",
-    "centrifugal",
-    "euler",
-    "rotary_inertia",
-    "base",
-    "gravity",
-    "damping",
-    "tip_mass",
-    "hub_coupling",
-)
-# In the inertial frame these are not terms of the equations but follow from the motion of the clamp.
-FRAME_EFFECTS: tuple[str, ...] = ("coriolis", "centrifugal", "euler")
+def _as_theory(value: Any) -> str:
+    return as_name(value, registry.theories)
 
 
 def _as_effects(value: Any) -> str | tuple[str, ...]:
-    if value == "auto":
-        return "auto"
-    allowed = f'allowed: "auto" or a list of {", ".join(EFFECTS)}'
-    if not isinstance(value, list | tuple):
-        raise problem("", value, allowed)
-    for name in value:
-        if name not in EFFECTS:
-            raise problem("", value, f"{show(name)} is not an effect; {did_you_mean(name, EFFECTS)}{allowed}")
-        if list(value).count(name) > 1:
-            raise problem("", value, f"{show(name)} is listed twice")
-    return tuple(value)
+    return "auto" if value == "auto" else as_names(value, registry.effects, '"auto" or ')
+
+
+def _as_scheme(value: Any) -> str:
+    return as_name(value, registry.schemes)
 
 
 def _as_plate_elements(value: Any) -> tuple[int, int]:
@@ -58,14 +39,14 @@ class Model(SceneModel):
     """The ``[model]`` table.
 
     Attributes:
-        theory: Order of the strain measure.
-        effects: ``"auto"``, or the names of the effects to include.
+        theory: Name of a registered theory, the order of the strain measure.
+        effects: ``"auto"``, or names of registered effects, those to include.
         frame: Frame to which displacements refer.
         tolerance: Relative model error up to which effects are left out and the theory may be poorer, or ``None``.
         on_exceed: What a run does that leaves the range its model was chosen for.
     """
 
-    theory: Theory = "reissner"
+    theory: Annotated[str, PlainValidator(_as_theory)] = "reissner"
     effects: Annotated[str | tuple[str, ...], PlainValidator(_as_effects)] = "auto"
     frame: Literal["rotating", "inertial"] = "rotating"
     tolerance: Positive | None = None
@@ -162,7 +143,7 @@ class Time(SceneModel):
     tolerance: Positive | None = None
     max_step: Positive | None = None
     min_step: Positive | None = None
-    scheme: Literal["newmark", "generalised_alpha"] = "generalised_alpha"
+    scheme: Annotated[str, PlainValidator(_as_scheme)] = "generalised_alpha"
     spectral_radius: Annotated[float, PlainValidator(Bounds(ge=0.0, le=1.0).number)] | None = None
     beta: Positive | None = None
     gamma: Annotated[float, PlainValidator(Bounds(ge=0.5).number)] | None = None
