@@ -75,8 +75,7 @@ class Registry(Generic[E]):
         return self._entries[name]
 
     def __contains__(self, name: object) -> bool:
-        self._load()
-        return name in self._entries
+        return name in self.names
 
     def __iter__(self) -> Iterator[E]:
         self._load()

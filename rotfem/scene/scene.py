@@ -34,7 +34,8 @@ from rotfem.scene.motion import (
     TorqueMotion,
 )
 from rotfem.scene.plates import PlateStructure
-from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh, Solver, Time
+from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver
+from rotfem.scene.stepping import Time
 from rotfem.scene.toml import apply_overrides, read_toml, scene_error, set_key, to_builtin
 from rotfem.scene.values import SceneModel
 
@@ -84,6 +85,7 @@ class Scene(SceneModel):
         time: Time interval and scheme, or ``None``.
         modes: What modes to compute.
         solver: Settings of Newton's method.
+        output: What to compute beside what is always recorded.
     """
 
     structure: Structure = Field(description="a table [structure]")
@@ -95,6 +97,7 @@ class Scene(SceneModel):
     time: Time | None = None
     modes: Modes = Modes()
     solver: Solver = Solver()
+    output: OutputTable = OutputTable()
 
     _name: str = PrivateAttr("scene")
     _file: str = PrivateAttr("scene")
@@ -167,6 +170,8 @@ class Scene(SceneModel):
     def to_dict(self) -> dict[str, Any]:
         """Tables of everything that was set and all defaults, fit for JSON and TOML; functions become their names."""
         tables: dict[str, Any] = _plain(self)
+        if not self.output.quantities:
+            del tables["output"]
         if isinstance(self.structure, PlateStructure) and self.structure.mesh is not None:
             without = {"elements", "cell"} | ({"degree"} - self.mesh.model_fields_set)
             tables["mesh"] = {key: value for key, value in tables["mesh"].items() if key not in without}
@@ -268,7 +273,7 @@ def as_scene(scene: Scene | str | Path | Mapping[str, Any]) -> Scene:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, BaseModel):
-        fields = {name: getattr(value, name) for name in type(value).model_fields}
+        fields = {name: getattr(value, name) for name in type(value).model_fields} | (value.model_extra or {})
         return {name: _plain(entry) for name, entry in fields.items() if entry is not None}
     if isinstance(value, Mapping):
         return {key: _plain(entry) for key, entry in value.items()}
