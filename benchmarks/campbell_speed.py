@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from rotfem import campbell
-from rotfem.results.results import CampbellResult
+from rotfem.results import CampbellResult
 
 #: First four frequencies at the last speed, with Coriolis force; no finite elements, converged to the digits shown.
 REFERENCE = {

@@ -26,7 +26,7 @@ from _demo import FIRST_RANK, command_line, report, save, say
 from matplotlib.figure import Figure
 
 import rotfem
-from rotfem.results.results import CampbellResult
+from rotfem.results import CampbellResult
 
 SCENE = Path(__file__).with_name("disk_campbell.toml")
 REFERENCE = 213.464695  # rad/s; Legendre–Ritz with 14 functions of the radius, Kirchhoff's plate

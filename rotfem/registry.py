@@ -9,7 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from importlib import import_module
-from typing import Any, ClassVar, Generic, Protocol, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar, cast
+
+if TYPE_CHECKING:
+    from rotfem.mechanics.effects import Effect
+    from rotfem.mechanics.outputs import Output
+    from rotfem.mechanics.theories import Theory
 
 
 class Entry(Protocol):
@@ -47,7 +52,7 @@ class Registry(Generic[E]):
         if not isinstance(entry.name, str) or not entry.name.isidentifier():
             raise ValueError(f"{entry.name!r} cannot be the name of a {self.kind}: letters, digits and _ only")
         if entry.name in self._entries:
-            raise ValueError(f"there is a {self.kind} called {entry.name!r} already")
+            raise ValueError(f"{entry.name!r} is the name of another {self.kind} already")
         self._entries[entry.name] = entry
 
     def remove(self, name: str) -> None:
@@ -70,12 +75,18 @@ class Registry(Generic[E]):
         return self._entries[name]
 
     def __contains__(self, name: object) -> bool:
-        self._load()
-        return name in self._entries
+        return name in self.names
 
     def __iter__(self) -> Iterator[E]:
         self._load()
         return iter(tuple(self._entries.values()))
+
+
+# The registries themselves are here, on the ground, so that a scene knows the names of what lies above it.
+theories: Registry[Theory] = Registry("theory", "rotfem.mechanics.theories")
+effects: Registry[Effect] = Registry("effect", "rotfem.mechanics.effects")
+schemes: Registry[Any] = Registry("scheme", "rotfem.analysis.alpha_family")
+outputs: Registry[Output] = Registry("output", "rotfem.mechanics.outputs")
 
 
 def register(entry: Entry | type[Entry]) -> None:

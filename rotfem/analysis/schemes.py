@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.registry import Registry
+from rotfem.registry import schemes as registered
 
 Array = npt.NDArray[np.float64]
 
@@ -83,7 +84,7 @@ class Scheme(ABC):
     it says its stages by `stage` and the state they end in by `finish`.
     """
 
-    registry: ClassVar[Registry[Any]] = Registry("scheme", "rotfem.analysis.alpha_family")
+    registry: ClassVar[Registry[Any]] = registered
 
     name: ClassVar[str]
     order: ClassVar[int]

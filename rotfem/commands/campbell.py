@@ -20,7 +20,7 @@ from rotfem.commands.modes import advice, instabilities, mode_rows, unstiffened
 from rotfem.commands.summary import summary_of
 from rotfem.errors import SceneError
 from rotfem.listeners import Hint, Progress, silent
-from rotfem.results.results import CampbellResult
+from rotfem.results import CampbellResult
 from rotfem.scene import Scene, as_scene
 from rotfem.selection.distance import MODES
 from rotfem.selection.model_choice import choose

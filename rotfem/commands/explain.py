@@ -14,7 +14,7 @@ from rotfem.commands.modes import modes
 from rotfem.commands.run import run
 from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
-from rotfem.results.results import ExplainResult
+from rotfem.results import ExplainResult
 from rotfem.scene import EFFECTS, Scene, as_scene
 from rotfem.selection.coarse_model import INCREMENT, Trial
 from rotfem.selection.dimensionless import MEANING, groups

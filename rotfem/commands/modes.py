@@ -20,7 +20,7 @@ from rotfem.analysis.modal import PURE, ModalAnalysis, Spinning, stability
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.commands.summary import summary_of
 from rotfem.listeners import Hint, silent
-from rotfem.results.results import ModesResult
+from rotfem.results import ModesResult
 from rotfem.scene import Scene, as_scene
 from rotfem.selection.distance import MODES
 from rotfem.selection.model_choice import choose

@@ -23,7 +23,7 @@ from rotfem.errors import ComputationError
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.numerics.newton import Newton
 from rotfem.results.extremes import figures
-from rotfem.results.results import RunResult, Table
+from rotfem.results.run import RunResult, Table
 from rotfem.scene import Scene, TorqueMotion, as_scene
 from rotfem.scene.advice import advise
 from rotfem.selection.distance import HISTORY, STEADY

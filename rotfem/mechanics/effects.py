@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from rotfem.registry import Registry, register, resolved
+from rotfem.registry import effects as registered
 
 #: (mechanics, variation) ↦ term of the residual, a UFL form (0 if there is none); see `rotfem.mechanics.work`.
 Work = str | Callable[..., Any]
@@ -40,7 +41,7 @@ class Effect:
         potential: mechanics ↦ its potential energy (J), a UFL form; None if it has none.
     """
 
-    registry: ClassVar[Registry[Effect]] = Registry("effect", "rotfem.mechanics.effects")
+    registry: ClassVar[Registry[Effect]] = registered
 
     name: str
     work: Work | None = None

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from rotfem.registry import Registry
+from rotfem.registry import outputs as registered
 
 #: mechanics ↦ functional of the motion, a UFL form without arguments; see `rotfem.mechanics.work.Mechanics`.
 Functional = str | Callable[..., Any]
@@ -22,7 +23,7 @@ class Output:
         unit: of its value.
     """
 
-    registry: ClassVar[Registry[Output]] = Registry("output", "rotfem.mechanics.outputs")
+    registry: ClassVar[Registry[Output]] = registered
 
     name: str
     form: Functional

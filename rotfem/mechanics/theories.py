@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from rotfem.registry import Registry, register, resolved
+from rotfem.registry import theories as registered
 
 #: What the strains of a structure type are computed by: a function, or "module:name".
 Strains = str | Callable[..., tuple[Any, ...]]
@@ -33,7 +34,7 @@ class Theory:
         quick: whether a quick study of cost tries it.
     """
 
-    registry: ClassVar[Registry[Theory]] = Registry("theory", "rotfem.mechanics.theories")
+    registry: ClassVar[Registry[Theory]] = registered
 
     name: str
     rank: float

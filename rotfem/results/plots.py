@@ -1,85 +1,45 @@
-"""Figures of results; imports only results."""
+"""Figures of results: every function that draws takes a result and returns a figure, one function writes them."""
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from rotfem.results import plots_explain
+from rotfem.results.columns import label
+from rotfem.results.files import write_whole
 
-from rotfem.results import plots_plate
-from rotfem.errors import OutputError
-from rotfem.results.results import CampbellResult, ExplainResult, ModesResult, RunResult
-
-#: Label and unit of every column that is plotted.
-LABELS = {
-    "t": "time t (s)",
-    "x": "position X (m)",
-    "psi_dot": "speed Ω (rad/s)",
-    "u1": "u₁ (m)",
-    "u2": "u₂ (m)",
-    "u3": "u₃ (m)",
-    "alpha": "rotation α (rad)",
-    **{f"theta{i}": f"rotation θ{sub} (rad)" for i, sub in zip((1, 2, 3), "₁₂₃", strict=True)},
-    **{f"alpha{i}": f"rotation α{sub} (rad)" for i, sub in zip((1, 2), "₁₂", strict=True)},
-    "kinetic": "kinetic energy (J)",
-    "strain": "strain energy (J)",
-    "jacobi": "Jacobi integral (J)",
-}
+if TYPE_CHECKING:
+    from rotfem.results.campbell import CampbellResult
+    from rotfem.results.modes import ModesResult
+    from rotfem.results.result import Result
+    from rotfem.results.run import RunResult
 
 
-def label(column: str) -> str:
-    """Return the axis label of a column, with its unit."""
-    name = column.removeprefix("tip_")
-    return ("tip " if column.startswith("tip_") else "") + LABELS.get(name, name)
+def plot(result: Result, folder: Path) -> list[Path]:
+    """Write all figures of a result into a folder; return their paths.
+
+    Raises:
+        OutputError: one cannot be written.
+    """
+    return [save(draw(), folder / name) for name, draw in result.drawings().items()]
 
 
-def plot(result: RunResult | ModesResult | CampbellResult | ExplainResult, folder: Path) -> list[Path]:
-    """Write the figures of a result into a folder; return their paths."""
-    if isinstance(result, ExplainResult):
-        return [save(plots_explain.explain_figure(result), folder / "explain.png")]
-    if isinstance(result, RunResult):
-        return plot_run(result, folder)
-    if isinstance(result, ModesResult):
-        if result.triangles is not None:
-            return [save(plots_plate.modes_figure(result), folder / "modes.png")]
-        return [save(shapes_figure(result), folder / "modes.png")]
-    paths = [save(campbell_figure(result), folder / "campbell.png")]
-    if result.travelling_waves():
-        paths.append(save(travelling_waves_figure(result), folder / "travelling_waves.png"))
-    return paths
-
-
-def plot_run(result: RunResult, folder: Path) -> list[Path]:
-    """Write history.png of a time history, shape.png of a steady state; return their paths."""
-    title = f"{result.summary['name']}: {result.summary['theory']}"
-    if result.summary["status"] != "done":
-        title += f" ({result.summary['status']})"
-    paths = []
-    if len(result.history.get("t", ())) > 1:
-        paths.append(save(history_figure(result, title), folder / "history.png"))
-    if result.shape and result.triangles is not None:
-        paths.append(save(plots_plate.shape_figure(result, title + ", final shape"), folder / "shape.png"))
-    elif result.shape and len(result.history.get("t", ())) <= 1:
-        paths.append(save(shape_figure(result, title), folder / "shape.png"))
-    return paths
-
-
-def history_figure(result: RunResult, title: str) -> Figure:
+def history_figure(result: RunResult) -> Figure:
     """Return the tip's components, and the speed over time."""
     h = result.history
     columns = [*(c for c in h if c.startswith("tip_")), "psi_dot"]
-    return stacked(h, "t", columns, title)
+    return stacked(h, "t", columns, result.title)
 
 
-def shape_figure(result: RunResult, title: str) -> Figure:
-    """Return the components of the final shape along the structure."""
+def shape_figure(result: RunResult) -> Figure:
+    """Return the components of a steady state along the structure."""
     s = result.shape
-    return stacked(s, "x", [c for c in s if c != "x"], title + ", steady state", marker=".")
+    return stacked(s, "x", [c for c in s if c != "x"], result.title + ", steady state", marker=".")
 
 
 def shapes_figure(result: ModesResult) -> Figure:
@@ -134,7 +94,7 @@ def campbell_figure(result: CampbellResult) -> Figure:
     axis.set_ylim(0, top)
     axis.set_xlabel(label("psi_dot"))
     axis.set_ylabel("frequency in the rotating frame (rad/s)")
-    axis.set_title(f"{result.summary['name']}: {result.summary['theory']}")
+    axis.set_title(result.title)
     axis.grid(True, lw=0.4, alpha=0.6)
     return figure
 
@@ -178,14 +138,13 @@ def stacked(data: dict[str, Any], x: str, columns: list[str], title: str, marker
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write a figure as PNG.
+    """Write a figure whole or not at all, in the format of the file's ending, PNG if it has none; return the path.
 
     Raises:
+        ValueError: Matplotlib does not write that format.
         OutputError: it cannot be written.
     """
-    try:
-        FigureCanvasAgg(figure)
-        figure.savefig(path, dpi=100)
-    except OSError as error:
-        raise OutputError(path, error.strerror or str(error)) from None
-    return path
+    content = io.BytesIO()
+    FigureCanvasAgg(figure)
+    figure.savefig(content, dpi=100, format=path.suffix[1:] or "png")
+    return write_whole(path, content.getvalue())

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from matplotlib.figure import Figure
 
-from rotfem.results.results import ExplainResult
+if TYPE_CHECKING:
+    from rotfem.results.explain import ExplainResult
 
 #: Relative changes below it are not drawn.
 ROUND_OFF = 1e-9

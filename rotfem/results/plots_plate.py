@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
 from rotfem.errors import OutputError, SceneError
-from rotfem.results.results import ModesResult, RunResult
+
+if TYPE_CHECKING:
+    from rotfem.results.modes import ModesResult
+    from rotfem.results.run import RunResult
 
 Array = npt.NDArray[Any]
 
@@ -67,14 +70,14 @@ def modes_figure(result: ModesResult) -> Figure:
     return figure
 
 
-def shape_figure(result: RunResult, title: str) -> Figure:
+def shape_figure(result: RunResult) -> Figure:
     """Return maps of the displacements of the final shape."""
     s = result.shape
     mesh = Triangulation(s["x"], s["y"], result.triangles)
     figure, axes = panels(3, float(np.ptp(s["y"]) / np.ptp(s["x"])))
     for axis, name in zip(axes, ("u1", "u2", "u3"), strict=True):
         map_of(figure, axis, mesh, s[name], name, f"{name} (m)")
-    figure.suptitle(title, fontsize=10)
+    figure.suptitle(result.title + ", final shape", fontsize=10)
     return figure
 
 

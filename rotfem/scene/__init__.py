@@ -1,8 +1,7 @@
 """What a user says: the scene, validated once. No dolfinx in it."""
 
+from rotfem import registry
 from rotfem.scene.scene import (
-    EFFECTS,
-    THEORIES,
     BeamMesh,
     CallableMotion,
     ConstantMotion,
@@ -26,3 +25,15 @@ from rotfem.scene.scene import (
     as_scene,
     load_scene,
 )
+
+#: Names of all effects, and of all theories from the poorest to the richest, as they are registered when asked for.
+EFFECTS: tuple[str, ...]
+THEORIES: tuple[str, ...]
+
+
+def __getattr__(name: str) -> tuple[str, ...]:
+    if name == "EFFECTS":
+        return registry.effects.names
+    if name == "THEORIES":
+        return tuple(theory.name for theory in sorted(registry.theories, key=lambda theory: theory.rank))
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

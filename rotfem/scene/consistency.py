@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from rotfem import registry
+from rotfem.errors import show
 from rotfem.scene.beams import PlanarBeamStructure, SpatialBeamStructure
 from rotfem.scene.loads import Loads
 from rotfem.scene.motion import ConstantMotion, Motion, TorqueMotion
 from rotfem.scene.plates import PlateStructure, locking
-from rotfem.scene.settings import FRAME_EFFECTS, BeamMesh, Initial, Model, PlateMesh
+from rotfem.scene.settings import BeamMesh, Initial, Model, PlateMesh
 from rotfem.scene.values import problem
 
 AnyStructure = PlanarBeamStructure | SpatialBeamStructure | PlateStructure
@@ -52,16 +54,26 @@ def check_mesh(structure: AnyStructure, mesh: BeamMesh | PlateMesh) -> None:
                 raise problem(f"mesh.{key}", getattr(mesh, key), "has no meaning with structure.mesh")
 
 
+def check_theory(structure: AnyStructure, model: Model) -> None:
+    """Raises a problem if the theory has no strains for the structure."""
+    kind, theory = structure.type, registry.theories[model.theory]
+    if not theory.holds_for(kind):
+        able = ", ".join(show(other.name) for other in registry.theories if other.holds_for(kind))
+        has = ", ".join(theory.strains) or "no structure"
+        raise problem("model.theory", theory.name, f"has strains for {has}, none for a {kind}; allowed there: {able}")
+
+
 def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:
     """Raises a problem if the inertial-frame form is asked for where there is none."""
     if model.frame != "inertial":
         return
-    if not isinstance(structure, PlanarBeamStructure) or model.theory != "reissner":
+    if not isinstance(structure, PlanarBeamStructure) or not registry.theories[model.theory].exact:
+        exact = (show(theory.name) for theory in registry.theories if theory.exact and theory.holds_for("planar_beam"))
         raise problem(
             "model.frame",
             model.frame,
-            'needs structure.type = "planar_beam" and model.theory = "reissner": displacements relative to the '
-            "inertial frame are large, which only the exact strains allow",
+            f'needs structure.type = "planar_beam" and model.theory = {" or ".join(exact)}: displacements relative to '
+            "the inertial frame are large, which only exact strains allow",
         )
     if isinstance(motion, TorqueMotion):
         raise problem("model.frame", model.frame, 'is not available with motion.type = "torque"; use "rotating"')
@@ -71,12 +83,13 @@ def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:
             list(structure.damping.rayleigh),
             'the mass-proportional part must be 0 with frame = "inertial", where it would brake the revolution itself',
         )
-    for name in FRAME_EFFECTS:
-        if model.effects != "auto" and name in model.effects:
+    for effect in registry.effects:
+        if effect.of_rotation and model.effects != "auto" and effect.name in model.effects:
             raise problem(
                 "model.effects",
                 list(model.effects),
-                f'"{name}" is not a separate effect with frame = "inertial"; it comes from the motion of the clamp',
+                f'"{effect.name}" is not a separate effect with frame = "inertial"; it comes from the motion of the '
+                "clamp",
             )
 
 

@@ -70,6 +70,21 @@ class Motion(SceneModel):
         """Whether the origin has an acceleration."""
         return self.base_acceleration is not None and not self.base_acceleration.is_zero
 
+    @property
+    def is_coupled(self) -> bool:
+        """Whether the structure moves a free hub."""
+        return False
+
+
+class Swept:
+    """A motion whose speed is swept: whether it spins does not follow from its own speed."""
+
+    def __init__(self, motion: Motion, is_spinning: bool):
+        self._motion, self.is_spinning = motion, is_spinning
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._motion, name)
+
 
 class ConstantMotion(Motion):
     """Steady rotation at the given speed (rad/s)."""
@@ -149,6 +164,10 @@ class TorqueMotion(Motion):
     coupled: Annotated[bool, Field(strict=True)] = True
     hub_damping: NonNegative = 0.0
     speed: Number = 0.0
+
+    @property
+    def is_coupled(self) -> bool:
+        return self.coupled
 
     @model_validator(mode="after")
     def _check_one(self) -> Self:

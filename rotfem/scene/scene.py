@@ -12,37 +12,34 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, Discriminator, Field, PrivateAttr, Tag, ValidationError, model_validator
 
+from rotfem import registry
 from rotfem.errors import SceneError
 from rotfem.scene.beams import PlanarBeamStructure, SpatialBeamStructure, Structure
-from rotfem.scene.consistency import check_frame, check_initial, check_loads, check_mesh, check_planar
+from rotfem.scene.consistency import (
+    check_frame,
+    check_initial,
+    check_loads,
+    check_mesh,
+    check_planar,
+    check_theory,
+)
 from rotfem.scene.loads import Load, Loads, MomentLoad, Signal
 from rotfem.scene.motion import (
     AnyMotion,
     CallableMotion,
     ConstantMotion,
     SpinUpMotion,
+    Swept,
     TableMotion,
     TorqueMotion,
 )
 from rotfem.scene.plates import PlateStructure
-from rotfem.scene.settings import (
-    EFFECTS,
-    FRAME_EFFECTS,
-    THEORIES,
-    BeamMesh,
-    Initial,
-    Model,
-    Modes,
-    PlateMesh,
-    Solver,
-    Time,
-)
+from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver
+from rotfem.scene.stepping import Time
 from rotfem.scene.toml import apply_overrides, read_toml, scene_error, set_key, to_builtin
 from rotfem.scene.values import SceneModel
 
 __all__ = [
-    "EFFECTS",
-    "THEORIES",
     "BeamMesh",
     "CallableMotion",
     "ConstantMotion",
@@ -88,6 +85,7 @@ class Scene(SceneModel):
         time: Time interval and scheme, or ``None``.
         modes: What modes to compute.
         solver: Settings of Newton's method.
+        output: What to compute beside what is always recorded.
     """
 
     structure: Structure = Field(description="a table [structure]")
@@ -99,6 +97,7 @@ class Scene(SceneModel):
     time: Time | None = None
     modes: Modes = Modes()
     solver: Solver = Solver()
+    output: OutputTable = OutputTable()
 
     _name: str = PrivateAttr("scene")
     _file: str = PrivateAttr("scene")
@@ -171,6 +170,8 @@ class Scene(SceneModel):
     def to_dict(self) -> dict[str, Any]:
         """Tables of everything that was set and all defaults, fit for JSON and TOML; functions become their names."""
         tables: dict[str, Any] = _plain(self)
+        if not self.output.quantities:
+            del tables["output"]
         if isinstance(self.structure, PlateStructure) and self.structure.mesh is not None:
             without = {"elements", "cell"} | ({"degree"} - self.mesh.model_fields_set)
             tables["mesh"] = {key: value for key, value in tables["mesh"].items() if key not in without}
@@ -180,6 +181,11 @@ class Scene(SceneModel):
         """Returns whether a load (``tip_force``, ``tip_moment``, ``distributed``) is given and is a dead one."""
         applied: Load | None = getattr(self.loads, load)
         return applied is not None and applied.kind == "dead"
+
+    @property
+    def frame(self) -> str:
+        """Frame to which displacements refer: ``rotating`` or ``inertial``."""
+        return self.model.frame
 
     def effective_effects(self, spinning: bool | None = None) -> tuple[str, ...]:
         """Effects that this scene includes.
@@ -192,24 +198,16 @@ class Scene(SceneModel):
                 the scene's own speed, says True.
 
         Returns:
-            Names in the order of `EFFECTS`.
+            Names in the order in which effects are registered.
         """
-        motion, structure = self.motion, self.structure
-        spins = motion.is_spinning if spinning is None else spinning
-        present = {
-            "coriolis": spins,
-            "centrifugal": spins,
-            "euler": motion.changes_speed,
-            "rotary_inertia": structure.has_rotary_inertia,
-            "base": motion.is_accelerated,
-            "gravity": any(self.loads.gravity),
-            "damping": not structure.damping.is_zero,
-            "tip_mass": structure.has_tip_mass,
-            "hub_coupling": isinstance(motion, TorqueMotion) and motion.coupled,
-        }
-        excluded = FRAME_EFFECTS if self.model.frame == "inertial" else ()
-        wanted = EFFECTS if self.model.effects == "auto" else self.model.effects
-        return tuple(name for name in EFFECTS if name in wanted and present[name] and name not in excluded)
+        seen = self if spinning is None else self.model_copy(update={"motion": Swept(self.motion, spinning)})
+        listed, rotates = self.model.effects, self.frame == "rotating"
+        return tuple(
+            effect.name
+            for effect in registry.effects
+            if (listed == "auto" or effect.name in listed) and (rotates or not effect.of_rotation)
+            if effect.present(seen)
+        )
 
     def check_run(self) -> None:
         """Checks that the scene can be run: a time history needs times, a steady state a constant speed.
@@ -241,6 +239,7 @@ class Scene(SceneModel):
             check_planar(self.motion, self.loads)
         check_loads(self.structure, self.loads)
         check_mesh(self.structure, self.mesh)
+        check_theory(self.structure, self.model)
         check_frame(self.structure, self.motion, self.model)
         check_initial(self.structure, self.motion, self.initial)
         return self
@@ -274,7 +273,7 @@ def as_scene(scene: Scene | str | Path | Mapping[str, Any]) -> Scene:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, BaseModel):
-        fields = {name: getattr(value, name) for name in type(value).model_fields}
+        fields = {name: getattr(value, name) for name in type(value).model_fields} | (value.model_extra or {})
         return {name: _plain(entry) for name, entry in fields.items() if entry is not None}
     if isinstance(value, Mapping):
         return {key: _plain(entry) for key, entry in value.items()}

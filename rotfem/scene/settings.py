@@ -1,46 +1,27 @@
-"""The tables that say how to compute: model, initial state, mesh, time, modes, solver."""
+"""The tables that say how to compute: model, initial state, mesh, modes, solver, output; time in its own module."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, PlainValidator, model_validator
+from pydantic import PlainValidator, model_validator
 
-from rotfem.errors import show
-from rotfem.scene.values import Bounds, Count, Number, Positive, SceneModel, did_you_mean, problem
+from rotfem import registry
+from rotfem.scene.names import as_name, as_names
+from rotfem.scene.values import Bounds, Count, Number, Positive, SceneModel, problem
 
-Theory = Literal["linear", "consistent_linear", "von_karman_linear", "second_order", "von_karman", "reissner"]
-THEORIES: tuple[str, ...] = get_args(Theory)
 
-# The order in which effects are always listed.
-EFFECTS: tuple[str, ...] = (
-    "coriolis",
-    "centrifugal",
-    "euler",
-    "rotary_inertia",
-    "base",
-    "gravity",
-    "damping",
-    "tip_mass",
-    "hub_coupling",
-)
-# In the inertial frame these are not terms of the equations but follow from the motion of the clamp.
-FRAME_EFFECTS: tuple[str, ...] = ("coriolis", "centrifugal", "euler")
+def _as_theory(value: Any) -> str:
+    return as_name(value, registry.theories)
 
 
 def _as_effects(value: Any) -> str | tuple[str, ...]:
-    if value == "auto":
-        return "auto"
-    allowed = f'allowed: "auto" or a list of {", ".join(EFFECTS)}'
-    if not isinstance(value, list | tuple):
-        raise problem("", value, allowed)
-    for name in value:
-        if name not in EFFECTS:
-            raise problem("", value, f"{show(name)} is not an effect; {did_you_mean(name, EFFECTS)}{allowed}")
-        if list(value).count(name) > 1:
-            raise problem("", value, f"{show(name)} is listed twice")
-    return tuple(value)
+    return "auto" if value == "auto" else as_names(value, registry.effects, '"auto" or ')
+
+
+def _as_outputs(value: Any) -> tuple[str, ...]:
+    return as_names(value, registry.outputs)
 
 
 def _as_plate_elements(value: Any) -> tuple[int, int]:
@@ -58,14 +39,14 @@ class Model(SceneModel):
     """The ``[model]`` table.
 
     Attributes:
-        theory: Order of the strain measure.
-        effects: ``"auto"``, or the names of the effects to include.
+        theory: Name of a registered theory, the order of the strain measure.
+        effects: ``"auto"``, or names of registered effects, those to include.
         frame: Frame to which displacements refer.
         tolerance: Relative model error up to which effects are left out and the theory may be poorer, or ``None``.
         on_exceed: What a run does that leaves the range its model was chosen for.
     """
 
-    theory: Theory = "reissner"
+    theory: Annotated[str, PlainValidator(_as_theory)] = "reissner"
     effects: Annotated[str | tuple[str, ...], PlainValidator(_as_effects)] = "auto"
     frame: Literal["rotating", "inertial"] = "rotating"
     tolerance: Positive | None = None
@@ -141,61 +122,6 @@ class PlateMesh(SceneModel):
         return 3 if cell == "triangle" and "degree" not in self.model_fields_set else self.degree
 
 
-class Time(SceneModel):
-    """The ``[time]`` table. Either step or tolerance is given.
-
-    Attributes:
-        end: Final time (s).
-        step: Time step (s), or ``None`` for adaptive steps.
-        tolerance: Error of all adaptive steps together, relative to the largest displacement, or ``None``.
-        max_step: Longest adaptive step (s), or ``None``.
-        min_step: Shortest adaptive step (s), or ``None``.
-        scheme: ``generalised_alpha`` or ``newmark``.
-        spectral_radius: ρ∞ of generalised-α; ``None`` for Newmark.
-        beta: Newmark's β; ``None`` for generalised-α.
-        gamma: Newmark's γ; ``None`` for generalised-α.
-        output_every: Number of steps from one output to the next.
-    """
-
-    end: Positive = Field(description="a number greater than 0 (s)")
-    step: Positive | None = None
-    tolerance: Positive | None = None
-    max_step: Positive | None = None
-    min_step: Positive | None = None
-    scheme: Literal["newmark", "generalised_alpha"] = "generalised_alpha"
-    spectral_radius: Annotated[float, PlainValidator(Bounds(ge=0.0, le=1.0).number)] | None = None
-    beta: Positive | None = None
-    gamma: Annotated[float, PlainValidator(Bounds(ge=0.5).number)] | None = None
-    output_every: Count = 1
-
-    @model_validator(mode="before")
-    @classmethod
-    def _fill_scheme(cls, data: Any) -> Any:
-        """Adds the parameters of the chosen scheme only, so that those of the other one stay absent."""
-        if not isinstance(data, Mapping):
-            return data
-        defaults = {"beta": 0.25, "gamma": 0.5} if data.get("scheme") == "newmark" else {"spectral_radius": 0.9}
-        return defaults | {key: value for key, value in data.items() if value is not None}
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if (self.step is None) == (self.tolerance is None):
-            reason = "give exactly one of step (fixed steps, s) and tolerance (adaptive steps)"
-            raise problem("step", self.step, reason)
-        if self.step is not None and self.step > self.end:
-            raise problem("step", self.step, f"must be at most time.end = {self.end:g}")
-        foreign = ("beta", "gamma") if self.scheme == "generalised_alpha" else ("spectral_radius",)
-        for key in foreign:
-            if getattr(self, key) is not None:
-                raise problem(key, getattr(self, key), f'has no meaning with scheme = "{self.scheme}"')
-        for key in ("max_step", "min_step"):
-            if self.tolerance is None and getattr(self, key) is not None:
-                raise problem(key, getattr(self, key), "has a meaning only with tolerance (adaptive steps)")
-        if self.max_step is not None and self.min_step is not None and self.min_step > self.max_step:
-            raise problem("min_step", self.min_step, f"must be at most max_step = {self.max_step:g}")
-        return self
-
-
 class Modes(SceneModel):
     """The ``[modes]`` table.
 
@@ -218,3 +144,13 @@ class Solver(SceneModel):
 
     increment_tolerance: Positive = 1e-9
     max_iterations: Count = 25
+
+
+class OutputTable(SceneModel):
+    """The ``[output]`` table.
+
+    Attributes:
+        quantities: Names of registered outputs, to be computed beside what is always recorded.
+    """
+
+    quantities: Annotated[tuple[str, ...], PlainValidator(_as_outputs)] = ()

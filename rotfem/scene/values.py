@@ -47,6 +47,11 @@ class SceneModel(BaseModel):
 
     model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
+    @classmethod
+    def keys(cls) -> list[str]:
+        """Returns all keys that the table may have."""
+        return list(cls.model_fields)
+
     @model_validator(mode="before")
     @classmethod
     def _check_keys(cls, data: Any) -> Any:
@@ -54,7 +59,7 @@ class SceneModel(BaseModel):
             return data
         if not isinstance(data, Mapping):
             raise problem("", data, "must be a table of key = value pairs")
-        names = list(cls.model_fields)
+        names = cls.keys()
         for key in data:
             if key not in names:
                 hint = did_you_mean(key, names)

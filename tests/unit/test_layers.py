@@ -101,7 +101,7 @@ def test_light_modules_import_no_fenicsx(module: str) -> None:
     [
         "rotfem",
         "rotfem.scene",
-        "rotfem.results.results",
+        "rotfem.results",
         "rotfem.results.plots",
         "rotfem.commands.cost.plot",
         "rotfem.commands.cli",

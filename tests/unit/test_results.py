@@ -11,7 +11,7 @@ import pytest
 
 from rotfem.errors import OutputError
 from rotfem.results.files import csv_text, json_text, prepare_folder, read_csv, write_text
-from rotfem.results.results import RunResult, Table
+from rotfem.results.run import RunResult, Table
 
 
 def test_table_grows_by_rows() -> None:

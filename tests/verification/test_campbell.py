@@ -14,8 +14,8 @@ import pytest
 from rotfem import SceneError, campbell, modes
 from rotfem.analysis.branches import AMBIGUOUS, SURE
 from rotfem.commands.campbell import parse_speeds
+from rotfem.results import CampbellResult
 from rotfem.results.plots import plot
-from rotfem.results.results import CampbellResult
 
 Array = npt.NDArray[np.float64]
 

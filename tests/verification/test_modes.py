@@ -28,8 +28,8 @@ from rotfem.analysis.state_space import state_space, write_matrices
 from rotfem.commands.campbell import campbell
 from rotfem.equations.affine import AffineSystem
 from rotfem.numerics import eigenproblem as pencil
+from rotfem.results import ModesResult
 from rotfem.results.plots import plot
-from rotfem.results.results import ModesResult
 
 Array = npt.NDArray[Any]
 

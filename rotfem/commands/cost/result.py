@@ -2,20 +2,58 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
-from rotfem.commands.cost.front import Row, describe, recommend, setting_of
+import numpy as np
+
+from rotfem.commands.cost.front import Row, describe, judged, recommend, setting_of
 from rotfem.commands.cost.reference import Reference
+from rotfem.commands.cost.settings import Setting
 from rotfem.commands.cost.tuned import write_tuned
 from rotfem.errors import ComputationError
-from rotfem.results.files import json_text, rows_text, write_text
+from rotfem.results import Result
+from rotfem.results.files import json_text, rows_text
+from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows
 from rotfem.scene import Scene
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class CostPoint:
+    """What one setting costs, and what it gives.
+
+    Attributes:
+        setting: theory, mesh, degree, scheme and step.
+        time: of one run without its set-up, median, s.
+        error: relative, that of the theory included where it is known.
+        pareto: whether no other setting is as fast and as exact, and better in one.
+    """
+
+    setting: Setting
+    time: float
+    error: float
+    pareto: bool
+
+    @classmethod
+    def of(cls, row: Row) -> CostPoint | None:
+        """Return the point of a row; None if its setting failed or there is nothing to judge it by."""
+        error = judged(row)
+        return None if error is None else cls(setting_of(row), float(row["time"]), error, bool(row["pareto"]))
+
+    def __str__(self) -> str:
+        return f"{describe(self.setting.key())}: error {self.error:.1e}, {self.time:.3g} s"
 
 
 @dataclass
-class CostResult:
+class CostResult(Result):
     """Outcome of `rotfem cost`.
 
     Attributes:
@@ -27,10 +65,25 @@ class CostResult:
         references: theory ↦ its converged output.
     """
 
-    summary: dict[str, Any]
     rows: list[Row]
     scene: Scene = field(repr=False)
     references: dict[str, Reference] = field(default_factory=dict, repr=False)
+
+    @property
+    def points(self) -> list[CostPoint]:
+        """Time and error of every setting that could be computed and judged, in the order they were tried."""
+        return [point for point in map(CostPoint.of, self.rows) if point is not None]
+
+    @property
+    def front(self) -> list[CostPoint]:
+        """The points that no other one beats in both time and error, fastest first."""
+        return sorted((point for point in self.points if point.pareto), key=lambda point: point.time)
+
+    @property
+    def recommended(self) -> CostPoint | None:
+        """The fastest setting within the accuracy that was asked for, uncertainty included; None if there is none."""
+        row = self.summary["recommended"]
+        return None if row is None else CostPoint.of(row)
 
     def recommend(self, accuracy: float) -> Row | None:
         """Return the fastest row within a relative accuracy, uncertainty included; None if there is none."""
@@ -61,17 +114,40 @@ class CostResult:
         )
         return write_tuned(self.scene, setting_of(row), Path(path), remark)
 
-    def write(self, folder: str | Path) -> list[Path]:
-        """Write cost.csv, cost.json and summary.json, each whole or not at all; return their paths.
+    def _flat_rows(self) -> list[Row]:
+        """Return the rows with numbers of elements as text where they are two."""
+        return [{k: "x".join(map(str, v)) if isinstance(v, list) else v for k, v in row.items()} for row in self.rows]
+
+    def files(self) -> dict[str, str]:
+        """Return cost.csv, cost.json and summary.json."""
+        keys = ("output", "references", "model_errors", "recommended", "recommendations")
+        return {
+            "cost.csv": rows_text(self._flat_rows()),
+            "cost.json": json_text({**{k: self.summary[k] for k in keys}, "rows": self.rows}),
+            "summary.json": json_text(self.summary),
+        }
+
+    def drawings(self) -> dict[str, Callable[[], Figure]]:
+        """Return cost.png."""
+        from rotfem.commands.cost.plot import cost_figure
+
+        return {"cost.png": partial(cost_figure, self)}
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return one row a setting, as in cost.csv.
 
         Raises:
-            OutputError: the folder cannot be written.
+            ImportError: pandas is not installed.
         """
-        folder = Path(folder)
-        flat = [{k: "x".join(map(str, v)) if isinstance(v, list) else v for k, v in row.items()} for row in self.rows]
-        keys = ("output", "references", "model_errors", "recommended", "recommendations")
-        return [
-            write_text(folder / "cost.csv", rows_text(flat)),
-            write_text(folder / "cost.json", json_text({**{k: self.summary[k] for k in keys}, "rows": self.rows})),
-            write_text(folder / "summary.json", json_text(self.summary)),
-        ]
+        return frame_of_rows(self._flat_rows())
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the columns of cost.csv over `setting`, the number of the row from 0 on.
+
+        Raises:
+            ImportError: xarray is not installed.
+        """
+        rows = self._flat_rows()
+        over: dict[str, Variable] = {name: (("setting",), column_of_rows(rows, name)) for name in rows[0]}
+        coordinates: dict[str, Variable] = {"setting": (("setting",), np.arange(len(rows)))}
+        return dataset(over, coordinates, self._attributes())

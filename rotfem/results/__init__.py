@@ -1,0 +1,17 @@
+"""What a computation returns, and how it is written, drawn and read: plain arrays, no dolfinx."""
+
+from rotfem.results.campbell import CampbellResult, CriticalSpeed, Instability
+from rotfem.results.explain import ExplainResult
+from rotfem.results.modes import ModesResult
+from rotfem.results.result import Result
+from rotfem.results.run import RunResult
+
+__all__ = [
+    "CampbellResult",
+    "CriticalSpeed",
+    "ExplainResult",
+    "Instability",
+    "ModesResult",
+    "Result",
+    "RunResult",
+]

@@ -1,0 +1,213 @@
+"""What a Campbell diagram returns: modes followed over speed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.results.files import json_text, rows_text
+from rotfem.results.frames import Variable, dataset, frame_of_rows
+from rotfem.results.result import Result
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.figure import Figure
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CriticalSpeed:
+    """A speed at which a branch meets a per-rev line kΩ: a force that stands still in space excites it there.
+
+    Attributes:
+        branch: number of the branch, from 1 on.
+        per_rev: k.
+        speed: rad/s.
+        frequency: of the branch there, kΩ, rad/s.
+        label: name of the branch.
+    """
+
+    branch: int
+    per_rev: int
+    speed: float
+    frequency: float
+    label: str
+
+
+@dataclass(frozen=True)
+class Instability:
+    """A range of speeds in which a mode grows.
+
+    Attributes:
+        speed: where it begins, rad/s; the first speed if the sweep begins with it.
+        kind: "static instability" or "dynamic instability".
+        until: where it ends, rad/s; None if no speed of the sweep ends it.
+    """
+
+    speed: float
+    kind: str
+    until: float | None
+
+
+@dataclass
+class CampbellResult(Result):
+    """Outcome of `rotfem campbell`.
+
+    Attributes:
+        summary: scene, branches, critical speeds, instabilities, self-checks, warnings, timings; JSON-able.
+        rows: one dictionary a speed and branch: `speed` (rad/s), `branch`, `label`, `mode` (its name at this speed),
+            `frequency` (rad/s), `frequency_hz`, `damping`, `growth` (1/s), `residual`, `share_…`, `confidence` (squared
+            correlation with the speed before), `refined` (1 where the speed was not asked for); of a disk `turning` (1
+            for a wave that travels with the spin, −1 against it, 0 for a standing one).
+    """
+
+    rows: list[dict[str, Any]]
+
+    @property
+    def labels(self) -> list[str]:
+        """Name of every branch, that of its mode at the first speed."""
+        return [branch["label"] for branch in self.summary["branches"]]
+
+    @property
+    def speeds(self) -> Array:
+        """All speeds solved, those asked for and those in between that following the modes took, rad/s."""
+        return np.array(list(self._refined()), dtype=np.float64)
+
+    @property
+    def refined(self) -> npt.NDArray[np.bool_]:
+        """Which of `speeds` were not asked for, shape (speeds,)."""
+        return np.array(list(self._refined().values()), dtype=bool)
+
+    @property
+    def frequencies(self) -> Array:
+        """Frequencies in the rotating frame, shape (speeds, branches), rad/s; NaN where a branch is lost."""
+        return self.column("frequency")
+
+    @property
+    def damping(self) -> Array:
+        """Damping ratios −Re λ/|λ|, shape (speeds, branches); NaN where a branch is lost."""
+        return self.column("damping")
+
+    @property
+    def growth(self) -> Array:
+        """Growth Re λ, shape (speeds, branches), 1/s; NaN where a branch is lost."""
+        return self.column("growth")
+
+    @property
+    def critical_speeds(self) -> list[CriticalSpeed]:
+        """Where branches meet the per-rev lines, by increasing speed."""
+        return [CriticalSpeed(**crossing) for crossing in self.summary["critical_speeds"]]
+
+    @property
+    def instabilities(self) -> list[Instability]:
+        """Ranges of speed in which a mode grows."""
+        return [Instability(**onset) for onset in self.summary["instabilities"]]
+
+    def _refined(self) -> dict[float, bool]:
+        return {row["speed"]: bool(row["refined"]) for row in self.rows}
+
+    def _numbers(self) -> list[str]:
+        own = ("speed", "branch", "refined")
+        return [k for k, v in self.rows[0].items() if isinstance(v, int | float) and k not in own]
+
+    def column(self, name: str) -> Array:
+        """Return a number of every mode, shape (speeds, branches), NaN where a branch is lost.
+
+        Args:
+            name: `frequency`, `residual`, `confidence`, `share_lag`, …
+
+        Raises:
+            KeyError: there is none of that name.
+        """
+        if name not in self._numbers():
+            raise KeyError(f"no number {name!r} of the branches; there are {', '.join(self._numbers())}")
+        place = {speed: i for i, speed in enumerate(self._refined())}
+        out = np.full((len(place), len(self.labels)), np.nan)
+        for row in self.rows:
+            out[place[row["speed"]], row["branch"] - 1] = row[name]
+        return out
+
+    def branches(self) -> dict[str, dict[str, Array]]:
+        """Return label ↦ columns `speed`, `frequency`, `growth`, … over all speeds solved."""
+        out: dict[str, dict[str, Array]] = {}
+        for label in dict.fromkeys(row["label"] for row in self.rows):
+            mine = [row for row in self.rows if row["label"] == label]
+            numbers = [k for k, v in mine[0].items() if isinstance(v, int | float)]
+            out[label] = {k: np.array([row[k] for row in mine], dtype=np.float64) for k in numbers}
+        return out
+
+    def travelling_waves(self) -> dict[str, dict[str, Array]]:
+        """Return label ↦ `speed`, `forward`, `backward` (rad/s) of a disk's modes with nodal diameters, fixed frame.
+
+        Of a pair of modes with m nodal diameters one travels with the spin and one against it (column `turning`). Seen
+        from the fixed frame they have ω₊ + mΩ and ω₋ − mΩ; the backward wave stands still where ω₋ = mΩ, a critical
+        speed. Where only one of a pair was computed it stands for both.
+        """
+        out: dict[str, dict[str, Array]] = {}
+        branches = self.branches()
+        for label, a in branches.items():
+            kind, _, number = label.partition(" ")
+            diameters = int(number.split(".")[0]) if kind == "diameters" else 0
+            if diameters == 0 or label[-1] in "bcdefgh":
+                continue
+            name = label.removesuffix("a")
+            b = branches.get(f"{name}b", a)
+            speed, here, there = np.intersect1d(a["speed"], b["speed"], return_indices=True)
+            first, second = ({k: c[i] for k, c in x.items()} for x, i in ((a, here), (b, there)))
+            ahead = first["turning"] >= second["turning"]
+            wave = diameters * np.abs(speed)
+            out[name] = {
+                "speed": speed,
+                "forward": np.where(ahead, first["frequency"], second["frequency"]) + wave,
+                "backward": np.where(ahead, second["frequency"], first["frequency"]) - wave,
+            }
+        return out
+
+    def files(self) -> dict[str, str]:
+        """Return campbell.csv, campbell.json and summary.json."""
+        keys = ("branches", "critical_speeds", "instabilities", "ambiguous", "per_rev")
+        return {
+            "campbell.csv": rows_text(self.rows),
+            "campbell.json": json_text({**{k: self.summary[k] for k in keys}, "rows": self.rows}),
+            "summary.json": json_text(self.summary),
+        }
+
+    def drawings(self) -> dict[str, Callable[[], Figure]]:
+        """Return campbell.png and, of a disk, travelling_waves.png."""
+        from rotfem.results import plots
+
+        waves = {"travelling_waves.png": partial(plots.travelling_waves_figure, self)}
+        return {"campbell.png": partial(plots.campbell_figure, self), **(waves if self.travelling_waves() else {})}
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return one row a speed and branch, indexed by `speed` (rad/s) and `label`, as in campbell.csv.
+
+        `to_pandas()["frequency"].unstack("label")` is the table of frequencies over speed.
+
+        Raises:
+            ImportError: pandas is not installed.
+        """
+        return frame_of_rows(self.rows, ["speed", "label"])
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the numbers of campbell.csv over `speed` (rad/s) and `branch`, whose coordinate are the labels.
+
+        NaN where a branch is lost; `refined` tells the speeds that were not asked for.
+
+        Raises:
+            ImportError: xarray is not installed.
+        """
+        over: dict[str, Variable] = {name: (("speed", "branch"), self.column(name)) for name in self._numbers()}
+        coordinates: dict[str, Variable] = {
+            "speed": (("speed",), self.speeds),
+            "branch": (("branch",), np.array(self.labels, dtype=str)),
+            "refined": (("speed",), self.refined),
+        }
+        return dataset(over, coordinates, self._attributes())

@@ -1,0 +1,74 @@
+"""What the columns of results are and their units: the axis labels of figures, the attributes of labelled arrays."""
+
+from __future__ import annotations
+
+from rotfem.registry import outputs
+
+_SUB = {"1": "₁", "2": "₂", "3": "₃"}
+
+#: Column ↦ what it is, and its unit; "1" of pure numbers.
+COLUMNS = {
+    "t": ("time t", "s"),
+    "x": ("position X", "m"),
+    "y": ("position Y", "m"),
+    "psi": ("angle ψ", "rad"),
+    "psi_dot": ("speed Ω", "rad/s"),
+    **{f"u{i}": (f"u{sub}", "m") for i, sub in _SUB.items()},
+    "alpha": ("rotation α", "rad"),
+    **{f"alpha{i}": (f"rotation α{_SUB[i]}", "rad") for i in "12"},
+    **{f"theta{i}": (f"rotation θ{sub}", "rad") for i, sub in _SUB.items()},
+    "kinetic": ("kinetic energy", "J"),
+    "strain": ("strain energy", "J"),
+    "jacobi": ("Jacobi integral", "J"),
+    "torque": ("torque on the hub", "N·m"),
+    "hub_kinetic": ("kinetic energy of the hub", "J"),
+    "angular_momentum": ("angular momentum", "N·m·s"),
+    "impulse": ("impulse of the torque", "N·m·s"),
+    "work": ("work of the torque", "J"),
+    "speed": ("speed Ω", "rad/s"),
+    "frequency": ("frequency in the rotating frame", "rad/s"),
+    "frequency_hz": ("frequency in the rotating frame", "Hz"),
+    "damping": ("damping ratio", "1"),
+    "growth": ("growth", "1/s"),
+    "residual": ("backward error", "1"),
+    "confidence": ("squared correlation with the speed before", "1"),
+    "turning": ("wave with the spin (1) or against it (−1)", "1"),
+    "estimate": ("estimated relative change", "1"),
+    "truth": ("relative change of the full models", "1"),
+    "worst": ("largest estimated relative change", "1"),
+    "step": ("time step", "s"),
+    "error": ("error of the discretisation, relative", "1"),
+    "model_error": ("error of the theory, relative", "1"),
+    "total_error": ("error, that of the theory included, relative", "1"),
+    "uncertainty": ("uncertainty of the reference, relative", "1"),
+    "time": ("time of one run without set-up, median", "s"),
+    "time_min": ("shortest time of one run", "s"),
+    "time_max": ("longest time of one run", "s"),
+    "cpu_time": ("processor time of one run, median", "s"),
+    "setup": ("time of the set-up, median", "s"),
+}
+
+
+def described(column: str) -> tuple[str, str]:
+    """Return what a column is and its unit; its name and "" of one that nothing is known of.
+
+    A registered output functional has the unit it was registered with.
+    """
+    if column in COLUMNS:
+        return COLUMNS[column]
+    if column.startswith("tip_"):
+        what, unit = described(column.removeprefix("tip_"))
+        return f"tip {what}", unit
+    if column.startswith("shape_"):
+        return f"shape, {described(column.removeprefix('shape_'))[0]}", "1"
+    if column.startswith("share_"):
+        return f"share of the kinetic energy, {column.removeprefix('share_')}", "1"
+    if column in outputs:
+        return column, outputs[column].unit
+    return column, ""
+
+
+def label(column: str) -> str:
+    """Return the axis label of a column, with its unit."""
+    what, unit = described(column)
+    return f"{what} ({'–' if unit == '1' else unit})" if unit else what

@@ -1,0 +1,141 @@
+"""How results are written and read: each file whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.errors import OutputError
+
+Array = npt.NDArray[np.float64]
+
+
+def prepare_folder(folder: str | Path) -> Path:
+    """Make the result folder and see that it can be written, before anything is computed.
+
+    Raises:
+        OutputError: it cannot be made or written.
+    """
+    path = Path(folder)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path):
+            pass
+    except OSError as error:
+        raise OutputError(path, error.strerror or str(error)) from None
+    return path
+
+
+def unwritable(path: Path) -> str:
+    """Return why a file cannot be written there; nothing where it can. Neither folder nor file is made or changed."""
+    if path.is_dir():
+        return "is a folder; must be the path of a file"
+    if not path.parent.is_dir():
+        return f"there is no folder {path.parent}; must be in one that is there"
+    if path.exists() and not os.access(path, os.W_OK):
+        return "the file cannot be written; must be a writable one"
+    try:
+        with tempfile.TemporaryFile(dir=path.parent):
+            return ""
+    except OSError as error:
+        return f"nothing can be written in {path.parent}: {error.strerror or error}"
+
+
+def csv_text(columns: dict[str, Array]) -> str:
+    """Return columns as CSV with a header; numbers keep all their digits."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*([repr(float(v)) for v in column] for column in columns.values()), strict=True))
+    return buffer.getvalue()
+
+
+def rows_text(rows: list[dict[str, Any]]) -> str:
+    """Return rows of named values as CSV with a header; numbers keep all their digits, what is absent stays empty."""
+    buffer = io.StringIO()
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    writer = csv.DictWriter(buffer, names, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({k: repr(v) if isinstance(v, float) else v for k, v in row.items()} for row in rows)
+    return buffer.getvalue()
+
+
+def read_csv(path: str | Path) -> dict[str, Array]:
+    """Return the columns of a CSV file that `csv_text` made."""
+    with open(path, encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    values = np.array(rows[1:], dtype=np.float64).reshape(len(rows) - 1, len(rows[0]))
+    return {name: values[:, i].copy() for i, name in enumerate(rows[0])}
+
+
+def json_text(data: Any) -> str:
+    """Return data as JSON; numbers that JSON cannot hold (NaN, infinity) become null."""
+    return json.dumps(_jsonable(data), indent=2, allow_nan=False) + "\n"
+
+
+def _jsonable(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {str(key): _jsonable(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_jsonable(value) for value in data]
+    if isinstance(data, np.ndarray):
+        return _jsonable(data.tolist())
+    if isinstance(data, np.generic):
+        data = data.item()
+    if isinstance(data, float) and not np.isfinite(data):
+        return None
+    return data
+
+
+def write_files(folder: Path, texts: Mapping[str, str]) -> list[Path]:
+    """Write files into a folder, each whole or not at all, in their order; return their paths.
+
+    Raises:
+        OutputError: one cannot be written; those before it are there.
+    """
+    return [write_text(folder / name, text) for name, text in texts.items()]
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a text file, in UTF-8, whole or not at all; return its path.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    return write_whole(path, text.encode())
+
+
+def write_whole(path: Path, content: bytes) -> Path:
+    """Write a file whole or not at all (temporary file in the same folder, then renamed); return its path.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    try:
+        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
+        try:
+            with os.fdopen(descriptor, "wb") as file:
+                file.write(content)
+            os.chmod(name, 0o666 & ~_umask())
+            os.replace(name, path)
+        except BaseException:
+            os.unlink(name)
+            raise
+    except OSError as error:
+        raise OutputError(path, error.strerror or str(error)) from None
+    return path
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

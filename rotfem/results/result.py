@@ -1,0 +1,103 @@
+"""What all results share: a summary, files, figures, tables and labelled arrays."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotfem.results.files import write_files
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.figure import Figure
+
+
+@dataclass
+class Result(ABC):
+    """Outcome of a computation.
+
+    Attributes:
+        summary: what was computed and how it went; JSON-able.
+    """
+
+    summary: dict[str, Any]
+
+    @property
+    def status(self) -> str:
+        """ "done", "failed" or "interrupted"; what has not come to its end holds what was computed until then."""
+        return str(self.summary["status"])
+
+    @property
+    def warnings(self) -> list[str]:
+        """What to know before the numbers are used."""
+        return list(self.summary["warnings"])
+
+    @property
+    def title(self) -> str:
+        """Heading of figures: name of the scene, theory where there is one, and status unless it is done."""
+        words = ": ".join(self.summary[key] for key in ("name", "theory") if key in self.summary)
+        return words if self.status == "done" else f"{words} ({self.status})"
+
+    @abstractmethod
+    def files(self) -> dict[str, str]:
+        """Return file name ↦ text, in the order they are written."""
+
+    @abstractmethod
+    def drawings(self) -> dict[str, Callable[[], Figure]]:
+        """Return file name ↦ what draws that figure, the main one first; empty where there is nothing to draw."""
+
+    @abstractmethod
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the result as a table.
+
+        Raises:
+            ImportError: pandas is not installed.
+        """
+
+    @abstractmethod
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the result as labelled arrays with `units` and `long_name` among their attributes.
+
+        Raises:
+            ImportError: xarray is not installed.
+        """
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write the files into a folder, each whole or not at all; return their paths.
+
+        Raises:
+            OutputError: the folder cannot be written.
+        """
+        return write_files(Path(folder), self.files())
+
+    def plot(self, path: str | Path | None = None, drawing: str = "") -> Figure:
+        """Return a figure, a Matplotlib one of its own that pyplot does not know of.
+
+        Args:
+            path: file to write it to as well, in the format of its ending (png, pdf, svg, …).
+            drawing: which of `drawings`, with or without its ending; the main one if empty.
+
+        Raises:
+            ValueError: there is no such drawing, or the format is not one of Matplotlib's.
+            OutputError: the file cannot be written.
+        """
+        from rotfem.results.plots import save
+
+        drawings = {name.removesuffix(".png"): draw for name, draw in self.drawings().items()}
+        name = drawing.removesuffix(".png") or next(iter(drawings), "")
+        if name not in drawings:
+            there = ", ".join(drawings) or "none, as too little was computed"
+            raise ValueError(f"drawing {drawing!r} is not among those of this result; there is {there}")
+        figure = drawings[name]()
+        if path is not None:
+            save(figure, Path(path))
+        return figure
+
+    def _attributes(self) -> dict[str, Any]:
+        """Return what labelled arrays say of themselves as a whole."""
+        names = ("command", "name", "theory", "frame", "kind", "status")
+        return {name: self.summary[name] for name in names if name in self.summary}

@@ -1,0 +1,41 @@
+"""Names of what is registered: the registries say what a scene may name, at the moment it is validated."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rotfem.errors import show
+from rotfem.registry import Registry
+from rotfem.scene.values import did_you_mean, problem
+
+
+def as_name(value: Any, registry: Registry[Any]) -> str:
+    """Returns the value. Raises if it is not the name of an entry."""
+    names = registry.names
+    if isinstance(value, str) and value in names:
+        return value
+    raise problem("", value, f"{did_you_mean(value, names)}allowed: {', '.join(map(show, names))}")
+
+
+def as_names(value: Any, registry: Registry[Any], others: str = "") -> tuple[str, ...]:
+    """Returns the value as a tuple.
+
+    Args:
+        value: A list of names.
+        registry: What they name: effects or outputs.
+        others: What is allowed beside a list, for the error message.
+
+    Raises:
+        PydanticCustomError: If it is not a list, or has something in it that is not registered, or is there twice.
+    """
+    names = registry.names
+    allowed = f"allowed: {others}a list of {', '.join(names)}" if names else "none are registered"
+    if not isinstance(value, list | tuple):
+        raise problem("", value, allowed)
+    for name in value:
+        if name not in names:
+            hint = did_you_mean(name, names)
+            raise problem("", value, f"{show(name)} is not an {registry.kind}; {hint}{allowed}")
+        if list(value).count(name) > 1:
+            raise problem("", value, f"{show(name)} is listed twice")
+    return tuple(value)

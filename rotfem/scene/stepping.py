@@ -1,0 +1,130 @@
+"""The ``[time]`` table: how long, in which steps and by which scheme, whose parameters are keys of the table too."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import MISSING, Field, fields, is_dataclass
+from typing import Annotated, Any, Self
+
+import pydantic
+from pydantic import ConfigDict, PlainValidator, model_validator
+
+from rotfem import registry
+from rotfem.errors import show
+from rotfem.scene.names import as_name
+from rotfem.scene.values import Count, Number, Positive, SceneModel, problem
+
+
+def _as_scheme(value: Any) -> str:
+    return as_name(value, registry.schemes)
+
+
+def parameters_of(scheme: type) -> dict[str, Field[Any]]:
+    """Returns name ↦ field of the parameters of a class of `Scheme`."""
+    return {field.name: field for field in fields(scheme) if field.init} if is_dataclass(scheme) else {}
+
+
+def estimates_error(scheme: type) -> bool:
+    """Returns whether a class of `Scheme` says `local_error` itself, rather than have what all schemes inherit."""
+    base: Any = next(parent for parent in scheme.__mro__ if "registry" in vars(parent))
+    own: Any = scheme
+    return own.local_error is not base.local_error
+
+
+class Time(SceneModel):
+    """The ``[time]`` table. Either step or tolerance is given; the parameters of the scheme are keys as well.
+
+    Attributes:
+        end: Final time (s).
+        step: Time step (s), or ``None`` for adaptive steps.
+        tolerance: Error of all adaptive steps together, relative to the largest displacement, or ``None``.
+        max_step: Longest adaptive step (s), or ``None``.
+        min_step: Shortest adaptive step (s), or ``None``.
+        scheme: Name of a registered scheme.
+        output_every: Number of steps from one output to the next.
+    """
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Number]
+
+    end: Positive = pydantic.Field(description="a number greater than 0 (s)")
+    step: Positive | None = None
+    tolerance: Positive | None = None
+    max_step: Positive | None = None
+    min_step: Positive | None = None
+    scheme: Annotated[str, PlainValidator(_as_scheme)] = "generalised_alpha"
+    output_every: Count = 1
+
+    @classmethod
+    def keys(cls) -> list[str]:
+        """Returns the keys of the table and the parameters of all schemes."""
+        return list(dict.fromkeys([*super().keys(), *(key for s in registry.schemes for key in parameters_of(s))]))
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Parameters of the scheme by name, those that are not given with their defaults."""
+        return dict(self.__pydantic_extra__)
+
+    @property
+    def spectral_radius(self) -> float | None:
+        """ρ∞ of generalised-α; ``None`` for a scheme without."""
+        return self.parameters.get("spectral_radius")
+
+    @property
+    def beta(self) -> float | None:
+        """Newmark's β; ``None`` for a scheme without."""
+        return self.parameters.get("beta")
+
+    @property
+    def gamma(self) -> float | None:
+        """Newmark's γ; ``None`` for a scheme without."""
+        return self.parameters.get("gamma")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_scheme(cls, data: Any) -> Any:
+        """Adds the parameters of the chosen scheme that are not given."""
+        if not isinstance(data, Mapping):
+            return data
+        given = {key: value for key, value in data.items() if value is not None}
+        name = given.get("scheme", cls.model_fields["scheme"].default)
+        if name not in registry.schemes:
+            return given
+        defaults = {}
+        for key, field in parameters_of(registry.schemes[name]).items():
+            if key in cls.model_fields:
+                raise problem("scheme", name, f"cannot have a parameter {key}, which is a key of [time] already")
+            if field.default is not MISSING:
+                defaults[key] = field.default
+            elif key not in given:
+                raise problem(key, None, f'required key is missing; scheme = "{name}" needs it')
+        return defaults | given
+
+    @model_validator(mode="after")
+    def _check_scheme(self) -> Self:
+        scheme = registry.schemes[self.scheme]
+        own = parameters_of(scheme)
+        for key, value in self.parameters.items():
+            if key not in own:
+                raise problem(key, value, f'has no meaning with scheme = "{self.scheme}"')
+        for key, allowed in scheme.check(self.parameters).items():
+            raise problem(key, self.parameters[key], allowed)
+        if self.tolerance is not None and not estimates_error(scheme):
+            able = ", ".join(show(other.name) for other in registry.schemes if estimates_error(other))
+            reason = f'scheme = "{self.scheme}" does not estimate its error, so its steps are fixed: give step instead'
+            raise problem("tolerance", self.tolerance, f"{reason} (adaptive steps: {able})")
+        return self
+
+    @model_validator(mode="after")
+    def _check_steps(self) -> Self:
+        if (self.step is None) == (self.tolerance is None):
+            reason = "give exactly one of step (fixed steps, s) and tolerance (adaptive steps)"
+            raise problem("step", self.step, reason)
+        if self.step is not None and self.step > self.end:
+            raise problem("step", self.step, f"must be at most time.end = {self.end:g}")
+        for key in ("max_step", "min_step"):
+            if self.tolerance is None and getattr(self, key) is not None:
+                raise problem(key, getattr(self, key), "has a meaning only with tolerance (adaptive steps)")
+        if self.max_step is not None and self.min_step is not None and self.min_step > self.max_step:
+            raise problem("min_step", self.min_step, f"must be at most max_step = {self.max_step:g}")
+        return self

@@ -1,0 +1,302 @@
+"""What is registered is what a scene may name: theories, effects, schemes, section shapes and outputs."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pytest
+
+import rotfem.scene
+from rotfem import registry
+from rotfem.analysis.schemes import Array, Scheme, Stage, State
+from rotfem.errors import SceneError
+from rotfem.mechanics.effects import Effect, present_effects
+from rotfem.mechanics.outputs import Output
+from rotfem.mechanics.theories import Theory, ladder
+from rotfem.registry import Entry, Registry, register
+from rotfem.scene import Scene
+
+ROOT = Path(__file__).resolve().parents[2]
+SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2}
+SPATIAL_SECTION = {"EA": 3.0, "GA2": 1.0, "GA3": 2.0, "GJ": 5.0, "EI2": 7.0, "EI3": 11.0, "mass_per_length": 13.0}
+STRUCTURES = {
+    "planar_beam": {"type": "planar_beam", "length": 10.0, "section": SECTION},
+    "spatial_beam": {"type": "spatial_beam", "length": 10.0, "section": SPATIAL_SECTION},
+}
+
+Add = Callable[[Any], Any]
+
+
+@pytest.fixture
+def add() -> Iterator[Add]:
+    """Registers for the length of a test."""
+    added: list[Any] = []
+
+    def add_one(entry: Any) -> Any:
+        register(entry)
+        added.append(entry)
+        return entry
+
+    yield add_one
+    for entry in added:
+        if entry.name in entry.registry:
+            entry.registry.remove(entry.name)
+
+
+def scene(structure: str = "planar_beam", **tables: Any) -> Scene:
+    motion = {"type": "constant", "speed": 3.0}
+    return Scene.from_dict({"structure": STRUCTURES[structure], "motion": motion} | tables, "test.toml")
+
+
+def refusal(structure: str = "planar_beam", **tables: Any) -> str:
+    with pytest.raises(SceneError) as caught:
+        scene(structure, **tables)
+    return str(caught.value)
+
+
+class OneStage(Scheme):
+    """What the schemes of these tests share."""
+
+    order: ClassVar[int] = 1
+
+    def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
+        return Stage(end, state.q.copy(), state.v.copy(), state.a.copy(), 1 / h, 1 / h**2)
+
+    def finish(self, state: State, h: float, done: Sequence[Stage]) -> State:
+        return State(done[0].t, done[0].q, done[0].v, done[0].a)
+
+
+@dataclass(frozen=True)
+class Damped(OneStage):
+    """A scheme without an estimate of its error, with a parameter that must be given and one with a default."""
+
+    name: ClassVar[str] = "damped"
+
+    decay: float
+    gamma: float = 0.75
+
+    @classmethod
+    def check(cls, parameters: dict[str, Any]) -> dict[str, str]:
+        return {} if parameters["decay"] < parameters["gamma"] else {"decay": "must be less than gamma"}
+
+
+class Estimated(OneStage):
+    """A scheme without parameters that estimates its error."""
+
+    name: ClassVar[str] = "estimated"
+
+    def local_error(self, new: State, old: State) -> Array:
+        return new.q - old.q
+
+
+def strains(q: Any) -> tuple[Any, ...]:
+    return ()
+
+
+# --- registries -----------------------------------------------------------------------------------------------------
+
+
+def test_the_classes_share_the_registries_of_the_ground() -> None:
+    assert (Theory.registry, Effect.registry) == (registry.theories, registry.effects)
+    assert (Scheme.registry, Output.registry) == (registry.schemes, registry.outputs)
+    assert ladder()[0] == "linear" and set(ladder()) == set(registry.theories.names)
+    assert registry.schemes.names == ("generalised_alpha", "newmark")
+
+
+@pytest.mark.parametrize("name", ["", "two words", "2nd", "a-b", "a.b", None])
+def test_bad_names_are_refused(name: Any) -> None:
+    with pytest.raises(ValueError, match="cannot be the name of a theory"):
+        register(Theory(name, 9, {}))
+    assert name not in registry.theories
+
+
+def test_a_name_is_given_once(add: Add) -> None:
+    add(Theory("mine", 9, {}))
+    with pytest.raises(ValueError, match="'mine' is the name of another theory already"):
+        register(Theory("mine", 10, {}))
+    assert registry.theories["mine"].rank == 9
+    with pytest.raises(ValueError, match="'gravity' is the name of another effect already"):
+        register(Effect("gravity"))
+
+
+@pytest.mark.parametrize("thing", ["reissner", object(), Registry])
+def test_only_entries_are_registered(thing: Any) -> None:
+    with pytest.raises(TypeError, match="cannot be registered"):
+        register(thing)
+
+
+def test_names_are_valid_values_until_they_are_removed(add: Add) -> None:
+    """One entry of each kind, where it is named in a scene, and what the scene is told when it is gone."""
+    entries: list[tuple[Entry, dict[str, Any], str]] = [
+        (Theory("mine", 9, {"planar_beam": strains}), {"model": {"theory": "mine"}}, "model.theory"),
+        (Effect("mine"), {"model": {"effects": ["mine"]}}, "model.effects"),
+        (Output("mine", strains), {"output": {"quantities": ["mine"]}}, "output.quantities"),
+    ]
+    for entry, tables, key in entries:
+        assert key in refusal(**tables)
+        add(entry)
+        assert scene(**tables).to_dict()[key.split(".")[0]][key.split(".")[1]] in ("mine", ["mine"])
+        entry.registry.remove("mine")
+        message = refusal(**tables)
+        assert message.startswith(f"test.toml: {key} = ")
+        assert "allowed: " in message or "none are registered" in message
+
+
+def test_what_a_user_registered_is_suggested(add: Add) -> None:
+    add(Theory("cubic_curvature", 3.5, {"planar_beam": strains}))
+    message = refusal(model={"theory": "cubic_curvatur"})
+    assert 'did you mean "cubic_curvature"? allowed: "linear", ' in message
+    assert message.endswith(', "reissner", "cubic_curvature"')
+
+
+def test_names_of_the_scene_are_those_of_now(add: Add) -> None:
+    before = rotfem.scene.THEORIES
+    assert before == ladder()
+    add(Theory("mine", 0.5, {}))
+    assert (before[0], "mine", *before[1:]) == rotfem.scene.THEORIES
+    add(Effect("lift"))
+    assert (*registry.effects.names[:-1], "lift") == rotfem.scene.EFFECTS
+    with pytest.raises(AttributeError, match="no attribute 'SHAPES'"):
+        _ = rotfem.scene.SHAPES  # type: ignore[attr-defined]
+
+
+def test_a_scene_is_validated_without_fenicsx() -> None:
+    """The registries are read then; what their entries compute with is not."""
+    code = (
+        "import sys, rotfem; rotfem.load_scene('tests/scenes/iccia_hub_beam.toml').effective_effects();"
+        "print(*sorted({'dolfinx', 'ufl', 'basix', 'ffcx', 'petsc4py', 'slepc4py', 'mpi4py'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=True)
+    assert done.stdout.split() == []
+
+
+# --- theories -------------------------------------------------------------------------------------------------------
+
+
+def test_a_theory_is_refused_for_a_structure_it_has_no_strains_for(add: Add) -> None:
+    add(Theory("flat", 9, {"planar_beam": strains}))
+    scene("planar_beam", model={"theory": "flat"})
+    message = refusal("spatial_beam", model={"theory": "flat"})
+    assert 'model.theory = "flat": has strains for planar_beam, none for a spatial_beam' in message
+    assert message.endswith('allowed there: "linear", "consistent_linear", "von_karman_linear", "second_order", '
+                            '"von_karman", "reissner"')  # fmt: skip
+
+
+def test_the_inertial_frame_takes_every_exact_theory(add: Add) -> None:
+    add(Theory("other_exact", 9, {"planar_beam": strains}, exact=True))
+    add(Theory("inexact", 10, {"planar_beam": strains}))
+    scene(model={"theory": "other_exact", "frame": "inertial"})
+    message = refusal(model={"theory": "inexact", "frame": "inertial"})
+    assert 'model.theory = "reissner" or "other_exact"' in message
+
+
+# --- effects --------------------------------------------------------------------------------------------------------
+
+
+def test_an_effect_is_in_a_scene_that_has_data_for_it(add: Add) -> None:
+    add(Effect("lift", present=lambda problem: problem.motion.is_spinning and problem.structure.length > 5))
+    assert scene().effective_effects() == ("coriolis", "centrifugal", "lift")
+    assert scene(motion={"type": "constant", "speed": 0.0}).effective_effects() == ()
+    at_rest = scene(motion={"type": "constant", "speed": 0.0})
+    assert at_rest.effective_effects(spinning=True) == ("coriolis", "centrifugal", "lift")
+    assert scene(model={"effects": ["coriolis"]}).effective_effects() == ("coriolis",)
+    assert scene(model={"effects": ["lift", "gravity"]}).effective_effects() == ("lift",)
+
+
+def test_an_effect_of_rotation_is_none_of_the_inertial_frame(add: Add) -> None:
+    add(Effect("drift", of_rotation=True))
+    inertial = {"frame": "inertial"}
+    assert "drift" in scene().effective_effects()
+    assert scene(model=inertial).effective_effects() == ()
+    assert '"drift" is not a separate effect' in refusal(model=inertial | {"effects": ["drift"]})
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "tests" / "scenes").glob("*.toml")), ids=lambda path: path.stem)
+def test_scene_and_mechanics_agree_about_what_is_present(path: Path) -> None:
+    auto = rotfem.load_scene(path, ["model.effects=auto"])
+    assert auto.effective_effects() == present_effects(auto)
+
+
+# --- schemes --------------------------------------------------------------------------------------------------------
+
+
+def test_the_fields_of_a_scheme_are_keys_of_its_table(add: Add) -> None:
+    add(Damped)
+    time = scene(time={"end": 1, "step": 0.1, "scheme": "damped", "decay": 0.5}).time
+    assert time is not None and time.parameters == {"decay": 0.5, "gamma": 0.75}
+    assert registry.schemes[time.scheme](**time.parameters) == Damped(0.5, 0.75)
+    assert time.gamma == 0.75 and time.beta is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({}, 'time.decay: required key is missing; scheme = "damped" needs it'),
+        ({"decay": 0.8}, "time.decay = 0.8: must be less than gamma"),
+        ({"decay": "little"}, 'time.decay = "little": must be a number'),
+        ({"decay": float("nan")}, "time.decay = nan: must be a finite number"),
+        ({"decay": 0.5, "beta": 0.3}, 'time.beta = 0.3: has no meaning with scheme = "damped"'),
+        ({"decay": 0.5, "decai": 0.3}, 'time.decai: unknown key; did you mean "decay"? allowed: end, step, '),
+    ],
+)
+def test_bad_parameters_of_a_scheme(add: Add, changes: dict[str, Any], message: str) -> None:
+    add(Damped)
+    assert message in refusal(time={"end": 1, "step": 0.1, "scheme": "damped"} | changes)
+
+
+def test_parameters_of_a_scheme_that_is_gone_are_unknown_keys(add: Add) -> None:
+    table = {"end": 1, "step": 0.1, "decay": 0.5}
+    assert "time.decay: unknown key" in refusal(time=table)
+    add(Damped)
+    assert 'time.decay = 0.5: has no meaning with scheme = "generalised_alpha"' in refusal(time=table)
+
+
+def test_adaptive_steps_need_an_estimate_of_the_error(add: Add) -> None:
+    add(Damped)
+    add(Estimated)
+    table = {"end": 1, "tolerance": 1e-3}
+    adaptive = scene(time=table | {"scheme": "estimated"}).time
+    assert adaptive is not None and adaptive.parameters == {}
+    message = refusal(time=table | {"scheme": "damped", "decay": 0.5})
+    assert 'time.tolerance = 0.001: scheme = "damped" does not estimate its error' in message
+    assert message.endswith('give step instead (adaptive steps: "generalised_alpha", "newmark", "estimated")')
+
+
+def test_a_parameter_cannot_have_the_name_of_a_key(add: Add) -> None:
+    @dataclass(frozen=True)
+    class Clashing(OneStage):
+        name: ClassVar[str] = "clashing"
+        tolerance: float = 0.5
+
+    add(Clashing)
+    message = refusal(time={"end": 1, "step": 0.1, "scheme": "clashing"})
+    assert "cannot have a parameter tolerance, which is a key of [time] already" in message
+
+
+@pytest.mark.parametrize("scheme", ["rk4", 4, ["newmark"], {"name": "newmark"}])
+def test_unknown_schemes(scheme: Any) -> None:
+    message = refusal(time={"end": 1, "step": 0.1, "scheme": scheme})
+    assert message.startswith("test.toml: time.scheme") and 'allowed: "generalised_alpha", "newmark"' in message
+
+
+# --- outputs --------------------------------------------------------------------------------------------------------
+
+
+def test_outputs_are_named_in_their_table(add: Add) -> None:
+    assert scene().output.quantities == ()
+    assert "output" not in scene().to_dict()
+    assert refusal(output={"quantities": ["lift"]}).endswith('"lift" is not an output; none are registered')
+    add(Output("root_moment", strains, "N·m"))
+    asked = scene(output={"quantities": ["root_moment"]})
+    assert asked.output.quantities == ("root_moment",)
+    assert asked.to_dict()["output"] == {"quantities": ["root_moment"]}
+    message = refusal(output={"quantities": ["rot_moment"]})
+    assert 'is not an output; did you mean "root_moment"? allowed: a list of root_moment' in message
+    assert "listed twice" in refusal(output={"quantities": ["root_moment", "root_moment"]})
+    assert "allowed: a list of root_moment" in refusal(output={"quantities": "root_moment"})
+    assert "unknown key" in refusal(output={"names": []})
