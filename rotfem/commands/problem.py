@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
 from mpi4py import MPI
@@ -13,14 +13,15 @@ from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.schemes import Array, Scheme, State
 from rotfem.analysis.time_loop import March, Steps
 from rotfem.equations.compiled import compile_system
-from rotfem.errors import input_of
+from rotfem.errors import SceneError, input_of
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.free_hub import FreeHub, Torque
 from rotfem.mechanics.motion import Motion, no_acceleration
 from rotfem.mechanics.outputs import Functional, Output
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
-from rotfem.scene import Scene, as_scene
+from rotfem.scene import Scene, Time, as_scene
+from rotfem.selection.case import Case
 
 
 class Problem(ProblemData):
@@ -158,6 +159,33 @@ class Moment:
         self.system.set_time(self.t)
         self.system.set_state(self.state.q, self.state.v, self.state.a)
         return self.system
+
+
+def case_of(scene: Scene) -> Case:
+    """Return the case of a scene: its problem, and what is to be computed of it."""
+    time, unsteady = scene.time, ""
+    try:
+        scene.check_run()
+    except SceneError as error:
+        unsteady = str(error)
+    return Case(
+        problem=Problem.of(scene),
+        steps=None if time is None else Steps.of(time),
+        scheme=None if time is None else scheme_of(time),
+        tip_displacement=scene.initial.tip_displacement,
+        from_steady=scene.initial.state == "steady",
+        mode_count=scene.modes.count,
+        about=scene.modes.about,
+        increment_tolerance=scene.solver.increment_tolerance,
+        max_iterations=scene.solver.max_iterations,
+        tolerance=scene.model.tolerance,
+        unsteady=unsteady,
+    )
+
+
+def scheme_of(time: Time) -> Scheme:
+    """Return the scheme that a scene's [time] table asks for."""
+    return cast(Scheme, Scheme.registry[time.scheme](**time.parameters))
 
 
 def motion_of(scene: Scene) -> Motion:

@@ -61,17 +61,9 @@ class Model:
         )
         self.switches: dict[str, fem.Constant] = {}
         self.mechanics = self._mechanics()
-        further = {name: Effect(name, term) for name, term in problem.terms.items()}
-        self.acting = {
-            effect.name: effect
-            for effect in (
-                INTERNAL,
-                INERTIA,
-                *(Effect.registry[name] for name in self.effects),
-                *further.values(),
-                LOADS,
-            )
-        }
+        chosen = [Effect.registry[name] for name in self.effects]
+        further = [Effect(name, term) for name, term in problem.terms.items()]
+        self.acting = {effect.name: effect for effect in (INTERNAL, INERTIA, *chosen, *further, LOADS)}
         self.terms = self.work(Variation(self.structure.k))
         self._stretch: Any = None
 

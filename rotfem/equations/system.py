@@ -1,8 +1,8 @@
 """The equations of motion F(q, v, a; δq) = 0 of a problem, and their tangents, compiled.
 
 F = Σ virtual work of inertia, effects, stress, damping and loads; M = ∂F/∂a, C = ∂F/∂v, K = ∂F/∂q by `ufl.derivative`.
-What all systems share is here; the nonlinear one is in `nonlinear`, that of the linear theories in `affine`, and one with
-the angle of a free hub as one more unknown in `bordered`.
+What all systems share is here; the nonlinear one is in `nonlinear`, that of the linear theories in `affine`, and one
+with the angle of a free hub as one more unknown in `bordered`.
 """
 
 from __future__ import annotations

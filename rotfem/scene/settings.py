@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
@@ -9,6 +10,7 @@ from pydantic import PlainValidator, model_validator
 
 from rotfem import registry
 from rotfem.scene.names import as_name, as_names
+from rotfem.scene.plates import locking
 from rotfem.scene.values import Bounds, Count, Number, Positive, SceneModel, problem
 
 
@@ -94,6 +96,10 @@ class BeamMesh(SceneModel):
     degree: Degree = 3
     integration: Integration = "reduced"
 
+    def at_most(self, nodes: int) -> Self:
+        """The mesh, with no more elements than so many nodes along the beam need."""
+        return self.model_copy(update={"elements": min(self.elements, math.ceil(nodes / self.degree))})
+
 
 class PlateMesh(SceneModel):
     """The ``[mesh]`` table of a plate.
@@ -120,6 +126,15 @@ class PlateMesh(SceneModel):
     def degree_on(self, cell: str) -> int:
         """Polynomial degree on cells of a shape: as given, else 2 on quadrilaterals and 3 on triangles."""
         return 3 if cell == "triangle" and "degree" not in self.model_fields_set else self.degree
+
+    def at_most(self, nodes: int) -> Self:
+        """The mesh of a rectangle, with no more elements than so many nodes in each direction need."""
+        enough = math.ceil(nodes / self.degree)
+        return self.model_copy(update={"elements": tuple(min(n, enough) for n in self.elements)})
+
+    def locking_on(self, cell: str) -> str | None:
+        """Why the elements lock on cells of a shape; ``None`` if they do not (see `locking`)."""
+        return locking(cell, self.degree_on(cell), self.integration)
 
 
 class Modes(SceneModel):
