@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from rotfem.errors import ComputationError, OutputError, SceneError
+from rotfem.registry import register
 from rotfem.scene import Scene, load_scene
 from rotfem.version import __version__
 
@@ -31,6 +32,7 @@ __all__ = [
     "explain",
     "load_scene",
     "modes",
+    "register",
     "run",
 ]
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rotfem.mechanics.effects import Effect
     from rotfem.mechanics.outputs import Output
     from rotfem.mechanics.theories import Theory
+    from rotfem.scene.section_shapes import Shape
 
 
 class Entry(Protocol):
@@ -86,6 +87,7 @@ class Registry(Generic[E]):
 theories: Registry[Theory] = Registry("theory", "rotfem.mechanics.theories")
 effects: Registry[Effect] = Registry("effect", "rotfem.mechanics.effects")
 schemes: Registry[Any] = Registry("scheme", "rotfem.analysis.alpha_family")
+shapes: Registry[Shape] = Registry("section shape", "rotfem.scene.section_shapes")
 outputs: Registry[Output] = Registry("output", "rotfem.mechanics.outputs")
 
 

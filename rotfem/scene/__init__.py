@@ -11,6 +11,7 @@ from rotfem.scene.scene import (
     Model,
     Modes,
     MomentLoad,
+    OutputTable,
     PlanarBeamStructure,
     PlateMesh,
     PlateStructure,
@@ -25,6 +26,7 @@ from rotfem.scene.scene import (
     as_scene,
     load_scene,
 )
+from rotfem.scene.section_shapes import Geometry, Shape
 
 #: Names of all effects, and of all theories from the poorest to the richest, as they are registered when asked for.
 EFFECTS: tuple[str, ...]

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from rotfem import registry
+from rotfem.scene.section_shapes import MATERIAL_AND_SHAPE
 from rotfem.scene.values import problem
 
 
@@ -30,16 +32,11 @@ class Way:
 
 
 def shape_ways(optional: tuple[str, ...]) -> tuple[Way, ...]:
-    """Returns the ways of giving a material and a shape, all with the same optional keys."""
-    dimensions: dict[str, list[tuple[str, ...]]] = {
-        "rectangle": [("width", "height")],
-        "circle": [("radius",)],
-        "tube": [("outer_radius", "inner_radius"), ("outer_radius", "wall")],
-    }
+    """Returns the ways of giving a material and a shape, as they are registered, all with the same optional keys."""
     return tuple(
-        Way("shape", ("E", "nu", "rho", "shape", *names), optional, shape)
-        for shape, choices in dimensions.items()
-        for names in choices
+        Way("shape", (*MATERIAL_AND_SHAPE, *dimensions), optional, shape.name)
+        for shape in registry.shapes
+        for dimensions in shape.choices
     )
 
 

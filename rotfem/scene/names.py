@@ -9,12 +9,12 @@ from rotfem.registry import Registry
 from rotfem.scene.values import did_you_mean, problem
 
 
-def as_name(value: Any, registry: Registry[Any]) -> str:
-    """Returns the value. Raises if it is not the name of an entry."""
+def as_name(value: Any, registry: Registry[Any], key: str = "") -> str:
+    """Returns the value. Raises a problem at `key` if it is not the name of an entry."""
     names = registry.names
     if isinstance(value, str) and value in names:
         return value
-    raise problem("", value, f"{did_you_mean(value, names)}allowed: {', '.join(map(show, names))}")
+    raise problem(key, value, f"{did_you_mean(value, names)}allowed: {', '.join(map(show, names))}")
 
 
 def as_names(value: Any, registry: Registry[Any], others: str = "") -> tuple[str, ...]:

@@ -49,6 +49,7 @@ __all__ = [
     "Model",
     "Modes",
     "MomentLoad",
+    "OutputTable",
     "PlanarBeamStructure",
     "PlateMesh",
     "PlateStructure",

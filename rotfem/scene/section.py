@@ -7,14 +7,17 @@ of a wedge.
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import PlainValidator, model_validator
+from pydantic import ConfigDict, PlainValidator, model_validator
 
-from rotfem.scene import section_shapes as shapes
+from rotfem import registry
 from rotfem.scene.alternatives import Way, choose_way, shape_ways
+from rotfem.scene.names import as_name
+from rotfem.scene.section_shapes import MATERIAL_AND_SHAPE, Geometry
 from rotfem.scene.values import (
     Array,
     Bounds,
@@ -27,7 +30,6 @@ from rotfem.scene.values import (
     problem,
 )
 
-Shape = Literal["rectangle", "circle", "tube"]
 PoissonProfile = Annotated[Profile, PlainValidator(Bounds(gt=-1.0, le=0.5).profile)]
 ShearProfile = Annotated[Profile, PlainValidator(Bounds(gt=0.0, le=1.0).profile)]
 
@@ -35,41 +37,51 @@ DEFAULT_SHEAR_CORRECTION = 5.0 / 6.0
 
 
 class Section(SceneModel):
-    """What planar and spatial beam sections share: material, shape, tapers.
+    """What planar and spatial beam sections share: material, shape, tapers. Dimensions of the shape are keys as well.
 
     Attributes:
         E: Young's modulus (Pa).
         nu: Poisson's ratio.
         rho: Density (kg/m³).
         area: Cross-section area (m²).
-        shape: ``rectangle``, ``circle`` or ``tube``, with its dimensions (m) below.
+        shape: Name of a registered shape.
         shear_correction: Shear correction factor; Cowper's for a shape, else 5/6.
     """
 
     WAYS: ClassVar[tuple[Way, ...]] = ()
+    WITH_SHAPE: ClassVar[tuple[str, ...]] = ()
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, PositiveProfile | None]
 
     E: PositiveProfile | None = None
     nu: PoissonProfile | None = None
     rho: PositiveProfile | None = None
     area: PositiveProfile | None = None
-    shape: Shape | None = None
-    width: PositiveProfile | None = None
-    height: PositiveProfile | None = None
-    radius: PositiveProfile | None = None
-    outer_radius: PositiveProfile | None = None
-    inner_radius: PositiveProfile | None = None
-    wall: PositiveProfile | None = None
+    shape: str | None = None
     shear_correction: ShearProfile | None = None
+
+    @classmethod
+    def keys(cls) -> list[str]:
+        """Returns the keys of the table and the dimensions of all shapes."""
+        dimensions = (key for shape in registry.shapes for keys in shape.choices for key in keys)
+        return list(dict.fromkeys([*super().keys(), *dimensions]))
+
+    @classmethod
+    def ways(cls) -> tuple[Way, ...]:
+        """Returns all ways of giving the section."""
+        return *cls.WAYS, *shape_ways(cls.WITH_SHAPE)
 
     @property
     def given(self) -> dict[str, object]:
         """The keys that are set, with their values."""
-        return {name: value for name in type(self).model_fields if (value := getattr(self, name)) is not None}
+        names = (*type(self).model_fields, *self.__pydantic_extra__)
+        return {name: value for name in names if (value := getattr(self, name)) is not None}
 
     @property
     def way(self) -> Way:
         """The set of keys by which the section is given."""
-        return choose_way(self.given, self.WAYS)
+        return choose_way(self.given, self.ways())
 
     @property
     def breakpoints(self) -> tuple[float, ...]:
@@ -95,25 +107,28 @@ class Section(SceneModel):
         profile: Profile = getattr(self, name)
         return evaluate(profile, x)
 
-    def _geometry(self, x: Array) -> shapes.Geometry:
-        nu = self._at("nu", x)
-        if self.shape == "rectangle":
-            return shapes.rectangle(self._at("width", x), self._at("height", x), nu)
-        if self.shape == "circle":
-            return shapes.circle(self._at("radius", x), nu)
-        outer = self._at("outer_radius", x)
-        inner = self._at("inner_radius", x) if self.wall is None else outer - self._at("wall", x)
-        return shapes.tube(outer, inner, nu)
+    def _dimensions(self, x: Array) -> dict[str, Array]:
+        """Returns the dimensions of the shape at x; the caller knows from `way` that there is one."""
+        return {name: self._at(name, x) for name in self.way.required if name not in MATERIAL_AND_SHAPE}
+
+    def _geometry(self, x: Array) -> Geometry:
+        return registry.shapes[str(self.shape)].geometry(self._at("nu", x), **self._dimensions(x))
+
+    @model_validator(mode="before")
+    @classmethod
+    def _check_shape(cls, data: Any) -> Any:
+        """Checks the name of the shape before the keys, as it says which there are."""
+        if isinstance(data, Mapping) and data.get("shape") is not None:
+            as_name(data["shape"], registry.shapes, "shape")
+        return data
 
     @model_validator(mode="after")
     def _check_way(self) -> Self:
-        way = choose_way(self.given, self.WAYS)
-        if way.shape == "tube":
-            key = "wall" if self.wall is not None else "inner_radius"
-            knots = np.array(sorted({x for taper in self.tapers.values() for x, _ in taper} | {0.0}))
+        if self.way.name == "shape":
             # All dimensions are linear between knots, so it is enough to look at the knots.
-            if np.any(self._at(key, knots) >= self._at("outer_radius", knots)):
-                raise problem(key, getattr(self, key), "must be less than outer_radius everywhere")
+            knots = np.array(sorted({x for taper in self.tapers.values() for x, _ in taper} | {0.0}))
+            for key, allowed in registry.shapes[str(self.shape)].check(**self._dimensions(knots)).items():
+                raise problem(key, self.given[key], allowed)
         return self
 
 
@@ -132,8 +147,8 @@ class PlanarSection(Section):
     WAYS: ClassVar[tuple[Way, ...]] = (
         Way("stiffness", ("EA", "GA", "EI", "mass_per_length"), ("rotary_inertia",)),
         Way("material", ("E", "nu", "rho", "area", "second_moment"), ("shear_correction",)),
-        *shape_ways(("shear_correction",)),
     )
+    WITH_SHAPE: ClassVar[tuple[str, ...]] = ("shear_correction",)
 
     EA: PositiveProfile | None = None
     GA: PositiveProfile | None = None

@@ -7,11 +7,18 @@ J. Appl. Mech. 33 (1966) 335-340, table 1.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
+from rotfem.registry import Registry, register
+from rotfem.registry import shapes as registered
 from rotfem.scene.values import Array
+
+#: Keys of a section that has a shape, beside its dimensions.
+MATERIAL_AND_SHAPE = ("E", "nu", "rho", "shape")
 
 # tanh(nπa/2b)/n⁵ falls so fast that the terms left out are below 1e-9 of the sum.
 _ODD = np.arange(1, 60, 2, dtype=np.float64)
@@ -36,16 +43,50 @@ class Geometry:
     shear_correction: Array
 
 
-def rectangle(width: Array, height: Array, nu: Array) -> Geometry:
+@dataclass(frozen=True)
+class Shape:
+    """A shape of cross-sections, which a section table names and gives the dimensions of.
+
+    Attributes:
+        name: What a scene calls it.
+        dimensions: Keys of its dimensions (m), each a number or a taper greater than 0.
+        geometry: (nu, **dimensions) ↦ properties; ν and the dimensions are arrays over positions along the beam.
+        alternatives: Further complete sets of keys, any of which may be given instead of `dimensions`.
+        check: dimensions ↦ what is allowed, by name of those that are not; asked at the knots of all tapers.
+    """
+
+    registry: ClassVar[Registry[Shape]] = registered
+
+    name: str
+    dimensions: tuple[str, ...]
+    geometry: Callable[..., Geometry]
+    alternatives: tuple[tuple[str, ...], ...] = ()
+    check: Callable[..., dict[str, str]] = lambda **dimensions: {}
+
+    def __post_init__(self) -> None:
+        choices: tuple[Any, ...] = self.choices
+        for keys in choices:
+            if isinstance(keys, str) or not all(isinstance(key, str) and key.isidentifier() for key in keys):
+                raise ValueError(f"dimensions of {self.name!r} must be a tuple of names, not {keys!r}")
+            if {*keys} & {*MATERIAL_AND_SHAPE}:
+                raise ValueError(f"no dimension of {self.name!r} can be called {', '.join(MATERIAL_AND_SHAPE)}")
+
+    @property
+    def choices(self) -> tuple[tuple[str, ...], ...]:
+        """All complete sets of dimensions."""
+        return self.dimensions, *self.alternatives
+
+
+def rectangle(nu: Array, width: Array, height: Array) -> Geometry:
     """Returns the geometry of a solid rectangle, shear correction 10(1+ν)/(12+11ν).
 
     The torsion constant is Saint-Venant's series (Timoshenko & Goodier, Theory of Elasticity, §109)
     J = (a b³/3) [1 − (192/π⁵)(b/a) Σ_{n odd} tanh(nπa/2b)/n⁵] with a ≥ b.
 
     Args:
+        nu: Poisson's ratio.
         width: Side along axis 2 (m).
         height: Side along axis 3 (m).
-        nu: Poisson's ratio.
     """
     a, b = np.maximum(width, height), np.minimum(width, height)
     series = np.sum(np.tanh(_ODD * np.pi * (a / (2.0 * b))[..., None]) / _ODD**5, axis=-1)
@@ -58,21 +99,23 @@ def rectangle(width: Array, height: Array, nu: Array) -> Geometry:
     )
 
 
-def circle(radius: Array, nu: Array) -> Geometry:
+def circle(nu: Array, radius: Array) -> Geometry:
     """Returns the geometry of a solid circle of the given radius (m), shear correction 6(1+ν)/(7+6ν)."""
-    return tube(radius, np.zeros_like(radius), nu)
+    return tube(nu, radius, np.zeros_like(radius))
 
 
-def tube(outer_radius: Array, inner_radius: Array, nu: Array) -> Geometry:
+def tube(nu: Array, outer_radius: Array, inner_radius: Array | None = None, wall: Array | float = 0.0) -> Geometry:
     """Returns the geometry of a hollow circle.
 
     The shear correction is 6(1+ν)(1+m²)² / [(7+6ν)(1+m²)² + (20+12ν)m²] with m = inner/outer radius.
 
     Args:
-        outer_radius: Outer radius (m).
-        inner_radius: Inner radius (m).
         nu: Poisson's ratio.
+        outer_radius: Outer radius (m).
+        inner_radius: Inner radius (m), or None.
+        wall: Thickness of the wall (m), where there is no inner radius.
     """
+    inner_radius = outer_radius - wall if inner_radius is None else inner_radius
     second_moment = np.pi / 4.0 * (outer_radius**4 - inner_radius**4)
     m2 = (inner_radius / outer_radius) ** 2
     k = 6.0 * (1.0 + nu) * (1.0 + m2) ** 2 / ((7.0 + 6.0 * nu) * (1.0 + m2) ** 2 + (20.0 + 12.0 * nu) * m2)
@@ -83,3 +126,16 @@ def tube(outer_radius: Array, inner_radius: Array, nu: Array) -> Geometry:
         torsion_constant=2.0 * second_moment,
         shear_correction=k,
     )
+
+
+def _hole_fits(outer_radius: Array, **hole: Array) -> dict[str, str]:
+    """Returns what is allowed of an inner radius or a wall thickness that leaves no hole, or no tube."""
+    return {key: "must be less than outer_radius everywhere" for key, r in hole.items() if np.any(r >= outer_radius)}
+
+
+for _shape in (
+    Shape("rectangle", ("width", "height"), rectangle),
+    Shape("circle", ("radius",), circle),
+    Shape("tube", ("outer_radius", "inner_radius"), tube, (("outer_radius", "wall"),), _hole_fits),
+):
+    register(_shape)

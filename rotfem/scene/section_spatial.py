@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import PlainValidator
 
-from rotfem.scene.alternatives import Way, shape_ways
+from rotfem.scene.alternatives import Way
 from rotfem.scene.section import DEFAULT_SHEAR_CORRECTION, Section
 from rotfem.scene.values import (
     Array,
@@ -78,8 +78,8 @@ class SpatialSection(Section):
             ("E", "nu", "rho", "area", "second_moment2", "second_moment3", "torsion_constant"),
             ("shear_correction", *_CENTERS),
         ),
-        *shape_ways(("shear_correction", *_CENTERS)),
     )
+    WITH_SHAPE: ClassVar[tuple[str, ...]] = ("shear_correction", *_CENTERS)
 
     EA: PositiveProfile | None = None
     GA2: PositiveProfile | None = None

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
-from typing import Annotated, Any, Self
+from typing import Any, Self
 
 import pydantic
-from pydantic import ConfigDict, PlainValidator, model_validator
+from pydantic import ConfigDict, model_validator
 
 from rotfem import registry
 from rotfem.errors import show
 from rotfem.scene.names import as_name
 from rotfem.scene.values import Count, Number, Positive, SceneModel, problem
-
-
-def _as_scheme(value: Any) -> str:
-    return as_name(value, registry.schemes)
 
 
 def parameters_of(scheme: type) -> dict[str, Field[Any]]:
@@ -52,7 +48,7 @@ class Time(SceneModel):
     tolerance: Positive | None = None
     max_step: Positive | None = None
     min_step: Positive | None = None
-    scheme: Annotated[str, PlainValidator(_as_scheme)] = "generalised_alpha"
+    scheme: str = "generalised_alpha"
     output_every: Count = 1
 
     @classmethod
@@ -83,13 +79,11 @@ class Time(SceneModel):
     @model_validator(mode="before")
     @classmethod
     def _fill_scheme(cls, data: Any) -> Any:
-        """Adds the parameters of the chosen scheme that are not given."""
+        """Adds the parameters of the chosen scheme that are not given; a slip in its name comes before all others."""
         if not isinstance(data, Mapping):
             return data
         given = {key: value for key, value in data.items() if value is not None}
-        name = given.get("scheme", cls.model_fields["scheme"].default)
-        if name not in registry.schemes:
-            return given
+        name = as_name(given.get("scheme", cls.model_fields["scheme"].default), registry.schemes, "scheme")
         defaults = {}
         for key, field in parameters_of(registry.schemes[name]).items():
             if key in cls.model_fields:

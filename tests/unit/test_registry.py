@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
 import pytest
+import tomli_w
 
 import rotfem.scene
 from rotfem import registry
@@ -18,8 +20,8 @@ from rotfem.errors import SceneError
 from rotfem.mechanics.effects import Effect, present_effects
 from rotfem.mechanics.outputs import Output
 from rotfem.mechanics.theories import Theory, ladder
-from rotfem.registry import Entry, Registry, register
-from rotfem.scene import Scene
+from rotfem.registry import Registry, register
+from rotfem.scene import Geometry, Scene, Shape
 
 ROOT = Path(__file__).resolve().parents[2]
 SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2}
@@ -38,7 +40,7 @@ def add() -> Iterator[Add]:
     added: list[Any] = []
 
     def add_one(entry: Any) -> Any:
-        register(entry)
+        rotfem.register(entry)
         added.append(entry)
         return entry
 
@@ -48,14 +50,14 @@ def add() -> Iterator[Add]:
             entry.registry.remove(entry.name)
 
 
-def scene(structure: str = "planar_beam", **tables: Any) -> Scene:
+def scene(kind: str = "planar_beam", /, **tables: Any) -> Scene:
     motion = {"type": "constant", "speed": 3.0}
-    return Scene.from_dict({"structure": STRUCTURES[structure], "motion": motion} | tables, "test.toml")
+    return Scene.from_dict({"structure": STRUCTURES[kind], "motion": motion} | tables, "test.toml")
 
 
-def refusal(structure: str = "planar_beam", **tables: Any) -> str:
+def refusal(kind: str = "planar_beam", /, **tables: Any) -> str:
     with pytest.raises(SceneError) as caught:
-        scene(structure, **tables)
+        scene(kind, **tables)
     return str(caught.value)
 
 
@@ -92,6 +94,28 @@ class Estimated(OneStage):
 
     def local_error(self, new: State, old: State) -> Array:
         return new.q - old.q
+
+
+def square(nu: Array, side: Array) -> Geometry:
+    second = side**4 / 12
+    return Geometry(side**2, second, second, 0.1406 * side**4, 10 * (1 + nu) / (12 + 11 * nu))
+
+
+def ellipse(nu: Array, semi_axis_2: Array, semi_axis_3: Array) -> Geometry:
+    a, b = semi_axis_2, semi_axis_3
+    area = np.pi * a * b
+    return Geometry(area, area * b**2 / 4, area * a**2 / 4, np.pi * (a * b) ** 3 / (a**2 + b**2), 0.9 + 0 * nu)
+
+
+def beam(kind: str = "planar_beam", /, **section: Any) -> dict[str, Any]:
+    """Returns the table of a beam of a material and a shape."""
+    return {"type": kind, "length": 2.0, "section": {"E": 210e9, "nu": 0.25, "rho": 7800.0} | section}
+
+
+def value_at(tables: Any, key: str) -> Any:
+    for part in key.split("."):
+        tables = tables[part]
+    return tables
 
 
 def strains(q: Any) -> tuple[Any, ...]:
@@ -132,16 +156,18 @@ def test_only_entries_are_registered(thing: Any) -> None:
 
 def test_names_are_valid_values_until_they_are_removed(add: Add) -> None:
     """One entry of each kind, where it is named in a scene, and what the scene is told when it is gone."""
-    entries: list[tuple[Entry, dict[str, Any], str]] = [
+    entries: list[tuple[Any, dict[str, Any], str]] = [
         (Theory("mine", 9, {"planar_beam": strains}), {"model": {"theory": "mine"}}, "model.theory"),
         (Effect("mine"), {"model": {"effects": ["mine"]}}, "model.effects"),
+        (Damped, {"time": {"end": 1, "step": 0.1, "scheme": "damped", "decay": 0.5}}, "time.scheme"),
+        (Shape("mine", ("side",), square), {"structure": beam(shape="mine", side=1)}, "structure.section.shape"),
         (Output("mine", strains), {"output": {"quantities": ["mine"]}}, "output.quantities"),
     ]
     for entry, tables, key in entries:
-        assert key in refusal(**tables)
+        assert f"{key} = " in refusal(**tables)
         add(entry)
-        assert scene(**tables).to_dict()[key.split(".")[0]][key.split(".")[1]] in ("mine", ["mine"])
-        entry.registry.remove("mine")
+        assert value_at(scene(**tables).to_dict(), key) in (entry.name, [entry.name])
+        entry.registry.remove(entry.name)
         message = refusal(**tables)
         assert message.startswith(f"test.toml: {key} = ")
         assert "allowed: " in message or "none are registered" in message
@@ -282,6 +308,97 @@ def test_a_parameter_cannot_have_the_name_of_a_key(add: Add) -> None:
 def test_unknown_schemes(scheme: Any) -> None:
     message = refusal(time={"end": 1, "step": 0.1, "scheme": scheme})
     assert message.startswith("test.toml: time.scheme") and 'allowed: "generalised_alpha", "newmark"' in message
+
+
+# --- section shapes -------------------------------------------------------------------------------------------------
+
+ELLIPSE = Shape("ellipse", dimensions=("semi_axis_2", "semi_axis_3"), geometry=ellipse)
+AXES = {"shape": "ellipse", "semi_axis_2": 0.2, "semi_axis_3": 0.1}
+
+
+def test_a_shape_of_ones_own_in_both_sections(add: Add) -> None:
+    add(ELLIPSE)
+    planar: Any = scene(structure=beam(**AXES)).structure
+    area, second = np.pi * 0.02, np.pi * 0.02 * 0.1**2 / 4
+    values = planar.section.at([0.0, 2.0])
+    for name, expected in {
+        "EA": 210e9 * area, "GA": 0.9 * 84e9 * area, "EI": 210e9 * second,
+        "mass_per_length": 7800 * area, "rotary_inertia": 7800 * second,
+    }.items():  # fmt: skip
+        np.testing.assert_allclose(values[name], [expected, expected])
+    spatial: Any = scene(structure=beam("spatial_beam", **AXES, mass_center=[0.0, 0.0])).structure
+    stiffness = np.diag(spatial.section.at(0.0)["stiffness"])
+    torsion = 84e9 * np.pi * 0.02**3 / 0.05
+    np.testing.assert_allclose(stiffness[3:], [torsion, 210e9 * second, 210e9 * 4 * second])
+
+
+def test_dimensions_of_a_shape_of_ones_own_may_be_tapers(add: Add) -> None:
+    add(ELLIPSE)
+    asked = scene(structure=beam(**AXES | {"semi_axis_3": [[0, 0.1], [0.5, 0.2], [2, 0.2]]}))
+    section: Any = asked.structure.section  # type: ignore[union-attr]
+    assert (section.breakpoints, section.uniform) == ((0.5,), False)
+    np.testing.assert_allclose(section.at(0.25)["EI"], 210e9 * np.pi * 0.2 * 0.15**3 / 4)
+    assert asked.to_dict()["structure"]["section"]["semi_axis_3"] == [[0.0, 0.1], [0.5, 0.2], [2.0, 0.2]]
+    assert "it ends at 1" in refusal(structure=beam(**AXES | {"semi_axis_3": [[0, 0.1], [1, 0.2]]}))
+
+
+def test_a_shape_of_ones_own_in_a_file(add: Add, tmp_path: Path) -> None:
+    tables = {"structure": beam(**AXES), "motion": {"type": "constant", "speed": 1.0}}
+    (tmp_path / "beam.toml").write_text(tomli_w.dumps(tables))
+    with pytest.raises(SceneError, match='structure.section.shape = "ellipse": allowed: '):
+        rotfem.load_scene(tmp_path / "beam.toml")
+    add(ELLIPSE)
+    loaded = rotfem.load_scene(tmp_path / "beam.toml", ["structure.section.semi_axis_2=0.3"])
+    assert loaded.to_dict()["structure"]["section"]["semi_axis_2"] == 0.3
+    assert Scene.from_dict(loaded.to_dict()).to_dict() == loaded.to_dict()
+
+
+@pytest.mark.parametrize(
+    ("section", "message"),
+    [
+        ({"shape": "ellipse", "semi_axis_2": 0.2}, "not a complete set of keys: missing semi_axis_3; give exactly one"),
+        (AXES | {"radius": 1}, "radius cannot be combined with the rest"),
+        (AXES | {"semi_axis_2": 0}, "structure.section.semi_axis_2 = 0: must be greater than 0"),
+        (AXES | {"semi_axis_2": [[0, 1], [2, -1]]}, "semi_axis_2 = [[0, 1], [2, -1]]: the value -1 at x = 2 must be"),
+        (AXES | {"semi_axis_2": "wide"}, 'semi_axis_2 = "wide": must be a number greater than 0, or a taper'),
+        (
+            AXES | {"semi_axes_2": 1},
+            'structure.section.semi_axes_2: unknown key; did you mean "semi_axis_2"? allowed: E',
+        ),
+        ({"shape": "elipse"}, 'did you mean "ellipse"? allowed: "rectangle", "circle", "tube", "ellipse"'),
+    ],
+)
+def test_bad_dimensions_of_a_shape(add: Add, section: dict[str, Any], message: str) -> None:
+    add(ELLIPSE)
+    assert message in refusal(structure=beam(**section))
+
+
+def test_a_shape_may_have_alternatives_and_a_check_of_its_own(add: Add) -> None:
+    def box(nu: Array, side: Array, **wall: Array) -> Geometry:
+        return square(nu, side * (1 - wall["ratio"]) if wall else side)
+
+    def check(side: Array, **wall: Array) -> dict[str, str]:
+        return {name: "must be less than 1 everywhere" for name, value in wall.items() if np.any(value >= 1)}
+
+    add(Shape("box", ("side",), box, (("side", "ratio"),), check))
+    half: Any = scene(structure=beam(shape="box", side=2, ratio=0.5)).structure
+    whole: Any = scene(structure=beam(shape="box", side=1)).structure
+    assert half.section.at(0.0)["EA"] == whole.section.at(0.0)["EA"] == 210e9
+    message = refusal(structure=beam(shape="box", side=2, ratio=[[0, 0.5], [1, 1.5], [2, 0.5]]))
+    assert "structure.section.ratio = " in message and "must be less than 1 everywhere" in message
+
+
+@pytest.mark.parametrize("dimensions", ["side", ("side", "two words"), ("nu",), (1,)])
+def test_bad_names_of_dimensions(dimensions: Any) -> None:
+    with pytest.raises(ValueError, match="dimension"):
+        Shape("bad", dimensions, square)
+
+
+def test_the_reference_names_every_dimension() -> None:
+    text = (ROOT / "docs" / "scene.md").read_text(encoding="utf-8")
+    for shape in registry.shapes:
+        for key in (f'"{shape.name}"', *(key for keys in shape.choices for key in keys)):
+            assert f"`{key}`" in text
 
 
 # --- outputs --------------------------------------------------------------------------------------------------------
