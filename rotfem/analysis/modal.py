@@ -152,6 +152,10 @@ class ModalAnalysis:
             return np.asarray(zero)
         return steady_state(s, speed, self.newton, start)
 
+    def report(self) -> dict[str, Any]:
+        """Return what a summary says of how the modes were solved; nothing special here."""
+        return {}
+
     def right(self, spinning: Spinning) -> Array:
         """Return the eigenvectors of the locally owned unknowns, one column each."""
         return spinning.pairs.right

@@ -16,9 +16,10 @@ from rotfem.analysis.equilibrium import check_steady
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
-from rotfem.commands.modes import advice, instabilities, mode_rows, unstiffened
-from rotfem.commands.summary import summary_of
-from rotfem.errors import SceneError
+from rotfem.commands.modes import advice, analysis_of, hints_of, instabilities, mode_rows, unstiffened
+from rotfem.commands.problem import Problem, case_of
+from rotfem.commands.summary import modal_summary
+from rotfem.errors import SceneError, input_of
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.results import CampbellResult
 from rotfem.scene import Scene, as_scene
@@ -54,6 +55,7 @@ def parse_speeds(text: str) -> list[float]:
 def campbell(
     scene: Scene | str | Path | Mapping[str, Any],
     speeds: Sequence[float] | str,
+    *,
     comm: MPI.Comm = MPI.COMM_WORLD,
     orders: int | None = None,
     progress: Progress | None = None,
@@ -76,66 +78,99 @@ def campbell(
     started = perf_counter()
     scene = as_scene(scene)
     values = parse_speeds(speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds))
-    if scene.modes.about == "steady":
-        check_steady(
-            scene.replace({"motion": {"type": "constant", "speed": values[-1]}}) if any(scene.loads.gravity) else scene
-        )
-    asked, choice = scene, None
-    if scene.model.tolerance is not None:
-        spinning = scene if scene.motion.is_spinning else scene.replace({"motion.speed": values[-1] or values[0]})
-        choice = choose(spinning, (MODES,), (values[0], 0.5 * (values[0] + values[-1]), values[-1]), comm)
-        scene = choice.apply(scene)
-    analysis = ModalAnalysis(scene, comm, sweep=True)
-    hints = analysis.advise("campbell", hint, max(map(abs, values)))
-    if worth_while(analysis, values):
-        analysis = ReducedAnalysis(analysis)
-        analysis.prepare(values[0], values[-1], scene.modes.count + SPARE)
-    sweep = Sweep(analysis, scene.modes.count)
-    sweep.run(values, progress or (lambda share: None))
-    count = min(scene.modes.count, len(sweep.nodes[0].order))
-    sweep.count = count
-    lowest = min((n.value(b).imag for n in sweep.nodes for b in range(count) if n.value(b).imag > 0), default=0.0)
-    fastest = max(abs(values[0]), abs(values[-1]))
-    highest = max((n.value(b).imag for n in sweep.nodes for b in range(count)), default=lowest)
-    orders = orders if orders is not None else int(np.clip(np.ceil(highest / max(fastest, 1e-300)), 1, 4))
-    labels = branch_labels(analysis, sweep.nodes[0], count)
-    rows = [row for node in sweep.nodes for row in node_rows(analysis, node, labels)]
-    crossings, onsets = sweep.crossings(orders), sweep.onsets()
-    for crossing in crossings:
-        crossing["label"] = labels[crossing["branch"] - 1]
-    lost = [labels[b] for b in range(count) if sweep.nodes[-1].order[b] < 0]
-    ends = mode_rows(analysis, sweep.nodes[-1].spinning)[:count]
-    warnings = [] if choice is not None else [*advice(analysis, fastest)]
-    warnings += unstiffened(analysis, fastest, ends)
-    warnings += [f"{name} left the computed modes before the last speed; more modes.count keeps it" for name in lost]
-    warnings += [
+    with input_of(scene.file):
+        sweep = Diagram(scene, values, comm, hint)
+        return sweep.result(orders, progress or (lambda share: None), started)
+
+
+class Diagram:
+    """One Campbell diagram of a scene.
+
+    Args:
+        scene: validated scene.
+        values: increasing speeds, rad/s.
+        comm: MPI communicator.
+        hint: called with every line of advice; None asks for none.
+    """
+
+    def __init__(self, scene: Scene, values: Sequence[float], comm: MPI.Comm, hint: Hint | None):
+        self.scene, self.values, self.choice = scene, values, None
+        problem = Problem.of(scene)
+        if scene.modes.about == "steady":
+            last = problem.motion.at_speed(values[-1])
+            check_steady(problem.replace(motion=last) if any(scene.loads.gravity) else problem)
+        if scene.model.tolerance is not None:
+            case = case_of(scene)
+            if not problem.motion.is_spinning:
+                case = case.replace(problem=problem.replace(motion=problem.motion.at_speed(values[-1] or values[0])))
+            speeds = (values[0], 0.5 * (values[0] + values[-1]), values[-1])
+            self.choice = choose(case, (MODES,), speeds, comm)
+            problem = self.choice.applied(problem)
+        self.analysis = analysis_of(scene, problem.spinning(), comm)
+        self.hints = hints_of(self.analysis, scene, "campbell", hint, max(map(abs, values)))
+        if worth_while(self.analysis, values):
+            self.analysis = ReducedAnalysis(self.analysis)
+            self.analysis.prepare(values[0], values[-1], scene.modes.count + SPARE)
+
+    def result(self, orders: int | None, progress: Progress, started: float) -> CampbellResult:
+        """Return the branches over speed, with what the diagram says."""
+        analysis, count, values = self.analysis, self.scene.modes.count, self.values
+        sweep = Sweep(analysis, count)
+        sweep.run(values, progress)
+        sweep.count = count = min(count, len(sweep.nodes[0].order))
+        found = [node.value(b).imag for node in sweep.nodes for b in range(count)]
+        lowest = min((w for w in found if w > 0), default=0.0)
+        fastest = max(abs(values[0]), abs(values[-1]))
+        if orders is None:
+            orders = int(np.clip(np.ceil(max(found, default=lowest) / max(fastest, 1e-300)), 1, 4))
+        labels = branch_labels(analysis, sweep.nodes[0], count)
+        rows = [row for node in sweep.nodes for row in node_rows(analysis, node, labels)]
+        crossings, onsets = sweep.crossings(orders), sweep.onsets()
+        for crossing in crossings:
+            crossing["label"] = labels[crossing["branch"] - 1]
+        ends = mode_rows(analysis, sweep.nodes[-1].spinning)[:count]
+        warnings = [] if self.choice is not None else advice(analysis, fastest)
+        warnings += [*unstiffened(analysis, fastest, ends), *told(sweep, labels, onsets, ends)]
+        summary = {
+            **modal_summary("campbell", analysis, self.scene, self.choice, started),
+            "branches": [{"branch": b + 1, "label": labels[b], **branch_summary(sweep, b)} for b in range(count)],
+            "per_rev": orders,
+            "critical_speeds": crossings,
+            "instabilities": onsets,
+            "ambiguous": sweep.ambiguous,
+            "speeds": len(values),
+            "speeds_solved": sweep.solves,
+            "checks": self_checks(analysis, sweep.nodes[-1].spinning),
+            **analysis.report(),
+            "lowest_frequency": lowest,
+            "warnings": warnings,
+            "advice": self.hints,
+        }
+        return CampbellResult(summary, rows)
+
+
+def told(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends: list[dict[str, Any]]) -> list[str]:
+    """Return warnings of branches that were lost or are unsure, and of instabilities.
+
+    Args:
+        sweep: the branches.
+        labels: their names.
+        onsets: ranges of instability.
+        ends: rows of the modes at the last speed.
+    """
+    last = sweep.nodes[-1]
+    lost = [label for b, label in enumerate(labels) if last.order[b] < 0]
+    out = [f"{name} left the computed modes before the last speed; more modes.count keeps it" for name in lost]
+    out += [
         f"ambiguous: {labels[int(a['branch']) - 1]} at {a['speed']:.6g} rad/s, correlation {a['confidence']:.2f}"
         for a in sweep.ambiguous
     ]
-    warnings += [
+    out += [
         f"{onset['kind']} from {onset['speed']:.8g} rad/s "
         + ("on" if onset["until"] is None else f"to {onset['until']:.8g} rad/s")
         for onset in onsets
     ]
-    last = sweep.nodes[-1].spinning
-    checks = self_checks(analysis, last)
-    warnings += [f"at {last.speed:g} rad/s, {text}" for text in instabilities(ends)]
-    summary = {
-        **summary_of(analysis, "campbell", asked, choice, started),
-        "branches": [{"branch": b + 1, "label": labels[b], **branch_summary(sweep, b)} for b in range(count)],
-        "per_rev": orders,
-        "critical_speeds": crossings,
-        "instabilities": onsets,
-        "ambiguous": sweep.ambiguous,
-        "speeds": len(values),
-        "speeds_solved": sweep.solves,
-        "checks": checks,
-        **(analysis.report() if isinstance(analysis, ReducedAnalysis) else {}),
-        "lowest_frequency": lowest,
-        "warnings": warnings,
-        "advice": hints,
-    }
-    return CampbellResult(summary, rows)
+    return out + [f"at {last.speed:g} rad/s, {text}" for text in instabilities(ends)]
 
 
 def branch_labels(analysis: ModalAnalysis, first: Node, count: int) -> list[str]:

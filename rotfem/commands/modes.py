@@ -15,13 +15,19 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.equilibrium import check_steady
+from rotfem.analysis.equilibrium import check_steady, critical_speed
 from rotfem.analysis.modal import PURE, ModalAnalysis, Spinning, stability
 from rotfem.analysis.mode_checks import self_checks
-from rotfem.commands.summary import summary_of
+from rotfem.commands.problem import Problem, case_of
+from rotfem.commands.summary import modal_summary
+from rotfem.errors import input_of
 from rotfem.listeners import Hint, silent
+from rotfem.mechanics.effects import Work
+from rotfem.mechanics.theories import richest
+from rotfem.numerics.newton import Newton
 from rotfem.results import ModesResult
 from rotfem.scene import Scene, as_scene
+from rotfem.scene.advice import advise
 from rotfem.selection.distance import MODES
 from rotfem.selection.model_choice import choose
 from rotfem.structures.paraview import writer
@@ -31,9 +37,11 @@ Array = npt.NDArray[Any]
 
 def modes(
     scene: Scene | str | Path | Mapping[str, Any],
+    *,
     comm: MPI.Comm = MPI.COMM_WORLD,
     sensitivities: bool = False,
     hint: Hint | None = silent,
+    terms: Mapping[str, Work] | None = None,
 ) -> ModesResult:
     """Return the modes of a scene at its final speed: that of a spin-up, at the end of [time], or the constant one.
 
@@ -42,6 +50,7 @@ def modes(
         comm: MPI communicator; every rank gets the whole result.
         sensitivities: also compute the derivatives of all eigenvalues to the scene's parameters.
         hint: called with every line of advice before the computation starts; None asks for none.
+        terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form (see `rotfem.Effect`).
 
     Raises:
         SceneError: the scene is not valid, or has no steady state.
@@ -49,15 +58,22 @@ def modes(
     """
     started = perf_counter()
     scene = as_scene(scene)
+    with input_of(scene.file):
+        return _modes(scene, Problem.of(scene, terms=terms), comm, sensitivities, (hint, started))
+
+
+def _modes(
+    scene: Scene, problem: Problem, comm: MPI.Comm, sensitivities: bool, around: tuple[Hint | None, float]
+) -> ModesResult:
+    (hint, started), choice = around, None
     if scene.modes.about == "steady":
-        check_steady(scene)
-    asked, choice = scene, None
+        check_steady(problem)
     if scene.model.tolerance is not None:
-        choice = choose(scene, (MODES,), comm=comm)
-        scene = choice.apply(scene)
-    analysis = ModalAnalysis(scene, comm)
-    speed = final_speed(analysis)
-    hints = analysis.advise("modes", hint, speed)
+        choice = choose(case_of(scene), (MODES,), comm=comm)
+        problem = choice.applied(problem)
+    analysis = analysis_of(scene, problem, comm)
+    speed = problem.motion.final_speed(scene.time.end if scene.time is not None else 0.0)
+    hints = hints_of(analysis, scene, "modes", hint, speed)
     spinning = analysis.at(speed, scene.modes.count, keep=False)
     flexible = scene.modes.count - int(spinning.rigid)
     spinning.pairs = spinning.pairs.select(np.arange(min(flexible, len(spinning.pairs.values))))
@@ -70,14 +86,14 @@ def modes(
     if spinning.rigid:
         rows = [rigid_row(rows), *rows]
     summary = {
-        **summary_of(analysis, "modes", asked, choice, started),
+        **modal_summary("modes", analysis, scene, choice, started),
         "speed": speed,
         "modes": rows,
         "checks": checks,
         "warnings": warnings,
         "advice": hints,
     }
-    structure, right = analysis.model.structure, spinning.pairs.right
+    structure, right = analysis.structure, spinning.pairs.right
     result = ModesResult(summary, rows, shapes, triangles=structure.surface(), analysis=analysis, spinning=spinning)
     if result.triangles is not None:
         first = 1 + int(spinning.rigid)
@@ -90,12 +106,24 @@ def modes(
     return result
 
 
-def final_speed(analysis: ModalAnalysis) -> float:
-    """Return the speed of the modes: at the end of the motion where the scene has one, constant otherwise (rad/s)."""
-    scene = analysis.scene
-    if scene.motion.type == "spin_up":
-        return float(scene.motion.speed)
-    return analysis.model.motion.speed(scene.time.end if scene.time is not None else 0.0)
+def analysis_of(scene: Scene, problem: Problem, comm: MPI.Comm) -> ModalAnalysis:
+    """Return the modal analysis that a scene asks for.
+
+    Raises:
+        InputError: more modes are asked for than there are unknowns, or a mesh that cannot be computed with.
+    """
+    analysis = ModalAnalysis(problem, scene.modes.about, Newton.of(scene.solver), comm)
+    if "count" in scene.modes.model_fields_set:  # what was not asked for is only an upper limit
+        analysis.check_count(scene.modes.count)
+    return analysis
+
+
+def hints_of(analysis: ModalAnalysis, scene: Scene, command: str, hint: Hint | None, speed: float) -> list[str]:
+    """Return hints about the computation ahead, up to a speed (rad/s), and hand them on."""
+    theory, critical = analysis.problem.theory, None
+    if hint is not None and theory.linear and not theory.prestress:
+        critical = critical_speed(analysis.system)
+    return advise(scene, command, hint, speed, critical)
 
 
 def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any]]:
@@ -148,13 +176,13 @@ def advice(analysis: ModalAnalysis, speed: float) -> list[str]:
 
 def unstiffened(analysis: ModalAnalysis, speed: float, rows: list[dict[str, Any]]) -> list[str]:
     """Return a warning if modes are among the rows whose stiffening by the spin the theory does not hold."""
-    families, theory = analysis.model.structure.unstiffened, analysis.scene.model.theory
+    families, theory = analysis.structure.unstiffened, analysis.problem.theory
     found = sorted({row["label"] for row in rows for f in families if row.get(f"share_{f}", 0.0) > PURE})
-    if speed == 0.0 or theory == "reissner" or not found:
+    if speed == 0.0 or theory.exact or not found:
         return []
     return [
-        f"{', '.join(found)}: the strains of {theory} for this structure leave out the stiffening of such modes by the "
-        'spin, so their frequencies are too low; model.theory = "reissner" has it'
+        f"{', '.join(found)}: the strains of {theory.name} for this structure leave out the stiffening of such modes "
+        f'by the spin, so their frequencies are too low; model.theory = "{richest().name}" has it'
     ]
 
 
@@ -170,6 +198,6 @@ def scaled_shape(analysis: ModalAnalysis, spinning: Spinning, i: int) -> dict[st
     peak = values.ravel()[np.argmax(np.abs(values))]
     values = values / peak
     columns: dict[str, Array] = dict(coordinates)
-    for c, name in enumerate(analysis.model.structure.components):
+    for c, name in enumerate(analysis.structure.components):
         columns[name], columns[f"{name}_imag"] = values[:, c].real, values[:, c].imag
     return columns

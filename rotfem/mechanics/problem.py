@@ -63,12 +63,6 @@ class Problem:
         present = present_effects(self)
         return present if self.effects is None else tuple(name for name in present if name in self.effects)
 
-    def all_effects(self) -> Self:
-        """Return the problem with all effects that it has data for."""
-        return self.replace(effects=None)
-
-    @property
-    def spins(self) -> Self:
-        """The problem of a structure that spins at a speed to be given, as in a sweep over speeds."""
-        motion = replace(self.motion, is_spinning=True)
-        return self.replace(motion=motion)
+    def spinning(self) -> Self:
+        """Return the problem of a structure that spins at a speed to be given, as in a sweep over speeds."""
+        return self.replace(motion=replace(self.motion, is_spinning=True))

@@ -1,0 +1,58 @@
+"""What a run keeps of its states: rows of the history, the last shape, fields of plates."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.schemes import State
+from rotfem.results.run import RunResult, Table
+from rotfem.structures.paraview import Snapshots, writer
+
+Array = npt.NDArray[np.float64]
+
+
+class Recorder:
+    """Takes states and keeps rows of history.csv.
+
+    Args:
+        system: equations of motion.
+
+    Attributes:
+        history: rows so far.
+    """
+
+    def __init__(self, system: Any):
+        self.system = system
+        names = tuple(f"tip_{c}" for c in system.structure.components)
+        free = ("torque", "hub_kinetic", "angular_momentum", "impulse", "work") if system.hub is not None else ()
+        further = tuple(system.model.problem.outputs)
+        self.history = Table(("t", "psi", "psi_dot", *names, "kinetic", "strain", "jacobi", *free, *further))
+        self.snapshots = Snapshots() if system.structure.mesh.topology.dim == 2 else None
+
+    def __call__(self, state: State) -> None:
+        """Add a row for a state."""
+        system, t = self.system, state.t
+        system.set_time(t)
+        system.set_state(state.q, state.v, state.a)
+        energy, motion = system.energies(), system.motion
+        row = [t, motion.angle(t), motion.speed(t), *system.tip(state.q, t)]
+        row += [energy[name] for name in ("kinetic", "strain", "jacobi")]
+        if system.hub is not None:
+            work, impulse = (0.0, 0.0) if state.given is None else state.given[:2]
+            hub = system.row
+            row += [system.hub.torque.at(t, after=True), hub.kinetic(), hub.angular_momentum(), impulse, work]
+        self.history.append([*row, *system.outputs().values()])
+        if self.snapshots is not None:
+            self.snapshots.add(t, state.q)
+
+    def result(self, summary: dict[str, Any], history: dict[str, Array]) -> RunResult:
+        """Return a result with the last shape and the fields kept."""
+        structure = self.system.structure
+        shape = self.system.shape() if len(self.history) else {}
+        out = RunResult(summary, history, shape, triangles=structure.surface())
+        if self.snapshots is not None:
+            out.fields = writer(self.system.V, "fields", self.snapshots.kept)
+        return out

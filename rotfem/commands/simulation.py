@@ -1,0 +1,217 @@
+"""One run: the compiled system, its march or its equilibrium, and what is watched on the way."""
+
+from __future__ import annotations
+
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from rotfem.analysis.equilibrium import critical_speed, static_tip_shape, steady_state
+from rotfem.analysis.schemes import State
+from rotfem.analysis.stepper import Stepper
+from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
+from rotfem.commands.problem import scheme_of
+from rotfem.commands.recorder import Recorder
+from rotfem.commands.summary import run_summary
+from rotfem.equations.compiled import compile_system
+from rotfem.errors import ComputationError
+from rotfem.listeners import Progress
+from rotfem.mechanics.problem import Problem
+from rotfem.mechanics.theories import Theory, richest, theories
+from rotfem.numerics.newton import Newton
+from rotfem.results.run import RunResult
+from rotfem.scene import Scene
+from rotfem.selection.model_choice import Choice, RangeExceeded
+
+Array = npt.NDArray[np.float64]
+
+#: Displacement over L in the plane of a plate from which a run says what its strains leave out there.
+NOTICED = 1e-3
+
+
+class Simulation:
+    """One run of a scene.
+
+    Args:
+        scene: the scene as it was asked for.
+        problem: its problem, with the model it is run with.
+        comm: MPI communicator.
+        choice: how this model was chosen, if it was.
+    """
+
+    def __init__(self, scene: Scene, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, choice: Choice | None = None):
+        self.started = perf_counter()
+        self.scene, self.comm, self.choice = scene, comm, choice
+        self.warnings: list[str] = [] if choice is None else upgrade_warnings(choice)
+        self.advice: list[str] = []
+        if scene.time is None and problem.frame == "inertial":
+            problem = problem.replace(frame="rotating")
+            self.warnings.append("a steady state is one only in the rotating frame, where it was computed")
+        self.problem = problem
+        self.system: Any = compile_system(problem, comm, moving=scene.time is not None)
+        self.compiled = perf_counter() - self.started
+        self.record = Recorder(self.system)
+        self.newton = Newton.of(scene.solver)
+        self.stepper: Stepper | None = None
+        self.steps = 0
+        self.critical = critical_speed(self.system)
+        self._critical_since: float | None = None
+        self._exceeded = ""
+
+    def run(self, progress: Progress | None = None) -> RunResult:
+        """Return the result of the scene (see `rotfem.run`).
+
+        Raises:
+            ComputationError: it failed; its attribute `result` holds what was computed until then.
+        """
+        try:
+            self._steady() if self.scene.time is None else self._march(progress or (lambda share: None))
+        except (ComputationError, KeyboardInterrupt) as error:
+            failure = error if isinstance(error, ComputationError) else None
+            status = "interrupted" if failure is None else "failed"
+            error.result = self.result(status, failure)  # type: ignore[union-attr]
+            raise
+        return self.result("done")
+
+    # --- the two kinds of run ----------------------------------------------------------------------------------------
+
+    def _steady(self) -> None:
+        omega = self.problem.motion.speed(0.0)
+        q = steady_state(self.system, omega, self.newton)
+        q, v = self.system.start(q)
+        self._keep(State(0.0, q, v, np.zeros_like(q)))
+        if self.critical is not None and abs(omega) > self.critical:
+            self.warnings.append(
+                f"the equilibrium is unstable: {abs(omega):g} rad/s is above the speed {self.critical:.6g} rad/s at "
+                f"which the {self.problem.theory.name} stiffness is singular"
+            )
+
+    def _march(self, progress: Progress) -> None:
+        time = self.scene.time
+        assert time is not None
+        newton = Newton.of(self.scene.solver, monotone=True)
+        march = March(self.system, scheme_of(time), Steps.of(time), newton, self._initial())
+        self.stepper = march.stepper
+        for self.steps, state in enumerate(march):
+            self._check(state)
+            if self.steps % time.output_every == 0 or state.t >= time.end * (1 - 1e-9):
+                self._keep(state)
+                progress(state.t / time.end)
+
+    def _initial(self) -> Array | None:
+        """Return q at t = 0 in the turning frame; None where it is undeformed."""
+        initial = self.scene.initial
+        if initial.tip_displacement is not None:
+            return static_tip_shape(self.problem, initial.tip_displacement, Newton.of(self.scene.solver))
+        if initial.state != "steady":
+            return None
+        system = self.system
+        if self.problem.frame == "inertial":
+            system = compile_system(self.problem.replace(frame="rotating"), self.comm, moving=False)
+        return steady_state(system, self.problem.motion.speed(0.0), Newton.of(self.scene.solver))
+
+    # --- what is watched ---------------------------------------------------------------------------------------------
+
+    def _keep(self, state: State) -> None:
+        """Record a state, and see that the model still holds for it."""
+        if not self.system.linear:
+            self.system.structure.check_range(state.q, state.t)
+        self.record(state)
+        if self.choice is None or self._exceeded:
+            return
+        sizes = self.system.sizes(state.q)
+        self._exceeded = self.choice.check(sizes)
+        if not self._exceeded:
+            return
+        if self.scene.model.on_exceed != "warn":
+            raise RangeExceeded(self._exceeded, state.t if self.scene.time is not None else None, sizes)
+        self.warnings.append(f"{self._exceeded}, at t = {state.t:.6g} s")
+
+    def _check(self, state: State) -> None:
+        """Stop a history that has left the range of its theory.
+
+        Raises:
+            ComputationError: displacements of a linear theory beyond the structure's length, or not finite.
+        """
+        if not self.system.linear:
+            return
+        speed = abs(self.system.motion.speed(state.t))
+        if self._critical_since is None and self.critical is not None and speed > self.critical:
+            self._critical_since = state.t
+        size = self.system.size(state.q)
+        if np.isfinite(size) and size <= LARGEST_LINEAR_DEFLECTION:
+            return
+        theory, why = self.problem.theory, "the motion is unstable or its load too large for a linear theory"
+        if self._critical_since is not None:
+            passed = f"passed at t = {self._critical_since:.4g} s"
+            why = f"its stiffness is not definite above {self.critical:.6g} rad/s, {passed}"
+            if not theory.prestress:
+                why += ": first-order strains keep the softening by the centrifugal force but not the stiffening"
+        raise ComputationError(
+            f"the {theory.name} solution diverged (a displacement exceeds the length, or a rotation 1 rad; {why})",
+            time=state.t,
+            advice=better_theories(theory),
+        )
+
+    # --- the result --------------------------------------------------------------------------------------------------
+
+    def result(self, status: str, failure: ComputationError | None = None) -> RunResult:
+        """Return everything computed so far with a summary of how it went."""
+        history = self.record.history.arrays()
+        self._warn_of_steps()
+        if status == "done" and self._critical_since is not None:
+            self.warnings.append(
+                f"the speed is above {self.critical:.6g} rad/s, where the {self.problem.theory.name} stiffness is no "
+                f"longer definite, since t = {self._critical_since:.4g} s"
+            )
+        self._warn_of_what_the_strains_lack(history)
+        summary = run_summary(self, status, history)
+        if failure is not None:
+            summary["failure"] = {"what": failure.what, "time": failure.time, "advice": failure.advice}
+        return self.record.result(summary, history)
+
+    def _warn_of_steps(self) -> None:
+        if self.stepper is not None and self.stepper.substeps:
+            self.warnings.append(f"{self.stepper.substeps} steps were halved because Newton did not converge")
+        if self.iteration.roundoff > 0:
+            self.warnings.append(f"Newton stopped at round-off, increments {self.iteration.roundoff:.1e} (relative)")
+
+    @property
+    def iteration(self) -> Newton:
+        """The iteration control that did the work."""
+        return self.newton if self.stepper is None else self.stepper.newton
+
+    def _warn_of_what_the_strains_lack(self, history: dict[str, Array]) -> None:
+        """Warn where a structure moves in a way that its theory's strains do not stiffen by the spin."""
+        structure, theory = self.system.structure, self.problem.theory
+        spins = np.any(history.get("psi_dot", np.zeros(1)) != 0.0)
+        if not structure.unstiffened or theory.exact or not spins or "centrifugal" not in self.system.model.effects:
+            return
+        size = float(np.max(np.abs(history["tip_u2"]), initial=0.0)) / structure.length
+        if size > NOTICED:
+            self.warnings.append(
+                f"the tip moves by up to {size:.2g} L in the plane: the strains of {theory.name} for this structure "
+                f'leave out the stiffening of such motions by the spin; model.theory = "{richest().name}" has it'
+            )
+
+
+def better_theories(theory: Theory) -> str:
+    """Return which theories to use in the place of a linear one that diverged."""
+    stiffened = next(t.name for t in theories() if t.linear and t.prestress)
+    small = "" if theory.prestress else f'"{stiffened}" for small or '
+    any_size = (
+        f'"{richest().name}" for any deflection' if small else f'"{richest().name}", which holds for any deflection'
+    )
+    return f"use model.theory = {small}{any_size}"
+
+
+def upgrade_warnings(choice: Choice) -> list[str]:
+    """Return what a run says of the models it has given up."""
+    return [
+        f"{note['why']}{'' if note['time'] is None else ' at t = {:.6g} s'.format(note['time'])}; "
+        f"started again with {note['to']} and all effects"
+        for note in choice.upgrades
+    ]
