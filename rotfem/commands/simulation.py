@@ -200,12 +200,11 @@ class Simulation:
 
 def better_theories(theory: Theory) -> str:
     """Return which theories to use in the place of a linear one that diverged."""
+    exact = richest().name
+    if theory.prestress:
+        return f'use model.theory = "{exact}", which holds for any deflection'
     stiffened = next(t.name for t in theories() if t.linear and t.prestress)
-    small = "" if theory.prestress else f'"{stiffened}" for small or '
-    any_size = (
-        f'"{richest().name}" for any deflection' if small else f'"{richest().name}", which holds for any deflection'
-    )
-    return f"use model.theory = {small}{any_size}"
+    return f'use model.theory = "{stiffened}" for small or "{exact}" for any deflection'
 
 
 def upgrade_warnings(choice: Choice) -> list[str]:

@@ -38,7 +38,7 @@ class Body:
         """Return δx."""
         return k.variation(self.x)
 
-    def turn(self, e: Any) -> Any:
+    def rigid_turn(self, e: Any) -> Any:
         """Return the change of x in a unit rigid turn about the axis e, e×x."""
         return ufl.cross(self.resolve(e), self.x)
 
@@ -95,7 +95,7 @@ class AppliedLoad:
         """Return what the force works on in a variation of q, δx."""
         return k.variation(self.x)
 
-    def turn(self, e: Any) -> Any:
+    def rigid_turn(self, e: Any) -> Any:
         """Return the change of x in a unit rigid turn about the axis e: e×x of a position, 1 of an angle about e."""
         return ufl.cross(e, self.x) if ufl.as_ufl(self.x).ufl_shape else e[2]
 

@@ -70,14 +70,14 @@ class Motion:
     def constant_speed(cls, speed: float, axis: npt.ArrayLike = (0, 0, 1), **more: Any) -> Motion:
         """Return steady rotation at a speed (rad/s)."""
         turning = (lambda t: speed), (lambda t: 0.0), (lambda t: speed * t)
-        state = {"constant": True, "is_spinning": speed != 0.0, "changes_speed": False}
+        state: dict[str, Any] = {"constant": True, "is_spinning": speed != 0.0, "changes_speed": False}
         return cls(*turning, about(axis), **(state | more))
 
     @classmethod
     def spin_up(cls, speed: float, duration: float, axis: npt.ArrayLike = (0, 0, 1), **more: Any) -> Motion:
         """Return the smooth spin-up from rest to a speed (rad/s) in a time (s); see `smooth_spin_up`."""
         turns = speed != 0.0
-        state = {"is_spinning": turns, "changes_speed": turns, "settled": duration}
+        state: dict[str, Any] = {"is_spinning": turns, "changes_speed": turns, "settled": duration}
         return cls(*smooth_spin_up(speed, duration), about(axis), **(state | more))
 
     @classmethod
@@ -86,7 +86,7 @@ class Motion:
     ) -> Motion:
         """Return rotation at a tabulated speed; see `tabulated`."""
         t, speeds = np.asarray(table, dtype=float).T
-        state = {
+        state: dict[str, Any] = {
             "is_spinning": bool(np.any(speeds != 0.0)),
             "changes_speed": len(set(speeds)) > 1,
             "knots": tuple(t),
@@ -103,12 +103,12 @@ class Motion:
         **more: Any,
     ) -> Motion:
         """Return rotation at the speed that a function of time gives; see `from_callable`."""
-        return cls(*from_callable(speed, rate, angle), about(axis), **({"smooth": False} | more))
+        return cls(*from_callable(speed, rate, angle), about(axis), **{"smooth": False, **more})
 
     @classmethod
     def free(cls, hub: FreeHub, axis: npt.ArrayLike = (0, 0, 1), **more: Any) -> Motion:
         """Return the rotation of a free hub, an unknown; what is prescribed of it is its initial speed."""
-        state = {"is_spinning": True, "changes_speed": True, "constant": False, "hub": hub}
+        state: dict[str, Any] = {"is_spinning": True, "changes_speed": True, "constant": False, "hub": hub}
         return replace(cls.constant_speed(hub.speed, axis), **(state | more))
 
     @property

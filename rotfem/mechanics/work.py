@@ -44,7 +44,7 @@ class RigidTurn:
 
     def of(self, moving: Body | AppliedLoad) -> Any:
         """Return e×x of a body, or of what a load works on."""
-        return moving.turn(self.e)
+        return moving.rigid_turn(self.e)
 
 
 @dataclass(frozen=True)

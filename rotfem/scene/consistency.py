@@ -6,7 +6,7 @@ from rotfem import registry
 from rotfem.errors import show
 from rotfem.scene.beams import PlanarBeamStructure, SpatialBeamStructure
 from rotfem.scene.loads import Loads
-from rotfem.scene.motion import ConstantMotion, Motion, TorqueMotion
+from rotfem.scene.motion import Motion, TorqueMotion
 from rotfem.scene.plates import PlateStructure, locking
 from rotfem.scene.settings import BeamMesh, Initial, Model, PlateMesh
 from rotfem.scene.values import problem
@@ -102,5 +102,5 @@ def check_initial(structure: AnyStructure, motion: Motion, initial: Initial) -> 
         if abs(displacement) >= structure.length:
             reason = f"must be less than the length {structure.length:g} in size"
             raise problem("initial.tip_displacement", displacement, reason)
-    if initial.state == "steady" and not isinstance(motion, ConstantMotion):
+    if initial.state == "steady" and not motion.is_steady:
         raise problem("initial.state", initial.state, 'needs motion.type = "constant"')

@@ -56,6 +56,11 @@ class Motion(SceneModel):
         return a / norm, b / norm, c / norm
 
     @property
+    def is_steady(self) -> bool:
+        """Whether the speed is constant and prescribed, so that there is a steady state."""
+        return False
+
+    @property
     def is_spinning(self) -> bool:
         """Whether the speed is not identically zero (as far as can be known beforehand)."""
         return True
@@ -91,6 +96,10 @@ class ConstantMotion(Motion):
 
     type: Literal["constant"]
     speed: Number = Field(description="a number (rad/s)")
+
+    @property
+    def is_steady(self) -> bool:
+        return True
 
     @property
     def is_spinning(self) -> bool:

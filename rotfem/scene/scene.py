@@ -216,7 +216,7 @@ class Scene(SceneModel):
         Raises:
             SceneError: If there is no ``[time]`` table though the motion is not constant.
         """
-        if self.time is None and not isinstance(self.motion, ConstantMotion):
+        if self.time is None and not self.motion.is_steady:
             raise SceneError(
                 self._file,
                 "time",

@@ -97,6 +97,6 @@ class EdgeMoment(AppliedLoad):
         """Return t×δt."""
         return ufl.cross(self.director, k.variation(self.director))
 
-    def turn(self, e: Any) -> Any:
+    def rigid_turn(self, e: Any) -> Any:
         """Return the turn in a unit rigid turn about e, without its part along t."""
         return e - ufl.dot(e, self.director) * self.director

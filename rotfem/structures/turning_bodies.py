@@ -110,6 +110,6 @@ class AppliedMoment(AppliedLoad):
         """Return k(δθ)."""
         return self.section.spatial_rate(rotation_part(k.dq))
 
-    def turn(self, e: Any) -> Any:
+    def rigid_turn(self, e: Any) -> Any:
         """Return the turn in a unit rigid turn about e, e itself."""
         return e

@@ -11,13 +11,13 @@ import numpy as np
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady
-from rotfem.analysis.modal import ModalAnalysis
 from rotfem.commands.cost.record import Measurement
 from rotfem.commands.cost.reference import Samples
 from rotfem.commands.cost.settings import Setting
-from rotfem.commands.modes import final_speed
-from rotfem.commands.run import Simulation
-from rotfem.errors import ComputationError, SceneError
+from rotfem.commands.modes import analysis_of
+from rotfem.commands.problem import Problem
+from rotfem.commands.simulation import Simulation
+from rotfem.errors import ComputationError, SceneError, input_of
 from rotfem.scene import Scene
 
 #: Steps of the run that warms up: the first ones load compiled forms and touch every library once.
@@ -90,9 +90,11 @@ class Bench:
 
     def _motion(self, variant: Scene) -> Callable[[], tuple[Samples, tuple[int, int, int]]]:
         variant.check_run()
-        if variant.time is None or variant.initial.state == "steady":
-            check_steady(variant)
-        simulation = Simulation(variant, self.comm)
+        problem = Problem.of(variant)
+        with input_of(variant.file):
+            if variant.time is None or variant.initial.state == "steady":
+                check_steady(problem)
+            simulation = Simulation(variant, problem, self.comm)
 
         def go() -> tuple[Samples, tuple[int, int, int]]:
             result = simulation.run()
@@ -105,13 +107,15 @@ class Bench:
         return go
 
     def _modal(self, variant: Scene) -> Callable[[], tuple[Samples, tuple[int, int, int]]]:
-        if variant.modes.about == "steady":
-            check_steady(variant)
-        analysis = ModalAnalysis(variant, self.comm)
-        V = analysis.system.V
+        problem = Problem.of(variant)
+        with input_of(variant.file):
+            if variant.modes.about == "steady":
+                check_steady(problem)
+            analysis = analysis_of(variant, problem, self.comm)
+        V, speed = analysis.system.V, problem.motion.final_speed(variant.time.end if variant.time is not None else 0.0)
 
         def go() -> tuple[Samples, tuple[int, int, int]]:
-            spinning = analysis.at(final_speed(analysis), variant.modes.count)
+            spinning = analysis.at(speed, variant.modes.count)
             values: Any = spinning.pairs.values[: variant.modes.count]
             dofs = V.dofmap.index_map.size_global * V.dofmap.index_map_bs
             samples = Samples(np.column_stack([values.imag, values.real]), np.empty(0))

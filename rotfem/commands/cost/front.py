@@ -8,16 +8,17 @@ from typing import Any
 
 from rotfem.commands.cost.record import Measurement
 from rotfem.commands.cost.reference import Reference, distance, size
-from rotfem.commands.cost.settings import RICHEST, Setting
+from rotfem.commands.cost.settings import Setting
+from rotfem.mechanics.theories import richest
 
 Row = dict[str, Any]
 
 
 def model_errors(references: Mapping[str, Reference], each: bool) -> dict[str, float]:
     """Return theory ↦ relative difference of its reference from the richest theory's; empty where that has none."""
-    if RICHEST not in references:
+    if richest().name not in references:
         return {}
-    truth = references[RICHEST].samples
+    truth = references[richest().name].samples
     return {theory: distance(r.samples, truth, each) for theory, r in references.items()}
 
 
@@ -31,7 +32,7 @@ def rows_of(
     What a failed setting does not have is None.
     """
     floors = model_errors(references, each)
-    truth = references.get(RICHEST)
+    truth = references.get(richest().name)
     scale = None if truth is None or each else size(truth.samples)
     rows = []
     for setting, m in measured:

@@ -6,17 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from rotfem import registry
 from rotfem.errors import SceneError
-from rotfem.scene import THEORIES, ConstantMotion, Scene
+from rotfem.mechanics.theories import ladder as theory_ladder
+from rotfem.mechanics.theories import theories as all_theories
+from rotfem.scene import Scene
 from rotfem.scene.values import did_you_mean
 
 Elements = int | tuple[int, int] | None
 
 OUTPUTS = ("tip", "frequencies")
-SCHEMES = ("generalised_alpha", "newmark")
-
-#: The theory whose converged result stands for the truth.
-RICHEST = THEORIES[-1]
 
 #: Steps tried, as multiples of the scene's own; a step is never longer than this part of the interval.
 STEPS_FULL, STEPS_QUICK, LONGEST = (0.45, 10.5), (1.9, 10.5), 1 / 20
@@ -26,9 +25,6 @@ TOLERANCES_FULL, TOLERANCES_QUICK = (1000.0, 100.0, 10.0, 1.0, 0.1), (100.0, 10.
 
 #: Numbers of elements tried, as multiples of the scene's own.
 MESHES_FULL, MESHES_QUICK = (0.25, 0.5, 1.0, 2.0), (0.5, 1.0)
-
-#: Theories of a quick study, besides the scene's own.
-QUICK = ("linear", "consistent_linear", RICHEST)
 
 HIGHEST_DEGREE = 6
 
@@ -118,7 +114,7 @@ def default_output(scene: Scene) -> str:
     """Return "tip" for a history or a steady state that the scene asks for, "frequencies" otherwise."""
     if scene.time is not None:
         return "tip"
-    steady = isinstance(scene.motion, ConstantMotion) and not scene.modes.model_fields_set
+    steady = scene.motion.is_steady and not scene.modes.model_fields_set
     return "tip" if steady and (scene.motion.is_spinning or scene.loads.model_fields_set) else "frequencies"
 
 
@@ -167,7 +163,7 @@ def _ways(
     factors = TOLERANCES_QUICK if quick else TOLERANCES_FULL
     own = time.tolerance if not chosen.get("steps") else None
     tolerances = [] if own is None else [own * factor for factor in factors]
-    others = [] if quick else [name for name in SCHEMES if name != time.scheme]
+    others = [] if quick else [name for name in registry.schemes.names if name != time.scheme]
     schemes = chosen.get("schemes") or [time.scheme, *others]
     fixed = [(scheme, h, None, max(1, round(interval / h))) for scheme in schemes for h in steps]
     return [*fixed, *((scheme, None, tolerance, 1) for scheme in schemes for tolerance in tolerances)]
@@ -177,7 +173,8 @@ def default_theories(scene: Scene, quick: bool) -> list[str]:
     """Return the theories that the scene allows, few of them for a quick study, poorest first."""
     if scene.model.frame == "inertial":
         return [scene.model.theory]
-    return [name for name in THEORIES if not quick or name in QUICK or name == scene.model.theory]
+    there = [theory for theory in all_theories() if theory.holds_for(scene.structure.type)]
+    return [t.name for t in there if not quick or t.quick or t.name == scene.model.theory]
 
 
 def ladder(own: float, interval: float, end: float, low: float, high: float) -> list[float]:
@@ -218,7 +215,7 @@ def check_choice(scene: Scene, chosen: Mapping[str, Sequence[Any] | None]) -> No
     Raises:
         SceneError: one is of the wrong kind, or has no meaning for this scene.
     """
-    for name, allowed in (("theories", THEORIES), ("schemes", SCHEMES)):
+    for name, allowed in (("theories", theory_ladder()), ("schemes", registry.schemes.names)):
         for value in chosen.get(name) or ():
             if value not in allowed:
                 reason = f"{did_you_mean(value, allowed)}allowed: {', '.join(allowed)}"

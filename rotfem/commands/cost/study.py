@@ -21,7 +21,6 @@ from rotfem.commands.cost.reference import Reference, reference
 from rotfem.commands.cost.result import CostResult
 from rotfem.commands.cost.settings import (
     OUTPUTS,
-    RICHEST,
     Setting,
     default_output,
     grid,
@@ -30,9 +29,11 @@ from rotfem.commands.cost.settings import (
     sample_interval,
     unique,
 )
+from rotfem.commands.problem import Problem
 from rotfem.equations.model import Model
-from rotfem.errors import ComputationError, SceneError
+from rotfem.errors import ComputationError, InputError, SceneError
 from rotfem.listeners import Progress
+from rotfem.mechanics.theories import richest
 from rotfem.scene import Scene, as_scene
 from rotfem.version import versions
 
@@ -121,6 +122,7 @@ class Study:
         self.each = output == "frequencies"
         path = folder / RECORD if folder is not None and comm.rank == 0 else None
         self.record = Record(path, fingerprint(scene, output, comm.size), fresh=not resume)
+        self.richest = richest().name
         self.bench = Bench(scene, output, comm)
         self.taken: set[Setting] = set()
         self.new = 0
@@ -146,7 +148,7 @@ class Study:
         self.check_degrees(chosen.get("degrees") or ())
         interval = None if base is None else sample_interval(self.scene, base)
         own = own_setting(self.scene)
-        theories = unique([*(s.theory for s in settings), RICHEST])
+        theories = unique([*(s.theory for s in settings), self.richest])
         finer = {theory: reference_settings(settings, own, theory, interval) for theory in theories}
         ahead = dict.fromkeys([*settings, *(s for levels in finer.values() for s in levels)], 0.0)
         for s in ahead:  # the work is about that of the steps, or that of the elements where there are none
@@ -167,7 +169,7 @@ class Study:
         failures: dict[str, str] = {}
         for theory, levels in finer.items():
             self._refer(theory, levels, get, references, failures)
-        if not self.each and RICHEST in references and not np.any(references[RICHEST].samples.values):
+        if not self.each and self.richest in references and not np.any(references[self.richest].samples.values):
             raise SceneError(self.scene.file, "cost --of", "tip", 'the tip does not move; try output "frequencies"')
         rows = rows_of(measured, references, self.each)
         return CostResult(self._summary(rows, references, failures, accuracy, quick), rows, self.scene, references)
@@ -180,8 +182,8 @@ class Study:
         """
         for degree in degrees if getattr(self.scene.structure, "mesh", None) is not None else ():
             try:
-                Model(self.scene.replace({"mesh.degree": degree}), self.comm, effects=())
-            except SceneError as error:
+                Model(Problem.of(self.scene.replace({"mesh.degree": degree})).replace(effects=()), self.comm)
+            except InputError as error:
                 raise SceneError(self.scene.file, "cost --degrees", degree, error.allowed) from None
 
     def base_step(self) -> float | None:
@@ -227,10 +229,10 @@ class Study:
         quick: bool,
     ) -> dict[str, Any]:
         warnings = []
-        if RICHEST not in references:
-            reason = failures.get(RICHEST, "")
-            warnings.append(f"no reference of {RICHEST} ({reason}): errors do not include that of the model")
-        judges = [r for t, r in references.items() if t == RICHEST or RICHEST not in references]
+        if self.richest not in references:
+            reason = failures.get(self.richest, "")
+            warnings.append(f"no reference of {self.richest} ({reason}): errors do not include that of the model")
+        judges = [r for t, r in references.items() if t == self.richest or self.richest not in references]
         uncertainty = max((r.uncertainty for r in judges), default=0.0)
         for theory, r in references.items():
             mine = [row["error"] for row in rows if row["theory"] == theory and row["error"]]
