@@ -69,4 +69,12 @@ def column_of_rows(rows: Sequence[Mapping[str, Any]], name: str) -> npt.NDArray[
         return np.array(values, dtype=bool)
     if any(isinstance(value, str) for value in there):
         return np.array(["" if value is None else str(value) for value in values], dtype=str)
+    if all(isinstance(value, int) for value in values):
+        return np.array(values, dtype=np.int64)
     return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
+
+
+def nodes_of(columns: Mapping[str, npt.NDArray[Any]], triangles: Any) -> dict[str, Variable]:
+    """Return where the nodes of columns are and, of a plate, the triangles between them."""
+    out: dict[str, Variable] = {name: (("node",), columns[name]) for name in ("x", "y") if name in columns}
+    return out if triangles is None else {**out, "triangles": (("triangle", "corner"), np.asarray(triangles))}

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.results.files import csv_text, json_text, rows_text
-from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows
+from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows, nodes_of
 from rotfem.results.result import Result
 
 if TYPE_CHECKING:
@@ -132,8 +132,8 @@ class ModesResult(Result):
     def to_xarray(self) -> xarray.Dataset:
         """Return the columns of modes.csv over `mode`, and the shapes over `mode` and `node`.
 
-        Shapes `shape_u1`, … are complex, largest entry of a mode 1, NaN for the rigid-body mode, which has none. The
-        nodes' `x` (and `y`, m) and the modes' labels are coordinates, and so is the speed (rad/s).
+        Shapes `shape_u1`, … are complex, largest entry of a mode 1, NaN for the rigid-body mode, which has none.
+        Coordinates are the modes' labels, the speed (rad/s), the nodes' `x` (m), of a plate `y` and `triangles` too.
 
         Raises:
             ImportError: xarray is not installed.
@@ -146,7 +146,7 @@ class ModesResult(Result):
             "speed": ((), np.array(self.speed)),
         }
         first = next(iter(self.shapes.values()), {})
-        coordinates |= {name: (("node",), first[name]) for name in ("x", "y") if name in first}
+        coordinates |= nodes_of(first, self.triangles)
         return dataset({**over, **self._shape_variables(first)}, coordinates, self._attributes())
 
     def _shape_variables(self, first: dict[str, Array]) -> dict[str, Variable]:

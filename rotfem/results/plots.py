@@ -74,9 +74,18 @@ def campbell_figure(result: CampbellResult) -> Figure:
     branches = result.branches()
     top = 1.05 * max(float(np.max(b["frequency"])) for b in branches.values())
     last = max(float(b["speed"][-1]) for b in branches.values())
+    heights = spread([float(b["frequency"][-1]) for b in branches.values()], 0.022 * top)
     for i, (name, b) in enumerate(branches.items()):
         axis.plot(b["speed"], b["frequency"], lw=1.6, color=f"C{i % 10}")
-        axis.annotate(name, (b["speed"][-1], b["frequency"][-1]), (5, -3), textcoords="offset points", fontsize=8)
+        axis.annotate(
+            name,
+            (float(b["speed"][-1]), heights[i]),
+            (5, -3),
+            textcoords="offset points",
+            annotation_clip=False,
+            fontsize=8,
+            color=f"C{i % 10}",
+        )
         unstable = b["growth"] > 1e-6 * (np.abs(b["frequency"]) + np.abs(b["growth"]))
         axis.plot(b["speed"][unstable], b["frequency"][unstable], "x", ms=5, color=f"C{i % 10}")
     for k in range(1, result.summary["per_rev"] + 1):
@@ -90,13 +99,22 @@ def campbell_figure(result: CampbellResult) -> Figure:
         axis.annotate(
             onset["kind"], (onset["speed"], top), (3, -10), textcoords="offset points", fontsize=7, color="C3"
         )
-    axis.set_xlim(min(0.0, *(float(b["speed"][0]) for b in branches.values())), last * 1.12)
+    axis.set_xlim(min(0.0, *(float(b["speed"][0]) for b in branches.values())), last)
     axis.set_ylim(0, top)
     axis.set_xlabel(label("psi_dot"))
     axis.set_ylabel("frequency in the rotating frame (rad/s)")
     axis.set_title(result.title)
     axis.grid(True, lw=0.4, alpha=0.6)
+    figure.subplots_adjust(left=0.09, right=0.86, top=0.94, bottom=0.08)  # the labels stand outside on the right
     return figure
+
+
+def spread(values: list[float], gap: float) -> list[float]:
+    """Return the values with the upper ones raised until all are at least `gap` apart, so that labels can be read."""
+    out, last = list(values), -np.inf
+    for i in np.argsort(values, kind="stable"):
+        last = out[i] = max(values[i], last + gap)
+    return out
 
 
 def travelling_waves_figure(result: CampbellResult) -> Figure:
@@ -110,10 +128,11 @@ def travelling_waves_figure(result: CampbellResult) -> Figure:
     axis.set_xlabel(label("psi_dot"))
     axis.set_ylabel("frequency in the fixed frame (rad/s)")
     axis.set_title(
-        f"{result.summary['name']}: forward waves solid, backward dashed (standing still at a critical speed)"
+        f"{result.title}; forward waves solid, backward dashed (standing still at a critical speed)", size=10
     )
     axis.legend(fontsize=8)
     axis.grid(True, lw=0.4, alpha=0.6)
+    figure.subplots_adjust(left=0.09, right=0.97, top=0.94, bottom=0.08)
     return figure
 
 

@@ -22,6 +22,9 @@ Array = npt.NDArray[Any]
 #: Largest displacement in a picture, part of the plate's size; frames of an animation and their number a second.
 WARP, FRAMES, RATE = 0.15, 24, 24
 
+#: Displacements below this part of the largest are round-off, not to be coloured as if they were something.
+ROUND_OFF = 1e-12
+
 
 def panels(count: int, aspect: float) -> tuple[Figure, list[Any]]:
     """Return a figure and its `count` axes, for maps whose height is `aspect` times their width."""
@@ -33,9 +36,9 @@ def panels(count: int, aspect: float) -> tuple[Figure, list[Any]]:
     return figure, [figure.add_subplot(rows, columns, i + 1) for i in range(count)]
 
 
-def map_of(figure: Figure, axis: Any, mesh: Triangulation, values: Array, title: str, unit: str) -> None:
-    """Draw a field over the mid-surface with its nodal lines and a colour bar."""
-    peak = max(float(np.max(np.abs(values))), 1e-300)
+def map_of(axis: Any, mesh: Triangulation, values: Array, title: str, unit: str, floor: float = 0.0) -> None:
+    """Draw a field over the mid-surface with its nodal lines and a colour bar; below the floor it has no colour."""
+    peak = max(float(np.max(np.abs(values))), floor, 1e-300)
     drawn = axis.tripcolor(mesh, values, shading="gouraud", cmap="RdBu_r", norm=Normalize(-peak, peak))
     if np.min(values) < -1e-9 * peak and np.max(values) > 1e-9 * peak:
         axis.tricontour(mesh, values, levels=[0.0], colors="0.2", linewidths=0.8)
@@ -44,7 +47,10 @@ def map_of(figure: Figure, axis: Any, mesh: Triangulation, values: Array, title:
     axis.set_xlabel("x (m)", fontsize=8)
     axis.set_ylabel("y (m)", fontsize=8)
     axis.tick_params(labelsize=7)
-    figure.colorbar(drawn, ax=axis, shrink=0.8, label=unit).ax.tick_params(labelsize=7)
+    bar = axis.figure.colorbar(drawn, ax=axis, shrink=0.8)
+    bar.set_label(unit, fontsize=8)
+    bar.ax.tick_params(labelsize=7)
+    bar.ax.yaxis.get_offset_text().set_size(7)
 
 
 def leading(columns: dict[str, Array]) -> str:
@@ -66,7 +72,7 @@ def modes_figure(result: ModesResult) -> Figure:
         turning = row.get("turning", 0.0)
         wave = "" if abs(turning) < 0.5 else (", forward wave" if turning > 0 else ", backward wave")
         caption = f"{title}{wave}\n{row['frequency']:.5g} rad/s"
-        map_of(figure, axis, mesh, columns[name], caption, f"{name} (–)")
+        map_of(axis, mesh, columns[name], caption, f"{name} (–)")
     return figure
 
 
@@ -74,9 +80,10 @@ def shape_figure(result: RunResult) -> Figure:
     """Return maps of the displacements of the final shape."""
     s = result.shape
     mesh = Triangulation(s["x"], s["y"], result.triangles)
+    floor = ROUND_OFF * max(float(np.max(np.abs(s[name]))) for name in ("u1", "u2", "u3"))
     figure, axes = panels(3, float(np.ptp(s["y"]) / np.ptp(s["x"])))
     for axis, name in zip(axes, ("u1", "u2", "u3"), strict=True):
-        map_of(figure, axis, mesh, s[name], name, f"{name} (m)")
+        map_of(axis, mesh, s[name], name, f"{name} (m)", floor)
     figure.suptitle(result.title + ", final shape", fontsize=10)
     return figure
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.results.files import csv_text, json_text
-from rotfem.results.frames import Variable, dataset, frame
+from rotfem.results.frames import Variable, dataset, frame, nodes_of
 from rotfem.results.result import Result
 
 if TYPE_CHECKING:
@@ -124,12 +124,16 @@ class RunResult(Result):
         return frame(self.history, "t")
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the history over `t` (s), and the shape at its end over `node` with the nodes' `x` (and `y`, m).
+        """Return the history over `t` (s), and the shape at its end over `node` with the nodes' `x` (m).
+
+        A plate has the nodes' `y` and the `triangles` between them too.
 
         Raises:
             ImportError: xarray is not installed.
         """
-        along: dict[str, Variable] = {name: (("node",), values) for name, values in self.shape.items()}
-        places: dict[str, Variable] = {name: along.pop(name) for name in ("x", "y") if name in along}
         over: dict[str, Variable] = {name: (("t",), values) for name, values in self.history.items() if name != "t"}
-        return dataset({**over, **along}, {"t": (("t",), self.t), **places}, self._attributes())
+        nodes = nodes_of(self.shape, self.triangles)
+        along: dict[str, Variable] = {
+            name: (("node",), values) for name, values in self.shape.items() if name not in nodes
+        }
+        return dataset({**over, **along}, {"t": (("t",), self.t), **nodes}, self._attributes())

@@ -45,14 +45,17 @@ def as_time_table(value: Any, info: ValidationInfo, columns: Sequence[int], shap
         shape: The expected form in words, for the error message.
 
     Raises:
-        PydanticCustomError: If it is not such a table, or the file cannot be read.
+        PydanticCustomError: If it is not such a table, or the file cannot be read; of a file it names the line.
     """
-    rows = read_csv(existing_file(value, info)) if isinstance(value, str | Path) else value
-    return as_increasing_rows(rows, columns, shape)
+    if not isinstance(value, str | Path):
+        return as_increasing_rows(value, columns, shape)
+    rows = read_csv(existing_file(value, info))
+    lines = tuple(rows)
+    return as_increasing_rows(tuple(rows.values()), columns, shape, lambda row: f"line {lines[row - 1]}")
 
 
-def read_csv(path: Path) -> list[list[float]]:
-    """Returns the rows of a CSV file of finite numbers, all of one length.
+def read_csv(path: Path) -> dict[int, tuple[float, ...]]:
+    """Returns number of the line ↦ row of a CSV file of finite numbers, all of one length.
 
     ``#`` starts a comment. The first row may be a header, and is one if none of its cells is a number.
 
@@ -60,13 +63,13 @@ def read_csv(path: Path) -> list[list[float]]:
         path: File with comma-separated columns.
 
     Raises:
-        PydanticCustomError: If it cannot be read or holds anything else, naming the line and the cell.
+        PydanticCustomError: If it cannot be read or holds anything else or nothing, naming the line and the cell.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise problem("", str(path), f"cannot be read: {error}") from None
-    rows: list[list[float]] = []
+    rows: dict[int, tuple[float, ...]] = {}
     width, top = 0, 0  # columns of the first row, and its line
     for number, line in enumerate(text.splitlines(), start=1):
         content = line.split("#", 1)[0].strip()
@@ -84,7 +87,9 @@ def read_csv(path: Path) -> list[list[float]]:
                 raise problem("", str(path), f"{reason} (only the first row may be a header, one without any number)")
         if len(cells) != width:
             raise problem("", str(path), f"line {number} has {len(cells)} columns; must be {width}, as in line {top}")
-        rows.append([value for value in values if value is not None])
+        rows[number] = tuple(value for value in values if value is not None)
+    if not rows:
+        raise problem("", str(path), "has no row of numbers")
     return rows
 
 

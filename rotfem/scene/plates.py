@@ -64,17 +64,6 @@ def _as_point_masses(value: Any) -> Matrix:
     return rows
 
 
-def _as_line_masses(value: Any) -> dict[str, float]:
-    if not isinstance(value, dict):
-        raise problem("", value, "must be a table edge = mass per length (kg/m)")
-    for edge, mass in value.items():
-        try:
-            Bounds(gt=0.0).number(mass)
-        except PydanticCustomError as error:
-            raise problem(str(edge), mass, error.message()) from None
-    return {str(edge): float(mass) for edge, mass in value.items()}
-
-
 def locking(cell: str, degree: int, integration: str) -> str | None:
     """Returns why elements of a degree (with reduced or full integration) are refused; ``None`` if they are good.
 
@@ -148,7 +137,7 @@ class PlateStructure(SceneModel):
     hub_radius: NonNegative = 0.0
     hub_offset: Vector | None = None
     point_masses: Annotated[Matrix, PlainValidator(_as_point_masses)] = ()
-    line_masses: Annotated[dict[str, float], PlainValidator(_as_line_masses)] = Field(default_factory=dict)
+    line_masses: dict[str, Positive] = Field(default_factory=dict)
     damping: Damping = Damping()
 
     @property

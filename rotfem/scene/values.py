@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias
 
@@ -136,13 +136,16 @@ def as_number(value: Any) -> float:
     return number
 
 
-def as_rows(value: Any, columns: Sequence[int], shape: str) -> tuple[tuple[float, ...], ...]:
+def as_rows(
+    value: Any, columns: Sequence[int], shape: str, row_name: Callable[[int], str] = "row {}".format
+) -> tuple[tuple[float, ...], ...]:
     """Returns a rectangular table of numbers as a tuple of rows.
 
     Args:
         value: A sequence of rows.
         columns: Allowed numbers of columns; all rows must have the same.
         shape: The expected form in words, for the error message.
+        row_name: Number of a row, from 1 ↦ what the error message calls it.
 
     Raises:
         PydanticCustomError: If it is not such a table.
@@ -150,26 +153,30 @@ def as_rows(value: Any, columns: Sequence[int], shape: str) -> tuple[tuple[float
     if not isinstance(value, list | tuple) or not value or not all(isinstance(row, list | tuple) for row in value):
         raise problem("", value, f"must be {shape}")
     if len(value[0]) not in columns:
-        raise problem("", value, f"must be {shape}; row 1 has {len(value[0])} entries")
+        raise problem("", value, f"must be {shape}; {row_name(1)} has {len(value[0])} entries")
     for i, row in enumerate(value, start=1):
         if len(row) != len(value[0]):
-            raise problem("", value, f"must be {shape}; row {i} has {len(row)} entries, row 1 has {len(value[0])}")
+            reason = f"{row_name(i)} has {len(row)} entries, {row_name(1)} has {len(value[0])}"
+            raise problem("", value, f"must be {shape}; {reason}")
         for entry in row:
             try:
                 as_number(entry)
             except PydanticCustomError as error:
-                raise problem("", value, f"must be {shape}; an entry of row {i} {error.message()}") from None
+                raise problem("", value, f"must be {shape}; an entry of {row_name(i)} {error.message()}") from None
     return tuple(tuple(float(entry) for entry in row) for row in value)
 
 
-def as_increasing_rows(value: Any, columns: Sequence[int], shape: str) -> tuple[tuple[float, ...], ...]:
+def as_increasing_rows(
+    value: Any, columns: Sequence[int], shape: str, row_name: Callable[[int], str] = "row {}".format
+) -> tuple[tuple[float, ...], ...]:
     """Returns `as_rows`, at least two rows of them with a strictly increasing first column, or raises."""
-    rows = as_rows(value, columns, shape)
+    rows = as_rows(value, columns, shape, row_name)
     if len(rows) < 2:
         raise problem("", value, f"must be {shape} with at least two rows")
     for i, (before, after) in enumerate(itertools.pairwise(rows), start=2):
         if after[0] <= before[0]:
-            raise problem("", value, f"the first column must increase strictly; row {i}: {after[0]:g} ≤ {before[0]:g}")
+            reason = f"{row_name(i)}: {after[0]:g} ≤ {before[0]:g}"
+            raise problem("", value, f"the first column must increase strictly; {reason}")
     return rows
 
 

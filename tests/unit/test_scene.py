@@ -402,6 +402,9 @@ TIME = {"end": 1.0, "step": 0.1}
         ("plate", {"structure__mesh": "no.msh"}, "structure.mesh", "file not found"),
         ("plate", {"structure__point_masses": [[2, 0, 1]]}, "structure.point_masses", "not on the plate"),
         ("plate", {"structure__point_masses": [[0, 0, -1]]}, "structure.point_masses", "greater than 0"),
+        ("plate", {"structure__line_masses": {"tip": 0}}, "structure.line_masses.tip", "greater than 0"),
+        ("plate", {"structure__line_masses": {"tip": "1"}}, "structure.line_masses.tip", "must be a number"),
+        ("plate", {"structure__line_masses": 1.0}, "structure.line_masses", "must be a table"),
     ],
 )
 def test_bad_scenes(kind: str, changes: dict[str, Any], key: str, message: str) -> None:
@@ -539,7 +542,7 @@ def test_relative_paths_start_at_the_scene(tmp_path: Path, monkeypatch: pytest.M
     [
         ("0, 0\n1, x\n", "line 2"),
         ("0, 0, 0\n1, 1, 1\n", "3 entries"),
-        ("t, w\n", "must be"),
+        ("t, w\n", "no row of numbers"),
         ("0, 0\n0, 1\n", "strictly"),
     ],
 )

@@ -35,7 +35,7 @@ table = "speed.csv"
 )
 def test_rows_that_are_meant_are_read(tmp_path: Path, content: str) -> None:
     (tmp_path / "speed.csv").write_bytes(content.encode())
-    assert read_csv(tmp_path / "speed.csv") == [[0.0, 0.0], [1.5, 3.0]]
+    assert list(read_csv(tmp_path / "speed.csv").values()) == [(0.0, 0.0), (1.5, 3.0)]
 
 
 @pytest.mark.parametrize(
@@ -56,6 +56,8 @@ def test_rows_that_are_meant_are_read(tmp_path: Path, content: str) -> None:
         ("0,0\n1,1e999\n", 'line 2, column 2: "1e999" must be'),
         ("0,0\n# ramp\n1,1,1\n", "line 3 has 3 columns; must be 2, as in line 1"),
         ("t,w,a\n0,0\n1,1\n", "line 2 has 2 columns; must be 3, as in line 1"),
+        ("", "has no row of numbers"),
+        ("t,w\n# nothing yet\n", "has no row of numbers"),
         ("0;0\n1;1\n", 'line 2, column 1: "1;1" must be'),
     ],
 )
@@ -78,3 +80,20 @@ def test_a_slip_in_the_first_row_refuses_the_scene(tmp_path: Path) -> None:
         assert part in str(caught.value)
     (tmp_path / "speed.csv").write_text("0,0\n1,5\n2,6\n")
     assert load_scene(tmp_path / "beam.toml").motion.table == ((0.0, 0.0), (1.0, 5.0), (2.0, 6.0))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("t,w,a\n# rig\n0,0,0\n1,1,1\n", "must be a table [[t, speed], …]; line 3 has 3 entries"),
+        ("0,0\n1,5\n# back\n1,6\n", "the first column must increase strictly; line 4: 1 ≤ 1"),
+        ("t,w\n\n0,0\n-1,5\n", "the first column must increase strictly; line 4: -1 ≤ 0"),
+        ("t,w\n0,0\n", "must be a table [[t, speed], …] with at least two rows"),
+    ],
+)
+def test_a_file_that_is_no_table_over_time_is_named_with_its_line(tmp_path: Path, content: str, message: str) -> None:
+    (tmp_path / "beam.toml").write_text(SCENE)
+    (tmp_path / "speed.csv").write_text(content)
+    with pytest.raises(SceneError) as caught:
+        load_scene(tmp_path / "beam.toml")
+    assert str(caught.value) == f'beam.toml: motion.table = "speed.csv": {message}'

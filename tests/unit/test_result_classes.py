@@ -1,0 +1,331 @@
+"""What is read from results in Python: properties, tables, labelled arrays and figures, of small results by hand."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray
+from matplotlib.figure import Figure
+
+from rotfem.commands.cost.result import CostResult
+from rotfem.errors import OutputError
+from rotfem.results import CampbellResult, CriticalSpeed, ExplainResult, Instability, ModesResult, Result, RunResult
+from rotfem.results.columns import described, label
+from rotfem.results.plots import plot, spread
+from rotfem.scene import Scene
+
+T = np.array([0.0, 0.5, 1.0])
+X = np.array([0.0, 2.0, 4.0])
+
+
+def summary(**more: Any) -> dict[str, Any]:
+    """Return what every summary holds."""
+    return {"name": "beam", "theory": "reissner", "status": "done", "warnings": ["mind the gap"], **more}
+
+
+def history(**more: Any) -> RunResult:
+    """Return the history of a beam's tip."""
+    columns = {"t": T, "psi": T**2, "psi_dot": 2 * T, "tip_u1": -(T**2), "tip_u2": T, "tip_alpha": 0.5 * T}
+    said = summary(command="run", kind="history", frame="rotating", figures={"tip_u2_max": 1.0}) | more
+    return RunResult(said, columns, {"x": X, "u1": -X, "u2": X**2, "alpha": 2 * X})
+
+
+def shape(scale: complex) -> dict[str, Any]:
+    """Return a mode shape along three nodes."""
+    values = scale * X / 4
+    return {"x": X, "u2": values.real, "u2_imag": values.imag, "alpha": 0 * X, "alpha_imag": 0 * X}
+
+
+def modes(stability: str = "stable") -> ModesResult:
+    """Return a rigid-body mode and two others, at 6 rad/s."""
+    rows = [
+        {"mode": 1, "label": "rigid body", "frequency": 0.0, "growth": 0.0, "stability": "neutral", "share_hub": 1.0},
+        {"mode": 2, "label": "lag 1", "frequency": 4.0, "growth": -3.0, "stability": "stable", "share_hub": 0.1},
+        {"mode": 3, "label": "lag 2", "frequency": 12.0, "growth": 0.5, "stability": stability, "share_hub": 0.2},
+    ]
+    for row in rows:
+        size = abs(complex(row["growth"], row["frequency"]))
+        row |= {"frequency_hz": row["frequency"] / (2 * np.pi), "damping": -row["growth"] / size if size else 0.0}
+    shapes = {"mode 2: lag 1": shape(1.0), "mode 3: lag 2": shape(1j)}
+    return ModesResult(summary(command="modes", speed=6.0), rows, shapes)
+
+
+def plate_modes() -> ModesResult:
+    """Return one mode of a plate of one triangle."""
+    columns = {"x": np.array([0.0, 1.0, 0.0]), "y": np.array([0.0, 0.0, 1.0])}
+    for name in ("u1", "u2", "u3"):
+        columns |= {name: np.array([0.0, 0.0, float(name == "u3")]), f"{name}_imag": np.zeros(3)}
+    row = {"mode": 1, "label": "flap 1", "frequency": 2.0, "growth": 0.0, "stability": "stable", "turning": 0.0}
+    result = ModesResult(summary(command="modes", speed=0.0), [row], {"mode 1: flap 1": columns})
+    result.triangles = np.array([[0, 1, 2]])
+    return result
+
+
+def campbell() -> CampbellResult:
+    """Return two branches over three speeds, one of them refined; the second branch is lost at the last."""
+    rows = [
+        {"speed": speed, "branch": branch, "label": name, "mode": name, "frequency": branch * (3.0 + speed)}
+        | {"growth": 0.0, "damping": 0.0, "confidence": 1.0, "refined": int(speed == 5.0)}
+        for speed in (0.0, 5.0, 10.0)
+        for branch, name in ((1, "lag 1"), (2, "axial 1"))
+        if (speed, branch) != (10.0, 2)
+    ]
+    said = summary(
+        command="campbell",
+        branches=[{"branch": 1, "label": "lag 1"}, {"branch": 2, "label": "axial 1"}],
+        per_rev=2,
+        critical_speeds=[{"branch": 1, "per_rev": 2, "speed": 3.0, "frequency": 6.0, "label": "lag 1"}],
+        instabilities=[{"speed": 8.0, "kind": "dynamic instability", "until": None}],
+        ambiguous=[],
+    )
+    return CampbellResult(said, rows)
+
+
+def explained() -> ExplainResult:
+    """Return an effect and a theory; the theory fails for one output, and its truth was not computed."""
+    rows = [
+        {"kind": "effect", "name": "coriolis", "included": True, "why": "the structure spins", "verdict": "noticeable"}
+        | {"estimate": {"steady": 0.0, "modes": 0.02}, "worst": 0.02, "truth": {"steady": 0.0, "modes": 0.021}},
+        {"kind": "theory", "name": "linear", "included": False, "why": "not good enough", "verdict": "large"}
+        | {"estimate": {"steady": np.inf, "modes": 0.5}, "worst": np.inf},
+    ]
+    return ExplainResult(summary(command="explain", outputs=["steady", "modes"], groups={}), rows)
+
+
+def cost_row(step: float, time: float, error: float | None, pareto: bool) -> dict[str, Any]:
+    """Return a row of a cost study; it failed where there is no error."""
+    setting = {
+        "theory": "reissner",
+        "elements": [4, 2],
+        "degree": 2,
+        "scheme": "newmark",
+        "tolerance": None,
+        "every": 1,
+    }
+    found = {"status": "failed" if error is None else "done", "error": error, "total_error": error, "reason": ""}
+    return {**setting, "step": step, **found, "time": time, "pareto": pareto}
+
+
+def cost() -> CostResult:
+    """Return a study of four settings: two on the front, one beaten, one failed."""
+    rows = [
+        cost_row(0.01, 4.0, 1e-5, True),
+        cost_row(0.02, 2.0, 1e-3, True),
+        cost_row(0.03, 3.0, 1e-2, False),
+        cost_row(0.1, 1.0, None, False),
+    ]
+    said = summary(command="cost", output="tip", accuracy=1e-4, uncertainty=1e-6, recommended=rows[0])
+    del said["theory"]  # a study is of several
+    said |= {"references": {}, "model_errors": {"reissner": 0.0}, "recommendations": []}
+    structure = {"type": "planar_beam", "length": 1.0}
+    structure["section"] = {"EA": 1.0, "GA": 1.0, "EI": 1.0, "mass_per_length": 1.0}
+    scene = Scene.from_dict({"structure": structure, "motion": {"type": "constant", "speed": 1.0}})
+    return CostResult(said, rows, scene)
+
+
+MAKERS = {
+    "run": history,
+    "modes": modes,
+    "plate": plate_modes,
+    "campbell": campbell,
+    "explain": explained,
+    "cost": cost,
+}
+ALL = pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
+
+
+# --- properties -------------------------------------------------------------------------------------------------------
+
+
+@ALL
+def test_every_result_says_how_it_went(make: Any) -> None:
+    result: Result = make()
+    assert (result.status, result.warnings) == ("done", ["mind the gap"])
+    result.warnings.clear()
+    assert result.summary["warnings"] == ["mind the gap"], "a property must not be a door into the summary"
+
+
+def test_a_run_by_its_names() -> None:
+    result = history()
+    np.testing.assert_array_equal(result.t, T)
+    assert list(result.tip) == ["u1", "u2", "alpha"]
+    np.testing.assert_array_equal(result.tip["u1"], -(T**2))
+    np.testing.assert_array_equal(result.column("psi_dot"), 2 * T)
+    assert result.figures == {"tip_u2_max": 1.0}
+    assert not result.steady and history(kind="steady").steady
+    with pytest.raises(KeyError, match="no column 'tip_u3' in the history; there are t, psi, psi_dot, tip_u1"):
+        result.column("tip_u3")
+
+
+def test_modes_by_their_names() -> None:
+    result = modes()
+    assert result.labels == ["rigid body", "lag 1", "lag 2"]
+    assert result.speed == 6.0
+    np.testing.assert_array_equal(result.frequencies, [0.0, 4.0, 12.0])
+    np.testing.assert_allclose(2 * np.pi * result.frequencies_hz, result.frequencies)
+    np.testing.assert_array_equal(result.growth, [0.0, -3.0, 0.5])
+    np.testing.assert_allclose(result.damping[1], 0.6)
+    np.testing.assert_array_equal(result.eigenvalues, [0.0, -3.0 + 4.0j, 0.5 + 12.0j])
+    np.testing.assert_array_equal(result.column("share_hub"), [1.0, 0.1, 0.2])
+    assert result.stable and not modes("dynamic instability").stable
+    with pytest.raises(KeyError, match="no number 'label' of the modes; there are mode, frequency"):
+        result.column("label")
+
+
+def test_branches_over_speed() -> None:
+    result = campbell()
+    np.testing.assert_array_equal(result.speeds, [0.0, 5.0, 10.0])
+    np.testing.assert_array_equal(result.refined, [False, True, False])
+    assert result.labels == ["lag 1", "axial 1"]
+    np.testing.assert_array_equal(result.frequencies, [[3.0, 6.0], [8.0, 16.0], [13.0, np.nan]])
+    assert result.growth.shape == result.damping.shape == (3, 2)
+    assert result.critical_speeds == [CriticalSpeed(1, 2, 3.0, 6.0, "lag 1")]
+    assert result.instabilities == [Instability(8.0, "dynamic instability", None)]
+    with pytest.raises(KeyError, match="no number 'mode' of the branches; there are frequency, growth"):
+        result.column("mode")
+
+
+def test_what_changes_the_outputs() -> None:
+    result = explained()
+    assert list(result.effects) == ["coriolis"] and list(result.theories) == ["linear"]
+    assert result.effects["coriolis"]["worst"] == 0.02
+    assert result.verdicts == {"coriolis": "noticeable", "linear": "large"}
+    assert result.outputs == ["steady", "modes"]
+
+
+def test_points_of_a_study() -> None:
+    result = cost()
+    assert [(point.time, point.error) for point in result.points] == [(4.0, 1e-5), (2.0, 1e-3), (3.0, 1e-2)]
+    assert [point.setting.step for point in result.front] == [0.02, 0.01]
+    assert result.recommended == result.points[0]
+    assert result.recommended.setting.elements == (4, 2)
+    assert str(result.recommended) == "reissner, 4×2 P2, newmark with step 0.01 s: error 1.0e-05, 4 s"
+    result.summary["recommended"] = None
+    assert result.recommended is None
+
+
+# --- tables and labelled arrays ---------------------------------------------------------------------------------------
+
+
+def test_tables() -> None:
+    run = history().to_pandas()
+    assert run.index.name == "t" and list(run.columns) == ["psi", "psi_dot", "tip_u1", "tip_u2", "tip_alpha"]
+    assert run.loc[0.5, "tip_u1"] == -0.25
+    assert modes().to_pandas().loc[3, "label"] == "lag 2"
+    table = campbell().to_pandas()
+    assert len(table) == 5 and table.loc[(5.0, "axial 1"), "frequency"] == 16.0
+    assert list(table["frequency"].unstack("label")["lag 1"]) == [3.0, 8.0, 13.0]
+    rows = explained().to_pandas()
+    assert rows.loc["coriolis", "truth_modes"] == 0.021 and np.isnan(rows.loc["linear", "truth_modes"])
+    assert rows.loc["linear", "estimate_steady"] == np.inf
+    study = cost().to_pandas()
+    assert list(study["elements"]) == ["4x2"] * 4 and np.isnan(study["error"][3])
+
+
+def test_history_over_time() -> None:
+    data = history().to_xarray()
+    assert data["tip_u2"].dims == ("t",) and float(data["tip_u2"].sel(t=0.5)) == 0.5
+    assert data["u2"].dims == ("node",) and list(data["x"].values) == list(X)
+    units = {name: data[name].attrs["units"] for name in ("t", "psi_dot", "tip_alpha", "u2", "x")}
+    assert units == {"t": "s", "psi_dot": "rad/s", "tip_alpha": "rad", "u2": "m", "x": "m"}
+    assert data.attrs["theory"] == "reissner" and data.attrs["kind"] == "history"
+
+
+def test_shapes_over_modes_and_nodes() -> None:
+    data = modes().to_xarray()
+    assert data["shape_u2"].dims == ("mode", "node")
+    assert bool(data["shape_u2"].sel(mode=1).isnull().all()), "a rigid-body mode has no shape"
+    np.testing.assert_array_equal(data["shape_u2"].sel(mode=3).values, 1j * X / 4)
+    assert data["shape_u2"].attrs["units"] == "1" and data["frequency"].attrs["units"] == "rad/s"
+    assert float(data["speed"]) == 6.0 and data["speed"].attrs["units"] == "rad/s"
+    assert list(data["label"].values) == ["rigid body", "lag 1", "lag 2"]
+    np.testing.assert_array_equal(plate_modes().to_xarray()["triangles"].values, [[0, 1, 2]])
+
+
+def test_frequencies_over_speed_and_branch() -> None:
+    data = campbell().to_xarray()
+    assert data["frequency"].dims == ("speed", "branch")
+    assert float(data["frequency"].sel(speed=5.0, branch="axial 1")) == 16.0
+    assert np.isnan(data["frequency"].sel(speed=10.0, branch="axial 1"))
+    assert data["frequency"].attrs["units"] == data["speed"].attrs["units"] == "rad/s"
+    assert list(data["refined"].values) == [False, True, False]
+
+
+def test_changes_and_settings_as_arrays(tmp_path: Path) -> None:
+    data = explained().to_xarray()
+    assert float(data["estimate"].sel(name="linear", output="steady")) == np.inf
+    assert np.isnan(data["truth"].sel(name="linear", output="modes"))
+    study = cost().to_xarray()
+    assert study["time"].attrs["units"] == "s" and study["degree"].dtype == np.int64
+    assert list(study["pareto"].values) == [True, True, False, False]
+    study.to_netcdf(tmp_path / "cost.nc")
+    with xarray.open_dataset(tmp_path / "cost.nc") as again:
+        np.testing.assert_array_equal(again["error"].values, study["error"].values)
+
+
+@ALL
+@pytest.mark.parametrize("package", ["pandas", "xarray"])
+def test_a_missing_package_says_how_to_get_it(make: Any, package: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, package, None)
+    convert = getattr(make(), f"to_{package}")
+    with pytest.raises(ImportError, match=rf"to_{package}\(\) needs {package}.*pip install {package}"):
+        convert()
+
+
+def test_a_column_that_nothing_is_known_of_has_no_unit() -> None:
+    assert described("tip_u1") == ("tip u₁", "m") and label("tip_u1") == "tip u₁ (m)"
+    assert label("damping") == "damping ratio (–)"
+    assert described("whirl") == ("whirl", "") and label("whirl") == "whirl"
+
+
+# --- figures ----------------------------------------------------------------------------------------------------------
+
+
+@ALL
+def test_every_axis_has_a_label_with_its_unit(make: Any) -> None:
+    figure: Figure = make().plot()
+    named = [axis for axis in figure.axes if axis.get_xlabel()]
+    assert named and all("(" in axis.get_xlabel() for axis in named)
+    bars = [axis for axis in figure.axes if axis.get_label() == "<colorbar>"]
+    for axis in {*figure.axes} - {*bars}:
+        ticks = [text.get_text() for text in axis.get_yticklabels()]
+        assert "(" in axis.get_ylabel() or "linear" in ticks, "a unit, or names of effects and theories"
+    assert all("(" in axis.get_ylabel() for axis in bars)
+
+
+@ALL
+def test_drawings_are_written_under_their_names(make: Any, tmp_path: Path) -> None:
+    result: Result = make()
+    paths = plot(result, tmp_path)
+    assert [path.name for path in paths] == list(result.drawings()) != []
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
+
+
+def test_plot_writes_the_format_of_the_ending(tmp_path: Path) -> None:
+    campbell().plot(tmp_path / "diagram.pdf")
+    assert (tmp_path / "diagram.pdf").read_bytes().startswith(b"%PDF")
+    with pytest.raises(ValueError, match="xyz"):
+        campbell().plot(tmp_path / "diagram.xyz")
+    with pytest.raises(OutputError, match=r"missing/diagram.png.*cannot be written"):
+        campbell().plot(tmp_path / "missing" / "diagram.png")
+    assert [path.name for path in tmp_path.iterdir()] == ["diagram.pdf"]
+
+
+def test_plot_of_a_drawing_by_its_name() -> None:
+    figure = history().plot(drawing="history.png")
+    np.testing.assert_array_equal(figure.axes[1].lines[0].get_ydata(), T)
+    with pytest.raises(ValueError, match="drawing 'shape' is not among those of this result; there is history"):
+        history().plot(drawing="shape")
+    empty = RunResult(summary(kind="history", status="failed"), {"t": T[:1]})
+    assert empty.title == "beam: reissner (failed)"
+    with pytest.raises(ValueError, match="none, as too little was computed"):
+        empty.plot()
+
+
+def test_labels_that_would_hide_one_another_are_spread() -> None:
+    assert spread([5.0, 1.0, 1.0, 1.5], 1.0) == [5.0, 1.0, 2.0, 3.0]
+    assert spread([3.0, 2.0], 0.5) == [3.0, 2.0]
