@@ -1,7 +1,8 @@
 """rotfem: rotating beams and plates with FEniCSx.
 
-One noun, the scene (`Scene`, `load_scene`), and verbs on it (`run`, `modes`, `campbell`, `explain`, `cost`). The verbs
-load FEniCSx when first used.
+One noun, the scene (`Scene`, `load_scene`), and verbs on it (`run`, `modes`, `campbell`, `explain`, `cost`); between scene
+and equations stands the `Problem`, which a script can build too. `register` adds a `Theory`, `Effect`, `Scheme`, `Shape` or
+`Output` of a user's own. What computes loads FEniCSx when first used.
 """
 
 from __future__ import annotations
@@ -9,23 +10,88 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from rotfem.errors import ComputationError, OutputError, SceneError
+from rotfem.errors import ComputationError, InputError, OutputError, SceneError
 from rotfem.registry import register
 from rotfem.scene import Scene, load_scene
 from rotfem.version import __version__
 
 if TYPE_CHECKING:
+    from rotfem.analysis.alpha_family import GeneralisedAlpha, Newmark
+    from rotfem.analysis.schemes import Scheme, Stage, State
     from rotfem.commands.campbell import campbell
     from rotfem.commands.cost.study import cost
     from rotfem.commands.explain import explain
     from rotfem.commands.modes import modes
+    from rotfem.commands.problem import Problem
     from rotfem.commands.run import run
+    from rotfem.mechanics.effects import Effect
+    from rotfem.mechanics.free_hub import FreeHub, Torque
+    from rotfem.mechanics.loads import ConstantLoad, Loads
+    from rotfem.mechanics.motion import Motion
+    from rotfem.mechanics.outputs import Output
+    from rotfem.mechanics.theories import Theory
+    from rotfem.results import CampbellResult, CostResult, ExplainResult, ModesResult, RunResult
+    from rotfem.scene import BeamMesh, PlateMesh
+    from rotfem.scene.beams import PlanarBeam, SpatialBeam
+    from rotfem.scene.plates import Plate
+    from rotfem.scene.section_shapes import Geometry, Shape
+
+#: Module ↦ public names it has: imported when one is first asked for, as most of them load FEniCSx.
+_HOMES = {
+    "analysis.alpha_family": ("GeneralisedAlpha", "Newmark"),
+    "analysis.schemes": ("Scheme", "Stage", "State"),
+    "commands.campbell": ("campbell",),
+    "commands.cost.study": ("cost",),
+    "commands.explain": ("explain",),
+    "commands.modes": ("modes",),
+    "commands.problem": ("Problem",),
+    "commands.run": ("run",),
+    "mechanics.effects": ("Effect",),
+    "mechanics.free_hub": ("FreeHub", "Torque"),
+    "mechanics.loads": ("ConstantLoad", "Loads"),
+    "mechanics.motion": ("Motion",),
+    "mechanics.outputs": ("Output",),
+    "mechanics.theories": ("Theory",),
+    "results": ("CampbellResult", "CostResult", "ExplainResult", "ModesResult", "RunResult"),
+    "scene": ("BeamMesh", "PlateMesh"),
+    "scene.beams": ("PlanarBeam", "SpatialBeam"),
+    "scene.plates": ("Plate",),
+    "scene.section_shapes": ("Geometry", "Shape"),
+}
+_LATER = {name: f"rotfem.{module}" for module, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "BeamMesh",
+    "CampbellResult",
     "ComputationError",
+    "ConstantLoad",
+    "CostResult",
+    "Effect",
+    "ExplainResult",
+    "FreeHub",
+    "GeneralisedAlpha",
+    "Geometry",
+    "InputError",
+    "Loads",
+    "ModesResult",
+    "Motion",
+    "Newmark",
+    "Output",
     "OutputError",
+    "PlanarBeam",
+    "Plate",
+    "PlateMesh",
+    "Problem",
+    "RunResult",
     "Scene",
     "SceneError",
+    "Scheme",
+    "Shape",
+    "SpatialBeam",
+    "Stage",
+    "State",
+    "Theory",
+    "Torque",
     "__version__",
     "campbell",
     "cost",
@@ -35,15 +101,6 @@ __all__ = [
     "register",
     "run",
 ]
-
-#: Name ↦ module that has it: what loads FEniCSx is imported when it is first asked for.
-_LATER = {
-    "campbell": "rotfem.commands.campbell",
-    "cost": "rotfem.commands.cost.study",
-    "explain": "rotfem.commands.explain",
-    "modes": "rotfem.commands.modes",
-    "run": "rotfem.commands.run",
-}
 
 
 def __getattr__(name: str) -> Any:

@@ -78,6 +78,11 @@ class Mechanics:
         rate = body.rate(self.k)
         return rate if self.frame.fixed else rate + self.carried(body)
 
+    def resultant(self, name: str) -> Any:
+        """Return the stress resultant of the strain of a name ("axial", "bending", …), N or N·m, as an expression."""
+        strain = next(s for s in self.strains if s.name == name)
+        return strain.force(strain.value)
+
     def positions(self) -> list[Body]:
         """Return the bodies of the structure itself that are points of it, not directors: its axis or mid-surface."""
         return [body for body in self.bodies if body.is_position and not body.effect]

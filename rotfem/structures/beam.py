@@ -64,11 +64,14 @@ class Beam(Structure):
         reduced = 2 * k - 2 if grid.integration == "reduced" else 2 * k
         self.dx_elastic = ufl.dx(self.mesh, metadata={"quadrature_degree": reduced})
         self.dx = ufl.dx(self.mesh, metadata={"quadrature_degree": 2 * k})
-        tip = mesh.locate_entities_boundary(self.mesh, 0, lambda p: np.isclose(p[0], self.length))
-        tags = mesh.meshtags(self.mesh, 0, tip, np.full(len(tip), 1, dtype=np.int32))
-        self.tip = ufl.ds(1, domain=self.mesh, subdomain_data=tags)
-        root = mesh.locate_entities_boundary(self.mesh, 0, lambda p: np.isclose(p[0], 0.0))
-        self.clamped = fem.locate_dofs_topological(self.V, 0, root)
+        ends = [
+            mesh.locate_entities_boundary(self.mesh, 0, lambda p, x=x: np.isclose(p[0], x)) for x in (self.length, 0.0)
+        ]
+        places, order = np.unique(np.concatenate(ends), return_index=True)
+        tags = np.repeat(np.array([1, 2], dtype=np.int32), [len(end) for end in ends])[order]
+        at = mesh.meshtags(self.mesh, 0, places, tags)
+        self.tip, self.root = (ufl.ds(tag, domain=self.mesh, subdomain_data=at) for tag in (1, 2))
+        self.clamped = fem.locate_dofs_topological(self.V, 0, ends[1])
         self.tip_values = TipValues(self.V, np.array([self.length, 0.0, 0.0]))
 
     def stretch(self, strains: list[Strain]) -> Any:

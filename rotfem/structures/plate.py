@@ -89,6 +89,7 @@ class Plate(Structure):
         low, high = self._box()
         self.length = float(np.max(high - low))
         self._has_tip = "tip" in self.grid.curve_names
+        self.root = self.grid.along("clamped")
         self.tip = self.grid.along("tip") if self._has_tip else None
         self.tip_values = TipValues(self.V, self._tip_point(low, high))
         self._properties()
