@@ -1,8 +1,8 @@
 """rotfem: rotating beams and plates with FEniCSx.
 
-One noun, the scene (`Scene`, `load_scene`), and verbs on it (`run`, `modes`, `campbell`, `explain`, `cost`); between scene
-and equations stands the `Problem`, which a script can build too. `register` adds a `Theory`, `Effect`, `Scheme`, `Shape` or
-`Output` of a user's own. What computes loads FEniCSx when first used.
+One noun, the scene (`Scene`, `load_scene`), and verbs on it (`run`, `modes`, `campbell`, `explain`, `cost`); between
+scene and equations stands the `Problem`, which a script can build too. `register` adds a `Theory`, `Effect`, `Scheme`,
+`Shape` or `Output` of a user's own. What computes loads FEniCSx when first used.
 """
 
 from __future__ import annotations
@@ -30,10 +30,12 @@ if TYPE_CHECKING:
     from rotfem.mechanics.motion import Motion
     from rotfem.mechanics.outputs import Output
     from rotfem.mechanics.theories import Theory
-    from rotfem.results import CampbellResult, CostResult, ExplainResult, ModesResult, RunResult
+    from rotfem.commands.cost.result import CostResult
+    from rotfem.results import CampbellResult, ExplainResult, ModesResult, RunResult
     from rotfem.scene import BeamMesh, PlateMesh
-    from rotfem.scene.beams import PlanarBeam, SpatialBeam
-    from rotfem.scene.plates import Plate
+    from rotfem.scene.beams import PlanarBeamStructure as PlanarBeam
+    from rotfem.scene.beams import SpatialBeamStructure as SpatialBeam
+    from rotfem.scene.plates import PlateStructure as Plate
     from rotfem.scene.section_shapes import Geometry, Shape
 
 #: Module ↦ public names it has: imported when one is first asked for, as most of them load FEniCSx.
@@ -52,13 +54,17 @@ _HOMES = {
     "mechanics.motion": ("Motion",),
     "mechanics.outputs": ("Output",),
     "mechanics.theories": ("Theory",),
-    "results": ("CampbellResult", "CostResult", "ExplainResult", "ModesResult", "RunResult"),
+    "commands.cost.result": ("CostResult",),
+    "results": ("CampbellResult", "ExplainResult", "ModesResult", "RunResult"),
     "scene": ("BeamMesh", "PlateMesh"),
-    "scene.beams": ("PlanarBeam", "SpatialBeam"),
-    "scene.plates": ("Plate",),
     "scene.section_shapes": ("Geometry", "Shape"),
 }
-_LATER = {name: f"rotfem.{module}" for module, names in _HOMES.items() for name in names}
+_LATER = {name: f"rotfem.{module}:{name}" for module, names in _HOMES.items() for name in names}
+_LATER |= {
+    "PlanarBeam": "rotfem.scene.beams:PlanarBeamStructure",
+    "SpatialBeam": "rotfem.scene.beams:SpatialBeamStructure",
+    "Plate": "rotfem.scene.plates:PlateStructure",
+}
 
 __all__ = [
     "BeamMesh",
@@ -106,7 +112,8 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _LATER:
         raise AttributeError(f"module 'rotfem' has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(_LATER[name]), name)
+    module, _, attribute = _LATER[name].partition(":")
+    value = globals()[name] = getattr(import_module(module), attribute)
     return value
 
 

@@ -60,7 +60,7 @@ class PlanarBeamStructure(SceneModel):
         damping: Damping coefficients.
     """
 
-    type: Literal["planar_beam"]
+    type: Literal["planar_beam"] = "planar_beam"
     length: Positive = Field(description="a number greater than 0 (m)")
     hub_radius: NonNegative = 0.0
     tip_mass: NonNegative = 0.0
@@ -105,7 +105,7 @@ class SpatialBeamStructure(SceneModel):
         damping: Damping coefficients.
     """
 
-    type: Literal["spatial_beam"]
+    type: Literal["spatial_beam"] = "spatial_beam"
     length: Positive = Field(description="a number greater than 0 (m)")
     hub_radius: NonNegative = 0.0
     hub_offset: Vector | None = None

@@ -117,7 +117,7 @@ class PlateStructure(SceneModel):
         Way("orthotropic", ("E1", "E2", "nu12", "G12"), ("G13", "G23")),
     )
 
-    type: Literal["plate"]
+    type: Literal["plate"] = "plate"
     length: Positive | None = None
     width: Positive | None = None
     mesh: Annotated[str, PlainValidator(_as_mesh_file)] | None = None

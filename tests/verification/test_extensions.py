@@ -1,0 +1,216 @@
+"""What a user adds from one file, by `register`: each holds to a theorem or a closed form, and nothing else changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rotfem
+from rotfem import registry
+from rotfem.errors import SceneError
+
+FILES = Path(__file__).resolve().parents[2] / "demos" / "extensions"
+KINDS = (registry.theories, registry.effects, registry.schemes, registry.shapes, registry.outputs)
+
+#: The beam of Kane, Ryan & Banerjee 1987 as Simo & Vu-Quoc 1986 have it.
+KRB = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
+
+Scene = Callable[..., rotfem.Scene]
+
+
+@pytest.fixture
+def extension() -> Iterator[Callable[[str], ModuleType]]:
+    """Return what loads a file of demos/extensions; what it registers goes when the test ends."""
+    before = [kind.names for kind in KINDS]
+
+    def load(name: str) -> ModuleType:
+        spec = spec_from_file_location(name, FILES / f"{name}.py")
+        assert spec is not None and spec.loader is not None
+        module = module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module
+
+    yield load
+    for kind, names in zip(KINDS, before, strict=True):
+        for name in set(kind.names) - set(names):
+            kind.remove(name)
+
+
+def beam(changes: dict[str, Any] | None = None) -> rotfem.Scene:
+    """Return the beam in a spin-up, on a mesh coarse enough for tests."""
+    tables: dict[str, Any] = {
+        "structure": {"type": "planar_beam", "length": 10.0, "section": KRB},
+        "motion": {"type": "spin_up", "speed": 2.0, "duration": 2.0},
+        "mesh": {"elements": 4},
+        "time": {"end": 2.0, "step": 0.02},
+    }
+    return rotfem.Scene.from_dict(tables).replace(changes or {})
+
+
+def free_hub(changes: dict[str, Any] | None = None) -> rotfem.Scene:
+    """Return the beam on a free hub under a smooth torque."""
+    torque = [[0.05 * i, 400.0 * np.sin(np.pi * i / 20) ** 2] for i in range(21)]
+    motion = {"type": "torque", "hub_inertia": 200.0, "table": torque}
+    return beam({"motion": motion, "time": {"end": 1.0, "step": 0.01}} | (changes or {}))
+
+
+# --- a theory ---------------------------------------------------------------------------------------------------------
+
+
+def test_theory(extension: Callable[[str], ModuleType]) -> None:
+    """½ u₂'² against the stretch: they differ by u₁' u₂'² and higher, so by the square of the deflection over L."""
+    extension("half_square_theory")
+    other, own = (rotfem.run(beam({"model.theory": name})).history["tip_u2"] for name in ("von_karman", "half_square"))
+    size = np.max(np.abs(other))
+    assert 0.01 < size / 10.0 < 0.1
+    assert 0.0 < np.max(np.abs(own - other)) <= (size / 10.0) ** 2 * size
+
+
+def test_theory_takes_its_place_in_the_ladder(extension: Callable[[str], ModuleType]) -> None:
+    extension("half_square_theory")
+    rows = rotfem.explain(beam({"time.end": 0.4})).rows
+    names = [row["name"] for row in rows if row["kind"] == "theory"]
+    assert names.index("half_square") == names.index("second_order") + 1
+
+
+def test_theory_is_refused_for_structures_that_it_lacks(extension: Callable[[str], ModuleType]) -> None:
+    extension("half_square_theory")
+    plate = {"type": "plate", "length": 1.0, "width": 1.0, "thickness": 0.01, "E": 1e9, "nu": 0.3, "rho": 1e3}
+    tables = {"structure": plate, "motion": {"type": "constant", "speed": 0.0}, "model": {"theory": "half_square"}}
+    with pytest.raises(SceneError, match="no strains for a plate; it has them for planar_beam"):
+        rotfem.Scene.from_dict(tables)
+    assert "half_square" not in [
+        row["name"] for row in rotfem.explain(rotfem.Scene.from_dict({**tables, "model": {}})).rows
+    ]
+
+
+# --- an effect --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
+def test_effect_on_a_free_hub(extension: Callable[[str], ModuleType], theory: str) -> None:
+    """Impulse = momentum with drag, by the trapezoidal rule in both: the error is of the second order of the step."""
+    extension("linear_drag")
+    errors = []
+    for step in (0.01, 0.005):
+        done = rotfem.run(free_hub({"model.theory": theory, "time.step": step}))
+        assert "drag" in done.summary["effects"]
+        h = done.history
+        errors.append(np.max(np.abs(h["angular_momentum"] - h["impulse"])) / np.max(np.abs(h["impulse"])))
+    without = rotfem.run(free_hub({"model.theory": theory, "model.effects": ["coriolis", "centrifugal", "euler"]}))
+    torque = np.trapezoid(h["torque"], h["t"])
+    assert h["impulse"][-1] < 0.95 * torque  # the drag takes more than a twentieth of it
+    assert without.history["psi_dot"][-1] > 1.02 * h["psi_dot"][-1]
+    assert errors[1] <= 2e-5
+    assert errors[1] < 0.3 * errors[0]
+
+
+def test_effect_slows_a_rigid_wheel(extension: Callable[[str], ModuleType]) -> None:
+    """I ω' = −c L³/3 ω for a beam that does not bend: ω = ω₀ exp(−c L³ t/3 I); what still bends makes 2e-5."""
+    drag = extension("linear_drag").DRAG
+    stiff = {**KRB, "EI": 1.4e8, "GA": 1e9, "EA": 2.8e9, "rotary_inertia": 0.0}
+    motion = {"type": "torque", "hub_inertia": 200.0, "speed": 1.0}
+    scene = free_hub({"motion": motion, "structure.section": stiff, "time": {"end": 2.0, "step": 0.02}})
+    h = rotfem.run(scene).history
+    inertia = 200.0 + 1.2 * 10.0**3 / 3
+    assert h["psi_dot"][-1] == pytest.approx(np.exp(-drag * 10.0**3 / 3 * 2.0 / inertia), rel=2e-5)
+
+
+def test_effect_damps_modes_and_is_explained(extension: Callable[[str], ModuleType]) -> None:
+    """At rest the first mode of ρ ẍ + c ẋ + … has λ = −c/2ρ + iω."""
+    drag = extension("linear_drag").DRAG
+    still = beam({"motion": {"type": "constant", "speed": 0.0}, "time": None, "structure.section.rotary_inertia": 0.0})
+    for theory in ("reissner", "consistent_linear"):
+        row = rotfem.modes(still.replace({"model.theory": theory})).rows[0]
+        assert row["growth"] == pytest.approx(-drag / 2 / 1.2, rel=1e-9)
+    rows = rotfem.explain(still).rows
+    assert next(row for row in rows if row["name"] == "drag")["why"].startswith("there is air")
+
+
+# --- schemes ----------------------------------------------------------------------------------------------------------
+
+
+def orders(scheme: str, make: Callable[..., rotfem.Scene], column: str, steps: tuple[float, ...]) -> list[float]:
+    """Return the orders observed of a column's last value from three steps and a fine reference of another scheme."""
+    exact = rotfem.run(make({"time.step": steps[-1] / 8, "time.scheme": "newmark"})).history[column][-1]
+    off = [abs(rotfem.run(make({"time.step": h, "time.scheme": scheme})).history[column][-1] - exact) for h in steps]
+    return [float(np.log2(a / b)) for a, b in zip(off, off[1:], strict=False)]
+
+
+@pytest.mark.parametrize("scheme", ["bdf2", "sdirk2"])
+@pytest.mark.parametrize(("kind", "column"), [("fixed", "tip_u2"), ("free hub", "psi_dot"), ("inertial", "tip_u2")])
+def test_scheme_of_second_order(
+    extension: Callable[[str], ModuleType], scheme: str, kind: str, column: str
+) -> None:
+    extension(scheme)
+    frame = {"model.frame": "inertial"} if kind == "inertial" else {}
+    base = free_hub if kind == "free hub" else beam
+    steps = (0.01, 0.005, 0.0025) if kind == "free hub" else (0.02, 0.01, 0.005)
+
+    def make(changes: dict[str, Any]) -> rotfem.Scene:
+        return base({"mesh.elements": 2, **frame, **changes})
+
+    found = orders(scheme, make, column, steps)
+    assert found[-1] == pytest.approx(2.0, abs=0.25), found
+
+
+def test_scheme_without_an_error_estimate_has_no_adaptive_steps(extension: Callable[[str], ModuleType]) -> None:
+    extension("bdf2")
+    with pytest.raises(SceneError, match=r"time\.(tolerance|scheme)"):
+        beam({"time": {"end": 1.0, "tolerance": 1e-3, "scheme": "bdf2"}})
+
+
+# --- a section --------------------------------------------------------------------------------------------------------
+
+
+def test_section(extension: Callable[[str], ModuleType]) -> None:
+    """An ellipse of equal axes is the circle; another one has the first bending frequencies of its two axes."""
+    extension("ellipse")
+    material = {"E": 7e10, "nu": 0.3, "rho": 2700.0}
+
+    def frequencies(structure: str, section: dict[str, Any]) -> Any:
+        tables = {
+            "structure": {"type": structure, "length": 2.0, "section": {**material, **section}},
+            "motion": {"type": "constant", "speed": 0.0},
+            "model": {"theory": "consistent_linear"},
+            "modes": {"count": 2},
+        }
+        return rotfem.modes(tables).frequencies
+
+    circle = frequencies("planar_beam", {"shape": "circle", "radius": 0.02})
+    ellipse = {"shape": "ellipse", "semi_axis_2": 0.02, "semi_axis_3": 0.02}
+    np.testing.assert_allclose(frequencies("planar_beam", ellipse), circle, rtol=1e-10)
+    lag, flap = frequencies("spatial_beam", {**ellipse, "semi_axis_2": 0.015, "semi_axis_3": 0.03})
+    assert flap / lag == pytest.approx(2.0, rel=2e-3)  # √(I₂/I₃) but for shear and rotary inertia
+
+
+# --- an output --------------------------------------------------------------------------------------------------------
+
+
+def test_output(extension: Callable[[str], ModuleType]) -> None:
+    """EI α' at the clamp under a tip force across: F L in the first-order theory, F (L + u₁) in the exact one."""
+    extension("root_moment")
+    loads = {"loads.tip_force": [0.0, 100.0], "motion": {"type": "constant", "speed": 0.0}, "time": None}
+    for theory in ("linear", "reissner"):
+        scene = beam({**loads, "model.theory": theory, "output.quantities": ["root_moment"]})
+        h = rotfem.run(scene).history
+        arm = 10.0 + (h["tip_u1"][0] if theory == "reissner" else 0.0)
+        assert h["root_moment"][0] == pytest.approx(100.0 * arm, rel=1e-6)
+
+
+def test_outputs_and_terms_of_a_call(extension: Callable[[str], ModuleType]) -> None:
+    """The same from a script, without a name in the scene."""
+    form, work = extension("root_moment").form, extension("linear_drag").work
+    registry.effects.remove("drag")
+    scene = beam({"time.end": 0.4})
+    done = rotfem.run(scene, terms={"air": work}, outputs={"root_M": form})
+    assert list(done.history)[-1] == "root_M"
+    still = rotfem.run(scene, outputs={"root_M": form})
+    assert "air" not in done.summary["effects"]
+    assert np.max(np.abs(done.history["root_M"] - still.history["root_M"])) > 1e-6
