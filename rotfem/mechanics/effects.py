@@ -31,8 +31,8 @@ class Effect:
             acceleration, − ∫ f·δx of a force. None where the effect only brings bodies, or couples the hub.
         present: problem ↦ whether there are data for it; `model.effects = "auto"` takes all that are present.
         reasons: why it is in a model, and why not, in a few words.
-        constants: names of the constants of the frame ("w", "dw", "a_o", "gravity") that its work is a product of;
-            () if it has none of them, None if it may be any polynomial of second degree in them.
+        constants: names of the constants ("w", "dw", "a_o", "gravity" of the frame, "loads" for those of all
+            loads) that its work is a product of; () if it has none of them, None if it may be any polynomial of second degree in them.
         of_rotation: whether it comes of the rotation of the frame, so that a frame that does not rotate has it not.
         internal: whether its forces act between structure and frame, so that they do no work in a rigid turn.
         momentum: whether its work in a rigid turn is a change of angular momentum; the moments of all others are the
@@ -79,7 +79,7 @@ def _work(name: str) -> str:
 # What every model has.
 INTERNAL = Effect("internal", _work("internal"), constants=(), internal=True)
 INERTIA = Effect("inertia", _work("inertia"), constants=(), momentum=True)
-LOADS = Effect("loads", _work("loads"), constants=None, potential=_work("potential_of_loads"))
+LOADS = Effect("loads", _work("loads"), constants=("loads",), potential=_work("potential_of_loads"))
 
 for _effect in (
     Effect(

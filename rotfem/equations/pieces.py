@@ -1,0 +1,250 @@
+"""The pieces of a linear theory: what f, K, C and M are with one product of constants at a time.
+
+f, K, C and M are the residual and its derivatives at the undeformed state, one form each with named constants: the
+switches of the terms and of the bodies, and those of frame and loads. So every term, part of the bodies and product of
+constants can be assembled by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations_with_replacement
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
+from ufl.algorithms.analysis import extract_constants
+
+from rotfem.equations.model import Model
+from rotfem.numerics import compat, forms
+from rotfem.numerics.linear import DirectSolver
+
+Array = npt.NDArray[np.float64]
+
+#: A piece belongs to the product of these entries (constant name, component): () is 1, (("w", 0), ("w", 0)) is Omega².
+Key = tuple[tuple[str, int], ...]
+
+#: What the pieces of the geometric stiffness are marked with; without them a prestressed theory is the linear one.
+PRESTRESS = "prestress"
+
+
+@dataclass
+class Piece:
+    """One operator (PETSc matrix, or vector for "f"), the constants whose product multiplies it, and what it is of.
+
+    Attributes:
+        of: names of the switches that must be on: the term, the bodies' effect, PRESTRESS.
+    """
+
+    kind: str
+    key: Key
+    operator: Any
+    of: frozenset[str]
+
+
+class Pieces:
+    """All pieces of a model, assembled.
+
+    With a prestressed theory the stiffness gains ∫ N⁰ D²Γ₁[δq, q] where N⁰ is the axial force of the linear structure
+    under each load piece (centrifugal, base, gravity, applied) and Γ₁ the axial strain of the theory's second order:
+    Simo & Vu-Quoc 1986 eqs. (12), (23) as corrected in docs/theory.md.
+
+    Args:
+        model: the terms, of a linear theory.
+        bcs: the clamp.
+        clamped: local numbers of the clamped unknowns.
+
+    Attributes:
+        at_rest: "f", "K", "C", "M" ↦ UFL form at q = v = a = 0; those that vanish are left out.
+        constants: name ↦ constant of frame and loads.
+        axis: components of the spin axis that w and dw have.
+        pattern: a matrix with the pattern of all.
+        all: the pieces.
+        assembled: time spent on assembly, s.
+    """
+
+    def __init__(self, model: Model, bcs: list[Any], clamped: npt.NDArray[Any]):
+        self.model, self.structure, self.bcs, self.clamped = model, model.structure, bcs, clamped
+        self.q, self.V = model.structure.k.q, model.structure.V
+        self.assembled = 0.0
+        loads = {name: constant for name, (constant, _) in self.structure.load_constants.items()}
+        self.at_rest = self._forms_at_rest()
+        self.constants: dict[str, fem.Constant] = {**model.frame.constants, **loads}
+        self.axis: Array = model.motion.axis[2:] if self.structure.planar else model.motion.axis
+        self._forms = {kind: forms.form(form, once=True) for kind, form in self.at_rest.items()}
+        self.pattern = fem_petsc.create_matrix(self._forms["K"])
+        fem_petsc.assemble_matrix(self.pattern, self._forms["K"], self.bcs)
+        self.pattern.assemble()
+        self.all: list[Piece] = []
+        for kind in self.at_rest:
+            self._decompose(kind)
+        self._set_switches(None)
+        if model.theory.prestress:
+            self._prestress()
+
+    def _forms_at_rest(self) -> dict[str, Any]:
+        """Return f, K, C and M at q = v = a = 0 as UFL forms; those that vanish are left out."""
+        k = self.structure.k
+        F, du, state = self.model.residual, ufl.TrialFunction(self.V), (k.q, k.v, k.a)
+        tangents = {kind: ufl.derivative(F, x, du) for kind, x in zip("KCM", state, strict=True)}
+        at_rest = {kind: forms.without(form, *state) for kind, form in {"f": F, **tangents}.items()}
+        return {kind: form for kind, form in at_rest.items() if not form.empty()}
+
+    def _zero_constants(self) -> None:
+        for constant in self.constants.values():
+            constant.value[...] = 0.0
+
+    def _set_switches(self, on: Collection[str] | None) -> None:
+        """Switch these on and all others off; all on if None."""
+        for name, switch in self.model.switches.items():
+            switch.value = 1.0 if on is None or name in on else 0.0
+
+    def _entries(self, name: str) -> list[tuple[str, int]]:
+        """Return the components of a constant that are ever there: w and dw keep to the axis, which is fixed."""
+        if name == "loads":
+            return [entry for load in self.structure.load_constants for entry in self._entries(load)]
+        n = self.constants[name].value.size
+        if name in ("w", "dw"):
+            return [(name, i) for i, c in enumerate(self.axis) if c != 0.0]
+        return [(name, i) for i in range(n)]
+
+    def _keys(self, name: str) -> list[Key]:
+        """Return the products of constants that a term consists of: its effect says which, or any two that it has."""
+        declared = self.model.acting[name].constants
+        if declared is not None:
+            if not declared:
+                return [()]
+            entries = self._entries(declared[0])
+            return list(combinations_with_replacement(entries, len(declared)))
+        mine = extract_constants(self.model.terms[name])
+        found = [entry for known, c in self.constants.items() if c in mine for entry in self._entries(known)]
+        return [(), *((entry,) for entry in found), *combinations_with_replacement(found, 2)]
+
+    def _parts(self, kind: str) -> list[tuple[str, tuple[str, ...]]]:
+        """Return the terms in one of the forms, each with the switches of the bodies it acts on there, none first."""
+        switches, found = self.model.switches, dict[str, set[str]]()
+        for integral in self.at_rest[kind].integrals():
+            there = set(extract_constants(integral.integrand()))
+            names = [name for name, switch in switches.items() if switch in there]
+            term = next(name for name in names if name in self.model.terms)
+            found.setdefault(term, set()).update([name for name in names if name != term] or [""])
+        return [(term, tuple(sorted(found[term]))) for term in self.model.terms if term in found]
+
+    def _decompose(self, kind: str) -> None:
+        """Assemble one form for every term, part of the bodies and product of constants."""
+        started = perf_counter()
+        for name, parts in self._parts(kind):
+            bodiless: dict[Key, Any] = {}
+            for part in parts:
+                for key in self._keys(name):
+                    self._set_switches((name, part))
+                    operator = self._polarised(kind, key, declared=self.model.acting[name].constants is not None)
+                    if part and key in bodiless:
+                        operator.axpy(-1.0, bodiless[key])
+                    elif not part:
+                        bodiless[key] = operator
+                    if operator.norm() > 0.0:
+                        if kind == "K" and name == "internal":
+                            set_diagonal(self.clamped, operator, 1.0)
+                        self.all.append(Piece(kind, key, operator, frozenset((name, part))))
+        self.assembled += perf_counter() - started
+
+    def _polarised(self, kind: str, key: Key, declared: bool) -> Any:
+        """Assemble what belongs to the product `key` of constants.
+
+        A term that is declared to be of one degree gives it with the constants at 1; a mixed product by polarisation.
+        Of any other polynomial of second degree, p, the constant part is p(0), that of x is (p(x) − p(−x))/2, that of
+        x² (p(x) + p(−x))/2 − p(0), and that of x y follows from p(x, y).
+        """
+
+        def at(*entries: tuple[tuple[str, int], float]) -> Any:
+            return self._assemble_at(kind, dict(entries))
+
+        if len(key) == 2 and key[0] != key[1]:
+            operator = at((key[0], 1.0), (key[1], 1.0))
+            for entry in key:
+                operator.axpy(-1.0, at((entry, 1.0)))
+            if not declared:
+                operator.axpy(1.0, at())
+            return operator
+        if declared or not key:
+            return at(*((entry, 1.0) for entry in key))
+        operator, mirrored = at((key[0], 1.0)), at((key[0], -1.0))
+        operator.axpy(-1.0 if len(key) == 1 else 1.0, mirrored)
+        operator.scale(0.5)
+        if len(key) == 2:
+            operator.axpy(-1.0, at())
+        return operator
+
+    def _assemble_at(self, kind: str, values: dict[tuple[str, int], float]) -> Any:
+        constants = self.constants
+        self._zero_constants()
+        for (name, i), value in values.items():
+            constants[name].value.flat[i] = value
+        operator = self._assemble(self._forms[kind], kind)
+        self._zero_constants()
+        return operator
+
+    def _assemble(self, form: Any, kind: str) -> Any:
+        if kind == "f":
+            b = compat.create_vector(self.V)
+            fem_petsc.assemble_vector(b, form)
+            b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
+            b.array[self.clamped] = 0.0
+            return b
+        A = self.pattern.duplicate()
+        fem_petsc.assemble_matrix(A, form, self.bcs, 0.0)
+        A.assemble()
+        return A
+
+    @property
+    def material(self) -> Any:
+        """Stiffness of the strains alone, clamped rows 1."""
+        return next(p.operator for p in self.all if p.kind == "K" and "internal" in p.of)
+
+    @cached_property
+    def prestressed(self) -> fem.Function:
+        """The displacement of the linear structure that carries N⁰."""
+        return fem.Function(self.V)
+
+    def geometric(self, u: Any, w: Any, base: Any) -> Any:
+        """Return ∫ N⁰ D²Γ₁[u, w] with N⁰ of the displacement `base`, a UFL form; 0 without a prestressed theory."""
+        s, theory = self.structure, self.model.theory
+        if not theory.prestress:
+            return 0
+        out: Any = 0
+        second = s.strains(theory.prestress_measures(s.type))
+        for first, higher in zip(self.model.mechanics.strains, second, strict=True):
+            if first.name in s.prestressing:
+                force = first.force(ufl.replace(first.value, {self.q: base}))
+                curvature = ufl.derivative(ufl.derivative(higher.value, self.q, u), self.q, w)
+                out += ufl.inner(force, forms.without(curvature, self.q)) * higher.measure
+        return out
+
+    def _prestress(self) -> None:
+        """Add the geometric stiffness of the axial force that each load piece causes in the linear structure."""
+        q0 = self.prestressed
+        solver, x = DirectSolver(self.material, symmetric=True), compat.wrap(q0.x)
+        compiled = forms.form(self.geometric(ufl.TestFunction(self.V), ufl.TrialFunction(self.V), q0), once=True)
+        started = perf_counter()
+        for piece in [p for p in self.all if p.kind == "f"]:
+            solver.solve(piece.operator, x)
+            x.scale(-1.0)
+            q0.x.scatter_forward()
+            K = self._assemble(compiled, "K")
+            if K.norm() > 0.0:
+                self.all.append(Piece("K", piece.key, K, piece.of | {PRESTRESS}))
+        self.assembled += perf_counter() - started
+
+
+def set_diagonal(clamped: npt.NDArray[Any], A: Any, value: float) -> None:
+    """Write a value to the diagonal of a matrix at the clamped unknowns."""
+    d = A.getDiagonal()
+    d.array[clamped] = value
+    A.setDiagonal(d)

@@ -1,0 +1,112 @@
+"""What is solved with the matrices of a system: Newton's corrections, and the acceleration that balances a state."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from rotfem.errors import ComputationError
+from rotfem.numerics.linear import DirectSolver, Increment
+
+Array = npt.NDArray[np.float64]
+
+#: Part of K, relative to M in norm, that makes a singular M regular.
+TRACE = 1e-9
+
+
+class Solutions:
+    """Solutions with the tangent and the mass matrix of a system, which it gives.
+
+    Attributes:
+        seconds: time spent on assembly and on solution.
+    """
+
+    seconds: dict[str, float]
+    _solver: DirectSolver | None
+    _dx: Increment
+
+    @abstractmethod
+    def residual(self) -> Any:
+        """Return −F at the state in q, v, a as a PETSc vector (reused), zero at clamped unknowns."""
+
+    @abstractmethod
+    def tangent(self, c_k: float, c_v: float, c_m: float) -> tuple[Any, bool]:
+        """Return (c_k K + c_v C + c_m M at the state, whether it changed); clamped rows are identity rows."""
+
+    @abstractmethod
+    def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
+        """Return a new matrix c_k K + c_v C + c_m M at the state with `diagonal` at clamped unknowns."""
+
+    def correction(self, shifts: tuple[float, float, float]) -> Array:
+        """Return −(c_k K + c_v C + c_m M)⁻¹ F at the state, Newton's correction of q (a local array, reused)."""
+        started = perf_counter()
+        b = self.residual()
+        A, changed = self.tangent(*shifts)
+        assembled = perf_counter()
+        dq = self._dx.solve(self.factor(A, changed), b)
+        self.seconds["assemble"] += assembled - started
+        self.seconds["solve"] += perf_counter() - assembled
+        return dq
+
+    def chord(self) -> Array:
+        """Return the correction of q at the state with the factor at hand."""
+        started = perf_counter()
+        b = self.residual()
+        assembled = perf_counter()
+        assert self._solver is not None
+        dq = self._dx.solve(self._solver, b)
+        self.seconds["assemble"] += assembled - started
+        self.seconds["solve"] += perf_counter() - assembled
+        return dq
+
+    def factor(self, A: Any, changed: bool = True) -> DirectSolver:
+        """Return the solver of the system's tangent, with a new factor where it has changed."""
+        if self._solver is None:
+            self._solver = DirectSolver(A)
+        elif changed:
+            self._solver.refresh()
+        return self._solver
+
+    @property
+    def factorisations(self) -> int:
+        """Number of matrix factorisations so far."""
+        return self._solver.factorisations if self._solver else 0
+
+    def acceleration(self, t: float) -> Array:
+        """Return what is to be added to a so that F = 0 at the state, M δa = −F; `set_time` has been called for t.
+
+        Unknowns without inertia (the rotation, where rotary inertia is absent or off) follow the others at once: their
+        acceleration keeps their equation in balance, K δa = 0 in their rows.
+        """
+        solver, massless = self.mass_solver()
+        b = self.residual()
+        b.array[massless] = 0.0
+        return self._dx.solve(solver, b)
+
+    def mass_solver(self) -> tuple[DirectSolver, Array]:
+        """Return a solver with M, where it has to be completed with K, and which owned unknowns have no inertia.
+
+        A tip mass beside the axis can leave a rotation without inertia in a direction that is no unknown of its own;
+        then so little of K is added to all of M that no motion with inertia feels it.
+        """
+        M = self.matrix(0.0, 0.0, 1.0, 1.0)
+        none = M.getDiagonal()
+        none.array[:] = none.array == 0.0
+        massless = np.asarray(none.array > 0.0)
+        if none.norm() > 0.0:
+            K = self.matrix(1.0, 0.0, 0.0, 1.0)
+            K.diagonalScale(none)
+            M.axpy(1.0, K, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        solver = DirectSolver(M)
+        try:
+            self._dx.solve(solver, self.residual())
+        except ComputationError:
+            K = self.matrix(1.0, 0.0, 0.0, 1.0)
+            M.axpy(TRACE * M.norm() / K.norm(), K, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            solver = DirectSolver(M)
+        return solver, massless
