@@ -1,46 +1,49 @@
-"""Schemes as data: parameters, their identities, and spectral radius and order on one linear oscillator."""
+"""Schemes: parameters, their identities, spectral radius and order on one linear oscillator, stages and update maps."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from rotfem.analysis.stepper import Scheme
-from rotfem.scene import Scene
+from rotfem.analysis.alpha_family import AlphaFamily, GeneralisedAlpha, Newmark
+from rotfem.analysis.schemes import State
+from rotfem.commands.problem import scheme_of
+from rotfem.scene import Scene, Time
 
 RADII = (0.0, 0.3, 0.5, 0.8, 0.9, 1.0)
+SCHEMES = [*map(GeneralisedAlpha, RADII), Newmark(), Newmark(0.3025, 0.6)]
 
 
-def amplification(s: Scheme, omega_h: float) -> np.ndarray:
+def amplification(scheme: AlphaFamily, omega_h: float) -> np.ndarray:
     """Return the matrix that carries (q, h v, h² a) over one step of q̈ + ω²q = 0, written out from the definitions."""
-    w2 = omega_h**2
+    w2, (alpha_m, alpha_f, beta, gamma) = omega_h**2, scheme.coefficients
     # unknowns (q, v, a) at n + 1, with q̈ = −w2 q at both ends:
     # (1 − alpha_m) a1 + alpha_m a0 = −w2 [(1 − alpha_f) q1 + alpha_f q0]
-    left = np.array([[1, 0, -s.beta], [0, 1, -s.gamma], [w2 * (1 - s.alpha_f), 0, 1 - s.alpha_m]])
-    right = np.array([[1, 1, 0.5 - s.beta], [0, 1, 1 - s.gamma], [-w2 * s.alpha_f, 0, -s.alpha_m]])
+    left = np.array([[1, 0, -beta], [0, 1, -gamma], [w2 * (1 - alpha_f), 0, 1 - alpha_m]])
+    right = np.array([[1, 1, 0.5 - beta], [0, 1, 1 - gamma], [-w2 * alpha_f, 0, -alpha_m]])
     return np.linalg.solve(left, right)
 
 
 @pytest.mark.parametrize("rho", RADII)
 def test_generalised_alpha(rho: float) -> None:
     """Second order needs gamma = ½ + alpha_f − alpha_m, unconditional stability beta = ¼(1 + alpha_f − alpha_m)²."""
-    s = Scheme.generalised_alpha(rho)
-    assert s.gamma == pytest.approx(0.5 + s.alpha_f - s.alpha_m, abs=1e-15)
-    assert s.beta == pytest.approx((1 + s.alpha_f - s.alpha_m) ** 2 / 4, abs=1e-15)
-    assert s.alpha_m <= s.alpha_f <= 0.5
+    alpha_m, alpha_f, beta, gamma = GeneralisedAlpha(rho).coefficients
+    assert gamma == pytest.approx(0.5 + alpha_f - alpha_m, abs=1e-15)
+    assert beta == pytest.approx((1 + alpha_f - alpha_m) ** 2 / 4, abs=1e-15)
+    assert alpha_m <= alpha_f <= 0.5
 
 
 @pytest.mark.parametrize("rho", RADII)
 def test_spectral_radius(rho: float) -> None:
     """rho_inf at infinite frequency (three equal values, so a root of round-off), at most 1 at every frequency."""
-    s = Scheme.generalised_alpha(rho)
+    s = GeneralisedAlpha(rho)
     assert max(abs(np.linalg.eigvals(amplification(s, 1e6)))) == pytest.approx(rho, abs=1e-3)
     for omega_h in np.logspace(-2, 4, 61):
         assert max(abs(np.linalg.eigvals(amplification(s, omega_h)))) <= 1 + 1e-9
 
 
-@pytest.mark.parametrize("scheme", [*map(Scheme.generalised_alpha, RADII), Scheme.newmark()], ids=str)
-def test_second_order(scheme: Scheme) -> None:
+@pytest.mark.parametrize("scheme", [*map(GeneralisedAlpha, RADII), Newmark()], ids=str)
+def test_second_order(scheme: AlphaFamily) -> None:
     """The principal eigenvalue differs from e^(iωh) by O(h³)."""
 
     def error(omega_h: float) -> float:
@@ -51,31 +54,53 @@ def test_second_order(scheme: Scheme) -> None:
 
 
 def test_newmark_is_the_trapezoidal_rule() -> None:
-    s = Scheme.newmark()
-    assert (s.alpha_m, s.alpha_f, s.beta, s.gamma) == (0.0, 0.0, 0.25, 0.5)
+    s = Newmark()
+    assert s.coefficients == (0.0, 0.0, 0.25, 0.5)
     np.testing.assert_allclose(abs(np.linalg.eigvals(amplification(s, 0.7)))[:2].max(), 1.0, atol=1e-14)
 
 
 def test_first_order_without_its_identity() -> None:
     """The test of order can fail: Newmark with gamma = 0.6 is of first order."""
-    s = Scheme.newmark(0.3025, 0.6)
+    s = Newmark(0.3025, 0.6)
     errors = [np.min(np.abs(np.linalg.eigvals(amplification(s, w)) - np.exp(1j * w))) for w in (0.02, 0.01)]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.05)
 
 
-@pytest.mark.parametrize("rho", RADII)
-def test_shifts_are_the_derivatives_of_the_update(rho: float) -> None:
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_shifts_are_the_derivatives_of_the_update(scheme: AlphaFamily) -> None:
     """c_q, c_v, c_m = ∂(q, v, q̈)/∂q by differences of the update maps (linear, so to round-off)."""
-    s, h = Scheme.generalised_alpha(rho), 0.01
+    alpha_m, alpha_f, beta, gamma = scheme.coefficients
+    h = 0.01
 
     def update(a1: float) -> tuple[float, float, float]:
-        q = 1 + h * 2 + h * h * ((0.5 - s.beta) * 3 + s.beta * a1)
-        v = 2 + h * ((1 - s.gamma) * 3 + s.gamma * a1)
-        acceleration = ((1 - s.alpha_m) * a1 + s.alpha_m * 3 - s.alpha_f * 4) / (1 - s.alpha_f)
+        q = 1 + h * 2 + h * h * ((0.5 - beta) * 3 + beta * a1)
+        v = 2 + h * ((1 - gamma) * 3 + gamma * a1)
+        acceleration = ((1 - alpha_m) * a1 + alpha_m * 3 - alpha_f * 4) / (1 - alpha_f)
         return q, v, acceleration
 
     one, zero = np.array(update(1.0)), np.array(update(0.0))
-    np.testing.assert_allclose(s.shifts(h), (one - zero) / (one - zero)[0], rtol=1e-9)
+    stage = scheme.stage(0, state(1.0, 2.0, 4.0, 3.0), h, h, [])
+    np.testing.assert_allclose(stage.shifts, (one - zero) / (one - zero)[0], rtol=1e-9)
+
+
+def state(q: float, v: float, a: float, auxiliary: float) -> State:
+    """Return the state of one unknown at t = 0."""
+    return State(0.0, *(np.array([x]) for x in (q, v, a)), memory=np.array([auxiliary]))
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_stage_and_finish_are_the_definitions(scheme: AlphaFamily) -> None:
+    """One step of q̈ + ω²q = 0, its stage solved at once, is the matrix written out above, q̈ and a apart."""
+    h, omega = 0.1, 7.0
+    start = state(1.0, 2.0, -(omega**2), 3.0)
+    stage = scheme.stage(0, start, h, h, [])
+    stage.correct(-(stage.a + omega**2 * stage.q) / (stage.shifts[2] + omega**2 * stage.shifts[0]))
+    end = scheme.finish(start, h, [stage])
+    expected = amplification(scheme, omega * h) @ np.array([1.0, h * 2.0, h * h * 3.0])
+    got = [end.q[0], h * end.v[0], h * h * end.memory[0]]
+    np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-14)
+    assert end.a[0] == pytest.approx(-(omega**2) * end.q[0], rel=1e-12)
+    assert end.t == h
 
 
 def test_scheme_of_a_scene() -> None:
@@ -86,7 +111,15 @@ def test_scheme_of_a_scene() -> None:
         "time": {"end": 1.0, "step": 0.1},
     }
     scene = Scene.from_dict(tables)
-    assert Scheme.of(scene) == Scheme.generalised_alpha(0.9)
-    assert Scheme.of(scene.replace({"time.spectral_radius": 0.2})) == Scheme.generalised_alpha(0.2)
-    assert Scheme.of(scene.replace({"time.scheme": "newmark"})) == Scheme.newmark()
-    assert Scheme.of(scene.replace({"time.scheme": "newmark", "time.beta": 0.3})) == Scheme.newmark(0.3, 0.5)
+
+    def of(changes: dict[str, object]) -> AlphaFamily:
+        time = scene.replace(changes).time
+        assert isinstance(time, Time)
+        scheme = scheme_of(time)
+        assert isinstance(scheme, AlphaFamily)
+        return scheme
+
+    assert of({}) == GeneralisedAlpha(0.9)
+    assert of({"time.spectral_radius": 0.2}) == GeneralisedAlpha(0.2)
+    assert of({"time.scheme": "newmark"}) == Newmark()
+    assert of({"time.scheme": "newmark", "time.beta": 0.3}) == Newmark(0.3, 0.5)

@@ -12,8 +12,9 @@ from dolfinx import mesh
 from mpi4py import MPI
 from scipy.integrate import quad
 
+from rotfem.commands.problem import motion_of
 from rotfem.mechanics.frame import Frame
-from rotfem.mechanics.motion import Motion, motion_of, smooth_spin_up
+from rotfem.mechanics.motion import Motion, smooth_spin_up
 from rotfem.scene import Scene
 
 BEAM: dict[str, Any] = {
