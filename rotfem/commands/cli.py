@@ -13,7 +13,7 @@ import typer
 
 from rotfem.commands.console import Session
 from rotfem.commands.printed import campbell_report, explain_report, modes_report, run_report
-from rotfem.errors import ComputationError, SceneError
+from rotfem.errors import ComputationError, SceneError, input_of
 from rotfem.scene import Scene, load_scene
 
 app = typer.Typer(
@@ -138,11 +138,12 @@ def modes(
         from rotfem.analysis.state_space import state_space as reduce
         from rotfem.analysis.state_space import write_matrices
 
-        if state_space:
-            model = reduce(result.analysis, result.spinning, todo.scene.modes.count)
-            model.write(todo.folder / "state_space.npz")
-        if matrices:
-            write_matrices(result.analysis, result.spinning, todo.folder)
+        with input_of(todo.scene.file):
+            if state_space:
+                model = reduce(result.analysis, result.spinning, todo.scene.modes.count)
+                model.write(todo.folder / "state_space.npz")
+            if matrices:
+                write_matrices(result.analysis, result.spinning, todo.folder)
     if animate is not None:
         todo.session.animate(result, animate, todo.folder)
     todo.finish(result, modes_report)
@@ -171,7 +172,7 @@ def explain(
     from rotfem.commands.explain import explain as estimate
 
     with todo.progress() as progress:
-        result = estimate(todo.scene, check, progress=progress)
+        result = estimate(todo.scene, check=check, progress=progress)
     todo.finish(result, explain_report)
 
 

@@ -118,14 +118,9 @@ class Session:
             return
         result.write(folder)
         if plots:
-            if result.summary["command"] == "cost":
-                from rotfem.commands.cost.plot import plot_cost
+            from rotfem.results.plots import plot
 
-                plot_cost(result, folder)
-            else:
-                from rotfem.results.plots import plot
-
-                plot(result, folder)
+            plot(result, folder)
         if self.as_json:
             from rotfem.results.files import json_text
 

@@ -32,7 +32,8 @@ class Effect:
         present: problem ↦ whether there are data for it; `model.effects = "auto"` takes all that are present.
         reasons: why it is in a model, and why not, in a few words.
         constants: names of the constants ("w", "dw", "a_o", "gravity" of the frame, "loads" for those of all
-            loads) that its work is a product of; () if it has none of them, None if it may be any polynomial of second degree in them.
+            loads) that its work is a product of; () if it has none of them, None if it may be any polynomial of second
+            degree in them.
         of_rotation: whether it comes of the rotation of the frame, so that a frame that does not rotate has it not.
         internal: whether its forces act between structure and frame, so that they do no work in a rigid turn.
         momentum: whether its work in a rigid turn is a change of angular momentum; the moments of all others are the

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -11,7 +10,6 @@ from matplotlib.ticker import LogLocator
 
 from rotfem.commands.cost.front import judged
 from rotfem.commands.cost.result import CostResult
-from rotfem.results.plots import save
 
 #: A marker a degree.
 MARKERS = {1: "v", 2: "s", 3: "o", 4: "D", 5: "P", 6: "*"}
@@ -21,11 +19,6 @@ ERRORS = {
     "tip": "error of the tip's motion, relative to its largest displacement (–)",
     "frequencies": "largest relative error of a frequency (–)",
 }
-
-
-def plot_cost(result: CostResult, folder: Path) -> list[Path]:
-    """Write cost.png into a folder; return its path."""
-    return [save(cost_figure(result), folder / "cost.png")]
 
 
 def cost_figure(result: CostResult) -> Figure:

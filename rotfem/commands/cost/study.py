@@ -49,6 +49,7 @@ DECADES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
 def cost(
     scene: Scene | str | Path | Mapping[str, Any],
+    *,
     quick: bool = False,
     accuracy: float = 1e-4,
     output: str | None = None,
