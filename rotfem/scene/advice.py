@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rotfem.listeners import Hint
+from rotfem.registry import theories
 from rotfem.scene.scene import ConstantMotion, PlateStructure, Scene, SpatialBeamStructure, SpinUpMotion, TableMotion
 
 #: Steps a period, below which the first mode's frequency is off by more than 1 %, and those to be advised.
@@ -94,14 +95,23 @@ def advise(
         out += _step(scene, speed)
     if command != "run" or scene.modes.model_fields_set:
         out += _elements(scene, speed)
-    if critical is not None and speed > critical and scene.model.theory == "linear":
-        out.append(
-            f'model.theory = "linear" loses its stiffness at {critical:.3g} rad/s and the scene reaches {speed:.3g}: '
-            '"consistent_linear" costs the same and does not'
-        )
+    if critical is not None and speed > critical:
+        out += _softening(scene, speed, critical)
     for line in out:
         hint(line)
     return out
+
+
+def _softening(scene: Scene, speed: float, critical: float) -> list[str]:
+    """Return a hint where the theory is a linear one that the spin softens but does not stiffen."""
+    theory = theories[scene.model.theory]
+    if not theory.linear or theory.prestress:
+        return []
+    stiffened = min((t for t in theories if t.linear and t.prestress), key=lambda t: t.rank)
+    return [
+        f'model.theory = "{theory.name}" loses its stiffness at {critical:.3g} rad/s and the scene reaches '
+        f'{speed:.3g}: "{stiffened.name}" costs the same and does not'
+    ]
 
 
 def _step(scene: Scene, speed: float) -> list[str]:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
+
+from rotfem import registry
 
 PACKAGE = Path(__file__).resolve().parents[2] / "rotfem"
 
@@ -43,11 +46,16 @@ def package(module: str) -> str:
     return first if (PACKAGE / first).is_dir() else ""
 
 
+@cache
+def tree(module: str) -> ast.Module:
+    """Return a module as it is written."""
+    return ast.parse(MODULES[module].read_text(encoding="utf-8"))
+
+
 def imports(module: str, everywhere: bool = True) -> set[str]:
     """Return full names of what a module imports: at its head only, or inside functions too; not for type checkers."""
-    tree = ast.parse(MODULES[module].read_text(encoding="utf-8"))
     found: set[str] = set()
-    pending: list[ast.AST] = list(tree.body)
+    pending: list[ast.AST] = list(tree(module).body)
     while pending:
         node = pending.pop()
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
@@ -91,6 +99,55 @@ def test_no_cycles_at_import() -> None:
     assert set(order) == set(MODULES)
 
 
+def test_only_commands_know_the_scene() -> None:
+    """What lies below works on a problem, which a script builds as well: no scene, no file, no [tables]."""
+    knowing = {name for name in MODULES if any(package(other) == "scene" for other in own(name))}
+    assert {package(name) for name in knowing - set(DOORS)} == {"scene", "commands"}
+
+
+def compared(code: ast.AST) -> set[str]:
+    """Return the texts that anything is compared with: ==, in, and the cases of a match."""
+    places = [node for node in ast.walk(code) if isinstance(node, ast.Compare | ast.MatchValue)]
+    inside = [node for place in places for node in ast.walk(place) if isinstance(node, ast.Constant)]
+    return {node.value for node in inside if isinstance(node.value, str)}
+
+
+def test_no_theory_is_asked_for_by_name() -> None:
+    """What a theory is like is read of it (`linear`, `exact`, `prestress`): one of a script's own is no less."""
+    names = set(registry.theories.names)
+    assert {module: found for module in MODULES if (found := compared(tree(module)) & names)} == {}
+
+
+#: Where the classes are whose objects say themselves what they do.
+SPEAKING = ("equations", "structures", "mechanics.motion", "mechanics.free_hub", "analysis")
+
+
+def classes(module: str) -> set[str]:
+    """Return the names of the classes that a module defines."""
+    return {node.name for node in ast.walk(tree(module)) if isinstance(node, ast.ClassDef)}
+
+
+def asked_for(code: ast.AST) -> set[str]:
+    """Return the names of the classes that `isinstance`, `issubclass` and comparisons of `type(…)` ask for."""
+    places: list[ast.AST] = []
+    for node in ast.walk(code):
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("isinstance", "issubclass"):
+            places.append(node.args[1])
+        elif isinstance(node, ast.Compare) and "type(" in ast.unparse(node):
+            places.append(node)
+        elif isinstance(node, ast.MatchClass):
+            places.append(node.cls)
+    inside = [node for place in places for node in ast.walk(place)]
+    names = {node.id for node in inside if isinstance(node, ast.Name)}
+    return names | {node.attr for node in inside if isinstance(node, ast.Attribute)}
+
+
+def test_nothing_branches_on_a_class_of_system_motion_structure_or_scheme() -> None:
+    speaking = {name for m in MODULES if m.startswith(SPEAKING) for name in classes(m)}
+    assert {"System", "BorderedSystem", "Motion", "FreeHub", "Structure", "Plate", "GeneralisedAlpha"} <= speaking
+    assert {module: found for module in MODULES if (found := asked_for(tree(module)) & speaking)} == {}
+
+
 @pytest.mark.parametrize("module", [name for name in MODULES if package(name) in LIGHT])
 def test_light_modules_import_no_fenicsx(module: str) -> None:
     assert {name.split(".")[0] for name in imports(module)} & FENICSX == set()
@@ -118,3 +175,11 @@ def test_an_import_from_above_is_seen() -> None:
     """The test can fail: what the command line imports is not allowed for the ground."""
     assert any(package(name) == "commands" for name in own("commands.cli"))
     assert "commands.modes" in own("commands.cli") - own("commands.cli", everywhere=False)
+
+
+def test_a_comparison_with_a_name_or_a_class_is_seen() -> None:
+    """The tests can fail."""
+    code = 'a == "linear" or b in ("reissner", x)\nmatch c:\n    case "von_karman":\n        pass'
+    assert compared(ast.parse(code)) == {"linear", "reissner", "von_karman"}
+    code = "isinstance(a, System | equations.Affine)\ntype(b) is Motion\nmatch c:\n    case Plate():\n        pass"
+    assert {"System", "Affine", "Motion", "Plate"} <= asked_for(ast.parse(code))
