@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rotfem.analysis.alpha_family import GeneralisedAlpha, Newmark
     from rotfem.analysis.schemes import Scheme, Stage, State
     from rotfem.commands.campbell import campbell
+    from rotfem.commands.cost.result import CostResult
     from rotfem.commands.cost.study import cost
     from rotfem.commands.explain import explain
     from rotfem.commands.modes import modes
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from rotfem.mechanics.motion import Motion
     from rotfem.mechanics.outputs import Output
     from rotfem.mechanics.theories import Theory
-    from rotfem.commands.cost.result import CostResult
     from rotfem.results import CampbellResult, ExplainResult, ModesResult, RunResult
     from rotfem.scene import BeamMesh, PlateMesh
     from rotfem.scene.beams import PlanarBeamStructure as PlanarBeam

@@ -21,6 +21,7 @@ from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import SceneError, input_of
 from rotfem.listeners import Hint, Progress, silent
+from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.results import CampbellResult
 from rotfem.scene import Scene, as_scene
 from rotfem.selection.distance import MODES
@@ -95,7 +96,7 @@ class Diagram:
 
     def __init__(self, scene: Scene, values: Sequence[float], comm: MPI.Comm, hint: Hint | None):
         self.scene, self.values, self.choice = scene, values, None
-        problem = Problem.of(scene)
+        problem: ProblemData = Problem.of(scene)
         if scene.modes.about == "steady":
             last = problem.motion.at_speed(values[-1])
             check_steady(problem.replace(motion=last) if any(scene.loads.gravity) else problem)

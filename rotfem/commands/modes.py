@@ -23,6 +23,7 @@ from rotfem.commands.summary import modal_summary
 from rotfem.errors import input_of
 from rotfem.listeners import Hint, silent
 from rotfem.mechanics.effects import Work
+from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.mechanics.theories import richest
 from rotfem.numerics.newton import Newton
 from rotfem.results import ModesResult
@@ -63,7 +64,7 @@ def modes(
 
 
 def _modes(
-    scene: Scene, problem: Problem, comm: MPI.Comm, sensitivities: bool, around: tuple[Hint | None, float]
+    scene: Scene, problem: ProblemData, comm: MPI.Comm, sensitivities: bool, around: tuple[Hint | None, float]
 ) -> ModesResult:
     (hint, started), choice = around, None
     if scene.modes.about == "steady":
@@ -106,7 +107,7 @@ def _modes(
     return result
 
 
-def analysis_of(scene: Scene, problem: Problem, comm: MPI.Comm) -> ModalAnalysis:
+def analysis_of(scene: Scene, problem: ProblemData, comm: MPI.Comm) -> ModalAnalysis:
     """Return the modal analysis that a scene asks for.
 
     Raises:

@@ -83,8 +83,17 @@ class NonlinearSystem(System):
 
     def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
         """Return a new matrix c_k K + c_v C + c_m M at the state with `diagonal` at clamped unknowns."""
-        A = fem_petsc.create_matrix(self._pattern)
+        A = self._empty.duplicate()
         self._assemble(A, (c_k, c_v, c_m), diagonal)
+        return A
+
+    @cached_property
+    def _empty(self) -> Any:
+        """A matrix with the pattern of all tangents and zeros in it."""
+        A = fem_petsc.create_matrix(self._pattern)
+        fem_petsc.assemble_matrix(A, self._pattern, self.bcs)
+        A.assemble()
+        A.zeroEntries()
         return A
 
     def _assemble(self, A: Any, shifts: tuple[float, float, float], diagonal: float) -> None:

@@ -21,8 +21,6 @@ KINDS = (registry.theories, registry.effects, registry.schemes, registry.shapes,
 #: The beam of Kane, Ryan & Banerjee 1987 as Simo & Vu-Quoc 1986 have it.
 KRB = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
 
-Scene = Callable[..., rotfem.Scene]
-
 
 @pytest.fixture
 def extension() -> Iterator[Callable[[str], ModuleType]]:
@@ -46,7 +44,7 @@ def beam(changes: dict[str, Any] | None = None) -> rotfem.Scene:
     """Return the beam in a spin-up, on a mesh coarse enough for tests."""
     tables: dict[str, Any] = {
         "structure": {"type": "planar_beam", "length": 10.0, "section": KRB},
-        "motion": {"type": "spin_up", "speed": 2.0, "duration": 2.0},
+        "motion": {"type": "spin_up", "speed": 0.4, "duration": 2.0},
         "mesh": {"elements": 4},
         "time": {"end": 2.0, "step": 0.02},
     }
@@ -83,7 +81,7 @@ def test_theory_is_refused_for_structures_that_it_lacks(extension: Callable[[str
     extension("half_square_theory")
     plate = {"type": "plate", "length": 1.0, "width": 1.0, "thickness": 0.01, "E": 1e9, "nu": 0.3, "rho": 1e3}
     tables = {"structure": plate, "motion": {"type": "constant", "speed": 0.0}, "model": {"theory": "half_square"}}
-    with pytest.raises(SceneError, match="no strains for a plate; it has them for planar_beam"):
+    with pytest.raises(SceneError, match="has strains for planar_beam, none for a plate"):
         rotfem.Scene.from_dict(tables)
     assert "half_square" not in [
         row["name"] for row in rotfem.explain(rotfem.Scene.from_dict({**tables, "model": {}})).rows
@@ -105,8 +103,8 @@ def test_effect_on_a_free_hub(extension: Callable[[str], ModuleType], theory: st
         errors.append(np.max(np.abs(h["angular_momentum"] - h["impulse"])) / np.max(np.abs(h["impulse"])))
     without = rotfem.run(free_hub({"model.theory": theory, "model.effects": ["coriolis", "centrifugal", "euler"]}))
     torque = np.trapezoid(h["torque"], h["t"])
-    assert h["impulse"][-1] < 0.95 * torque  # the drag takes more than a twentieth of it
-    assert without.history["psi_dot"][-1] > 1.02 * h["psi_dot"][-1]
+    assert h["impulse"][-1] < 0.99 * torque  # the drag takes more than a hundredth of it
+    assert without.history["psi_dot"][-1] > 1.01 * h["psi_dot"][-1]
     assert errors[1] <= 2e-5
     assert errors[1] < 0.3 * errors[0]
 
@@ -136,18 +134,15 @@ def test_effect_damps_modes_and_is_explained(extension: Callable[[str], ModuleTy
 # --- schemes ----------------------------------------------------------------------------------------------------------
 
 
-def orders(scheme: str, make: Callable[..., rotfem.Scene], column: str, steps: tuple[float, ...]) -> list[float]:
-    """Return the orders observed of a column's last value from three steps and a fine reference of another scheme."""
-    exact = rotfem.run(make({"time.step": steps[-1] / 8, "time.scheme": "newmark"})).history[column][-1]
-    off = [abs(rotfem.run(make({"time.step": h, "time.scheme": scheme})).history[column][-1] - exact) for h in steps]
-    return [float(np.log2(a / b)) for a, b in zip(off, off[1:], strict=False)]
+def values(make: Callable[..., rotfem.Scene], scheme: str, column: str, steps: tuple[float, ...]) -> list[float]:
+    """Return the last value of a column for every step."""
+    scenes = (make({"time.step": step, "time.scheme": scheme}) for step in steps)
+    return [float(rotfem.run(scene).history[column][-1]) for scene in scenes]
 
 
 @pytest.mark.parametrize("scheme", ["bdf2", "sdirk2"])
 @pytest.mark.parametrize(("kind", "column"), [("fixed", "tip_u2"), ("free hub", "psi_dot"), ("inertial", "tip_u2")])
-def test_scheme_of_second_order(
-    extension: Callable[[str], ModuleType], scheme: str, kind: str, column: str
-) -> None:
+def test_scheme_of_second_order(extension: Callable[[str], ModuleType], scheme: str, kind: str, column: str) -> None:
     extension(scheme)
     frame = {"model.frame": "inertial"} if kind == "inertial" else {}
     base = free_hub if kind == "free hub" else beam
@@ -156,8 +151,10 @@ def test_scheme_of_second_order(
     def make(changes: dict[str, Any]) -> rotfem.Scene:
         return base({"mesh.elements": 2, **frame, **changes})
 
-    found = orders(scheme, make, column, steps)
-    assert found[-1] == pytest.approx(2.0, abs=0.25), found
+    a, b, c = values(make, scheme, column, steps)
+    assert np.log2(abs((b - a) / (c - b))) == pytest.approx(2.0, abs=0.2)
+    limit, other = c + (c - b) / 3, values(make, "newmark", column, steps)[1:]
+    assert limit == pytest.approx(other[1] + (other[1] - other[0]) / 3, rel=2e-4)
 
 
 def test_scheme_without_an_error_estimate_has_no_adaptive_steps(extension: Callable[[str], ModuleType]) -> None:
@@ -185,7 +182,7 @@ def test_section(extension: Callable[[str], ModuleType]) -> None:
 
     circle = frequencies("planar_beam", {"shape": "circle", "radius": 0.02})
     ellipse = {"shape": "ellipse", "semi_axis_2": 0.02, "semi_axis_3": 0.02}
-    np.testing.assert_allclose(frequencies("planar_beam", ellipse), circle, rtol=1e-10)
+    np.testing.assert_allclose(frequencies("planar_beam", ellipse), circle, rtol=1e-8)
     lag, flap = frequencies("spatial_beam", {**ellipse, "semi_axis_2": 0.015, "semi_axis_3": 0.03})
     assert flap / lag == pytest.approx(2.0, rel=2e-3)  # √(I₂/I₃) but for shear and rotary inertia
 
@@ -198,7 +195,7 @@ def test_output(extension: Callable[[str], ModuleType]) -> None:
     extension("root_moment")
     loads = {"loads.tip_force": [0.0, 100.0], "motion": {"type": "constant", "speed": 0.0}, "time": None}
     for theory in ("linear", "reissner"):
-        scene = beam({**loads, "model.theory": theory, "output.quantities": ["root_moment"]})
+        scene = beam({**loads, "model.theory": theory, "output.quantities": ["root_moment"], "mesh.elements": 16})
         h = rotfem.run(scene).history
         arm = 10.0 + (h["tip_u1"][0] if theory == "reissner" else 0.0)
         assert h["root_moment"][0] == pytest.approx(100.0 * arm, rel=1e-6)
