@@ -1,4 +1,4 @@
-"""The problem of a scene, and what a script does with one."""
+"""The problem of a scene, and the verbs that a script has on one: march, steady, modes, system."""
 
 from __future__ import annotations
 
@@ -9,23 +9,27 @@ from typing import Any, Self, cast
 import numpy as np
 from mpi4py import MPI
 
-from rotfem.analysis.equilibrium import steady_state
+from rotfem.analysis.equilibrium import check_steady, steady_state
+from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import Array, Scheme, State
 from rotfem.analysis.time_loop import March, Steps
+from rotfem.commands.moment import Moment
 from rotfem.equations.compiled import compile_system
-from rotfem.errors import SceneError, input_of
+from rotfem.errors import InputError, SceneError, input_of
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.free_hub import FreeHub, Torque
 from rotfem.mechanics.motion import Motion, no_acceleration
 from rotfem.mechanics.outputs import Functional, Output
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
+from rotfem.results import ModesResult
 from rotfem.scene import Scene, Time, as_scene
+from rotfem.scene.stepping import estimates_error
 from rotfem.selection.case import Case
 
 
 class Problem(ProblemData):
-    """A problem and the verbs of a script: `march`, `steady`, `system` (its parts: `rotfem.mechanics.problem`)."""
+    """A problem and the verbs of a script (its parts: `rotfem.mechanics.problem`)."""
 
     @classmethod
     def of(
@@ -93,72 +97,91 @@ class Problem(ProblemData):
             comm: communicator the structure is distributed over.
 
         Raises:
-            InputError: neither step nor tolerance, or both; a mesh or a section that cannot be computed with.
+            InputError: neither step nor tolerance, or both, or one that is not positive; a tolerance for a scheme
+                that does not estimate its error; a mesh or a section that cannot be computed with.
             ComputationError: a step failed, however short.
         """
-        system = self.system(comm=comm)
         scheme = scheme or Scheme.registry["generalised_alpha"]()
+        check_steps(end, step, tolerance, scheme)
+        system = self.system(comm=comm)
         march = March(system, scheme, Steps(end, step, tolerance), Newton(monotone=True), start)
         return (Moment(system, state) for state in march)
 
     def steady(self, *, speed: float | None = None, comm: MPI.Comm = MPI.COMM_WORLD) -> Moment:
-        """Return the equilibrium in the rotating frame at a constant speed (rad/s), that of the motion if None.
+        """Return the equilibrium in the rotating frame at a constant speed.
+
+        Args:
+            speed: rad/s; that of the motion if None, its last where it changes.
+            comm: communicator the structure is distributed over.
 
         Raises:
+            InputError: gravity across the axis, with which there is none; a mesh or a section as for `system`.
             ComputationError: no equilibrium was reached; says how far the load got.
         """
-        system = self.system(moving=False, comm=comm)
-        q = steady_state(system, self.motion.speed(0.0) if speed is None else speed, Newton())
+        speed = self.motion.final_speed(0.0) if speed is None else speed
+        still = self.replace(frame="rotating", motion=self.motion.at_speed(speed))
+        check_steady(still)
+        system = still.system(moving=False, comm=comm)
+        q = steady_state(system, speed, Newton())
         return Moment(system, State(0.0, q, np.zeros_like(q), np.zeros_like(q)))
 
+    def modes(
+        self,
+        *,
+        count: int = 6,
+        speed: float | None = None,
+        about: str = "steady",
+        comm: MPI.Comm = MPI.COMM_WORLD,
+    ) -> ModesResult:
+        """Return the modes of small vibrations at a constant speed.
 
-class Moment:
-    """The motion at one instant, as a script sees it.
+        Args:
+            count: number of modes.
+            speed: rad/s; that of the motion if None, its last where it changes.
+            about: the state that they are about: "steady" or "undeformed".
+            comm: communicator the structure is distributed over.
 
-    Args:
-        system: the equations of motion.
-        state: unknowns and rates.
+        Raises:
+            InputError: more modes than unknowns; no such state; a mesh or a section that cannot be computed with.
+            ComputationError: no equilibrium, or eigenpairs that fail the check of their backward error.
+        """
+        # The tables of modes are made by the command, which starts from a problem.
+        from rotfem.commands.modes import advice, instabilities, mode_rows, rigid_row, scaled_shape, unstiffened
 
-    Attributes:
-        t: time, s.
+        if about not in ("steady", "undeformed"):
+            raise InputError("modes.about", about, 'must be "steady" or "undeformed"')
+        speed = self.motion.final_speed(0.0) if speed is None else speed
+        problem = self.spinning() if speed != 0.0 else self
+        if about == "steady":
+            check_steady(problem)
+        analysis = ModalAnalysis(problem, about, comm=comm)
+        analysis.check_count(count)
+        spinning = analysis.at(speed, count)
+        rigid = int(spinning.rigid)
+        spinning.pairs = spinning.pairs.select(np.arange(min(count - rigid, len(spinning.pairs.values))))
+        rows = [{**row, "mode": row["mode"] + rigid} for row in mode_rows(analysis, spinning)]
+        shapes = {f"mode {r['mode']}: {r['label']}": scaled_shape(analysis, spinning, i) for i, r in enumerate(rows)}
+        warnings = [*advice(analysis, speed), *unstiffened(analysis, speed, rows), *instabilities(rows)]
+        rows = [rigid_row(rows), *rows] if rigid else rows
+        summary = {"command": "modes", "status": "done", "theory": self.theory.name, "speed": speed}
+        summary |= {"effects": list(analysis.model.effects), "modes": rows, "warnings": warnings}
+        surface = analysis.structure.surface()
+        return ModesResult(summary, rows, shapes, triangles=surface, analysis=analysis, spinning=spinning)
+
+
+def check_steps(end: float, step: float | None, tolerance: float | None, scheme: Scheme) -> None:
+    """Refuse steps that are none.
+
+    Raises:
+        InputError: says which and why.
     """
-
-    def __init__(self, system: Any, state: State):
-        self.system, self.state, self.t = system, state, state.t
-
-    @property
-    def tip(self) -> dict[str, float]:
-        """The unknowns at the tip, relative to the turning frame: u1, u2, … (m), alpha, … (rad)."""
-        values = self.system.tip(self.state.q, self.t)
-        return dict(zip(self.system.structure.components, map(float, values), strict=True))
-
-    @property
-    def angle(self) -> float:
-        """Angle psi of the frame, rad."""
-        return self._set().motion.angle(self.t)
-
-    @property
-    def speed(self) -> float:
-        """Speed of the frame, rad/s."""
-        return self._set().motion.speed(self.t)
-
-    def energies(self) -> dict[str, float]:
-        """Return kinetic and strain energy and the Jacobi integral, J."""
-        return dict(self._set().energies())
-
-    def outputs(self) -> dict[str, float]:
-        """Return the output functionals of the problem."""
-        return dict(self._set().outputs())
-
-    def shape(self) -> dict[str, Array]:
-        """Return the deflected structure: position of the nodes (m) and their displacements and rotations."""
-        return dict(self._set().shape())
-
-    def _set(self) -> Any:
-        """Write the state into the system."""
-        self.system.set_time(self.t)
-        self.system.set_state(self.state.q, self.state.v, self.state.a)
-        return self.system
+    if (step is None) == (tolerance is None):
+        raise InputError("time.step", step, "give step, or tolerance for adaptive steps, not both")
+    for name, value in (("end", end), ("step", step), ("tolerance", tolerance)):
+        if value is not None and not value > 0.0:
+            raise InputError(f"time.{name}", value, "must be greater than 0")
+    if tolerance is not None and not estimates_error(type(scheme)):
+        raise InputError("time.tolerance", tolerance, f"{scheme.name} does not estimate its error; give step")
 
 
 def case_of(scene: Scene) -> Case:

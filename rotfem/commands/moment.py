@@ -1,0 +1,69 @@
+"""The motion at one instant, as a script sees it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rotfem.analysis.schemes import Array, State
+
+
+class Moment:
+    """The motion at one instant, as a script sees it.
+
+    Args:
+        system: the equations of motion.
+        state: unknowns and rates.
+
+    Attributes:
+        t: time, s.
+    """
+
+    def __init__(self, system: Any, state: State):
+        self.system, self.state, self.t = system, state, state.t
+
+    @property
+    def tip(self) -> dict[str, float]:
+        """The unknowns at the tip, relative to the turning frame: u1, u2, … (m), alpha, … (rad)."""
+        values = self.system.tip(self.state.q, self.t)
+        return dict(zip(self.system.structure.components, map(float, values), strict=True))
+
+    @property
+    def angle(self) -> float:
+        """Angle psi of the frame, rad."""
+        return self._set().motion.angle(self.t)
+
+    @property
+    def speed(self) -> float:
+        """Speed of the frame, rad/s."""
+        return self._set().motion.speed(self.t)
+
+    def energies(self) -> dict[str, float]:
+        """Return kinetic and strain energy and the Jacobi integral, J."""
+        return dict(self._set().energies())
+
+    def hub(self) -> dict[str, float]:
+        """Return what the history has of a free hub: `torque`, `hub_kinetic`, …; empty where none is free.
+
+        Torque (N·m) and kinetic energy of the hub (J), angular momentum of hub and structure, angular impulse of all
+        forces from outside (N·m·s) and work of torque and brake (J) since t = 0.
+        """
+        system = self._set()
+        if system.hub is None:
+            return {}
+        work, impulse = (0.0, 0.0) if self.state.given is None else map(float, self.state.given[:2])
+        own = {"torque": system.hub.torque.at(self.t, after=True), "hub_kinetic": system.row.kinetic()}
+        return {**own, "angular_momentum": system.row.angular_momentum(), "impulse": impulse, "work": work}
+
+    def outputs(self) -> dict[str, float]:
+        """Return the output functionals of the problem."""
+        return dict(self._set().outputs())
+
+    def shape(self) -> dict[str, Array]:
+        """Return the deflected structure: position of the nodes (m) and their displacements and rotations."""
+        return dict(self._set().shape())
+
+    def _set(self) -> Any:
+        """Write the state into the system."""
+        self.system.set_time(self.t)
+        self.system.set_state(self.state.q, self.state.v, self.state.a)
+        return self.system
