@@ -11,30 +11,20 @@ import numpy as np
 from mpi4py import MPI
 
 from rotfem.commands.modes import modes
+from rotfem.commands.problem import case_of
 from rotfem.commands.run import run
-from rotfem.errors import ComputationError
+from rotfem.commands.summary import summary
+from rotfem.errors import ComputationError, input_of
 from rotfem.listeners import Progress
+from rotfem.mechanics.effects import Effect
+from rotfem.mechanics.theories import Theory
 from rotfem.results import ExplainResult
-from rotfem.scene import EFFECTS, Scene, as_scene
+from rotfem.scene import Scene, as_scene
 from rotfem.selection.coarse_model import INCREMENT, Trial
 from rotfem.selection.dimensionless import MEANING, groups
 from rotfem.selection.distance import HISTORY, MODES, STEADY, Outputs, change, notes, outputs_of
-from rotfem.selection.estimate import LADDER, Change, Estimates
+from rotfem.selection.estimate import Change, Estimates
 from rotfem.selection.model_choice import choose
-from rotfem.version import versions
-
-#: Why an effect is in the full model; the scene reference has the same list.
-REASONS = {
-    "coriolis": ("the structure spins", "nothing spins"),
-    "centrifugal": ("the structure spins", "nothing spins"),
-    "euler": ("the speed changes", "the speed is constant"),
-    "rotary_inertia": ("the section has rotary inertia", "the section has no rotary inertia"),
-    "base": ("the origin is accelerated", "no base_acceleration"),
-    "gravity": ("loads.gravity is not zero", "no gravity"),
-    "damping": ("there is a damping coefficient", "no damping"),
-    "tip_mass": ("there is a tip mass", "no tip mass"),
-    "hub_coupling": ("the hub is free and coupled", "the hub does not feel the structure"),
-}
 
 #: What follows from the size of a change: for an effect or a richer theory, and for a poorer theory.
 NEEDED = {"negligible": "not needed", "noticeable": "needed where {:.1%} matters", "large": "needed"}
@@ -46,6 +36,7 @@ FULL = " of the full model"
 
 def explain(
     scene: Scene | str | Path | Mapping[str, Any],
+    *,
     check: bool = False,
     comm: MPI.Comm = MPI.COMM_WORLD,
     progress: Progress | None = None,
@@ -61,60 +52,68 @@ def explain(
     Raises:
         SceneError: the scene is not valid.
     """
-    started = perf_counter()
     scene = as_scene(scene)
-    trial = Trial(scene, comm=comm)
-    asked = scene.replace({"model.frame": "rotating", "model.tolerance": None})
-    theory, effects = scene.model.theory, asked.effective_effects()
-    estimates = Estimates(trial, theory, effects)
+    with input_of(scene.file):
+        return _explained(scene, check, comm, progress or (lambda share: None))
+
+
+def _explained(scene: Scene, check: bool, comm: MPI.Comm, progress: Progress) -> ExplainResult:
+    started = perf_counter()
+    case = case_of(scene)
+    trial, theory = Trial(case, comm=comm), case.problem.theory
+    effects = case.problem.replace(frame="rotating").effective_effects()
+    estimates = Estimates(trial, theory.name, effects)
     changes = estimates.all()
-    estimated = perf_counter()
+    spent = {"estimate": perf_counter() - started, "check": 0.0}
     if check:
-        check_changes(asked, effects, changes, trial, comm, progress or (lambda share: None))
-    own = estimates.own
-    warnings = [f"{name} of {theory} cannot be computed: {why}" for name, why in own.failed.items()]
-    if trial.unknown:
-        warnings.append(
-            f"frequencies at rest cannot be computed, the estimates take the scene's steps: {trial.unknown}"
-        )
-    if scene.model.frame == "inertial":
-        warnings.append("estimates are of the rotating frame, where the same physics is a sum of effects")
-    total = perf_counter() - started
-    numbers = groups(scene, trial, own)
-    rows = [{**c.row(), "why": why(c, scene)} for c in changes]
-    summary: dict[str, Any] = {
-        "command": "explain",
-        "status": "done",
-        "name": scene.name,
-        "theory": theory,
+        check_changes(scene, effects, changes, trial, comm, progress)
+        spent["check"] = perf_counter() - started - spent["estimate"]
+    numbers = groups(trial, estimates.own)
+    rows = [{**item.row(), "why": why(item, theory)} for item in changes]
+    chosen = case.tolerance is not None
+    result: dict[str, Any] = {
+        **summary("explain", scene, comm, choose(case, trial.wanted, comm=comm) if chosen else None),
+        "theory": theory.name,
         "effects": list(effects),
         "groups": numbers,
         "meaning": {name: MEANING[name] for name in numbers},
         "outputs": list(trial.wanted),
         "absent_outputs": trial.absent,
-        "absent_effects": {name: REASONS[name][1] for name in EFFECTS if name not in trial.effects},
+        "absent_effects": {
+            effect.name: effect.reasons[1] for effect in Effect.registry if effect.name not in trial.effects
+        },
         "rows": rows,
         "speeds": list(trial.speeds),
-        "warnings": warnings,
-        "timings": {"estimate": estimated - started, "check": total - (estimated - started), "total": total},
-        "versions": versions(),
-        "ranks": comm.size,
-        "scene": scene.to_dict(),
+        "warnings": doubts(scene, trial, estimates),
+        "timings": {**spent, "total": sum(spent.values())},
     }
-    if scene.model.tolerance is not None:
-        summary["choice"] = choose(scene, trial.wanted, comm=comm).summary()
-    return ExplainResult(summary, rows)
+    return ExplainResult(result, rows)
 
 
-def why(item: Change, scene: Scene) -> str:
-    """Return in a few words why an effect or theory is in the scene's model or not, and whether it has to be."""
+def doubts(scene: Scene, trial: Trial, estimates: Estimates) -> list[str]:
+    """Return warnings about what the estimates are of."""
+    out = [f"{name} of {estimates.theory} cannot be computed: {why}" for name, why in estimates.own.failed.items()]
+    if trial.unknown:
+        out.append(f"frequencies at rest cannot be computed, the estimates take the scene's steps: {trial.unknown}")
+    if scene.frame == "inertial":
+        out.append("estimates are of the rotating frame, where the same physics is a sum of effects")
+    return out
+
+
+def why(item: Change, own: Theory) -> str:
+    """Return in a few words why an effect or theory is in a model or not, and whether it has to be.
+
+    Args:
+        item: the change it makes.
+        own: theory of the model.
+    """
     failed = "".join(f"; {name}: {text}" for name, text in item.notes.items() if FULL not in name)
     if item.kind == "effect":
-        reason = REASONS[item.name][0]
+        reason = Effect.registry[item.name].reasons[0]
         if not item.included:
             reason += ", but it is not in model.effects"
         return f"{reason}; {NEEDED[item.verdict].format(item.worst)}{failed}"
-    poorer = LADDER.index(item.name) < LADDER.index(scene.model.theory)
+    poorer = Theory.registry[item.name].rank < own.rank
     return (ENOUGH if poorer else NEEDED)[item.verdict].format(item.worst) + failed
 
 
@@ -129,14 +128,24 @@ def check_changes(
     comm: MPI.Comm,
     progress: Progress,
 ) -> None:
-    """Write the true change into every row: both models run as the scene says, on its own mesh with its own steps."""
-    exact = {"solver.increment_tolerance": min(INCREMENT, scene.solver.increment_tolerance)}
+    """Write the true change into every row: both models run as the scene says, on its own mesh with its own steps.
+
+    Args:
+        scene: as it was given; it runs in the rotating frame with the model of each row.
+        effects: of its own model.
+        changes: the rows.
+        trial: what was tried out.
+        comm: MPI communicator.
+        progress: called with the share of the rows that are done.
+    """
+    increment = min(INCREMENT, scene.solver.increment_tolerance)
+    exact = {"model.frame": "rotating", "model.tolerance": None, "solver.increment_tolerance": increment}
     scene = scene.replace(exact)
     own = full_outputs(scene.replace({"model.effects": list(effects)}), trial.wanted, comm)
     for i, item in enumerate(changes, start=1):
         if item.kind == "effect":
             kept = set(effects) ^ {item.name}
-            other = scene.replace({"model.effects": [name for name in EFFECTS if name in kept]})
+            other = scene.replace({"model.effects": [name for name in trial.effects if name in kept]})
         else:
             other = scene.replace({"model.theory": item.name, "model.effects": list(effects)})
         there = full_outputs(other, trial.wanted, comm)
@@ -160,10 +169,10 @@ def full_outputs(scene: Scene, wanted: tuple[str, ...], comm: MPI.Comm) -> Outpu
 
     for name in wanted:
         if name in (HISTORY, STEADY):
-            done = attempt(name, lambda: run(scene, comm))
+            done = attempt(name, lambda: run(scene, comm=comm))
             history = done.history if done is not None else {"tip_u": np.zeros(1)}
         else:
-            found = attempt(MODES, lambda: modes(scene, comm))
+            found = attempt(MODES, lambda: modes(scene, comm=comm))
             rows = [row for row in found.rows if row["label"] != "rigid body"] if found is not None else []
     out = outputs_of(wanted, history, rows)
     out.failed = failed

@@ -12,9 +12,6 @@ from typing import Any
 from rotfem.selection.coarse_model import Trial
 from rotfem.selection.distance import Outputs, change, notes
 
-#: From the cheapest to the richest theory.
-LADDER = ("linear", "consistent_linear", "von_karman_linear", "second_order", "von_karman", "reissner")
-
 #: Factor by which an estimate may be wrong: estimates below a tolerance are believed only with it.
 SAFETY = 3.0
 
@@ -28,11 +25,11 @@ class Change:
 
     Attributes:
         kind: "effect" or "theory".
-        name: of the effect, or of the theory that takes the place of the scene's.
-        included: whether the scene's own model has it.
+        name: of the effect, or of the theory that takes the place of the model's.
+        included: whether the model itself has it.
         estimate: output ↦ relative change; infinite where one of the models fails.
         notes: output ↦ why a model fails.
-        truth: output ↦ relative change on the scene's own mesh and steps, where it was computed.
+        truth: output ↦ relative change on the case's own mesh and steps, where it was computed.
     """
 
     kind: str
@@ -65,8 +62,8 @@ class Estimates:
     """The changes that steps from one model make.
 
     Args:
-        trial: the scene to be tried out.
-        theory: of the model that is changed.
+        trial: the case to be tried out.
+        theory: name of that of the model that is changed.
         effects: of that model.
     """
 
@@ -85,13 +82,13 @@ class Estimates:
         return self._change("effect", name, included, self.trial.outputs(self.theory, self.without ^ {name}))
 
     def replaced(self, theory: str) -> Change:
-        """Return what another theory makes of the scene."""
+        """Return what another theory makes of the case."""
         return self._change("theory", theory, theory == self.theory, self.trial.outputs(theory, self.without))
 
     def all(self) -> list[Change]:
-        """Return every effect the scene has data for, then every other theory."""
+        """Return every effect there are data for, then every other theory."""
         effects = [self.effect(name) for name in self.trial.effects]
-        return effects + [self.replaced(name) for name in self.trial.theories() if name != self.theory]
+        return effects + [self.replaced(name) for name in self.trial.theories if name != self.theory]
 
     def _change(self, kind: str, name: str, included: bool, other: Outputs) -> Change:
         estimate = change(self.own, other, self.trial.wanted)

@@ -1,7 +1,7 @@
 """The cheapest model that is good enough: `effects = "auto"` with `model.tolerance`.
 
-The full model has the richest allowed theory (model.theory, "reissner" unless it is given) and all effects the scene
-has data for. The choice is the poorest theory of its ladder, and then as many effects left out, as keep
+The full model has the richest allowed theory (that of the problem) and all effects there are data for. The choice is
+the poorest of its cheaper theories, and then as many effects left out, as keep
 
     SAFETY · (change by the theory + Σ changes by the effects left out) ≤ tolerance.
 """
@@ -18,23 +18,13 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.errors import ComputationError
-from rotfem.scene import EFFECTS, Scene
+from rotfem.mechanics.problem import Problem
+from rotfem.selection.case import Case
 from rotfem.selection.coarse_model import Dear, Trial
 from rotfem.selection.distance import HISTORY, Bound, change
 from rotfem.selection.estimate import SAFETY
 
 Array = npt.NDArray[Any]
-
-#: Richest allowed theory ↦ those to choose from, cheapest first. Nonlinear theories of moderate rotation cost what the
-#: exact one costs, so they are not among its cheaper neighbours.
-LADDERS = {
-    "linear": ("linear",),
-    "consistent_linear": ("linear", "consistent_linear"),
-    "von_karman_linear": ("linear", "von_karman_linear"),
-    "second_order": ("linear", "consistent_linear", "second_order"),
-    "von_karman": ("linear", "von_karman_linear", "von_karman"),
-    "reissner": ("linear", "consistent_linear", "reissner"),
-}
 
 #: What is left out is taken to grow as the square of the motion up to this multiple of the motion that was tried out.
 GROWTH = 3.0
@@ -55,18 +45,19 @@ class RangeExceeded(ComputationError):
         self.sizes = sizes
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Choice:
     """A model, and what was left out of the full one.
 
     Attributes:
-        theory, effects: of the model.
+        theory, effects: of the model, by name.
         tolerance: relative change of the outputs that was allowed.
+        richest: name of the theory of the full model.
+        everything: its effects.
         estimated_error: SAFETY times the estimated changes of all that was left out, relative to the full model.
         dropped: one dictionary each: `kind`, `name`, `estimate`.
-        richest: theory of the full model.
-        everything: its effects.
-        errors: theory of the ladder ↦ estimated change when it takes the place of the richest, all effects in it.
+        errors: theory of the ladder, from the poorest on ↦ estimated change when it takes the place of the richest,
+            all effects in it.
         sizes: largest displacement over L, or rotation in rad, of each component that the estimates found.
         seconds: what choosing took.
         remark: why nothing was tried out, where nothing was.
@@ -76,12 +67,12 @@ class Choice:
     theory: str
     effects: tuple[str, ...]
     tolerance: float
-    estimated_error: float
-    dropped: list[dict[str, Any]]
     richest: str
     everything: tuple[str, ...]
-    errors: dict[str, float]
-    sizes: Array
+    estimated_error: float = 0.0
+    dropped: list[dict[str, Any]] = field(default_factory=list)
+    errors: dict[str, float] = field(default_factory=dict)
+    sizes: Array = field(default_factory=lambda: np.zeros(0))
     seconds: float = 0.0
     remark: str = ""
     upgrades: list[dict[str, Any]] = field(default_factory=list)
@@ -115,11 +106,10 @@ class Choice:
         """Largest of the limits; infinite where nothing is left out."""
         return np.inf if self.full else float(np.max(self.limits, initial=0.0))
 
-    def apply(self, scene: Scene) -> Scene:
-        """Return the scene with the chosen model."""
-        return scene.replace(
-            {"model.theory": self.theory, "model.effects": list(self.effects), "model.tolerance": None}
-        )
+    def applied(self, problem: Problem) -> Problem:
+        """Return the problem that this model was chosen for with the model."""
+        poorer = {} if self.theory == self.richest else {"theory": self.theory}
+        return problem.replace(effects=self.effects, **poorer)
 
     def check(self, sizes: Array) -> str:
         """Return why a state of this size is outside the range of the choice; nothing where it is not.
@@ -148,7 +138,7 @@ class Choice:
         seen = np.where(self.sizes > REST, self.sizes, 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             growth = float(np.max(np.divide(sizes, seen)[moves], initial=1.0)) ** 2
-        ladder = LADDERS[self.richest]
+        ladder = tuple(self.errors)
         theory, error = self.richest, 0.0
         for poorer in ladder[ladder.index(self.theory) + 1 : -1]:
             expected = SAFETY * max(self.errors[poorer], UNKNOWN) * growth
@@ -185,76 +175,96 @@ class Choice:
 
 
 def choose(
-    scene: Scene,
+    case: Case,
     outputs: Collection[str],
     speeds: Collection[float] | None = None,
     comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> Choice:
-    """Return the cheapest model whose estimated error is below the scene's tolerance.
+    """Return the cheapest model whose estimated error is below the tolerance of a case.
 
     Args:
-        scene: validated scene with a tolerance.
+        case: problem, what is to be computed of it, and the tolerance.
         outputs: which of "history", "steady" and "modes" count.
         speeds: speeds of the modes, rad/s; by default the final one.
         comm: MPI communicator.
+
+    Raises:
+        InputError: the case has none of the outputs; a mesh or a section that cannot be computed with.
     """
     started = perf_counter()
-    tolerance, richest = scene.model.tolerance, scene.model.theory
+    tolerance, richest = case.tolerance, case.problem.theory.name
     assert tolerance is not None
-    trial = Trial(scene, outputs, speeds, comm, thrifty=True)
+    trial = Trial(case, outputs, speeds=speeds, comm=comm, thrifty=True)
     try:
         choice = cheapest(trial, tolerance, richest)
     except Dear as dear:
-        remark = f"trying models out would take longer than running the full one: {dear.what}"
-        size = np.zeros(0)
-        choice = Choice(richest, trial.effects, tolerance, 0.0, [], richest, trial.effects, {}, size, remark=remark)
+        choice = Choice(
+            theory=richest,
+            effects=trial.effects,
+            tolerance=tolerance,
+            richest=richest,
+            everything=trial.effects,
+            remark=f"trying models out would take longer than running the full one: {dear.what}",
+        )
     choice.seconds = perf_counter() - started
     return comm.bcast(choice) if comm.size > 1 else choice
+
+
+def ladder_of(trial: Trial, richest: str) -> tuple[str, ...]:
+    """Return the theories to choose from, cheapest first: those the richest names that the structure has, and it."""
+    return (*(name for name in trial.theories[richest].poorer if name in trial.theories), richest)
 
 
 def cheapest(trial: Trial, tolerance: float, richest: str) -> Choice:
     """Return the cheapest model (see `choose`).
 
     Args:
-        trial: the scene to be tried out.
+        trial: the case to be tried out.
         tolerance: relative change of the outputs that is allowed.
-        richest: theory of the full model.
+        richest: name of the theory of the full model.
 
     Raises:
         Dear: trying out would not pay.
     """
-    allowed = tolerance / SAFETY
-
-    def error(base: str, theory: str, without: Collection[str] = ()) -> float:
-        """Return the change from a theory with all effects to a model."""
-        of = trial.outputs(base)
-        bound = None if HISTORY in of.failed else Bound(of, allowed)
-        other = trial.outputs(theory, without, bound)
-        # Where the other needed shorter steps, the first one is computed again with them.
-        return max(change(trial.outputs(base), other, trial.wanted).values(), default=np.inf)
-
-    errors = {theory: error(richest, theory) for theory in LADDERS[richest]}
-    theory = next(name for name in LADDERS[richest] if errors[name] <= allowed or name == richest)
+    allowed, ladder = tolerance / SAFETY, ladder_of(trial, richest)
+    errors = {name: _error(trial, allowed, richest, name) for name in ladder}
+    theory = next(name for name in ladder if errors[name] <= allowed or name == richest)
     spent = errors[theory]
     dropped = [theory_step(richest, theory, spent)] if theory != richest else []
-    costs = sorted((error(theory, theory, {name}), name) for name in trial.effects)
+    costs = sorted((_error(trial, allowed, theory, theory, {name}), name) for name in trial.effects)
     left_out: list[tuple[float, str]] = []
     for cost, name in costs:
         if spent + sum(c for c, _ in left_out) + cost <= allowed:
             left_out.append((cost, name))
     together = 0.0
     while left_out:
-        together = error(richest, theory, {name for _, name in left_out})
+        together = _error(trial, allowed, richest, theory, {name for _, name in left_out})
         if together <= allowed:
             break
         left_out.pop()  # the effects leave more out together than one by one
         together = 0.0
     dropped += [{"kind": "effect", "name": name, "estimate": cost} for cost, name in left_out]
     without = {name for _, name in left_out}
-    total = SAFETY * max(spent + sum(cost for cost, _ in left_out), together)
-    effects = tuple(name for name in EFFECTS if name in trial.effects and name not in without)
-    sizes = trial.outputs(theory, without).sizes
-    return Choice(theory, effects, tolerance, total, dropped, richest, trial.effects, errors, sizes)
+    return Choice(
+        theory=theory,
+        effects=tuple(name for name in trial.effects if name not in without),
+        tolerance=tolerance,
+        estimated_error=SAFETY * max(spent + sum(cost for cost, _ in left_out), together),
+        dropped=dropped,
+        richest=richest,
+        everything=trial.effects,
+        errors=errors,
+        sizes=trial.outputs(theory, without).sizes,
+    )
+
+
+def _error(trial: Trial, allowed: float, base: str, theory: str, without: Collection[str] = ()) -> float:
+    """Return the change from a theory with all effects to a model; one larger than allowed may come out infinite."""
+    of = trial.outputs(base)
+    bound = None if HISTORY in of.failed else Bound(of, allowed)
+    other = trial.outputs(theory, without, bound)
+    # Where the other needed shorter steps, the first one is computed again with them.
+    return max(change(trial.outputs(base), other, trial.wanted).values(), default=np.inf)
 
 
 def theory_step(richest: str, theory: str, estimate: float) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Where a trial needs shorter steps, so that nothing its scene prescribes is stepped over.
+"""Where a trial needs shorter steps, so that nothing its problem prescribes is stepped over.
 
 Loads, base acceleration, speed and torque are known before anything is solved. With f̂ the linear interpolation of such
 a signal f at the steps, every interval between two samples of a trial is cut into as many steps as keep
@@ -10,15 +10,15 @@ over it; the right side is the largest impulse that the slowest mode feels. So a
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.mechanics.motion import Motion
-from rotfem.scene import Scene, Signal, TorqueMotion
+from rotfem.mechanics.loads import Load
+from rotfem.mechanics.problem import Problem
 
 Array = npt.NDArray[Any]
 
@@ -31,13 +31,13 @@ MOST_PARTS = 1024
 #: Times in an interval at which a smooth signal is looked at.
 SMOOTH_LOOKS = 8
 
-#: Fewest and most times at which a function is looked at: twice in every step of the scene's own if it can be.
+#: Fewest and most times at which a function is looked at: twice in every step of the case's own if it can be.
 LOOKS = (20_000, 200_000)
 
 
 @dataclass(frozen=True)
 class Given:
-    """A signal that the scene prescribes.
+    """A signal that is prescribed.
 
     Attributes:
         at: times (n,) in s ↦ values, shape (n, components).
@@ -52,25 +52,21 @@ class Given:
     smooth: bool = False
 
 
-def given(scene: Scene, motion: Motion) -> list[Given]:
-    """Return all that a scene prescribes and that changes with time.
-
-    Args:
-        scene: validated scene.
-        motion: its prescribed motion.
-    """
-    out = [_signal(s) for s in _loads(scene) if s is not None and not s.constant]
-    if isinstance(scene.motion, TorqueMotion):
-        if scene.motion.table is not None:
-            out.append(_table(np.array(scene.motion.table)))
-        return out  # pulses have their jumps met by every run
-    if scene.motion.changes_speed:
-        rows = getattr(scene.motion, "table", None)
-        knots = np.array([row[0] for row in rows]) if rows is not None else np.empty(0)
-        smooth = scene.motion.type != "callable"
-        out += [Given(_each(f), knots, smooth=smooth) for f in (motion.speed, motion.rate)]
-    if any(scene.loads.gravity) and scene.motion.is_spinning:
-        g = np.array(scene.loads.gravity)
+def given(problem: Problem) -> list[Given]:
+    """Return all that a problem prescribes and that changes with time."""
+    motion, loads = problem.motion, problem.loads
+    applied = (loads.tip_force, loads.tip_moment, loads.distributed)
+    out = [_load(load) for load in applied if load is not None and not load.constant]
+    if motion.is_accelerated and not motion.constant:
+        out.append(Given(_each(motion.base_acceleration), np.empty(0)))
+    if motion.hub is not None:
+        table = motion.hub.torque.table
+        return out if table is None else [*out, _table(table)]  # pulses have their jumps met by every march
+    if motion.changes_speed:
+        knots = np.array(motion.knots)
+        out += [Given(_each(f), knots, smooth=motion.smooth) for f in (motion.speed, motion.rate)]
+    if any(loads.gravity) and motion.is_spinning:
+        g = np.array(loads.gravity)
         out.append(Given(_each(lambda t: motion.rotation(t).T @ g), np.empty(0), smooth=True))
     return out
 
@@ -83,13 +79,13 @@ def parts(signals: list[Given], times: Array, period: float, most: int, own: int
         times: ends of the intervals, s.
         period: 1/ω₁, s.
         most: steps there may be in all; they are longer everywhere where that is not enough.
-        own: steps of the scene itself, if they are fixed: what is too narrow for them need not be seen.
+        own: steps of the case itself, if they are fixed: what is too narrow for them need not be seen.
     """
     looks = int(np.clip(2 * (own or 0), *LOOKS))
     out: Array = np.ones(len(times) - 1, dtype=np.int64)
     for signal in signals:
         out = np.maximum(out, _parts(signal, times, period, looks))
-    # Steps of half the scene's own length see all that the run sees.
+    # Steps of half the case's own length see all that the run sees.
     longest = MOST_PARTS if own is None else min(MOST_PARTS, -(-2 * own // len(out)))
     out = np.minimum(out, longest)
     while out.sum() > max(most, len(out)):
@@ -139,19 +135,12 @@ def _looks(signal: Given, times: Array, number: int) -> Array:
     return np.union1d(between, found)
 
 
-def _loads(scene: Scene) -> tuple[Signal | None, ...]:
-    loads = scene.loads
-    return loads.tip_force, loads.tip_moment, loads.distributed, scene.motion.base_acceleration
+def _load(load: Load) -> Given:
+    return Given(_each(load.at), np.empty(0)) if load.table is None else _table(load.table)
 
 
-def _signal(signal: Signal) -> Given:
-    if signal.table is not None:
-        return _table(np.array(signal.table))
-    return Given(_each(signal.at), np.empty(0))
-
-
-def _table(rows: Array) -> Given:
-    t, *columns = rows.T
+def _table(rows: Sequence[Sequence[float]]) -> Given:
+    t, *columns = np.array(rows).T
     return Given(lambda x: np.stack([np.interp(x, t, column) for column in columns], axis=1), t, linear=True)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rotfem.mechanics.motion import motion_of
+from rotfem.commands.problem import Problem
 from rotfem.scene import Scene
 from rotfem.selection.resolution import MOST_PARTS, given, parts
 
@@ -26,7 +26,7 @@ TIMES, PERIOD = np.linspace(0.0, 10.0, 201), 0.25
 
 def counts(changes: dict[str, Any], most: int = 10_000, own: int | None = None) -> Any:
     scene = Scene.from_dict(BEAM).replace(changes)
-    return parts(given(scene, motion_of(scene)), TIMES, PERIOD, most, own)
+    return parts(given(Problem.of(scene)), TIMES, PERIOD, most, own)
 
 
 def blow(t: float, width: float, force: float = 1.0) -> list[list[float]]:

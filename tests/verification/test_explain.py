@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 import rotfem
-from rotfem.equations.hub import Hub
-from rotfem.equations.model import Model
-from rotfem.equations.switched import SwitchedSystem
-from rotfem.equations.system import compile_system
+from rotfem.commands.problem import Problem, case_of
+from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, SceneError
 from rotfem.scene import Scene
 from rotfem.selection.coarse_model import Trial
@@ -76,21 +74,22 @@ def state_of(system: Any, t: float) -> Any:
 @pytest.mark.parametrize("theory", ["linear", "consistent_linear", "reissner"])
 def test_an_effect_switched_off_is_one_that_is_not_there(theory: str) -> None:
     """Residual and tangent at a random state are those of the model compiled without it, to rounding."""
-    full = scene(ALL, {"model.theory": theory})
-    switched = SwitchedSystem(full)
-    assert switched.effects == full.effective_effects()
-    assert set(switched.effects) >= {"base", "gravity", "damping", "tip_mass", "rotary_inertia", "euler"}
-    whole = state_of(switched.system, 1.3)
-    for name in switched.effects:
-        rest = tuple(e for e in switched.effects if e != name)
-        expected = state_of(compile_system(Model(full, effects=rest)), 1.3)
-        switched.leave_out({name})
-        found = state_of(switched.system, 1.3)
+    full = Problem.of(scene(ALL, {"model.theory": theory}))
+    effects = full.effective_effects()
+    system = compile_system(full)
+    assert system.model.effects == effects
+    assert set(effects) >= {"base", "gravity", "damping", "tip_mass", "rotary_inertia", "euler"}
+    whole = state_of(system, 1.3)
+    for name in effects:
+        rest = tuple(e for e in effects if e != name)
+        expected = state_of(compile_system(full.replace(effects=rest)), 1.3)
+        system.leave_out({name})
+        found = state_of(system, 1.3)
         size = np.abs(expected).max()
         assert np.abs(found - expected).max() < 1e-12 * size  # rounding of sums of up to 1e3 terms
         assert np.abs(found - whole).max() > 1e-9 * size  # the effect is felt in this state
-    switched.leave_out(())
-    assert np.array_equal(state_of(switched.system, 1.3), whole)
+    system.leave_out(())
+    assert np.array_equal(state_of(system, 1.3), whole)
 
 
 @pytest.mark.slow
@@ -109,33 +108,44 @@ def test_bodies_beside_the_axis_are_switched_too(theory: str) -> None:
         "mesh": {"elements": 2},
         "time": {"end": 4.0, "step": 0.01},
     }
-    full = scene(tables)
-    switched = SwitchedSystem(full)
+    full = Problem.of(scene(tables))
+    system = compile_system(full)
     for name in ("tip_mass", "rotary_inertia"):
-        rest = tuple(e for e in switched.effects if e != name)
-        expected = state_of(compile_system(Model(full, effects=rest)), 1.3)
-        switched.leave_out({name})
+        rest = tuple(e for e in full.effective_effects() if e != name)
+        expected = state_of(compile_system(full.replace(effects=rest)), 1.3)
+        system.leave_out({name})
         size = np.abs(expected).max()
-        assert np.abs(state_of(switched.system, 1.3) - expected).max() < 1e-12 * size  # rounding
+        assert np.abs(state_of(system, 1.3) - expected).max() < 1e-12 * size  # rounding
 
 
 def test_switches_reach_the_hub() -> None:
     torque = {"type": "torque", "hub_inertia": 0.5, "pulses": [[0.0, 1.0, 0.2]]}
-    full = scene(ALL, {"motion": torque})
-    switched = SwitchedSystem(full)
-    assert "hub_coupling" in switched.effects
+    full = Problem.of(scene(ALL, {"motion": torque}))
+    effects, switched = full.effective_effects(), compile_system(full)
+    assert "hub_coupling" in effects
     for name in ("coriolis", "centrifugal", "euler", "tip_mass", "gravity"):
-        rest = tuple(e for e in switched.effects if e != name)
-        system = compile_system(Model(full, effects=rest))
         values = []
-        for s, hub in ((system, Hub(system, full.motion, True)), (switched.system, switched.hub)):
-            switched.leave_out({name})
-            hub.values[:] = (0.3, 2.0, 1.0)
-            state_of(s, 0.5)
-            values.append(hub.residual(0.5))
+        switched.leave_out({name})
+        for system in (compile_system(full.replace(effects=tuple(e for e in effects if e != name))), switched):
+            system.angle.values[:] = (0.3, 2.0, 1.0)
+            state_of(system.held, 0.5)
+            values.append(system.row.residual(0.5))
         assert values[1] == pytest.approx(values[0], rel=1e-12)  # rounding
     switched.leave_out({"hub_coupling"})
-    assert switched.hub is not None and not switched.hub.coupled
+    assert switched.hub is not None and not switched.row.coupled
+
+
+def test_a_theory_is_tried_out_on_the_system_of_its_prestressed_twin() -> None:
+    """Residual and tangent of the linear theory, gravity and base acceleration stretching the beam, to rounding."""
+    full = scene(ALL, {"loads": {"gravity": [-5.0, 0.0, 0.0]}})
+    trial = Trial(case_of(full), (HISTORY,))
+    linear, twin = (trial.candidate(theory) for theory in ("linear", "consistent_linear"))
+    assert linear.system is twin.system
+    alone = state_of(compile_system(Problem.of(full).replace(theory="linear", mesh=trial.case.problem.mesh)), 1.3)
+    size = np.abs(alone).max()
+    assert np.abs(state_of(linear.switched(), 1.3) - alone).max() < 1e-12 * size
+    assert np.abs(state_of(twin.switched(), 1.3) - alone).max() > 1e-9 * size
+    assert trial.candidate("reissner").system is not twin.system
 
 
 # --- estimates ------------------------------------------------------------------------------------------------------
@@ -169,7 +179,7 @@ def test_change_by_a_theory_is_that_of_spectral_histories() -> None:
     |Δu|/|u| = 0.032756985; the coarse steps of the trial make up the tolerance.
     """
     spin_up = scene(SPIN_UP, {"motion.speed": 6.0, "motion.duration": 15.0, "time.end": 20.0})
-    trial = Trial(spin_up, (HISTORY,))
+    trial = Trial(case_of(spin_up), (HISTORY,))
     estimates = Estimates(trial, "reissner", spin_up.effective_effects())
     change = estimates.replaced("consistent_linear")
     times = np.linspace(0.0, 20.0, len(estimates.own.tip))
@@ -203,12 +213,21 @@ def test_changes_of_frequencies_are_those_of_a_spectral_method() -> None:
         assert rows[name]["estimate"][MODES] == pytest.approx(expected, rel=5e-3), name
 
 
+def test_an_estimate_does_not_depend_on_what_was_tried_before() -> None:
+    """Newton's method learns of a model when to stop, which must not be when another model has converged."""
+    stretched = case_of(scene(SPIN_UP, {"motion": {"type": "constant", "speed": 2.0}, "time": None}))
+    alone, after = Trial(stretched), Trial(stretched)
+    after.outputs("von_karman")
+    expected, found = (trial.outputs("reissner") for trial in (alone, after))
+    assert np.array_equal(found.tip, expected.tip) and np.array_equal(found.values, expected.values)
+
+
 def test_change_by_damping_is_the_damping_ratio() -> None:
     """A beam at rest with η: λ = ω(−ζ ± i√(1 − ζ²)), ζ = ηω/2, ω₁ = 3.79773 rad/s less 1.2e-4 by shear."""
     eta = 2e-3
     still = scene(SPIN_UP, {"motion": {"type": "constant", "speed": 0.0}, "time": None, "modes.count": 1})
     damped = still.replace({"structure.damping": {"kelvin_voigt": eta}})
-    estimates = Estimates(Trial(damped, (MODES,)), "reissner", damped.effective_effects())
+    estimates = Estimates(Trial(case_of(damped), (MODES,)), "reissner", damped.effective_effects())
     change = estimates.effect("damping").estimate[MODES]
     assert change == pytest.approx(eta * 3.79773 / 2, rel=3e-4)
 
@@ -259,7 +278,8 @@ def test_a_chosen_model_is_within_its_tolerance(tolerance: float, theory: str) -
 
 
 def test_theory_given_is_the_richest() -> None:
-    choice = choose(scene(SPIN_UP, {"model.theory": "consistent_linear", "model.tolerance": 1e-9}), (HISTORY,))
+    asked = scene(SPIN_UP, {"model.theory": "consistent_linear", "model.tolerance": 1e-9})
+    choice = choose(case_of(asked), (HISTORY,))
     assert choice.theory == choice.richest == "consistent_linear"
     assert choice.full and np.isinf(choice.limit)
 
@@ -283,7 +303,7 @@ def test_steady_state_is_chosen_by_its_tip() -> None:
     still = scene(
         ALL, {"motion": {"type": "constant", "speed": 1.5}, "loads": {"tip_force": [0.0, 0.05]}, "time": None}
     )
-    trial = Trial(still)
+    trial = Trial(case_of(still))
     assert trial.wanted == (STEADY, MODES)
     result = rotfem.run(still.replace({"model.tolerance": 1e-2}))
     full = rotfem.run(still)
@@ -357,9 +377,10 @@ def test_a_trial_sees_a_blow_between_its_samples(changes: dict[str, Any], as_fun
     if as_function:
         force = lambda t: [np.interp(t, rows[:, 0], rows[:, i]) for i in (1, 2)]  # noqa: E731
         asked = asked.replace({"loads": {"tip_force": force}})
-    trial = Trial(asked, (HISTORY,))
-    assert trial.step > 0.01 and trial.parts.max() >= 4
-    assert trial.parts.sum() < 1.5 * len(trial.parts)  # shorter steps at the blow only
+    trial = Trial(case_of(asked), (HISTORY,))
+    samples = trial.samples
+    assert samples is not None and samples.step > 0.01 and samples.parts.max() >= 4
+    assert samples.parts.sum() < 1.5 * len(samples.parts)  # shorter steps at the blow only
     full = np.abs(tip(rotfem.run(asked))[:, 1]).max()
     assert np.abs(trial.outputs("reissner").tip[:, 1]).max() == pytest.approx(full, rel=0.05)
 
@@ -372,10 +393,24 @@ def test_a_blow_does_not_cost_the_tolerance(changes: dict[str, Any]) -> None:
     assert "upgrades" not in result.summary["choice"]  # seen beforehand
 
 
+def chosen(error: float, errors: dict[str, float], sizes: Any, everything: tuple[str, ...]) -> Choice:
+    """Return a choice of the linear theory without effects, for a tolerance of 1e-3."""
+    return Choice(
+        theory="linear",
+        effects=(),
+        tolerance=1e-3,
+        richest="reissner",
+        everything=everything,
+        estimated_error=error,
+        errors=errors,
+        sizes=sizes,
+    )
+
+
 def test_the_next_richer_model_is_the_first_that_holds() -> None:
     errors = {"linear": 1e-4, "consistent_linear": 1e-6, "reissner": 0.0}
     everything = ("coriolis", "centrifugal")
-    choice = Choice("linear", (), 1e-3, 1.5e-3, [], "reissner", everything, errors, sizes=np.array([0.01, 0.1]))
+    choice = chosen(1.5e-3, errors, np.array([0.01, 0.1]), everything)
     assert choice.limits == pytest.approx(np.sqrt(2.0) * choice.sizes)  # 5e-4 (s/0.1)² = 1e-3
     near, far = (choice.richer(np.array([0.01, s]), 1.0, "why") for s in (0.5, 2.0))
     assert (near.theory, near.effects) == ("consistent_linear", everything)
@@ -387,10 +422,10 @@ def test_no_choice_is_trusted_far_beyond_what_was_tried_out() -> None:
     """Estimates of 0 and of round-off, and components that did not move; 1e-3/3 of the motion cannot be felt."""
     errors = {"linear": 0.0, "consistent_linear": 1e-12, "reissner": 0.0}
     for estimate in (0.0, 1e-14):
-        still = Choice("linear", (), 1e-3, estimate, [], "reissner", ("coriolis",), errors, sizes=np.zeros(3))
+        still = chosen(estimate, errors, np.zeros(3), ("coriolis",))
         assert still.check(np.full(3, 1e-15)) == "" and still.check(np.array([0.0, 1e-9, 0.0])) != ""
         assert still.richer(np.array([0.0, 1e-9, 0.0]), None, "why").theory == "reissner"
-        stretched = Choice("linear", (), 1e-3, estimate, [], "reissner", (), errors, sizes=np.array([1e-5, 0.0, 0.0]))
+        stretched = chosen(estimate, errors, np.array([1e-5, 0.0, 0.0]), ())
         assert stretched.limit == pytest.approx(3e-5)
         assert stretched.check(np.array([2e-5, 1e-9, 0.0])) == "" and stretched.check(np.array([0, 1e-8, 0])) != ""
         assert stretched.richer(np.array([4e-5, 0.0, 0.0]), None, "why").theory == "consistent_linear"
@@ -405,12 +440,13 @@ def test_a_trial_takes_no_more_steps_than_the_scene() -> None:
     """A release from 0.6 L, whose Newton wants shorter steps than the modes do."""
     changes = {"motion": {"type": "constant", "speed": 1.0}, "initial": {"tip_displacement": 6.0}}
     asked = scene(SPIN_UP, changes | {"time": {"end": 8.0, "step": 0.01}})
-    trial = Trial(asked, (HISTORY,))
-    assert trial.own == 800
-    assert trial.levels[-1] == 2 and trial.outputs("reissner").failed == {}
-    assert all(np.maximum(trial.parts, finer).sum() <= 800 for finer in trial.levels)
+    trial = Trial(case_of(asked), (HISTORY,))
+    samples = trial.samples
+    assert samples is not None and samples.own == 800
+    assert samples.levels[-1] == 2 and trial.outputs("reissner").failed == {}
+    assert all(np.maximum(samples.parts, finer).sum() <= 800 for finer in samples.levels)
     assert trial.finer == 2
-    choice = choose(asked.replace({"model.tolerance": 1e-1}), (HISTORY,))
+    choice = choose(case_of(asked.replace({"model.tolerance": 1e-1})), (HISTORY,))
     assert choice.full and "would take longer" in choice.remark
     assert "remark" in choice.summary()
 

@@ -1,0 +1,165 @@
+"""One model that is tried out: the system of its theory with some effects left out, and what it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.equilibrium import steady_state
+from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
+from rotfem.equations.affine import PRESTRESS
+from rotfem.errors import ComputationError
+from rotfem.mechanics.problem import Problem
+from rotfem.mechanics.theories import Theory, theories
+from rotfem.numerics.eigenproblem import ZERO, Pencil
+from rotfem.selection.case import Case
+from rotfem.selection.distance import Beyond, Bound, Outputs
+
+Array = npt.NDArray[Any]
+
+
+class Halved(ComputationError):
+    """So many steps had to be halved that the others are too long to be trusted."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A model of a case.
+
+    Attributes:
+        case: what is computed, on the coarse mesh.
+        system: equations of motion that hold its theory.
+        without: what is left out of them.
+    """
+
+    case: Case
+    system: Any
+    without: frozenset[str]
+
+    def switched(self) -> Any:
+        """Return the system with everything switched as this model has it, and a free hub where it starts."""
+        self.system.leave_out(self.without)
+        return self.system
+
+    def tip(self, q: Array) -> Array:
+        """Return the displacement of the tip (m) of a state."""
+        structure = self.system.structure
+        moved = [name.startswith("u") for name in structure.components]
+        return np.asarray(structure.tip_values(q)[moved])
+
+    # --- outputs ------------------------------------------------------------------------------------------------------
+
+    def equilibrium(self) -> Array:
+        """Return the equilibrium at the speed of the case, a local dof array.
+
+        Raises:
+            ComputationError: there is none.
+        """
+        return steady_state(self.switched(), self.case.problem.motion.speed(0.0), self.case.newton())
+
+    def steady(self, out: Outputs) -> None:
+        """Write the equilibrium into the outputs.
+
+        Raises:
+            ComputationError: there is none.
+        """
+        q = self.equilibrium()
+        out.tip, out.sizes = self.tip(q)[None, :], self.system.sizes(q)
+
+    def eigenvalues(self, speeds: Collection[float]) -> Array:
+        """Return λ of the wanted modes at all speeds (rad/s), without those of a rigid body.
+
+        Raises:
+            ComputationError: no equilibrium, or eigenpairs not to be trusted.
+        """
+        self.switched()
+        return np.concatenate([self._eigenvalues(speed) for speed in speeds])
+
+    def _eigenvalues(self, speed: float) -> Array:
+        held, count = self.system.held, self.case.mode_count
+        if self.case.about == "undeformed" or held.linear:
+            held.set_time(0.0, self.case.problem.motion.at_speed(speed))
+            held.set_state(held.zeros())
+        else:
+            steady_state(held, speed, self.case.newton())
+        matrices = held.mass_damping_stiffness()
+        pencil = Pencil(*matrices)
+        if self.system.hub is None:
+            return pencil.solve(count).values[:count]
+        values = Pencil(*self.system.with_hub(matrices)).solve(count, pencil.scale()).values
+        flexible = np.abs(values) > ZERO * np.median(np.abs(values))
+        return values[flexible][: count - int(not flexible.all())]
+
+    def history(self, steps: Steps, q: Array | None, out: Outputs, watch: Watch) -> None:
+        """Write a history into the outputs, as far as it goes.
+
+        Args:
+            steps: its steps.
+            q: shape at t = 0, undeformed if None.
+            out: where its samples go.
+            watch: what ends it early.
+
+        Raises:
+            Beyond: it is farther from another one than was asked for.
+            Halved: more steps were halved than is allowed.
+            ComputationError: a step failed, or a linear theory has lost its meaning.
+        """
+        system, scheme = self.switched(), self.case.scheme
+        assert scheme is not None
+        march = March(system, scheme, steps, self.case.newton(monotone=True), q)
+        tips: list[Array] = []
+        out.sizes = np.zeros(len(system.structure.components))
+        try:
+            for state in march:
+                tips.append(self.tip(state.q))
+                out.sizes = np.maximum(out.sizes, system.sizes(state.q))
+                if watch.bound is not None and watch.bound.passed(len(tips) - 1, tips[-1]):
+                    raise Beyond(f"it is beyond the bound from t = {state.t:.4g} s on")
+                if system.linear and not out.size <= LARGEST_LINEAR_DEFLECTION:
+                    raise ComputationError(f"it diverges at t = {state.t:.4g} s")
+                if march.stepper.substeps > watch.halved:
+                    raise Halved(f"{march.stepper.substeps} steps were halved by t = {state.t:.4g} s")
+        finally:
+            out.tip = np.array(tips) if tips else out.tip
+
+
+@dataclass(frozen=True)
+class Watch:
+    """What ends a history early.
+
+    Attributes:
+        bound: what it may not go beyond; None if nothing.
+        halved: so many steps may be halved.
+    """
+
+    bound: Bound | None = None
+    halved: float = np.inf
+
+
+def theories_of(problem: Problem) -> dict[str, Theory]:
+    """Return all theories by name that this kind of structure has, its own among them, from the poorest on."""
+    kind, own = problem.structure.type, problem.theory
+    found = {theory.name: theory for theory in theories() if theory.holds_for(kind)} | {own.name: own}
+    return {theory.name: theory for theory in sorted(found.values(), key=lambda theory: theory.rank)}
+
+
+def stand_in(theory: Theory, others: Mapping[str, Theory], kind: str) -> tuple[Theory, frozenset[str]]:
+    """Return the theory whose system a theory is tried out on, and what is to be left out of it.
+
+    A linear theory without prestress is any other one of the same strains without its geometric stiffness, so that one
+    system serves both.
+
+    Args:
+        theory: to be tried out.
+        others: all theories there are.
+        kind: type of the structure.
+    """
+    if theory.linear and not theory.prestress:
+        for other in others.values():
+            if other.linear and kind in other.prestress and other.measures(kind) is theory.measures(kind):
+                return other, frozenset({PRESTRESS})
+    return theory, frozenset()

@@ -1,0 +1,79 @@
+"""When the histories of a trial are sampled, and in how many steps each goes from one sample to the next.
+
+Samples are as close as the first two modes ask for, so only histories of one sampling can be compared. Between them
+there are as many steps as what is prescribed needs, or Newton, but never more than the case takes itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.time_loop import Steps
+from rotfem.selection.resolution import Given, parts
+
+Array = npt.NDArray[Any]
+
+#: Steps in a period of the first and of the second eigenfrequency, and the fewest and most of a history.
+STEPS_A_PERIOD, FEWEST_STEPS, MOST_STEPS = (32, 10), 200, 1500
+
+#: Steps between two samples of a history, tried one after the other as far as the case has as many steps itself.
+FINER = (1, 4, 16)
+
+#: Samples in 1/ω₁ where no frequency is known.
+SAMPLES_A_RADIAN = 5
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """The samples of a history, and the steps between them.
+
+    Attributes:
+        end: last time, s.
+        step: distance of the samples, s.
+        own: steps of the case itself; None where they are adaptive.
+        parts: steps between two samples that what is prescribed asks for, (samples,).
+    """
+
+    end: float
+    step: float
+    own: int | None
+    parts: Array
+
+    @classmethod
+    def of(cls, steps: Steps, at_rest: Array, signals: list[Given]) -> Self:
+        """Return the samples of a history.
+
+        Args:
+            steps: of the case itself.
+            at_rest: frequencies of the resting structure, rad/s, as far as they are known.
+            signals: what is prescribed.
+        """
+        end = steps.end
+        own = None if steps.step is None else int(np.ceil(end / steps.step - 1e-9))
+        wanted = max((w * n for w, n in zip(at_rest, STEPS_A_PERIOD, strict=False)), default=np.inf) / (2 * np.pi)
+        number = int(np.clip(np.ceil(min(end * wanted, MOST_STEPS)), FEWEST_STEPS, MOST_STEPS))
+        step = end / min(number, own or MOST_STEPS)
+        times = np.linspace(0.0, end, round(end / step) + 1)
+        period = 1 / at_rest[0] if at_rest.size else SAMPLES_A_RADIAN * step
+        most = own or FINER[-1] * len(times)
+        return cls(end, step, own, parts(signals, times, float(period), most, own))
+
+    @property
+    def levels(self) -> tuple[int, ...]:
+        """`FINER` as far as no history takes more steps than the case itself, and the most that does not."""
+        finest = FINER[-1]
+        while self.own is not None and finest > 1 and self.count(finest) > self.own:
+            finest -= 1
+        return tuple(dict.fromkeys(min(finer, finest) for finer in FINER))
+
+    def count(self, finer: int) -> int:
+        """Return the steps of a history with at least so many between two samples."""
+        return int(np.maximum(self.parts, finer).sum())
+
+    def steps(self, finer: int) -> Steps:
+        """Return the steps of a history with at least so many between two samples."""
+        return Steps(self.end, self.step, parts=tuple(max(finer, int(n)) for n in self.parts))
