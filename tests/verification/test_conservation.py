@@ -13,15 +13,16 @@ import numpy.typing as npt
 import pytest
 
 from rotfem import Scene, run
-from rotfem.analysis.equilibrium import newton_for, steady_state
-from rotfem.equations.model import Model
-from rotfem.equations.system import System, compile_system
-from rotfem.mechanics.strains import THEORIES
+from rotfem.analysis.equilibrium import steady_state
+from rotfem.commands.problem import Problem
+from rotfem.equations.system import System
+from rotfem.mechanics.theories import theories
+from rotfem.numerics.newton import Newton
 
 Array = npt.NDArray[np.float64]
 
-LINEAR = [name for name, theory in THEORIES.items() if theory.linear]
-NONLINEAR = [name for name, theory in THEORIES.items() if not theory.linear]
+LINEAR = [theory.name for theory in theories() if theory.linear]
+NONLINEAR = [theory.name for theory in theories() if not theory.linear]
 SPIN = {"type": "constant", "speed": 3.0}
 #: Everything that derives from a potential in the frame.
 POTENTIAL = {
@@ -135,11 +136,11 @@ def test_jacobi_integral_is_the_same_in_both_frames(unit_beam: Any, frame: str) 
 # --- symmetry --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("theory", list(THEORIES))
+@pytest.mark.parametrize("theory", [*LINEAR, *NONLINEAR])
 def test_symmetries_about_a_deformed_steady_state(unit_beam: Any, theory: str) -> None:
     scene = unit_beam({"model.theory": theory, "mesh": MESH, **TIP}, **POTENTIAL)
-    system = compile_system(Model(scene))
-    q = steady_state(system, 3.0, newton_for(scene))
+    system = Problem.of(scene).system()
+    q = steady_state(system, 3.0, Newton.of(scene.solver))
     assert np.max(np.abs(q)) > 0.05
     M, C, K = matrices(system)
     assert asymmetry(M) < 1e-14
@@ -172,7 +173,7 @@ def test_what_breaks_the_symmetries(unit_beam: Any, theory: str) -> None:
 
 def prepared(scene: Scene, t: float) -> System:
     """Return the compiled system of a scene at rest at time t."""
-    system = compile_system(Model(scene))
+    system: System = Problem.of(scene).system()
     system.set_time(t)
     return system
 
@@ -183,26 +184,23 @@ CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "potential": (POTENTIAL, TIP),
     "everything": (EVERYTHING, TIP | DISSIPATION),
 }
-PAIRS = [(t, "potential") for t in THEORIES] + [(t, "everything") for t in ("consistent_linear", *NONLINEAR)]
+PAIRS = [(t, "potential") for t in (*LINEAR, *NONLINEAR)] + [(t, "everything") for t in ("consistent_linear", *NONLINEAR)]
 
 
 @pytest.mark.parametrize(("theory", "case"), PAIRS)
 def test_tangents_are_the_derivatives_of_the_residual(unit_beam: Any, theory: str, case: str) -> None:
     """Central differences with steps of 1e-5 leave 1e-10 of truncation and 1e-9 of round-off; 1e-6 is asked for."""
     tables, changes = CASES[case]
-    errors = tangent_errors(compiled(unit_beam(changes | {"model.theory": theory, "mesh": MESH}, **tables)), 0.7)
+    scene = unit_beam(changes | {"model.theory": theory, "mesh": MESH}, **tables)
+    errors = tangent_errors(Problem.of(scene).system(), 0.7)
     assert max(errors.values()) < 1e-6
 
 
 def test_tangents_in_the_inertial_frame(unit_beam: Any) -> None:
     changes = {"structure.damping.kelvin_voigt": 0.01, "model.frame": "inertial", "mesh": MESH, **TIP}
     scene = unit_beam(changes, motion=EVERYTHING["motion"])
-    errors = tangent_errors(compiled(scene), 0.7)
+    errors = tangent_errors(Problem.of(scene).system(), 0.7)
     assert max(errors.values()) < 1e-6
-
-
-def compiled(scene: Scene) -> System:
-    return compile_system(Model(scene))
 
 
 def tangent_errors(system: System, t: float) -> dict[str, float]:
@@ -230,7 +228,7 @@ def tangent_errors(system: System, t: float) -> dict[str, float]:
     return errors
 
 
-@pytest.mark.parametrize("theory", list(THEORIES))
+@pytest.mark.parametrize("theory", [*LINEAR, *NONLINEAR])
 def test_tangents_follow_the_speed(unit_beam: Any, theory: str) -> None:
     """C is proportional to Omega, K − K(0) to Omega² at the undeformed state; stale constants would show here."""
     system = prepared(unit_beam({"model.theory": theory, "mesh": MESH}, motion=SPIN), 0.0)

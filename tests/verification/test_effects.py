@@ -10,8 +10,9 @@ import pytest
 import ufl
 
 from rotfem import Scene, run
-from rotfem.equations.affine import AffineSystem
-from rotfem.equations.model import Model, integral_count
+from rotfem.commands.problem import Problem
+from rotfem.equations.model import Model
+from rotfem.numerics.forms import integral_count
 from rotfem.scene import EFFECTS
 
 Array = npt.NDArray[np.float64]
@@ -31,21 +32,24 @@ TIME = {"end": 0.02, "step": 0.01}
 @pytest.mark.parametrize("name", PRESENT)
 def test_an_effect_that_is_off_leaves_nothing_behind(unit_beam: Any, theory: str, name: str) -> None:
     """Model without the effect: its term, its body and its frame constant are gone, and no other."""
-    scene = unit_beam(ALL | {"model.theory": theory, "mesh.degree": 1})
-    assert scene.effective_effects() == PRESENT
-    full = Model(scene)
-    less = Model(scene.replace({"model.effects": [e for e in PRESENT if e != name]}))
+    problem = Problem.of(unit_beam(ALL | {"model.theory": theory, "mesh.degree": 1}))
+    assert problem.effective_effects() == PRESENT
+    full, less = Model(problem), Model(without(problem, name))
     assert less.effects == tuple(e for e in PRESENT if e != name)
     if name in ("rotary_inertia", "tip_mass"):
-        assert len(less.bodies) == len(full.bodies) - 1
+        assert len(less.mechanics.bodies) == len(full.mechanics.bodies) - 1
         assert set(less.terms) == set(full.terms)
     else:
         assert set(full.terms) - set(less.terms) == {name}
-        assert len(less.bodies) == len(full.bodies)
+        assert len(less.mechanics.bodies) == len(full.mechanics.bodies)
     used = {"euler": {"dw"}, "base": {"a_o"}, "gravity": {"gravity"}}.get(name, set())
     assert set(full.frame.constants) - set(less.frame.constants) == used
-    both = Model(scene.replace({"model.effects": [e for e in PRESENT if e not in ("coriolis", "centrifugal")]}))
-    assert "w" not in both.frame.constants
+    assert "w" not in Model(without(problem, "coriolis", "centrifugal")).frame.constants
+
+
+def without(problem: Problem, *names: str) -> Problem:
+    """Return the problem with all effects but these."""
+    return problem.replace(effects=tuple(e for e in PRESENT if e not in names))
 
 
 def counts(model: Model) -> tuple[int, int]:
@@ -57,9 +61,8 @@ def counts(model: Model) -> tuple[int, int]:
 
 @pytest.mark.parametrize("name", PRESENT)
 def test_an_effect_that_is_off_leaves_no_integral(unit_beam: Any, name: str) -> None:
-    scene = unit_beam(ALL | {"mesh.degree": 1})
-    full = counts(Model(scene))
-    less = counts(Model(scene.replace({"model.effects": [e for e in PRESENT if e != name]})))
+    problem = Problem.of(unit_beam(ALL | {"mesh.degree": 1}))
+    full, less = counts(Model(problem)), counts(Model(without(problem, name)))
     assert less[0] < full[0]
     if name in ("base", "gravity"):  # forces that do not depend on q are not in the tangent anyway
         assert less[1] == full[1]
@@ -72,18 +75,19 @@ def test_summary_states_the_integrals(unit_beam: Any) -> None:
     for effects, expected in (([], 4), (["rotary_inertia"], 5), ("auto", 5)):
         scene = unit_beam({"model.effects": effects, "mesh.degree": 1}, time=TIME)
         stated = run(scene).summary["integrals"]
-        assert (stated["F"], stated["J"]) == counts(Model(scene))
+        assert (stated["F"], stated["J"]) == counts(Model(Problem.of(scene)))
         assert stated["F"] == expected
 
 
 def test_pieces_of_a_linear_theory(unit_beam: Any) -> None:
     """A linear theory has integrals and pieces for each operator of each effect; what is off is missing in both."""
-    scene = unit_beam({"model.theory": "consistent_linear", "motion": ALL["motion"], "mesh.degree": 1})
-    full = AffineSystem(Model(scene))
-    less = AffineSystem(Model(scene.replace({"model.effects": ["rotary_inertia"]})))
+    changes = {"model.theory": "consistent_linear", "motion": ALL["motion"], "mesh.degree": 1}
+    problem = Problem.of(unit_beam(changes))
+    full, less = problem.system(), problem.replace(effects=("rotary_inertia",)).system()
     assert less.integrals["J"] < full.integrals["J"]
-    # stiffness, and mass of the axis and of its director
-    assert [(p.kind, p.key) for p in less.pieces] == [("K", ()), ("M", ())]
+    stiffness, mass, director = ({"internal", ""}, {"inertia", "structure"}, {"inertia", "rotary_inertia"})
+    assert [(p.kind, p.key) for p in less.pieces] == [("K", ()), ("M", ()), ("M", ())]
+    assert [set(p.of) for p in less.pieces] == [stiffness, director, mass]
     constants = {name for p in full.pieces for name, _ in p.key}
     assert constants == {"w", "dw", "a_o"}
 
@@ -105,10 +109,10 @@ def test_pieces_of_a_linear_theory(unit_beam: Any) -> None:
     ],
 )
 def test_auto_is_what_the_scene_makes_non_zero(unit_beam: Any, changes: dict[str, Any], effects: set[str]) -> None:
-    model = Model(unit_beam({**changes, "mesh": {"elements": 2, "degree": 1}}))
+    model = Model(Problem.of(unit_beam({**changes, "mesh": {"elements": 2, "degree": 1}})))
     assert set(model.effects) == effects
     assert set(model.terms) == {"internal", "inertia"} | (effects - {"rotary_inertia", "tip_mass"})
-    assert len(model.bodies) == 1 + len(effects & {"rotary_inertia", "tip_mass"})
+    assert len(model.mechanics.bodies) == 1 + len(effects & {"rotary_inertia", "tip_mass"})
 
 
 def test_auto_drops_nothing_that_matters(unit_beam: Any) -> None:

@@ -15,16 +15,17 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 from rotfem import Scene, run
-from rotfem.analysis.equilibrium import newton_for, steady_state
-from rotfem.analysis.stepper import Scheme, State, Stepper
-from rotfem.equations.model import Model
-from rotfem.equations.system import System, compile_system
+from rotfem.analysis.alpha_family import Newmark
+from rotfem.analysis.equilibrium import steady_state
+from rotfem.analysis.schemes import State
+from rotfem.analysis.stepper import Stepper
+from rotfem.commands.problem import Problem
+from rotfem.equations.system import System
 from rotfem.mechanics.motion import smooth_spin_up
-from rotfem.mechanics.strains import THEORIES
+from rotfem.mechanics.theories import ladder
+from rotfem.numerics.newton import Newton
 
 Array = npt.NDArray[np.float64]
-
-NONLINEAR = [name for name, theory in THEORIES.items() if not theory.linear]
 
 
 def slender(r: float, **more: float) -> dict[str, Any]:
@@ -55,7 +56,7 @@ def first_mode(system: System, about: Array | None = None) -> tuple[float, Array
     nu, vectors = sl.eigh(M[np.ix_(free, free)], K[np.ix_(free, free)], subset_by_index=[n - 1, n - 1])
     mode = np.zeros(len(M))
     mode[free] = vectors[:, 0]
-    return float(1 / np.sqrt(nu[0])), mode / system.structure.probe(mode)[1]
+    return float(1 / np.sqrt(nu[0])), mode / system.structure.tip_values(mode)[1]
 
 
 # --- thin beams ----------------------------------------------------------------------------------------------------
@@ -218,7 +219,7 @@ def test_frequency_with_a_tip_mass(unit_beam: Any, mu: float, J: float) -> None:
 
     exact = brentq(mismatch, 0.5, 1.8) ** 2
     changes = slender(1e-3) | {"structure.tip_mass": mu, "structure.tip_inertia": J, "model.theory": "linear"}
-    omega, _ = first_mode(compile_system(Model(unit_beam(changes))))
+    omega, _ = first_mode(Problem.of(unit_beam(changes)).system())
     assert omega == pytest.approx(exact, rel=1e-5)  # shear and rotary inertia take off a few r²/L² = 1e-6
 
 
@@ -233,7 +234,7 @@ def test_weight_of_beam_and_tip_mass(unit_beam: Any) -> None:
 # --- rotation --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("theory", list(THEORIES))
+@pytest.mark.parametrize("theory", ladder())
 @pytest.mark.parametrize(
     ("row", "speed", "expected"),
     [
@@ -261,7 +262,7 @@ def test_without_spin_the_linear_theories_are_one(unit_beam: Any, theory: str) -
 
     def stiffness(name: str, omega: float) -> Array:
         scene = unit_beam({"model.theory": name}, motion={"type": "constant", "speed": 1.0})
-        system = compile_system(Model(scene))
+        system = Problem.of(scene).system()
         system.set_time(0.0, system.motion.at_speed(omega))
         return dense(system.mass_damping_stiffness()[2])
 
@@ -282,8 +283,8 @@ def test_consistent_linearisation_of_a_stiff_rod(unit_beam: Any, linear: str, no
         found = []
         for theory in (linear, nonlinear):
             scene = unit_beam(slender(r) | {"model.theory": theory}, motion={"type": "constant", "speed": 3.0})
-            system = compile_system(Model(scene))
-            q = steady_state(system, 3.0, newton_for(scene))
+            system = Problem.of(scene).system()
+            q = steady_state(system, 3.0, Newton.of(scene.solver))
             found.append(first_mode(system, q)[0])
         difference[r] = abs(found[0] / found[1] - 1)
     assert difference[0.01] < 2 * 4.5 * 0.01**2
@@ -292,8 +293,8 @@ def test_consistent_linearisation_of_a_stiff_rod(unit_beam: Any, linear: str, no
 
 def test_no_spin_is_a_common_cantilever(unit_beam: Any) -> None:
     """First frequency of the thin cantilever at rest in every theory: 3.516015 (any text), less a few r²/L²."""
-    for theory in THEORIES:
-        omega, _ = first_mode(compile_system(Model(unit_beam(slender(1e-3) | {"model.theory": theory}))))
+    for theory in ladder():
+        omega, _ = first_mode(Problem.of(unit_beam(slender(1e-3) | {"model.theory": theory})).system())
         assert omega == pytest.approx(3.516015, rel=1e-5)
 
 
@@ -325,19 +326,19 @@ def test_rotary_inertia_may_vanish(spin_up: Any, theory: str) -> None:
 def test_decay_of_the_first_mode(unit_beam: Any, damping: dict[str, Any], theory: str) -> None:
     """x(t) = e^(−ζωt) (cos ω_d t + ζω/ω_d sin ω_d t) with 2ζω = a0 + (a1 + eta) ω², exact."""
     scene = unit_beam({"structure.damping": damping, "model.theory": theory})
-    system = compile_system(Model(scene))
+    system = Problem.of(scene).system()
     omega, mode = first_mode(system)
     a0, a1 = damping.get("rayleigh", (0.0, 0.0))
     rate = (a0 + (a1 + damping.get("kelvin_voigt", 0.0)) * omega**2) / 2
     damped = np.sqrt(omega**2 - rate**2)
     amplitude, h = 1e-4, 0.005
-    stepper = Stepper(system, Scheme.newmark(), newton_for(scene))
+    stepper = Stepper(system, Newmark(), Newton.of(scene.solver))
     state: State = stepper.start(0.0, amplitude * mode, np.zeros_like(mode))
     for _ in range(800):
         state = stepper.step(state, h)
         x = np.exp(-rate * state.t) * (np.cos(damped * state.t) + rate / damped * np.sin(damped * state.t))
         # the trapezoidal rule is late by ω³h²t/12
-        assert system.structure.probe(state.q)[1] / amplitude == pytest.approx(x, abs=omega**3 * h**2 * 4.0 / 12)
+        assert system.structure.tip_values(state.q)[1] / amplitude == pytest.approx(x, abs=omega**3 * h**2 * 4.0 / 12)
     assert np.exp(-rate * state.t) < 0.7  # so there was decay to be seen
 
 

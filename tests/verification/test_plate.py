@@ -14,9 +14,7 @@ from scipy.special import iv, jv, kv, yv
 
 import rotfem
 from rotfem.analysis.modal import ModalAnalysis
-from rotfem.equations.affine import AffineSystem
-from rotfem.equations.model import Model
-from rotfem.equations.system import System, compile_system
+from rotfem.commands.problem import Problem
 from rotfem.errors import SceneError
 from rotfem.scene import Scene
 from tests.plate_mesh_files import grid, write_msh
@@ -272,8 +270,7 @@ def test_point_mass_is_all_there() -> None:
     """Translation of the whole plate: e·M e is its mass, with a point mass at no node more by just that."""
     masses = []
     for points in ([], [[0.37, 0.211, 5.0], [1.0, -0.5, 2.0]]):
-        system = compile_system(Model(square(0.01, structure__point_masses=points)))
-        assert isinstance(system, AffineSystem)
+        system = Problem.of(square(0.01, structure__point_masses=points)).system()
         system.set_time(0.0)
         x, y = system.A.createVecs()
         x.array[2::5] = 1.0
@@ -402,7 +399,7 @@ def test_gravity_is_an_upward_acceleration_of_the_hub() -> None:
 @pytest.mark.parametrize("theory", ["consistent_linear", "von_karman", "reissner"])
 def test_a_factor_kept_over_steps_changes_nothing(theory: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps with an old factor against steps with their own: the same history to the tolerance, spin-up and after."""
-    import rotfem.analysis.stepper
+    import rotfem.equations.system
 
     scene = square(
         0.05,
@@ -413,7 +410,7 @@ def test_a_factor_kept_over_steps_changes_nothing(theory: str, monkeypatch: pyte
         solver__increment_tolerance=1e-12,
     )
     kept = rotfem.run(scene)
-    monkeypatch.setattr(rotfem.analysis.stepper, "KEPT_FROM", {2: np.inf})
+    monkeypatch.setattr(rotfem.equations.system, "KEPT_FROM", {2: np.inf})
     own = rotfem.run(scene)
     scale = np.max(np.abs(own.history["tip_u3"]))
     np.testing.assert_allclose(kept.history["tip_u3"], own.history["tip_u3"], rtol=0, atol=1e-9 * scale)
@@ -452,8 +449,7 @@ def test_in_plane_stiffening_is_missed_and_said() -> None:
 
 
 def test_analysis_keeps_its_space() -> None:
-    analysis = ModalAnalysis(square(0.01, mesh__elements=[2, 2]))
-    assert isinstance(analysis.system, System)
+    analysis = ModalAnalysis(Problem.of(square(0.01, mesh__elements=[2, 2])))
     assert analysis.system.V.dofmap.index_map_bs == 5
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from rotfem import Scene, modes
 from rotfem.analysis.modal import ModalAnalysis
+from rotfem.commands.problem import Problem
 
 Array = npt.NDArray[Any]
 
@@ -37,7 +38,7 @@ SCENE: dict[str, Any] = {
 
 
 def eigenvalues(scene: Scene, speed: float) -> Array:
-    return ModalAnalysis(scene).at(speed, 3).pairs.values[:3]
+    return ModalAnalysis(Problem.of(scene)).at(speed, 3).pairs.values[:3]
 
 
 def key(parameter: str) -> str:

@@ -17,12 +17,13 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
 from rotfem import ComputationError, Scene, SceneError, modes, run
-from rotfem.analysis.equilibrium import newton_for, steady_state
+from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.sensitivity import sensitivities
-from rotfem.equations.model import Model
-from rotfem.equations.system import System, compile_system
-from rotfem.mechanics.strains import THEORIES
+from rotfem.commands.problem import Problem
+from rotfem.equations.system import System
+from rotfem.mechanics.theories import ladder
+from rotfem.numerics.newton import Newton
 
 Array = npt.NDArray[np.float64]
 
@@ -128,7 +129,7 @@ def dense(A: Any) -> Array:
 )
 def test_blade_table(theory: str, tip_mass: float, table: dict[float, tuple[float, ...]]) -> None:
     """Flap frequencies in units of (EI/mL⁴)^½ = 1 rad/s to the printed digits."""
-    analysis = ModalAnalysis(scene(BLADE, {"model.theory": theory, "structure.tip_mass": tip_mass}), sweep=True)
+    analysis = ModalAnalysis(Problem.of(scene(BLADE, {"model.theory": theory, "structure.tip_mass": tip_mass})).spinning())
     for speed, printed in table.items():
         spinning = analysis.at(speed, 12)
         pairs = list(zip(analysis.names(spinning), spinning.pairs.values.imag, strict=True))
@@ -177,7 +178,8 @@ def test_timoshenko_table(reference: Callable[[str], Path], direction: str, geo:
     if direction == "lag":
         section |= {"EI2": 2.0, "EI3": 1.0, "rotary_inertia2": 1e-5, "rotary_inertia3": r**2}
     tables = {"structure": {"type": "spatial_beam", "length": 1.0, "section": section}, "motion": AT_REST}
-    analysis = ModalAnalysis(scene(tables, {"model.theory": theory, "mesh.elements": 24}), sweep=True)
+    blade = scene(tables, {"model.theory": theory, "mesh.elements": 24})
+    analysis = ModalAnalysis(Problem.of(blade).spinning())
     for row in rows:
         spinning = analysis.at(float(row["eta"]), 14)
         found = spinning.pairs.values.imag
@@ -554,12 +556,12 @@ def test_mass_matrix_that_is_none() -> None:
 # --- conservation, symmetry, tangents -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("theory", [*(t for t in THEORIES if t != "reissner"), EXACT_SLOW])
+@pytest.mark.parametrize("theory", [*(t for t in ladder() if t != "reissner"), EXACT_SLOW])
 def test_symmetries_about_a_deformed_steady_state(theory: str) -> None:
     with_rest = theory in ("reissner", "consistent_linear")
     s = scene(TWISTED, {"model.theory": theory} | (REST if with_rest else {}))
-    system = compile_system(Model(s))
-    q = steady_state(system, 2.0, newton_for(s))
+    system = Problem.of(s).system()
+    q = steady_state(system, 2.0, Newton.of(s.solver))
     assert np.max(np.abs(q)) > 0.05
     free = np.setdiff1d(np.arange(system.scale.size), system.clamped)
     M, C, K = (dense(A)[np.ix_(free, free)] for A in system.mass_damping_stiffness())
@@ -603,7 +605,7 @@ def test_tangents_are_the_derivatives_of_the_residual(theory: str) -> None:
     """Central differences with steps of 1e-5; every effect, load and kind of damping on."""
     damping = {"structure.damping": {"kelvin_voigt": 0.01, "rayleigh": [0.3, 0.02]}, "model.theory": theory}
     with_rest = theory in ("reissner", "consistent_linear")
-    system = compile_system(Model(scene(TWISTED, damping | (REST if with_rest else {}), **EVERYTHING)))
+    system = Problem.of(scene(TWISTED, damping | (REST if with_rest else {}), **EVERYTHING)).system()
     system.set_time(0.7)
     state = [smooth_state(system, size, seed) for seed, size in enumerate((0.3, 0.3, 1.0))]
     free = np.setdiff1d(np.arange(system.scale.size), system.clamped)
@@ -629,7 +631,7 @@ def smooth_state(system: System, size: float, seed: int) -> Array:
 
 def test_large_rotations_have_exact_tangents() -> None:
     """From the series to the closed forms, |θ| up to 5 rad, and through θ = 0: forces against differences of energy."""
-    system = compile_system(Model(scene(MOMENT_BEAM)))
+    system = Problem.of(scene(MOMENT_BEAM)).system()
     system.set_time(0.0)
     direction, zero = smooth_state(system, 1.0, 9), np.zeros(system.scale.size)
     free = np.setdiff1d(np.arange(system.scale.size), system.clamped)
@@ -651,7 +653,7 @@ def test_sensitivities() -> None:
     """dω/dp of the first two modes against central differences, for one parameter of every kind."""
     changes = {"structure.pretwist": 0.3, "structure.tip_mass": 0.2, "model.theory": "consistent_linear"}
     s = scene(TWISTED, changes | {"mesh.elements": 6}, loads={}, motion={"type": "constant", "speed": 2.0})
-    analysis = ModalAnalysis(s)
+    analysis = ModalAnalysis(Problem.of(s))
     spinning = analysis.at(2.0, 2)
     rows = [r for r in sensitivities(analysis, spinning) if r["mode"] <= 2]
     keys = {"GJ": "structure.section.GJ", "rotary_inertia3": "structure.section.rotary_inertia3"}
