@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 import pytest
+import ufl
 
 import rotfem
 from rotfem.commands.problem import Problem, case_of
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, SceneError
+from rotfem.mechanics.effects import Effect
+from rotfem.mechanics.theories import Theory
+from rotfem.registry import register
 from rotfem.scene import Scene
 from rotfem.selection.coarse_model import Trial
 from rotfem.selection.distance import HISTORY, MODES, STEADY, tip_change
@@ -148,6 +153,20 @@ def test_a_theory_is_tried_out_on_the_system_of_its_prestressed_twin() -> None:
     assert trial.candidate("reissner").system is not twin.system
 
 
+@pytest.fixture
+def add() -> Iterator[Callable[[Any], None]]:
+    """Registers for the length of a test."""
+    added: list[Any] = []
+
+    def add_one(entry: Any) -> None:
+        register(entry)
+        added.append(entry)
+
+    yield add_one
+    for entry in added:
+        entry.registry.remove(entry.name)
+
+
 # --- estimates ------------------------------------------------------------------------------------------------------
 
 
@@ -230,6 +249,31 @@ def test_change_by_damping_is_the_damping_ratio() -> None:
     estimates = Estimates(Trial(case_of(damped), (MODES,)), "reissner", damped.effective_effects())
     change = estimates.effect("damping").estimate[MODES]
     assert change == pytest.approx(eta * 3.79773 / 2, rel=3e-4)
+
+
+def test_what_a_user_registers_has_its_row_too(add: Callable[[Any], None]) -> None:
+    """A drag c per length and velocity makes the damping ratio c/(2 m ω₁) of a beam at rest, ω₁ as above.
+
+    A linear theory with the strains of another one changes what that one changes.
+    """
+    drag = 0.01
+
+    def work(m: Any, delta: Any) -> Any:
+        return sum(drag * ufl.inner(b.rate(m.k), delta.of(b)) * b.measure for b in m.positions())
+
+    add(Effect("drag", work, reasons=("there is air", "there is no air"), constants=()))
+    add(Theory("unstiffened", 0.5, Theory.registry["linear"].strains, linear=True))
+    still = scene(SPIN_UP, {"motion": {"type": "constant", "speed": 0.0}, "time": None, "modes.count": 1})
+    result = rotfem.explain(still, check=True)
+    row = result.effects["drag"]
+    assert row["estimate"][MODES] == pytest.approx(drag / (2 * 1.2 * 3.79773), rel=3e-4)
+    assert row["estimate"][MODES] == pytest.approx(row["truth"][MODES], rel=1e-3)
+    assert row["why"].startswith("there is air; ")
+    theories = result.theories
+    assert list(theories)[:2] == ["linear", "unstiffened"]
+    assert theories["unstiffened"]["estimate"] == theories["linear"]["estimate"]
+    airless = rotfem.explain(still.replace({"model.effects": []}))
+    assert not airless.effects["drag"]["included"] and "not in model.effects" in airless.effects["drag"]["why"]
 
 
 def test_an_effect_left_out_by_a_list_is_estimated_too() -> None:
