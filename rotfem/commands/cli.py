@@ -192,8 +192,7 @@ def cost(
     resume: Annotated[bool, typer.Option("--resume/--fresh", help="go on with what is in the result folder")] = True,
 ) -> None:
     """Measure what accuracy costs: error and time of SCENE over theory, mesh, degree, step and scheme."""
-    from rotfem.commands.cost.report import cost_report
-    from rotfem.commands.cost.study import cost as study
+    from rotfem import cost as study
 
     if write is not None:
         todo.session.check_writable("--write", write)
@@ -213,7 +212,7 @@ def cost(
             schemes=listed("--schemes", schemes, str),
             progress=progress,
         )
-    todo.finish(result, lambda summary, folder: cost_report(summary, result.rows, folder))
+    todo.finish(result, lambda summary, folder: result.report(folder))
     if write is not None and todo.session.first:
         result.write_tuned(write)
         todo.session.say([f"tuned scene in {write}"])

@@ -12,6 +12,7 @@ import numpy as np
 
 from rotfem.commands.cost.front import Row, describe, judged, recommend, setting_of
 from rotfem.commands.cost.reference import Reference
+from rotfem.commands.cost.report import cost_report
 from rotfem.commands.cost.settings import Setting
 from rotfem.commands.cost.tuned import write_tuned
 from rotfem.errors import ComputationError
@@ -113,6 +114,10 @@ class CostResult(Result):
             f"{describe(row)}.\nMeasured: error {error:.1e}, {row['time']:.3g} s."
         )
         return write_tuned(self.scene, setting_of(row), Path(path), remark)
+
+    def report(self, folder: Path) -> list[str]:
+        """Return the lines that the command prints."""
+        return cost_report(self.summary, self.rows, folder)
 
     def _flat_rows(self) -> list[Row]:
         """Return the rows with numbers of elements as text where they are two."""

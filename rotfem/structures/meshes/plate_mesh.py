@@ -16,9 +16,9 @@ from mpi4py import MPI
 from rotfem.errors import InputError, shown
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import compat
-from rotfem.structures.beam import beam_nodes
 from rotfem.structures.meshes.checks import BadMesh
 from rotfem.structures.meshes.gmsh_file import read
+from rotfem.structures.meshes.line import beam_nodes
 
 Array = npt.NDArray[np.float64]
 

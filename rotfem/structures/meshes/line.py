@@ -1,0 +1,23 @@
+"""Nodes along a beam, or along a side of a rectangle."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+def beam_nodes(length: float, elements: int, knots: tuple[float, ...]) -> Array:
+    """Return elements + 1 node positions on [0, length], evenly spaced between knots that are all nodes (m)."""
+    stations = np.array([0.0, *knots, length])
+    if len(stations) - 1 > elements:
+        elements = len(stations) - 1
+    share = np.diff(stations) / length * elements
+    counts = np.maximum(1, np.floor(share).astype(int))
+    while counts.sum() < elements:
+        counts[np.argmax(share / counts)] += 1
+    while counts.sum() > elements:
+        counts[np.argmin(np.where(counts > 1, share / counts, np.inf))] -= 1
+    pieces = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(stations[:-1], stations[1:], counts, strict=True)]
+    return np.concatenate([*pieces, [length]])
