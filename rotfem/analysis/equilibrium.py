@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from mpi4py import MPI
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
@@ -107,7 +108,7 @@ def check_steady(problem: Problem) -> None:
         )
 
 
-def static_tip_shape(problem: Problem, displacement: float, newton: Newton) -> Array:
+def static_tip_shape(problem: Problem, displacement: float, newton: Newton, comm: MPI.Comm = MPI.COMM_WORLD) -> Array:
     """Return q (local dof array) of the beam at rest under the tip force F_2 that gives u_2(L) = displacement (m).
 
     Raises:
@@ -115,7 +116,7 @@ def static_tip_shape(problem: Problem, displacement: float, newton: Newton) -> A
     """
     still, force = Motion.constant_speed(0.0), Loads(tip_force=ConstantLoad((0.0, 1.0, 0.0)))
     resting = problem.replace(frame="rotating", effects=(), motion=still, loads=force, terms={}, outputs={})
-    system = compile_system(resting, moving=False)
+    system = compile_system(resting, comm, moving=False)
     tip, q, F = system.structure.tip_values, system.zeros(), 0.0
     under_load, under_residual = Increment(system.V), Increment(system.V)
 

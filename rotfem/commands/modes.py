@@ -70,7 +70,7 @@ def _modes(
     if scene.modes.about == "steady":
         check_steady(problem)
     if scene.model.tolerance is not None:
-        choice = choose(case_of(scene), (MODES,), comm=comm)
+        choice = choose(case_of(scene).replace(problem=problem), (MODES,), comm=comm)
         problem = choice.applied(problem)
     analysis = analysis_of(scene, problem, comm)
     speed = problem.motion.final_speed(scene.time.end if scene.time is not None else 0.0)
@@ -152,7 +152,7 @@ def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any
 
 def rigid_row(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Return the row of the rigid-body mode: hub and structure turn together, λ = 0."""
-    row = {name: 0.0 for name in (rows[0] if rows else ())}
+    row: dict[str, Any] = dict.fromkeys(rows[0] if rows else (), 0.0)
     return {**row, "mode": 1, "label": "rigid body", "stability": "neutral", "share_hub": 1.0}
 
 

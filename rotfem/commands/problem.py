@@ -218,6 +218,7 @@ def motion_of(scene: Scene) -> Motion:
     more = {
         "base_acceleration": no_acceleration if base is None else base.at,
         "is_accelerated": m.is_accelerated,
+        "base_knots": None if base is None else base.knots,
     }
     motion = _MOTIONS[m.type](m, {"axis": m.axis, **more})
     return motion if base is None or base.constant else motion.with_changing_base()

@@ -71,7 +71,7 @@ def run_chosen(
     Raises:
         ComputationError: the full model failed, or one of them with on_exceed = "stop" or "warn".
     """
-    choice = choose(case_of(scene), (HISTORY, STEADY), comm=comm)
+    choice = choose(case_of(scene).replace(problem=problem), (HISTORY, STEADY), comm=comm)
     while True:
         try:
             return hinted(Simulation(scene, choice.applied(problem), comm, choice), hint).run(progress)

@@ -105,7 +105,7 @@ class Simulation:
         """Return q at t = 0 in the turning frame; None where it is undeformed."""
         initial = self.scene.initial
         if initial.tip_displacement is not None:
-            return static_tip_shape(self.problem, initial.tip_displacement, Newton.of(self.scene.solver))
+            return static_tip_shape(self.problem, initial.tip_displacement, Newton.of(self.scene.solver), self.comm)
         if initial.state != "steady":
             return None
         system = self.system

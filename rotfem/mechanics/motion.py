@@ -48,6 +48,7 @@ class Motion:
         is_accelerated: whether a_o is anything but zero.
         knots: times (s) between which Omega is smooth.
         smooth: whether it is known to be smooth between them.
+        base_knots: times (s) between which a_o is linear; None if that is not known.
         settled: time (s) from which on Omega stays as it is, 0 if that is not known.
         hub: what turns freely where the rotation is an unknown; its speed is then only that of the start.
     """
@@ -63,6 +64,7 @@ class Motion:
     is_accelerated: bool = False
     knots: tuple[float, ...] = ()
     smooth: bool = True
+    base_knots: tuple[float, ...] | None = None
     settled: float = 0.0
     hub: FreeHub | None = None
 

@@ -76,6 +76,11 @@ class Signal(SceneModel):
         return self.function is None and not any(component for row in self._rows for component in row[1:])
 
     @property
+    def knots(self) -> tuple[float, ...] | None:
+        """Times (s) between which it is linear; ``None`` of a function."""
+        return None if self.function is not None else tuple(row[0] for row in self._rows)
+
+    @property
     def components(self) -> int:
         """Number of components; 3, but for a moment 1 or 3."""
         return 3 if self.function is not None else len(self._rows[0]) - 1

@@ -234,6 +234,6 @@ class Trial:
         if case.tip_displacement is not None:
             if theory not in self._released:
                 problem = case.problem.replace(theory=self.theories[theory])
-                self._released[theory] = static_tip_shape(problem, case.tip_displacement, case.newton())
+                self._released[theory] = static_tip_shape(problem, case.tip_displacement, case.newton(), self.comm)
             return self._released[theory].copy()
         return candidate.equilibrium() if case.from_steady else None

@@ -58,7 +58,8 @@ def given(problem: Problem) -> list[Given]:
     applied = (loads.tip_force, loads.tip_moment, loads.distributed)
     out = [_load(load) for load in applied if load is not None and not load.constant]
     if motion.is_accelerated and not motion.constant:
-        out.append(Given(_each(motion.base_acceleration), np.empty(0)))
+        linear = motion.base_knots is not None
+        out.append(Given(_each(motion.base_acceleration), np.array(motion.base_knots or ()), linear))
     if motion.hub is not None:
         table = motion.hub.torque.table
         return out if table is None else [*out, _table(table)]  # pulses have their jumps met by every march
