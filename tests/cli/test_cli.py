@@ -122,7 +122,8 @@ def test_bad_scenes(rotfem: Run, here: Path, what: str) -> None:
 
 def test_missing_scene(rotfem: Run, here: Path) -> None:
     done = rotfem("run", "bean.toml")
-    assert done.returncode == 2 and done.stdout == ""
+    assert done.returncode == 2
+    assert done.stdout == ""
     assert done.stderr == "rotfem: bean.toml: no such file\n"
     assert os.listdir(here) == ["beam.toml"]
 
@@ -130,7 +131,8 @@ def test_missing_scene(rotfem: Run, here: Path) -> None:
 def test_unwritable_output(rotfem: Run, here: Path) -> None:
     """A folder below a file cannot be made, by root neither; it is found out before anything is computed."""
     done = rotfem("run", "beam.toml", "-o", "beam.toml/results")
-    assert done.returncode == 2 and done.stdout == ""
+    assert done.returncode == 2
+    assert done.stdout == ""
     assert re.search(r"beam.toml/results.*cannot be written.*-o DIR", done.stderr)
     assert os.listdir(here) == ["beam.toml"]
 
@@ -140,20 +142,23 @@ def test_several_mistakes_are_told_at_once(rotfem: Run, here: Path) -> None:
     done = rotfem("run", "beam.toml")
     assert done.returncode == 2
     assert "(and 1 more)" in done.stderr
-    assert "structure.length" in done.stderr and "structure.section.EI" in done.stderr
+    assert "structure.length" in done.stderr
+    assert "structure.section.EI" in done.stderr
 
 
 def test_run_writes_its_results(rotfem: Run, here: Path) -> None:
     done = rotfem("run", "beam.toml")
     assert done.returncode == 0, done.stderr
-    assert "50 steps" in done.stdout and "results/beam" in done.stdout
+    assert "50 steps" in done.stdout
+    assert "results/beam" in done.stdout
     folder = here / "results" / "beam"
     assert sorted(os.listdir(folder)) == ["history.csv", "history.png", "shape.csv", "summary.json"]
     history = read_csv(folder / "history.csv")
     assert list(history)[:7] == ["t", "psi", "psi_dot", "tip_u1", "tip_u2", "tip_alpha", "kinetic"]
     np.testing.assert_allclose(history["t"], np.arange(51) * 0.01, atol=1e-12)
     summary = json.loads((folder / "summary.json").read_text())
-    assert summary["status"] == "done" and summary["steps"] == 50
+    assert summary["status"] == "done"
+    assert summary["steps"] == 50
     assert summary["effects"] == ["coriolis", "centrifugal", "euler", "rotary_inertia"]
     assert summary["scene"]["structure"]["length"] == 10.0
     assert {"rotfem", "python", "numpy"} <= set(summary["versions"])
@@ -190,7 +195,8 @@ def test_steady_state_without_time(rotfem: Run, here: Path) -> None:
     (here / "beam.toml").write_text(text)
     done = rotfem("run", "beam.toml")
     assert done.returncode == 0, done.stderr
-    assert "steady state" in done.stdout and "0.000514317" in done.stdout
+    assert "steady state" in done.stdout
+    assert "0.000514317" in done.stdout
     assert sorted(os.listdir(here / "results/beam")) == ["history.csv", "shape.csv", "shape.png", "summary.json"]
 
 
@@ -221,7 +227,8 @@ def test_json_of_a_failed_computation(rotfem: Run) -> None:
 def test_debug_shows_the_traceback(rotfem: Run) -> None:
     done = rotfem("run", "beam.toml", "--debug", "--set", "time.step=0")
     assert done.returncode not in (0, 2)
-    assert "Traceback" in done.stderr and "SceneError" in done.stderr
+    assert "Traceback" in done.stderr
+    assert "SceneError" in done.stderr
 
 
 #: Runs the command line with a signal to itself after the step numbered 30.
@@ -246,7 +253,8 @@ main()
 def test_an_interrupted_run_keeps_what_it_had(rotfem: Run, here: Path, name: str) -> None:
     done = rotfem("run", "beam.toml", "--no-plots", code=SIGNALLED.format(name=name))
     assert done.returncode == 130
-    assert done.stderr == "rotfem: interrupted\n" and done.stdout == ""
+    assert done.stderr == "rotfem: interrupted\n"
+    assert done.stdout == ""
     folder = here / "results" / "beam"
     assert sorted(os.listdir(folder)) == ["history.csv", "shape.csv", "summary.json"]
     assert json.loads((folder / "summary.json").read_text())["status"] == "interrupted"
@@ -256,10 +264,12 @@ def test_an_interrupted_run_keeps_what_it_had(rotfem: Run, here: Path, name: str
 
 def test_no_arguments_show_help(rotfem: Run) -> None:
     done = rotfem()
-    assert "run" in done.stdout + done.stderr and "Traceback" not in done.stderr
+    assert "run" in done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
     assert rotfem("--help").returncode == 0
 
 
 def test_a_wrong_option_is_bad_input(rotfem: Run) -> None:
     done = rotfem("run", "beam.toml", "--tset", "time.step=0")
-    assert done.returncode == 2 and "--tset" in done.stderr
+    assert done.returncode == 2
+    assert "--tset" in done.stderr

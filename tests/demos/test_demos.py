@@ -63,7 +63,8 @@ TABLES: list[type[SceneModel]] = [
 def load(name: str) -> ModuleType:
     """Return a demo, imported from its file."""
     spec = importlib.util.spec_from_file_location(f"demo_{name}", DEMOS / f"{name}.py")
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -108,7 +108,8 @@ def check_refused(answer: Answer, *parts: str) -> None:
     """Check that all processes end with status 2, and that the first one alone tells why, in one line."""
     assert set(answer.statuses) == {2}, answer
     first, *others = ([t for t in text.splitlines() if t.startswith("rotfem:")] for text in answer.told)
-    assert len(first) == 1 and not any(others), answer
+    assert len(first) == 1, answer
+    assert not any(others), answer
     for part in parts:
         assert part in first[0]
     assert not any("Traceback" in text for text in answer.told)
@@ -145,5 +146,6 @@ def test_exit_status(two: Ended, four: Ended) -> None:
     for ranks, done in ((2, two), (4, four)):
         told = [text for text in done.told.splitlines() if text.startswith("rotfem:")]
         assert done.status == 2, done.told
-        assert len(told) == 1 and f"cannot be shared by {ranks} processes" in told[0], done.told
+        assert len(told) == 1, done.told
+        assert f"cannot be shared by {ranks} processes" in told[0], done.told
         assert "Traceback" not in done.told

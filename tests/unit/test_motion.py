@@ -67,7 +67,8 @@ def test_smooth_spin_up() -> None:
     omega, rate, angle = smooth_spin_up(6.0, 15.0)
     assert (omega(0.0), omega(7.5), omega(15.0), omega(100.0)) == pytest.approx((0.0, 3.0, 6.0, 6.0), abs=1e-14)
     assert (rate(0.0), rate(7.5), rate(15.0)) == pytest.approx((0.0, 0.8, 0.0), abs=1e-14)
-    assert angle(15.0) == pytest.approx(45.0) and angle(16.0) == pytest.approx(51.0)
+    assert angle(15.0) == pytest.approx(45.0)
+    assert angle(16.0) == pytest.approx(51.0)
 
 
 @pytest.mark.parametrize("kind", ["pchip", "cubic", "linear"])

@@ -128,7 +128,8 @@ def strains(q: Any) -> tuple[Any, ...]:
 def test_the_classes_share_the_registries_of_the_ground() -> None:
     assert (Theory.registry, Effect.registry) == (registry.theories, registry.effects)
     assert (Scheme.registry, Output.registry) == (registry.schemes, registry.outputs)
-    assert ladder()[0] == "linear" and set(ladder()) == set(registry.theories.names)
+    assert ladder()[0] == "linear"
+    assert set(ladder()) == set(registry.theories.names)
     assert registry.schemes.names == ("generalised_alpha", "newmark")
 
 
@@ -254,9 +255,11 @@ def test_scene_and_mechanics_agree_about_what_is_present(path: Path) -> None:
 def test_the_fields_of_a_scheme_are_keys_of_its_table(add: Add) -> None:
     add(Damped)
     time = scene(time={"end": 1, "step": 0.1, "scheme": "damped", "decay": 0.5}).time
-    assert time is not None and time.parameters == {"decay": 0.5, "gamma": 0.75}
+    assert time is not None
+    assert time.parameters == {"decay": 0.5, "gamma": 0.75}
     assert registry.schemes[time.scheme](**time.parameters) == Damped(0.5, 0.75)
-    assert time.gamma == 0.75 and time.beta is None
+    assert time.gamma == 0.75
+    assert time.beta is None
 
 
 @pytest.mark.parametrize(
@@ -287,7 +290,8 @@ def test_adaptive_steps_need_an_estimate_of_the_error(add: Add) -> None:
     add(Estimated)
     table = {"end": 1, "tolerance": 1e-3}
     adaptive = scene(time=table | {"scheme": "estimated"}).time
-    assert adaptive is not None and adaptive.parameters == {}
+    assert adaptive is not None
+    assert adaptive.parameters == {}
     message = refusal(time=table | {"scheme": "damped", "decay": 0.5})
     assert 'time.tolerance = 0.001: scheme = "damped" does not estimate its error' in message
     assert message.endswith('give step instead (adaptive steps: "generalised_alpha", "newmark", "estimated")')
@@ -307,7 +311,8 @@ def test_a_parameter_cannot_have_the_name_of_a_key(add: Add) -> None:
 @pytest.mark.parametrize("scheme", ["rk4", 4, ["newmark"], {"name": "newmark"}])
 def test_unknown_schemes(scheme: Any) -> None:
     message = refusal(time={"end": 1, "step": 0.1, "scheme": scheme})
-    assert message.startswith("test.toml: time.scheme") and 'allowed: "generalised_alpha", "newmark"' in message
+    assert message.startswith("test.toml: time.scheme")
+    assert 'allowed: "generalised_alpha", "newmark"' in message
 
 
 # --- section shapes -------------------------------------------------------------------------------------------------
@@ -385,7 +390,8 @@ def test_a_shape_may_have_alternatives_and_a_check_of_its_own(add: Add) -> None:
     whole: Any = scene(structure=beam(shape="box", side=1)).structure
     assert half.section.at(0.0)["EA"] == whole.section.at(0.0)["EA"] == 210e9
     message = refusal(structure=beam(shape="box", side=2, ratio=[[0, 0.5], [1, 1.5], [2, 0.5]]))
-    assert "structure.section.ratio = " in message and "must be less than 1 everywhere" in message
+    assert "structure.section.ratio = " in message
+    assert "must be less than 1 everywhere" in message
 
 
 @pytest.mark.parametrize("dimensions", ["side", ("side", "two words"), ("nu",), (1,)])

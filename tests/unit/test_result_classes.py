@@ -156,7 +156,8 @@ def test_a_run_by_its_names() -> None:
     np.testing.assert_array_equal(result.tip["u1"], -(T**2))
     np.testing.assert_array_equal(result.column("psi_dot"), 2 * T)
     assert result.figures == {"tip_u2_max": 1.0}
-    assert not result.steady and history(kind="steady").steady
+    assert not result.steady
+    assert history(kind="steady").steady
     with pytest.raises(KeyError, match="no column 'tip_u3' in the history; there are t, psi, psi_dot, tip_u1"):
         result.column("tip_u3")
 
@@ -171,7 +172,8 @@ def test_modes_by_their_names() -> None:
     np.testing.assert_allclose(result.damping[1], 0.6)
     np.testing.assert_array_equal(result.eigenvalues, [0.0, -3.0 + 4.0j, 0.5 + 12.0j])
     np.testing.assert_array_equal(result.column("share_hub"), [1.0, 0.1, 0.2])
-    assert result.stable and not modes("dynamic instability").stable
+    assert result.stable
+    assert not modes("dynamic instability").stable
     with pytest.raises(KeyError, match="no number 'label' of the modes; there are mode, frequency"):
         result.column("label")
 
@@ -191,7 +193,8 @@ def test_branches_over_speed() -> None:
 
 def test_what_changes_the_outputs() -> None:
     result = explained()
-    assert list(result.effects) == ["coriolis"] and list(result.theories) == ["linear"]
+    assert list(result.effects) == ["coriolis"]
+    assert list(result.theories) == ["linear"]
     assert result.effects["coriolis"]["worst"] == 0.02
     assert result.verdicts == {"coriolis": "noticeable", "linear": "large"}
     assert result.outputs == ["steady", "modes"]
@@ -213,26 +216,33 @@ def test_points_of_a_study() -> None:
 
 def test_tables() -> None:
     run = history().to_pandas()
-    assert run.index.name == "t" and list(run.columns) == ["psi", "psi_dot", "tip_u1", "tip_u2", "tip_alpha"]
+    assert run.index.name == "t"
+    assert list(run.columns) == ["psi", "psi_dot", "tip_u1", "tip_u2", "tip_alpha"]
     assert run.loc[0.5, "tip_u1"] == -0.25
     assert modes().to_pandas().loc[3, "label"] == "lag 2"
     table = campbell().to_pandas()
-    assert len(table) == 5 and table.loc[(5.0, "axial 1"), "frequency"] == 16.0
+    assert len(table) == 5
+    assert table.loc[(5.0, "axial 1"), "frequency"] == 16.0
     assert list(table["frequency"].unstack("label")["lag 1"]) == [3.0, 8.0, 13.0]
     rows = explained().to_pandas()
-    assert rows.loc["coriolis", "truth_modes"] == 0.021 and np.isnan(rows.loc["linear", "truth_modes"])
+    assert rows.loc["coriolis", "truth_modes"] == 0.021
+    assert np.isnan(rows.loc["linear", "truth_modes"])
     assert rows.loc["linear", "estimate_steady"] == np.inf
     study = cost().to_pandas()
-    assert list(study["elements"]) == ["4x2"] * 4 and np.isnan(study["error"][3])
+    assert list(study["elements"]) == ["4x2"] * 4
+    assert np.isnan(study["error"][3])
 
 
 def test_history_over_time() -> None:
     data = history().to_xarray()
-    assert data["tip_u2"].dims == ("t",) and float(data["tip_u2"].sel(t=0.5)) == 0.5
-    assert data["u2"].dims == ("node",) and list(data["x"].values) == list(X)
+    assert data["tip_u2"].dims == ("t",)
+    assert float(data["tip_u2"].sel(t=0.5)) == 0.5
+    assert data["u2"].dims == ("node",)
+    assert list(data["x"].values) == list(X)
     units = {name: data[name].attrs["units"] for name in ("t", "psi_dot", "tip_alpha", "u2", "x")}
     assert units == {"t": "s", "psi_dot": "rad/s", "tip_alpha": "rad", "u2": "m", "x": "m"}
-    assert data.attrs["theory"] == "reissner" and data.attrs["kind"] == "history"
+    assert data.attrs["theory"] == "reissner"
+    assert data.attrs["kind"] == "history"
 
 
 def test_shapes_over_modes_and_nodes() -> None:
@@ -240,8 +250,10 @@ def test_shapes_over_modes_and_nodes() -> None:
     assert data["shape_u2"].dims == ("mode", "node")
     assert bool(data["shape_u2"].sel(mode=1).isnull().all()), "a rigid-body mode has no shape"
     np.testing.assert_array_equal(data["shape_u2"].sel(mode=3).values, 1j * X / 4)
-    assert data["shape_u2"].attrs["units"] == "1" and data["frequency"].attrs["units"] == "rad/s"
-    assert float(data["speed"]) == 6.0 and data["speed"].attrs["units"] == "rad/s"
+    assert data["shape_u2"].attrs["units"] == "1"
+    assert data["frequency"].attrs["units"] == "rad/s"
+    assert float(data["speed"]) == 6.0
+    assert data["speed"].attrs["units"] == "rad/s"
     assert list(data["label"].values) == ["rigid body", "lag 1", "lag 2"]
     np.testing.assert_array_equal(plate_modes().to_xarray()["triangles"].values, [[0, 1, 2]])
 
@@ -260,7 +272,8 @@ def test_changes_and_settings_as_arrays(tmp_path: Path) -> None:
     assert float(data["estimate"].sel(name="linear", output="steady")) == np.inf
     assert np.isnan(data["truth"].sel(name="linear", output="modes"))
     study = cost().to_xarray()
-    assert study["time"].attrs["units"] == "s" and study["degree"].dtype == np.int64
+    assert study["time"].attrs["units"] == "s"
+    assert study["degree"].dtype == np.int64
     assert list(study["pareto"].values) == [True, True, False, False]
     study.to_netcdf(tmp_path / "cost.nc")
     with xarray.open_dataset(tmp_path / "cost.nc") as again:
@@ -277,9 +290,11 @@ def test_a_missing_package_says_how_to_get_it(make: Any, package: str, monkeypat
 
 
 def test_a_column_that_nothing_is_known_of_has_no_unit() -> None:
-    assert described("tip_u1") == ("tip u₁", "m") and label("tip_u1") == "tip u₁ (m)"
+    assert described("tip_u1") == ("tip u₁", "m")
+    assert label("tip_u1") == "tip u₁ (m)"
     assert label("damping") == "damping ratio (–)"
-    assert described("whirl") == ("whirl", "") and label("whirl") == "whirl"
+    assert described("whirl") == ("whirl", "")
+    assert label("whirl") == "whirl"
 
 
 # --- figures ----------------------------------------------------------------------------------------------------------
@@ -289,7 +304,8 @@ def test_a_column_that_nothing_is_known_of_has_no_unit() -> None:
 def test_every_axis_has_a_label_with_its_unit(make: Any) -> None:
     figure: Figure = make().plot()
     named = [axis for axis in figure.axes if axis.get_xlabel()]
-    assert named and all("(" in axis.get_xlabel() for axis in named)
+    assert named
+    assert all("(" in axis.get_xlabel() for axis in named)
     bars = [axis for axis in figure.axes if axis.get_label() == "<colorbar>"]
     for axis in {*figure.axes} - {*bars}:
         ticks = [text.get_text() for text in axis.get_yticklabels()]

@@ -149,7 +149,8 @@ def test_pretwist_and_precone_in_either_table() -> None:
 def test_tip_inertia_of_a_spatial_beam() -> None:
     isotropic = scene("spatial", structure__tip_inertia=2.0).structure
     full = scene("spatial", structure__tip_inertia=[[2, 0.1, 0], [0.1, 3, 0], [0, 0, 4]]).structure
-    assert isinstance(isotropic, SpatialBeamStructure) and isinstance(full, SpatialBeamStructure)
+    assert isinstance(isotropic, SpatialBeamStructure)
+    assert isinstance(full, SpatialBeamStructure)
     np.testing.assert_array_equal(isotropic.tip_inertia_matrix, 2 * np.eye(3))
     np.testing.assert_array_equal(full.tip_inertia_matrix, [[2, 0.1, 0], [0.1, 3, 0], [0, 0, 4]])
 
@@ -170,7 +171,9 @@ def test_loads_in_all_their_forms() -> None:
     assert spatial is not None
     np.testing.assert_array_equal(spatial.at(0.0), [1, 2, 3])
     zero = scene(loads__tip_force=[[0, 0, 0], [1, 0, 0]]).loads.tip_force
-    assert zero is not None and zero.is_zero and zero.constant
+    assert zero is not None
+    assert zero.is_zero
+    assert zero.constant
 
 
 def test_dead_and_follower_loads() -> None:
@@ -183,7 +186,8 @@ def test_base_acceleration_as_table_and_function() -> None:
     assert table is not None
     np.testing.assert_allclose(table.at(1.0), [2, 0, 0])
     function = scene(motion__base_acceleration=lambda t: (t, -t)).motion.base_acceleration
-    assert function is not None and not function.constant
+    assert function is not None
+    assert not function.constant
     np.testing.assert_allclose(function.at(2.0), [2, -2, 0])
 
 
@@ -225,7 +229,8 @@ def test_to_dict_shows_functions_by_name() -> None:
 def test_replace() -> None:
     s = scene(time={"end": 1, "step": 0.1})
     newmark = s.replace({"time.scheme": "newmark", "time.step": None, "time.tolerance": 1e-3})
-    assert newmark.time is not None and s.time is not None
+    assert newmark.time is not None
+    assert s.time is not None
     assert (newmark.time.scheme, newmark.time.step, newmark.time.tolerance) == ("newmark", None, 1e-3)
     assert (s.time.step, newmark.name) == (0.1, s.name)
     with pytest.raises(SceneError, match="model.theory"):
@@ -417,7 +422,8 @@ def test_orthotropic_plate() -> None:
     material = {"E1": 140e9, "E2": 10e9, "nu12": 0.3, "G12": 5e9}
     plate = {key: value for key, value in PLATE.items() if key not in ("E", "nu")} | material
     structure = scene(structure=plate).structure
-    assert isinstance(structure, PlateStructure) and structure.is_orthotropic
+    assert isinstance(structure, PlateStructure)
+    assert structure.is_orthotropic
     assert "not stable" in str(refused(structure=plate | {"nu12": 4.0}))
 
 
@@ -484,7 +490,8 @@ def test_overrides(scene_file: Path) -> None:
          "loads.tip_force=[1, 2]", "motion.speed=8"],
     )  # fmt: skip
     assert (loaded.model.theory, loaded.to_dict()["motion"]["speed"]) == ("linear", 8.0)
-    assert loaded.time is not None and loaded.time.step == 0.5
+    assert loaded.time is not None
+    assert loaded.time.step == 0.5
     assert loaded.to_dict()["loads"]["tip_force"]["value"] == [1.0, 2.0, 0.0]
 
 

@@ -127,7 +127,8 @@ def test_lost_and_ambiguous_branches_are_said_to_be(unit_beam: Any) -> None:
         assert max(result.branches()[label]["speed"]) < 40.0  # no row pretends to follow it
     assert summary["ambiguous"]
     for entry in summary["ambiguous"]:
-        assert 0.0 <= entry["confidence"] < AMBIGUOUS and 0.0 < entry["speed"] <= 40.0
+        assert 0.0 <= entry["confidence"] < AMBIGUOUS
+        assert 0.0 < entry["speed"] <= 40.0
         label = summary["branches"][entry["branch"] - 1]["label"]
         assert any(text.startswith(f"ambiguous: {label} at") for text in summary["warnings"])
     assert all(0.0 <= row["confidence"] <= 1.0 for row in result.rows)
@@ -166,10 +167,13 @@ def test_onset_and_end_of_flutter(unit_beam: Any) -> None:
     load = {"tip_force": {"value": [-22.0, 0.0], "kind": "follower"}}
     beam = unit_beam({"structure.section": slender(1e-2), "modes.count": 3}, mesh=MESH, loads=load)
     (ending,) = campbell(beam, [0.0, 2.0, 4.0], orders=0).summary["instabilities"]
-    assert ending["speed"] == 0.0 and ending["kind"] == "dynamic instability" and 2.0 < ending["until"] < 4.0
+    assert ending["speed"] == 0.0
+    assert ending["kind"] == "dynamic instability"
+    assert 2.0 < ending["until"] < 4.0
     result = campbell(beam, [-4.0, -2.0, 0.0], orders=0)
     (starting,) = result.summary["instabilities"]
-    assert starting["speed"] == pytest.approx(-ending["until"], rel=1e-6) and starting["until"] is None
+    assert starting["speed"] == pytest.approx(-ending["until"], rel=1e-6)
+    assert starting["until"] is None
     assert any(text.startswith("dynamic instability from -2.") for text in result.summary["warnings"])
     for factor, kinds in ((0.9999, {"stable", "dynamic instability"}), (1.0001, {"stable"})):
         rows = modes(beam.replace({"motion.speed": factor * ending["until"]})).rows
@@ -198,7 +202,9 @@ def test_results_read_back(unit_beam: Any, tmp_path: Path) -> None:
     assert diagram["rows"] == result.rows
     assert diagram["critical_speeds"] == result.summary["critical_speeds"]
     summary = json.loads((tmp_path / "summary.json").read_text())
-    assert summary["status"] == "done" and summary["speeds"] == 4 and summary["speeds_solved"] >= 4
+    assert summary["status"] == "done"
+    assert summary["speeds"] == 4
+    assert summary["speeds_solved"] >= 4
     assert set(result.branches()) == {b["label"] for b in diagram["branches"]}
     (figure,) = plot(result, tmp_path)
     assert figure.read_bytes().startswith(b"\x89PNG")

@@ -144,7 +144,8 @@ def test_svq_21b_drops_the_term_that_9_lacks() -> None:
     exact = force(X + 1j * step).imag / step / eps**2
     first, second = 2 * (3 * X**2 - X), (1 + 2 * X) * (6 * X - 1)
     assert exact == pytest.approx(first + second, rel=1e-5)  # the rest is O(eps)
-    assert first == pytest.approx(0.96) and second == pytest.approx(5.72)  # by hand, for these u_1, u_2 at X = 0.6
+    assert first == pytest.approx(0.96)  # by hand, for these u_1, u_2 at X = 0.6
+    assert second == pytest.approx(5.72)
 
 
 @pytest.mark.parametrize(

@@ -137,7 +137,8 @@ def test_switches_reach_the_hub() -> None:
             values.append(system.row.residual(0.5))
         assert values[1] == pytest.approx(values[0], rel=1e-12)  # rounding
     switched.leave_out({"hub_coupling"})
-    assert switched.hub is not None and not switched.row.coupled
+    assert switched.hub is not None
+    assert not switched.row.coupled
 
 
 def test_a_theory_is_tried_out_on_the_system_of_its_prestressed_twin() -> None:
@@ -209,7 +210,9 @@ def test_change_by_a_theory_is_that_of_spectral_histories() -> None:
     assert np.linalg.norm(linear - exact) / np.linalg.norm(exact) == pytest.approx(0.032756985, rel=1e-3)
     assert 0.0327 < change.estimate[HISTORY] < 0.0335  # largest, over the largest |u|: a little before 7 s
     diverging = estimates.replaced("linear")
-    assert np.isinf(diverging.worst) and diverging.verdict == "large" and "diverges" in diverging.notes[HISTORY]
+    assert np.isinf(diverging.worst)
+    assert diverging.verdict == "large"
+    assert "diverges" in diverging.notes[HISTORY]
 
 
 def test_changes_of_frequencies_are_those_of_a_spectral_method() -> None:
@@ -238,7 +241,8 @@ def test_an_estimate_does_not_depend_on_what_was_tried_before() -> None:
     alone, after = Trial(stretched), Trial(stretched)
     after.outputs("von_karman")
     expected, found = (trial.outputs("reissner") for trial in (alone, after))
-    assert np.array_equal(found.tip, expected.tip) and np.array_equal(found.values, expected.values)
+    assert np.array_equal(found.tip, expected.tip)
+    assert np.array_equal(found.values, expected.values)
 
 
 def test_change_by_damping_is_the_damping_ratio() -> None:
@@ -273,13 +277,15 @@ def test_what_a_user_registers_has_its_row_too(add: Callable[[Any], None]) -> No
     assert list(theories)[:2] == ["linear", "unstiffened"]
     assert theories["unstiffened"]["estimate"] == theories["linear"]["estimate"]
     airless = rotfem.explain(still.replace({"model.effects": []}))
-    assert not airless.effects["drag"]["included"] and "not in model.effects" in airless.effects["drag"]["why"]
+    assert not airless.effects["drag"]["included"]
+    assert "not in model.effects" in airless.effects["drag"]["why"]
 
 
 def test_an_effect_left_out_by_a_list_is_estimated_too() -> None:
     asked = scene(SPIN_UP, {"model.effects": ["centrifugal", "euler"], "model.theory": "consistent_linear"})
     rows = {row["name"]: row for row in rotfem.explain(asked).rows}
-    assert not rows["coriolis"]["included"] and rows["euler"]["included"]
+    assert not rows["coriolis"]["included"]
+    assert rows["euler"]["included"]
     assert "not in model.effects" in rows["coriolis"]["why"]
     assert rows["coriolis"]["estimate"][HISTORY] > 0.0
 
@@ -316,7 +322,8 @@ def test_a_chosen_model_is_within_its_tolerance(tolerance: float, theory: str) -
     assert tip_change(tip(full), tip(result)) <= choice["estimated_error"] <= tolerance
     left_out = set(scene(SPIN_UP).effective_effects()) - set(choice["effects"])
     assert left_out == {row["name"] for row in choice["dropped"] if row["kind"] == "effect"}
-    assert "rotary_inertia" in left_out and "euler" not in left_out
+    assert "rotary_inertia" in left_out
+    assert "euler" not in left_out
     assert result.summary["integrals"]["F"] < full.summary["integrals"]["F"]
     assert result.summary["scene"]["model"]["tolerance"] == tolerance
 
@@ -325,14 +332,16 @@ def test_theory_given_is_the_richest() -> None:
     asked = scene(SPIN_UP, {"model.theory": "consistent_linear", "model.tolerance": 1e-9})
     choice = choose(case_of(asked), (HISTORY,))
     assert choice.theory == choice.richest == "consistent_linear"
-    assert choice.full and np.isinf(choice.limit)
+    assert choice.full
+    assert np.isinf(choice.limit)
 
 
 def test_modes_and_campbell_choose_by_frequency() -> None:
     """A tolerance of 1e-3 leaves out Coriolis forces (1e-4 of a thin beam's frequencies)."""
     asked = scene(SPIN_UP, {"model.tolerance": 1e-3})
     full, chosen = rotfem.modes(scene(SPIN_UP)), rotfem.modes(asked)
-    assert "coriolis" not in chosen.summary["effects"] and chosen.summary["warnings"] == []
+    assert "coriolis" not in chosen.summary["effects"]
+    assert chosen.summary["warnings"] == []
     for a, b in zip(full.rows, chosen.rows, strict=True):
         assert b["frequency"] == pytest.approx(a["frequency"], rel=1e-3)
     speeds = [0.0, 2.0, 4.0]
@@ -392,7 +401,8 @@ def test_a_run_that_leaves_its_range_stops_or_warns() -> None:
         rotfem.run(scene(SPIN_UP, BLOW | {"model.on_exceed": "stop"}))
     assert caught.value.result.history["t"][-1] < 3.1  # type: ignore[attr-defined]
     result = rotfem.run(scene(SPIN_UP, BLOW | {"model.on_exceed": "warn"}))
-    assert result.summary["theory"] == "linear" and result.history["t"][-1] == 4.0
+    assert result.summary["theory"] == "linear"
+    assert result.history["t"][-1] == 4.0
     assert [text for text in result.summary["warnings"] if "left the range" in text]
 
 
@@ -423,7 +433,9 @@ def test_a_trial_sees_a_blow_between_its_samples(changes: dict[str, Any], as_fun
         asked = asked.replace({"loads": {"tip_force": force}})
     trial = Trial(case_of(asked), (HISTORY,))
     samples = trial.samples
-    assert samples is not None and samples.step > 0.01 and samples.parts.max() >= 4
+    assert samples is not None
+    assert samples.step > 0.01
+    assert samples.parts.max() >= 4
     assert samples.parts.sum() < 1.5 * len(samples.parts)  # shorter steps at the blow only
     full = np.abs(tip(rotfem.run(asked))[:, 1]).max()
     assert np.abs(trial.outputs("reissner").tip[:, 1]).max() == pytest.approx(full, rel=0.05)
@@ -458,8 +470,11 @@ def test_the_next_richer_model_is_the_first_that_holds() -> None:
     assert choice.limits == pytest.approx(np.sqrt(2.0) * choice.sizes)  # 5e-4 (s/0.1)² = 1e-3
     near, far = (choice.richer(np.array([0.01, s]), 1.0, "why") for s in (0.5, 2.0))
     assert (near.theory, near.effects) == ("consistent_linear", everything)
-    assert near.size == 0.5 and near.check(np.array([0.01, 0.6])) == ""
-    assert far.theory == "reissner" and far.full and far.check(np.array([1e9, 1e9])) == ""
+    assert near.size == 0.5
+    assert near.check(np.array([0.01, 0.6])) == ""
+    assert far.theory == "reissner"
+    assert far.full
+    assert far.check(np.array([1e9, 1e9])) == ""
 
 
 def test_no_choice_is_trusted_far_beyond_what_was_tried_out() -> None:
@@ -467,11 +482,13 @@ def test_no_choice_is_trusted_far_beyond_what_was_tried_out() -> None:
     errors = {"linear": 0.0, "consistent_linear": 1e-12, "reissner": 0.0}
     for estimate in (0.0, 1e-14):
         still = chosen(estimate, errors, np.zeros(3), ("coriolis",))
-        assert still.check(np.full(3, 1e-15)) == "" and still.check(np.array([0.0, 1e-9, 0.0])) != ""
+        assert still.check(np.full(3, 1e-15)) == ""
+        assert still.check(np.array([0.0, 1e-9, 0.0])) != ""
         assert still.richer(np.array([0.0, 1e-9, 0.0]), None, "why").theory == "reissner"
         stretched = chosen(estimate, errors, np.array([1e-5, 0.0, 0.0]), ())
         assert stretched.limit == pytest.approx(3e-5)
-        assert stretched.check(np.array([2e-5, 1e-9, 0.0])) == "" and stretched.check(np.array([0, 1e-8, 0])) != ""
+        assert stretched.check(np.array([2e-5, 1e-9, 0.0])) == ""
+        assert stretched.check(np.array([0, 1e-8, 0])) != ""
         assert stretched.richer(np.array([4e-5, 0.0, 0.0]), None, "why").theory == "consistent_linear"
         # 3 · 1e-9 (as good as unknown) times 1000² is above the tolerance.
         assert stretched.richer(np.array([1e-2, 0.0, 0.0]), None, "why").theory == "reissner"
@@ -486,12 +503,15 @@ def test_a_trial_takes_no_more_steps_than_the_scene() -> None:
     asked = scene(SPIN_UP, changes | {"time": {"end": 8.0, "step": 0.01}})
     trial = Trial(case_of(asked), (HISTORY,))
     samples = trial.samples
-    assert samples is not None and samples.own == 800
-    assert samples.levels[-1] == 2 and trial.outputs("reissner").failed == {}
+    assert samples is not None
+    assert samples.own == 800
+    assert samples.levels[-1] == 2
+    assert trial.outputs("reissner").failed == {}
     assert all(np.maximum(samples.parts, finer).sum() <= 800 for finer in samples.levels)
     assert trial.finer == 2
     choice = choose(case_of(asked.replace({"model.tolerance": 1e-1})), (HISTORY,))
-    assert choice.full and "would take longer" in choice.remark
+    assert choice.full
+    assert "would take longer" in choice.remark
     assert "remark" in choice.summary()
 
 
@@ -502,7 +522,8 @@ def test_a_failing_eigenproblem_at_rest_ends_nothing(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr("rotfem.selection.coarse_model.Pencil.solve", fail)
     result = rotfem.explain(scene(SPIN_UP))
     rows = {row["name"]: row for row in result.rows}
-    assert np.isinf(rows["euler"]["estimate"][MODES]) and "backward error" in rows["euler"]["notes"][MODES]
+    assert np.isinf(rows["euler"]["estimate"][MODES])
+    assert "backward error" in rows["euler"]["notes"][MODES]
     assert rows["euler"]["estimate"][HISTORY] == pytest.approx(1.0, abs=0.1)
     assert any("frequencies at rest cannot be computed" in text for text in result.summary["warnings"])
     assert "speed_ratio" not in result.summary["groups"]

@@ -29,7 +29,8 @@ def extension() -> Iterator[Callable[[str], ModuleType]]:
 
     def load(name: str) -> ModuleType:
         spec = spec_from_file_location(name, FILES / f"{name}.py")
-        assert spec is not None and spec.loader is not None
+        assert spec is not None
+        assert spec.loader is not None
         module = module_from_spec(spec)
         spec.loader.exec_module(module)
         return module

@@ -277,7 +277,8 @@ def test_stiffening(hub_beam: Any) -> None:
         result = campbell(hub_beam({"model.theory": theory}), speeds, orders=0)
         first[theory] = result.branches()["lag 1"]["frequency"]
         assert len(first[theory]) == len(speeds)  # smooth: nothing refined
-    assert np.all(np.diff(first["linear"]) < 0) and first["linear"][-1] < 0.3 * first["linear"][0]
+    assert np.all(np.diff(first["linear"]) < 0)
+    assert first["linear"][-1] < 0.3 * first["linear"][0]
     for theory in ("consistent_linear", "von_karman_linear", "reissner"):
         assert np.all(np.diff(first[theory]) > 0)
         np.testing.assert_allclose(first[theory], first["consistent_linear"], rtol=2e-5)
@@ -399,7 +400,8 @@ def test_rows_and_names(unit_beam: Any) -> None:
         assert row["share_axial"] + row["share_lag"] == pytest.approx(1.0, abs=1e-12)
         assert row["residual"] < 1e-12
         assert max(np.max(np.hypot(shape[c], shape[f"{c}_imag"])) for c in ("u1", "u2", "alpha")) == pytest.approx(1.0)
-        assert shape["x"][0] == 0.0 and abs(shape["u2"][0]) < 1e-12
+        assert shape["x"][0] == 0.0
+        assert abs(shape["u2"][0]) < 1e-12
     sine = result.shapes["mode 3: axial 1"]
     np.testing.assert_allclose(sine["u1"], np.sin(np.pi / 2 * sine["x"]), atol=1e-6)
 
@@ -422,7 +424,8 @@ def test_about_the_undeformed_state(unit_beam: Any) -> None:
     steady = modes(unit_beam(changes))
     np.testing.assert_allclose(frequencies(undeformed), frequencies(linear), rtol=1e-9)
     assert undeformed.rows[0]["frequency"] < 0.6 * steady.rows[0]["frequency"]
-    assert undeformed.summary["about"] == "undeformed" and steady.summary["about"] == "steady"
+    assert undeformed.summary["about"] == "undeformed"
+    assert steady.summary["about"] == "steady"
 
 
 def test_speed_of_the_modes(hub_beam: Any) -> None:
@@ -493,7 +496,9 @@ def test_self_checks(unit_beam: Any) -> None:
         assert checks["spectrum"] < 1e-10
         assert not nonlinear or checks["linearisation"] < 1e-6
     damped = modes(unit_beam(NONCONSERVATIVE)).summary["checks"]
-    assert damped["asymmetry_C"] > 1e-6 and damped["asymmetry_K"] > 1e-6 and "spectrum" not in damped
+    assert damped["asymmetry_C"] > 1e-6
+    assert damped["asymmetry_K"] > 1e-6
+    assert "spectrum" not in damped
 
 
 @pytest.mark.parametrize("name", ["M", "C", "K"])

@@ -129,7 +129,8 @@ def dense(A: Any) -> Array:
 )
 def test_blade_table(theory: str, tip_mass: float, table: dict[float, tuple[float, ...]]) -> None:
     """Flap frequencies in units of (EI/mL⁴)^½ = 1 rad/s to the printed digits."""
-    analysis = ModalAnalysis(Problem.of(scene(BLADE, {"model.theory": theory, "structure.tip_mass": tip_mass})).spinning())
+    blade = scene(BLADE, {"model.theory": theory, "structure.tip_mass": tip_mass})
+    analysis = ModalAnalysis(Problem.of(blade).spinning())
     for speed, printed in table.items():
         spinning = analysis.at(speed, 12)
         pairs = list(zip(analysis.names(spinning), spinning.pairs.values.imag, strict=True))
@@ -541,7 +542,7 @@ def test_base_acceleration_is_minus_gravity(theory: str) -> None:
 def test_section_given_as_matrices(theory: str) -> None:
     """Centres or full 6×6 matrices: the same section, the same frequencies."""
     by_centers = scene(TWISTED, {"model.theory": theory, "structure.section.mass_center": [0.03, 0.02]})
-    matrices = {name: value for name, value in by_centers.structure.section.at(0.0).items()}
+    matrices = dict(by_centers.structure.section.at(0.0))
     by_matrices = by_centers.replace({"structure.section": matrices})
     one, other = (np.array([f for _, f in frequencies(s, 6)]) for s in (by_centers, by_matrices))
     np.testing.assert_allclose(other, one, rtol=1e-9)
