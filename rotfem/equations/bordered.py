@@ -263,7 +263,8 @@ def bordered(A: Any, row: Array, column: Array, corner: float) -> Any:
 
     Args:
         A: square PETSc matrix.
-        row, column: owned parts of the vectors.
+        row: owned part of the new row.
+        column: owned part of the new column.
         corner: the last diagonal entry.
     """
     comm = A.comm.tompi4py()

@@ -106,7 +106,8 @@ class NonlinearSystem(System):
             A.assemble()
             return
         wanted = [name for name, c in zip("KCM", shifts, strict=True) if c != 0.0]
-        assert shifts == tuple(float(name in wanted) for name in "KCM") and len(wanted) == 1
+        assert shifts == tuple(float(name in wanted) for name in "KCM")
+        assert len(wanted) == 1
         if self._parts[wanted[0]] is not None:
             fem_petsc.assemble_matrix(A, self._parts[wanted[0]], self.bcs, 0.0)
         A.assemble()

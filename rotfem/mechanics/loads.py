@@ -12,18 +12,15 @@ Array = npt.NDArray[np.float64]
 
 
 class Load(Protocol):
-    """A force or moment over time.
-
-    Attributes:
-        kind: "dead" keeps its direction in the frame, "follower" turns with the section.
-        table: rows (t, components…), linear between; None where it is no table.
-    """
+    """A force or moment over time."""
 
     @property
-    def kind(self) -> str: ...
+    def kind(self) -> str:
+        """What its direction does: "dead" keeps it in the frame, "follower" turns with the section."""
 
     @property
-    def table(self) -> tuple[tuple[float, ...], ...] | None: ...
+    def table(self) -> tuple[tuple[float, ...], ...] | None:
+        """Rows (t, components…), linear between; None where it is no table."""
 
     @property
     def is_zero(self) -> bool:
@@ -58,19 +55,23 @@ class ConstantLoad:
 
 
 class Applied(Protocol):
-    """Gravity (m/s², inertial axes) and the loads on a structure; None where there is none."""
+    """Gravity and the loads on a structure, None where there is none."""
 
     @property
-    def gravity(self) -> tuple[float, ...]: ...
+    def gravity(self) -> tuple[float, ...]:
+        """Acceleration of gravity, m/s², inertial axes."""
 
     @property
-    def tip_force(self) -> Load | None: ...
+    def tip_force(self) -> Load | None:
+        """Force at the tip, N."""
 
     @property
-    def tip_moment(self) -> Load | None: ...
+    def tip_moment(self) -> Load | None:
+        """Moment at the tip, N·m."""
 
     @property
-    def distributed(self) -> Load | None: ...
+    def distributed(self) -> Load | None:
+        """Force per length of a beam, N/m, or per area of a plate, N/m²."""
 
 
 @dataclass(frozen=True)

@@ -84,6 +84,6 @@ class Turn:
         return self._map(b, c, dtheta)
 
     def _map(self, first: Any, second: Any, v: Any) -> Any:
-        """v + first θ×v + second θ×(θ×v)."""
+        """Return v + first θ×v + second θ×(θ×v)."""
         turned = cross(self.theta, v)
         return v + first * turned + second * cross(self.theta, turned)

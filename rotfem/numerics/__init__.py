@@ -1,0 +1,1 @@
+"""Compiled forms, linear solvers, Newton's method, eigenproblems; no physics."""

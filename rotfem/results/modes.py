@@ -89,7 +89,7 @@ class ModesResult(Result):
         return all(row["stability"] in ("stable", "neutral") for row in self.rows)
 
     def column(self, name: str) -> Array:
-        """Return a number of every mode, shape (modes,): `frequency`, `residual`, `share_lag`, …
+        """Return a number of every mode, shape (modes,): `frequency`, `residual`, `share_lag` and so on.
 
         Raises:
             KeyError: there is none of that name.

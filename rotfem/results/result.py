@@ -28,7 +28,7 @@ class Result(ABC):
 
     @property
     def status(self) -> str:
-        """ "done", "failed" or "interrupted"; what has not come to its end holds what was computed until then."""
+        """Word for how it ended: "done", or "failed" or "interrupted", and then what was computed until there is held."""
         return str(self.summary["status"])
 
     @property

@@ -99,14 +99,17 @@ class ConstantMotion(Motion):
 
     @property
     def is_steady(self) -> bool:
+        """Whether there is a steady state: there is, at this speed."""
         return True
 
     @property
     def is_spinning(self) -> bool:
+        """Whether the speed is not 0."""
         return self.speed != 0.0
 
     @property
     def changes_speed(self) -> bool:
+        """Whether the spin rate changes: it does not."""
         return False
 
 
@@ -124,10 +127,12 @@ class SpinUpMotion(Motion):
 
     @property
     def is_spinning(self) -> bool:
+        """Whether the final speed is not 0."""
         return self.speed != 0.0
 
     @property
     def changes_speed(self) -> bool:
+        """Whether the hub starts at all."""
         return self.speed != 0.0
 
 
@@ -147,10 +152,12 @@ class TableMotion(Motion):
 
     @property
     def is_spinning(self) -> bool:
+        """Whether a speed of the table is not 0."""
         return any(speed != 0.0 for _, speed in self.table)
 
     @property
     def changes_speed(self) -> bool:
+        """Whether there are two speeds in the table."""
         return len({speed for _, speed in self.table}) > 1
 
 
@@ -176,6 +183,7 @@ class TorqueMotion(Motion):
 
     @property
     def is_coupled(self) -> bool:
+        """Whether the structure moves the hub."""
         return self.coupled
 
     @model_validator(mode="after")

@@ -46,7 +46,7 @@ class Change:
 
     @property
     def verdict(self) -> str:
-        """ "negligible", "noticeable" or "large"; only what stays below 1 % with the safety factor is negligible."""
+        """Word for it: "negligible" (below 1 % even with the safety factor), "noticeable" or "large"."""
         if self.worst >= LARGE:
             return "large"
         return "negligible" if SAFETY * self.worst < NOTICEABLE else "noticeable"

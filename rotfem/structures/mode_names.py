@@ -103,7 +103,7 @@ def _lines(x: npt.NDArray[Any], y: npt.NDArray[Any], w: npt.NDArray[Any]) -> tup
 def _diameters(
     x: npt.NDArray[Any], y: npt.NDArray[Any], w: npt.NDArray[Any]
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Return (parts, (rings, m); their squares' sum over the rings, (m,)) of a shape in e^{−imθ}, m = 0, 1, …"""
+    """Return (parts, (rings, m); their squares' sum over the rings, (m,)) of a shape in e^{−imθ}, m ≥ 0."""
     r, angle = np.hypot(x, y), np.arctan2(y, x)
     edges = np.linspace(r.min(), r.max(), STATIONS // 2 + 1)
     ring = np.clip(np.digitize(r, edges) - 1, 0, STATIONS // 2 - 1)

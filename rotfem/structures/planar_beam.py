@@ -45,7 +45,7 @@ class PlanarBeam(Beam):
     # --- kinematics ---------------------------------------------------------------------------------------------
 
     def position(self, q: Any) -> Any:
-        """r = (R + X + u_1) a_1 + u_2 a_2, Simo & Vu-Quoc 1986 eq. (1a)."""
+        """Return r = (R + X + u_1) a_1 + u_2 a_2, Simo & Vu-Quoc 1986 eq. (1a)."""
         X = ufl.SpatialCoordinate(self.mesh)[0]
         return ufl.as_vector((self.scalars["hub_radius"] + X + q[0], q[1], 0))
 

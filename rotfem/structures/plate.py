@@ -134,7 +134,7 @@ class Plate(Structure):
     # --- kinematics -------------------------------------------------------------------------------------------------
 
     def position(self, q: Any) -> Any:
-        """r = r_0 + (x_γ + u_γ) a_γ + u_3 a_3, Simo & Vu-Quoc 1986 section 5."""
+        """Return r = r_0 + (x_γ + u_γ) a_γ + u_3 a_3, Simo & Vu-Quoc 1986 section 5."""
         x = ufl.SpatialCoordinate(self.mesh)
         return ufl.as_vector([self._root[i] + (x[i] if i < 2 else 0) + q[i] for i in range(3)])
 
@@ -241,7 +241,7 @@ class Plate(Structure):
         return out
 
     def spread(self, name: str, load: Any) -> Any:
-        """A load of the tip over the length of its edge."""
+        """Return a load of the tip over the length of its edge."""
         if name == "distributed":
             return load
         if "tip_length" not in self.scalars:

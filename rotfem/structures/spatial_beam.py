@@ -117,7 +117,7 @@ class SpatialBeam(Beam):
     # --- kinematics ---------------------------------------------------------------------------------------------
 
     def position(self, q: Any) -> Any:
-        """r = r_root + ∫ t_1⁰ dX + u, X e for a straight beam."""
+        """Return r = r_root + ∫ t_1⁰ dX + u, X e for a straight beam."""
         return self._root + self._axis + ufl.as_vector([q[i] for i in (0, 1, 2)])
 
     def turned(self, q: Any, v: Any) -> Any:

@@ -18,7 +18,7 @@ from rotfem.mechanics.rotations import Turn
 
 
 def rotation_part(q: Any) -> Any:
-    """Return θ of q = (u, θ), θ̇ of q̇, …"""
+    """Return θ of q = (u, θ), θ̇ of q̇ and so on."""
     return ufl.as_vector([q[i] for i in (3, 4, 5)])
 
 

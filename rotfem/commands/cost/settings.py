@@ -157,7 +157,8 @@ def _ways(
 ) -> list[tuple[str | None, float | None, float | None, int]]:
     """Return (scheme, step, tolerance, samples every) of a time history, schemes × steps."""
     time = scene.time
-    assert time is not None and base_step is not None
+    assert time is not None
+    assert base_step is not None
     interval = sample_interval(scene, base_step)
     steps = list(chosen.get("steps") or ladder(base_step, interval, time.end, *(STEPS_QUICK if quick else STEPS_FULL)))
     factors = TOLERANCES_QUICK if quick else TOLERANCES_FULL

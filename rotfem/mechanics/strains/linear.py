@@ -20,7 +20,9 @@ def spatial_beam(du: Any, theta: Any, dtheta: Any, e: Any) -> tuple[Any, Any]:
     """Return (Gamma, K), vectors (3,): Γ = u' − θ×e (1) and K = θ' (1/m).
 
     Args:
-        du, theta, dtheta: u', θ, θ' in frame components, as the result is.
+        du: u' in frame components, as the result is.
+        theta: θ.
+        dtheta: θ'.
         e: unit tangent of the undeformed axis.
     """
     return du - ufl.cross(theta, e), dtheta

@@ -21,7 +21,9 @@ def spatial_beam(du: Any, theta: Any, dtheta: Any, e: Any) -> tuple[Any, Any]:
     """Return (Gamma, K), vectors (3,): Γ = Λᵀ(e + u') − e (1) and K = axial(Λᵀ Λ') (1/m), Simo 1985.
 
     Args:
-        du, theta, dtheta: u', θ, θ' in frame components, as the result is.
+        du: u' in frame components, as the result is.
+        theta: θ.
+        dtheta: θ'.
         e: unit tangent of the undeformed axis.
     """
     turn = Turn(theta)

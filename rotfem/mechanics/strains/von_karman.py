@@ -23,7 +23,9 @@ def spatial_beam(du: Any, theta: Any, dtheta: Any, e: Any) -> tuple[Any, Any]:
     """Return (Gamma, K), vectors (3,): Γ·e = |e + u'| − 1, else of first order (1), and K = θ' (1/m).
 
     Args:
-        du, theta, dtheta: u', θ, θ' in frame components, as the result is.
+        du: u' in frame components, as the result is.
+        theta: θ.
+        dtheta: θ'.
         e: unit tangent of the undeformed axis.
     """
     stretch = ufl.sqrt(ufl.dot(e + du, e + du))
