@@ -127,16 +127,13 @@ def tolerance(names: list[str]) -> None:
 COLD = """
 import sys, rotfem
 from time import perf_counter
-from rotfem.scene import Scene
 sys.path.insert(0, sys.argv[1])
 from explain_scenes import scene
-from rotfem.equations.system import compile_system
-from rotfem.equations.model import Model
-s = scene(sys.argv[2])
-effects = s.effective_effects()
-compile_system(Model(s, effects=()))  # what all of them share: libraries, elements
+problem = rotfem.Problem.of(scene(sys.argv[2]))
+effects = problem.effective_effects()
+problem.replace(effects=()).system()  # what all of them share: libraries, elements
 started = perf_counter()
-system = compile_system(Model(s, effects=tuple(e for e in effects if e != sys.argv[3])))
+system = problem.replace(effects=tuple(e for e in effects if e != sys.argv[3])).system()
 print(perf_counter() - started, system.integrals["F"], system.integrals["J"])
 """
 
@@ -145,7 +142,7 @@ def effects(names: list[str]) -> None:
     """Print integrals, compile time with an empty cache and time a step with all effects and without each."""
     print(f"{'scene':<20}{'without':<16}{'F':>4}{'J':>4}{'compile s':>11}{'ms a step':>11}")
     for name in names:
-        present = scene(name).effective_effects()
+        present = rotfem.Problem.of(scene(name)).effective_effects()
         variants = {left_out: [e for e in present if e != left_out] for left_out in ("nothing", *present)}
         steps: dict[str, list[float]] = {left_out: [] for left_out in variants}
         for i in range(6):

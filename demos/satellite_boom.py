@@ -28,7 +28,6 @@ from _demo import FIRST_RANK, History, command_line, report, save, say
 from matplotlib.figure import Figure
 
 import rotfem
-from rotfem.mechanics.motion import Motion, motion_of
 
 SCENE = Path(__file__).with_name("satellite_boom.toml")
 REFERENCE = 0.0  # exact
@@ -38,7 +37,7 @@ TIP = ("tip_u1", "tip_u2", "tip_u3")
 def main(figure: Path | None = None) -> float:
     """Return the largest difference of the tip's displacement between two descriptions, relative to the largest."""
     scene = rotfem.load_scene(SCENE)
-    motion, b = motion_of(scene), np.array(scene.structure.root_position)
+    motion, b = rotfem.Problem.of(scene).motion, np.array(scene.structure.root_position)
 
     def at_the_clamp(t: float) -> np.ndarray:
         w, dw = motion.speed(t) * motion.axis, motion.rate(t) * motion.axis
@@ -61,7 +60,7 @@ def main(figure: Path | None = None) -> float:
     return difference
 
 
-def plot(motion: Motion, first: History, second: History, path: Path) -> None:
+def plot(motion: rotfem.Motion, first: History, second: History, path: Path) -> None:
     """Draw what the satellite does and what the tip makes of it, in both descriptions."""
     picture = Figure(figsize=(8, 6), layout="constrained")
     above, below = picture.subplots(2, sharex=True, height_ratios=(2, 3))
