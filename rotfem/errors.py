@@ -16,9 +16,9 @@ class Problem(NamedTuple):
     """One thing wrong with a scene.
 
     Attributes:
-        key: Dotted path of the key, e.g. ``structure.length``; empty if the whole file is meant.
-        value: What the scene holds there; ``None`` if the key is absent or has no value worth showing.
-        allowed: What is wrong and what would be right.
+        key: dotted path of the key, e.g. `structure.length`; empty if the whole file is meant.
+        value: what the scene holds there; None if the key is absent or has no value worth showing.
+        allowed: what is wrong and what would be right.
     """
 
     key: str
@@ -37,9 +37,9 @@ class InputError(ValueError):
     """Something a user gave cannot be computed with.
 
     Attributes:
-        key: Dotted path of what is meant, as a scene calls it.
-        value: What was given there; ``None`` if there is nothing to show.
-        allowed: What is wrong with it and what is allowed.
+        key: dotted path of what is meant, as a scene calls it.
+        value: what was given there; None if there is nothing to show.
+        allowed: what is wrong with it and what is allowed.
     """
 
     def __init__(self, key: str, value: Any, allowed: str) -> None:
@@ -57,10 +57,10 @@ def input_of(file: str) -> Iterator[None]:
     """Say of which scene file an `InputError` is.
 
     Args:
-        file: Name of the file as errors show it.
+        file: name of the file as errors show it.
 
     Raises:
-        SceneError: In the place of an `InputError` that names no file.
+        SceneError: in the place of an `InputError` that names no file.
     """
     try:
         yield
@@ -74,11 +74,11 @@ class SceneError(InputError):
     """A scene, or an override of it, is not valid.
 
     Attributes:
-        file: File name of the scene (or the name given to it in Python).
-        key: Dotted path of the first offending key; empty if the whole file is meant.
-        value: What the scene holds there; ``None`` if there is nothing to show.
-        allowed: What is wrong with it and what is allowed.
-        others: Further problems found in the same pass.
+        file: file name of the scene (or the name given to it in Python).
+        key: dotted path of the first offending key; empty if the whole file is meant.
+        value: what the scene holds there; None if there is nothing to show.
+        allowed: what is wrong with it and what is allowed.
+        others: further problems found in the same pass.
     """
 
     def __init__(
@@ -108,9 +108,9 @@ class ComputationError(RuntimeError):
     """A computation on a valid scene failed.
 
     Attributes:
-        what: What failed, e.g. ``Newton's method did not converge in 25 iterations``.
-        time: Time at which it failed (s), or ``None`` outside a time history.
-        advice: What to try; may be empty.
+        what: what failed, e.g. "Newton's method did not converge in 25 iterations".
+        time: time at which it failed (s), or None outside a time history.
+        advice: what to try; may be empty.
     """
 
     def __init__(self, what: str, time: float | None = None, advice: str = "") -> None:
@@ -128,8 +128,8 @@ class OutputError(OSError):
     """A result cannot be written.
 
     Attributes:
-        path: File or folder that was to be written.
-        reason: Why it could not be.
+        path: file or folder that was to be written.
+        reason: why it could not be.
     """
 
     def __init__(self, path: object, reason: str) -> None:
@@ -142,14 +142,7 @@ class OutputError(OSError):
 
 
 def show(value: Any) -> str:
-    """Text of a value as it would stand in a TOML file.
-
-    Args:
-        value: Any value read from a scene.
-
-    Returns:
-        One line, shortened to a readable length; a path in full, so that it can be found.
-    """
+    """Return a value as it would stand in a TOML file, in one line of readable length; a path in full, to be found."""
     text = _full_text(value)
     if isinstance(value, Path):
         return text

@@ -172,7 +172,7 @@ class Sweep:
         self.nodes.append(target)
 
     def _watched(self, last: Node, target: Node) -> bool:
-        """Whether a branch that is asked for (not only a spare one) is unsure."""
+        """Return whether a branch that is asked for (not only a spare one) is unsure."""
         return bool(np.any(target.confidence[: self.count][last.order[: self.count] >= 0] < SURE))
 
     # --- what the diagram says ----------------------------------------------------------------------------------------

@@ -68,7 +68,7 @@ def steady_state(system: Any, omega: float, newton: Newton, start: Array | None 
 
 
 def _balance(system: System, omega: float, share: float, guess: Array, newton: Newton) -> Array:
-    """Newton for F(q, 0, 0) = 0 with loads, base acceleration and omega² multiplied by share."""
+    """Solve F(q, 0, 0) = 0 by Newton's method with loads, base acceleration and omega² multiplied by share."""
     motion = system.motion.at_speed(np.sqrt(share) * omega)
     system.set_time(0.0, motion, share)
     q, dx = guess.copy(), Increment(system.V)

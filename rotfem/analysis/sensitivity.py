@@ -215,7 +215,7 @@ class Sensitivity:
         return transposed(system.matrix(1.0, 0.0, 0.0, 1.0))
 
     def _denominator(self, j: int) -> complex:
-        """y^H (2λ M + C) x of one pair."""
+        """Return y^H (2λ M + C) x of one pair."""
         pairs = self.spinning.pairs.select(np.array([j]))
         return complex(self.spinning.pencil.gram(pairs.left, pairs.values, pairs.right, pairs.values)[0, 0])
 

@@ -100,7 +100,7 @@ class Stepper:
         self._iterate(stage)
 
     def _new_factor_pays(self, t: float) -> bool:
-        """Whether the matrix stays what it is now, though the factor is that of another: a last one serves for long."""
+        """Return whether the matrix stays as it is from now on, while the factor is that of another."""
         s = self.system
         if not s.linear:
             return False

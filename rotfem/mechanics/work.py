@@ -102,42 +102,42 @@ def _of_acceleration(m: Mechanics, delta: Any, acceleration: Callable[[Body], An
 
 
 def inertia(m: Mechanics, delta: Any) -> Any:
-    """ẍ, the acceleration relative to the frame."""
+    """Return the work of ẍ, the acceleration relative to the frame."""
     return _of_acceleration(m, delta, lambda body: body.second_rate(m.k))
 
 
 def coriolis(m: Mechanics, delta: Any) -> Any:
-    """2 w×ẋ."""
+    """Return the work of 2 w×ẋ."""
     return _of_acceleration(m, delta, lambda body: 2 * cross(body.resolve(m.frame.w), body.rate(m.k)))
 
 
 def centrifugal(m: Mechanics, delta: Any) -> Any:
-    """w×(w×x)."""
+    """Return the work of w×(w×x)."""
     return _of_acceleration(m, delta, lambda body: cross(body.resolve(m.frame.w), m.carried(body)))
 
 
 def euler(m: Mechanics, delta: Any) -> Any:
-    """ẇ×x."""
+    """Return the work of ẇ×x."""
     return _of_acceleration(m, delta, lambda body: cross(body.resolve(m.frame.dw), body.x))
 
 
 def base(m: Mechanics, delta: Any) -> Any:
-    """a_o, felt by positions only."""
+    """Return the work of a_o, felt by positions only."""
     return _of_acceleration(m, delta, lambda body: m.frame.a_o if body.is_position else None)
 
 
 def gravity(m: Mechanics, delta: Any) -> Any:
-    """−g, felt by positions only."""
+    """Return the work of −g, felt by positions only."""
     return _of_acceleration(m, delta, lambda body: -m.frame.gravity if body.is_position else None)
 
 
 def internal(m: Mechanics, delta: Variation) -> Any:
-    """δ(∫ ½ Γ·C Γ): the work of the stresses is the derivative of the stored energy."""
+    """Return δ(∫ ½ Γ·C Γ): the work of the stresses is the derivative of the stored energy."""
     return sum(ufl.derivative(s.energy, m.k.q, m.k.dq) for s in m.strains)
 
 
 def damping(m: Mechanics, delta: Variation) -> Any:
-    """Kelvin–Voigt stress C η Γ̇ and Rayleigh damping a0 M + a1 K.
+    """Return the work of the Kelvin–Voigt stress C η Γ̇ and of Rayleigh damping, a0 M + a1 K.
 
     The mass part acts on the velocity relative to the frame; the stiffness part a1 adds to η.
     """
@@ -151,7 +151,7 @@ def damping(m: Mechanics, delta: Variation) -> Any:
 
 
 def loads(m: Mechanics, delta: Any) -> Any:
-    """−Σ ∫ (force · δx) over applied forces and moments."""
+    """Return −Σ ∫ (force · δx) over applied forces and moments."""
     return -sum(ufl.inner(load.force, delta.of(load)) * load.measure for load in m.loads)
 
 
@@ -190,15 +190,15 @@ def _potential_in(m: Mechanics, field: Any) -> Any:
 
 
 def potential_of_base(m: Mechanics) -> Any:
-    """∫ ρ a_o·x."""
+    """Return ∫ ρ a_o·x."""
     return _potential_in(m, -m.frame.a_o)
 
 
 def potential_of_gravity(m: Mechanics) -> Any:
-    """−∫ ρ g·x."""
+    """Return −∫ ρ g·x."""
     return _potential_in(m, m.frame.gravity)
 
 
 def potential_of_loads(m: Mechanics) -> Any:
-    """−Σ ∫ force·x over the dead loads."""
+    """Return −Σ ∫ force·x over the dead loads."""
     return -sum(ufl.inner(load.force, load.x) * load.measure for load in m.loads if load.dead)

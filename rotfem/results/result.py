@@ -28,7 +28,7 @@ class Result(ABC):
 
     @property
     def status(self) -> str:
-        """Word for how it ended: "done", or "failed" or "interrupted", and then what was computed until there is held."""
+        """Word for how it ended: "done", or "failed" or "interrupted", with what was computed until then."""
         return str(self.summary["status"])
 
     @property

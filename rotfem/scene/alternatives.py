@@ -15,10 +15,10 @@ class Way:
     """A complete set of keys.
 
     Attributes:
-        name: What the set is called.
-        required: Keys that must be given.
-        optional: Keys that may be given.
-        shape: Value the key ``shape`` must have, if it is among the required ones.
+        name: what the set is called.
+        required: keys that must be given.
+        optional: keys that may be given.
+        shape: value the key `shape` must have, if it is among the required ones.
     """
 
     name: str
@@ -32,7 +32,7 @@ class Way:
 
 
 def shape_ways(optional: tuple[str, ...]) -> tuple[Way, ...]:
-    """Returns the ways of giving a material and a shape, as they are registered, all with the same optional keys."""
+    """Return the ways of giving a material and a shape, as they are registered, all with the same optional keys."""
     return tuple(
         Way("shape", (*MATERIAL_AND_SHAPE, *dimensions), optional, shape.name)
         for shape in registry.shapes
@@ -41,14 +41,14 @@ def shape_ways(optional: tuple[str, ...]) -> tuple[Way, ...]:
 
 
 def choose_way(given: dict[str, object], ways: Sequence[Way]) -> Way:
-    """Returns the way that the given keys make up.
+    """Return the way that the given keys make up.
 
     Args:
-        given: The keys that are set, with their values.
-        ways: The possible ways.
+        given: the keys that are set, with their values.
+        ways: the possible ways.
 
     Raises:
-        PydanticCustomError: If they make up none, saying what is missing or does not belong, and what is possible.
+        PydanticCustomError: they make up none, saying what is missing or does not belong, and what is possible.
     """
     keys = set(given)
 

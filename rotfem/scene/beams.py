@@ -1,4 +1,4 @@
-"""The ``[structure]`` table: planar beam or spatial beam here, plate in its own module."""
+"""The [structure] table: planar beam or spatial beam here, plate in its own module."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def _as_inertia(value: Any) -> float | Matrix:
 
 
 def _as_sweep(value: Any) -> Profile:
-    """Returns a number or rows (x, angle); linear between, and a jump where one x stands in two rows."""
+    """Return a number or rows (x, angle); linear between, and a jump where one x stands in two rows."""
     if not isinstance(value, list | tuple):
         return Bounds().profile(value)
     rows = as_rows(value, (2,), "a profile [[x, angle], …]")
@@ -51,13 +51,13 @@ class PlanarBeamStructure(SceneModel):
     """A beam that moves in the plane (1, 2) of the rotating frame, clamped at X = 0.
 
     Attributes:
-        type: ``planar_beam``.
+        type: "planar_beam".
         length: L (m).
-        hub_radius: Distance of the clamp from the axis of rotation (m).
-        tip_mass: Mass at the free end (kg).
-        tip_inertia: Its moment of inertia about axis 3 (kg·m²).
-        section: Cross-section.
-        damping: Damping coefficients.
+        hub_radius: distance of the clamp from the axis of rotation (m).
+        tip_mass: mass at the free end (kg).
+        tip_inertia: its moment of inertia about axis 3 (kg·m²).
+        section: cross-section.
+        damping: damping coefficients.
     """
 
     type: Literal["planar_beam"] = "planar_beam"
@@ -88,21 +88,21 @@ class SpatialBeamStructure(SceneModel):
     """A beam in space, its axis along direction 1 of the rotating frame (before precone), clamped at X = 0.
 
     Attributes:
-        type: ``spatial_beam``.
+        type: "spatial_beam".
         length: L (m).
-        hub_radius: Distance of the clamp from the origin of the frame along direction 1 (m).
-        hub_offset: Position of the clamp in the frame (m), instead of the hub radius; ``None`` if not given.
-        tip_mass: Mass at the free end (kg).
-        tip_inertia: Its inertia tensor (kg·m²) as 3×3 rows, or a number for an isotropic one.
-        tip_offset: Position of its center relative to the end of the axis, in section axes (m).
-        section: Cross-section.
-        pretwist: Angle of the section axes about the beam axis (rad), a number or a taper. May also stand in the
+        hub_radius: distance of the clamp from the origin of the frame along direction 1 (m).
+        hub_offset: position of the clamp in the frame (m), instead of the hub radius; None if not given.
+        tip_mass: mass at the free end (kg).
+        tip_inertia: its inertia tensor (kg·m²) as 3×3 rows, or a number for an isotropic one.
+        tip_offset: position of its center relative to the end of the axis, in section axes (m).
+        section: cross-section.
+        pretwist: angle of the section axes about the beam axis (rad), a number or a taper. May also stand in the
             section table.
-        sweep: Angle of the axis in the plane (1, 2), towards direction 2 (rad), over the length of arc: a number, or
+        sweep: angle of the axis in the plane (1, 2), towards direction 2 (rad), over the length of arc: a number, or
             rows (x, angle), which are arcs between, and a kink where one x stands twice.
-        precone: Angle of the beam axis out of the plane (1, 2), towards direction 3 (rad). May also stand in the
+        precone: angle of the beam axis out of the plane (1, 2), towards direction 3 (rad). May also stand in the
             section table.
-        damping: Damping coefficients.
+        damping: damping coefficients.
     """
 
     type: Literal["spatial_beam"] = "spatial_beam"
@@ -141,7 +141,7 @@ class SpatialBeamStructure(SceneModel):
     @model_validator(mode="before")
     @classmethod
     def _lift_from_section(cls, data: Any) -> Any:
-        """Moves pretwist and precone, which describe the beam, out of a section table that holds them."""
+        """Move pretwist and precone, which describe the beam, out of a section table that holds them."""
         section = data.get("section") if isinstance(data, dict) else None
         if not isinstance(section, dict):
             return data

@@ -17,7 +17,7 @@ def _as_rayleigh(value: Any) -> tuple[float, float]:
 
 
 class Damping(SceneModel):
-    """The ``[structure.damping]`` table.
+    """The [structure.damping] table.
 
     Attributes:
         kelvin_voigt: η (s) in stress = C (ε + η ε̇).
@@ -34,6 +34,6 @@ class Damping(SceneModel):
 
 
 def check_one_hub(hub_radius: float, hub_offset: tuple[float, float, float] | None) -> None:
-    """Raises a problem if the clamp's position is given twice."""
+    """Refuse a clamp whose position is given twice."""
     if hub_offset is not None and hub_radius != 0.0:
         raise problem("hub_offset", hub_offset, "give either hub_radius or hub_offset")

@@ -15,7 +15,7 @@ AnyStructure = PlanarBeamStructure | SpatialBeamStructure | PlateStructure
 
 
 def check_planar(motion: Motion, loads: Loads) -> None:
-    """Raises a problem if anything would move a planar beam out of its plane."""
+    """Refuse what would move a planar beam out of its plane."""
     if motion.axis[0] != 0.0 or motion.axis[1] != 0.0:
         raise problem("motion.axis", list(motion.axis), "must be [0, 0, 1] or [0, 0, -1] for a planar_beam")
     vectors = {
@@ -32,7 +32,7 @@ def check_planar(motion: Motion, loads: Loads) -> None:
 
 
 def check_loads(structure: AnyStructure, loads: Loads) -> None:
-    """Raises a problem if the structure cannot bear a moment of that kind at its tip."""
+    """Refuse a moment at the tip that the structure cannot bear."""
     moment = loads.tip_moment
     if moment is None:
         return
@@ -43,7 +43,7 @@ def check_loads(structure: AnyStructure, loads: Loads) -> None:
 
 
 def check_mesh(structure: AnyStructure, mesh: BeamMesh | PlateMesh) -> None:
-    """Raises a problem if the mesh is given both as a file and by numbers of elements, or of elements that lock."""
+    """Refuse a mesh that is given both as a file and by numbers of elements, and elements that lock."""
     if isinstance(structure, PlateStructure) and isinstance(mesh, PlateMesh) and structure.mesh is None:
         why = locking(mesh.cell, mesh.degree_on(mesh.cell), mesh.integration)
         if why is not None:
@@ -55,7 +55,7 @@ def check_mesh(structure: AnyStructure, mesh: BeamMesh | PlateMesh) -> None:
 
 
 def check_theory(structure: AnyStructure, model: Model) -> None:
-    """Raises a problem if the theory has no strains for the structure."""
+    """Refuse a theory that has no strains for the structure."""
     kind, theory = structure.type, registry.theories[model.theory]
     if not theory.holds_for(kind):
         able = ", ".join(show(other.name) for other in registry.theories if other.holds_for(kind))
@@ -64,7 +64,7 @@ def check_theory(structure: AnyStructure, model: Model) -> None:
 
 
 def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:
-    """Raises a problem if the inertial-frame form is asked for where there is none."""
+    """Refuse the inertial-frame form where there is none."""
     if model.frame != "inertial":
         return
     if not isinstance(structure, PlanarBeamStructure) or not registry.theories[model.theory].exact:
@@ -94,7 +94,7 @@ def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:
 
 
 def check_initial(structure: AnyStructure, motion: Motion, initial: Initial) -> None:
-    """Raises a problem if the scene has no such initial state."""
+    """Refuse an initial state that the scene cannot have."""
     displacement = initial.tip_displacement
     if displacement is not None:
         if not isinstance(structure, PlanarBeamStructure):

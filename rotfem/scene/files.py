@@ -13,14 +13,14 @@ from rotfem.scene.values import Matrix, as_increasing_rows, problem
 
 
 def existing_file(value: Any, info: ValidationInfo) -> Path:
-    """Returns the absolute path of a file named in the scene.
+    """Return the absolute path of a file named in the scene.
 
     Args:
-        value: The path, relative to the scene's directory or absolute.
-        info: Validation info; its context holds that directory.
+        value: the path, relative to the scene's directory or absolute.
+        info: validation info; its context holds that directory.
 
     Raises:
-        PydanticCustomError: If it is not a string, or there is no such file.
+        PydanticCustomError: it is not a string, or there is no such file.
     """
     if not isinstance(value, str | Path) or not str(value):
         raise problem("", value, "must be the path of a file")
@@ -36,16 +36,16 @@ def existing_file(value: Any, info: ValidationInfo) -> Path:
 
 
 def as_time_table(value: Any, info: ValidationInfo, columns: Sequence[int], shape: str) -> Matrix:
-    """Returns rows (t, …) with t (s) strictly increasing, at least two.
+    """Return rows (t, …) with t (s) strictly increasing, at least two.
 
     Args:
-        value: The rows, or the path of a CSV file holding them.
-        info: Validation info; its context holds the scene's directory.
-        columns: Allowed numbers of columns.
-        shape: The expected form in words, for the error message.
+        value: the rows, or the path of a CSV file holding them.
+        info: validation info; its context holds the scene's directory.
+        columns: allowed numbers of columns.
+        shape: the expected form in words, for the error message.
 
     Raises:
-        PydanticCustomError: If it is not such a table, or the file cannot be read; of a file it names the line.
+        PydanticCustomError: it is not such a table, or the file cannot be read; of a file it names the line.
     """
     if not isinstance(value, str | Path):
         return as_increasing_rows(value, columns, shape)
@@ -55,15 +55,15 @@ def as_time_table(value: Any, info: ValidationInfo, columns: Sequence[int], shap
 
 
 def read_csv(path: Path) -> dict[int, tuple[float, ...]]:
-    """Returns number of the line ↦ row of a CSV file of finite numbers, all of one length.
+    """Return number of the line ↦ row of a CSV file of finite numbers, all of one length.
 
-    ``#`` starts a comment. The first row may be a header, and is one if none of its cells is a number.
+    `#` starts a comment. The first row may be a header, and is one if none of its cells is a number.
 
     Args:
-        path: File with comma-separated columns.
+        path: file with comma-separated columns.
 
     Raises:
-        PydanticCustomError: If it cannot be read or holds anything else or nothing, naming the line and the cell.
+        PydanticCustomError: it cannot be read or holds anything else or nothing, naming the line and the cell.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -94,7 +94,7 @@ def read_csv(path: Path) -> dict[int, tuple[float, ...]]:
 
 
 def _number(cell: str) -> float | None:
-    """Returns the number in a cell, ``None`` if there is none."""
+    """Return the number in a cell, None if there is none."""
     try:
         return float(cell)
     except ValueError:

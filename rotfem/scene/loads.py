@@ -1,4 +1,4 @@
-"""The ``[loads]`` table, and vectors that are constant, tabulated over time or (in Python) a function of time."""
+"""The [loads] table, and vectors that are constant, tabulated over time or (in Python) a function of time."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from rotfem.scene.values import (
 
 
 def as_function(value: Any) -> Callable[[float], Any]:
-    """Returns the value. Raises if it is not callable."""
+    """Return the value; raise if it is not callable."""
     if not callable(value):
         raise problem("", value, "must be a Python function of the time t (s)")
     function: Callable[[float], Any] = value
@@ -51,14 +51,14 @@ TimeFunction = Annotated[Callable[[float], Any], PlainValidator(as_function)]
 class Signal(SceneModel):
     """A vector over time, given by exactly one of value, table and function.
 
-    In a scene it may be written without its table: ``[…]`` is a value, ``[[t, …], …]`` a table, as is the path of a
+    In a scene it may be written without its table: […] is a value, [[t, …], …] a table, as is the path of a
     CSV file. Vectors with two components get a third one, zero. Ask `at`, which
     covers all three.
 
     Attributes:
-        value: Constant components, or ``None``.
-        table: Rows (t, a1, a2, a3), linear between them and constant outside, or ``None``.
-        function: Python function t (s) ↦ 2 or 3 components, or ``None``.
+        value: constant components, or None.
+        table: rows (t, a1, a2, a3), linear between them and constant outside, or None.
+        function: Python function t (s) ↦ 2 or 3 components, or None.
     """
 
     value: Annotated[tuple[float, ...], PlainValidator(as_padded_vector3)] | None = None
@@ -77,7 +77,7 @@ class Signal(SceneModel):
 
     @property
     def knots(self) -> tuple[float, ...] | None:
-        """Times (s) between which it is linear; ``None`` of a function."""
+        """Times (s) between which it is linear; None of a function."""
         return None if self.function is not None else tuple(row[0] for row in self._rows)
 
     @property
@@ -86,7 +86,7 @@ class Signal(SceneModel):
         return 3 if self.function is not None else len(self._rows[0]) - 1
 
     def at(self, t: float) -> Array:
-        """Components at time t (s), shape (components,)."""
+        """Return the components at time t (s), shape (components,)."""
         if self.function is not None:
             given = np.asarray(self.function(t), dtype=np.float64).ravel()
             return np.append(given, 0.0) if given.size == 2 else given
@@ -132,7 +132,7 @@ class Load(Signal):
     """A force over time, components in the rotating frame (N, or N/m if distributed).
 
     Attributes:
-        kind: ``dead`` (keeps its direction in the rotating frame) or ``follower`` (turns with the section).
+        kind: "dead" (keeps its direction in the rotating frame) or "follower" (turns with the section).
     """
 
     kind: Literal["dead", "follower"] = "dead"
@@ -146,13 +146,13 @@ class MomentLoad(Load):
 
 
 class Loads(SceneModel):
-    """The ``[loads]`` table.
+    """The [loads] table.
 
     Attributes:
-        gravity: Acceleration (m/s²) in inertial axes, which coincide with the frame's at ψ = 0.
-        tip_force: Force at the free end (N), or ``None``.
-        tip_moment: Moment at the free end (N·m), or ``None``.
-        distributed: Force per length (N/m), for a plate per area (N/m²), or ``None``.
+        gravity: acceleration (m/s²) in inertial axes, which coincide with the frame's at ψ = 0.
+        tip_force: force at the free end (N), or None.
+        tip_moment: moment at the free end (N·m), or None.
+        distributed: force per length (N/m), for a plate per area (N/m²), or None.
     """
 
     gravity: PaddedVector = (0.0, 0.0, 0.0)

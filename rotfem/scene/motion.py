@@ -1,4 +1,4 @@
-"""The ``[motion]`` table: how the hub turns and moves."""
+"""The [motion] table: how the hub turns and moves."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ class Motion(SceneModel):
     """What all motions share.
 
     Attributes:
-        axis: Direction of the angular velocity in the frame, of any length.
-        base_acceleration: Absolute acceleration of the frame's origin in frame components (m/s²), or ``None``.
+        axis: direction of the angular velocity in the frame, of any length.
+        base_acceleration: absolute acceleration of the frame's origin in frame components (m/s²), or None.
     """
 
     axis: Annotated[Vector3, PlainValidator(_as_axis)] = (0.0, 0.0, 1.0)
@@ -117,7 +117,7 @@ class SpinUpMotion(Motion):
     """Smooth spin-up from rest, Ω(t) = speed (t/T − sin(2πt/T)/2π), then constant.
 
     Attributes:
-        speed: Final speed (rad/s).
+        speed: final speed (rad/s).
         duration: T (s).
     """
 
@@ -140,8 +140,8 @@ class TableMotion(Motion):
     """Speed interpolated in a table.
 
     Attributes:
-        table: Rows (t, Ω) in s and rad/s.
-        interpolation: ``pchip``, ``cubic`` or ``linear``.
+        table: rows (t, Ω) in s and rad/s.
+        interpolation: "pchip", "cubic" or "linear".
     """
 
     type: Literal["table"]
@@ -166,11 +166,11 @@ class TorqueMotion(Motion):
 
     Attributes:
         hub_inertia: I_R (kg·m²).
-        pulses: Rows (start, end, torque) in s, s, N·m; they add up where they overlap. ``None`` if not given.
-        table: Rows (t, torque), instead of pulses, or ``None``.
-        coupled: Whether the hub feels the structure's elastic motion.
-        hub_damping: Viscous damping of the hub (N·m·s).
-        speed: Initial speed of the hub (rad/s).
+        pulses: rows (start, end, torque) in s, s, N·m; they add up where they overlap. None if not given.
+        table: rows (t, torque), instead of pulses, or None.
+        coupled: whether the hub feels the structure's elastic motion.
+        hub_damping: viscous damping of the hub (N·m·s).
+        speed: initial speed of the hub (rad/s).
     """
 
     type: Literal["torque"]
@@ -198,8 +198,8 @@ class CallableMotion(Motion):
 
     Attributes:
         speed: t (s) ↦ Ω (rad/s).
-        rate: t (s) ↦ dΩ/dt (rad/s²), or ``None``.
-        angle: t (s) ↦ ψ (rad), or ``None``.
+        rate: t (s) ↦ dΩ/dt (rad/s²), or None.
+        angle: t (s) ↦ ψ (rad), or None.
     """
 
     type: Literal["callable"]

@@ -10,7 +10,7 @@ from rotfem.scene.values import did_you_mean, problem
 
 
 def as_name(value: Any, registry: Registry[Any], key: str = "") -> str:
-    """Returns the value. Raises a problem at `key` if it is not the name of an entry."""
+    """Return the value; raise a problem at `key` if it is not the name of an entry."""
     names = registry.names
     if isinstance(value, str) and value in names:
         return value
@@ -18,15 +18,15 @@ def as_name(value: Any, registry: Registry[Any], key: str = "") -> str:
 
 
 def as_names(value: Any, registry: Registry[Any], others: str = "") -> tuple[str, ...]:
-    """Returns the value as a tuple.
+    """Return the value as a tuple.
 
     Args:
-        value: A list of names.
-        registry: What they name: effects or outputs.
-        others: What is allowed beside a list, for the error message.
+        value: a list of names.
+        registry: what they name: effects or outputs.
+        others: what is allowed beside a list, for the error message.
 
     Raises:
-        PydanticCustomError: If it is not a list, or has something in it that is not registered, or is there twice.
+        PydanticCustomError: it is not a list, or has something in it that is not registered, or is there twice.
     """
     names = registry.names
     allowed = f"allowed: {others}a list of {', '.join(names)}" if names else "none are registered"

@@ -1,4 +1,4 @@
-"""The ``[structure]`` table of a plate."""
+"""The [structure] table of a plate."""
 
 from __future__ import annotations
 
@@ -65,12 +65,12 @@ def _as_point_masses(value: Any) -> Matrix:
 
 
 def locking(cell: str, degree: int, integration: str) -> str | None:
-    """Returns why elements of a degree (with reduced or full integration) are refused; ``None`` if they are good.
+    """Return why elements of a degree (with reduced or full integration) are refused; None if they are good.
 
     Args:
-        cell: ``triangle`` or ``quadrilateral``.
-        degree: Polynomial degree.
-        integration: ``reduced`` or ``full`` membrane and shear integration.
+        cell: "triangle" or "quadrilateral".
+        degree: polynomial degree.
+        integration: "reduced" or "full" membrane and shear integration.
     """
     least = {("quadrilateral", "reduced"): 2, ("quadrilateral", "full"): 3, ("triangle", "reduced"): 3}
     needed = least.get((cell, integration), 4)
@@ -90,22 +90,22 @@ class PlateStructure(SceneModel):
     """A plate in the plane (1, 2) of the rotating frame: a rectangle clamped at x = 0, or a mesh file.
 
     Attributes:
-        type: ``plate``.
-        length: Side along x (m); ``None`` with a mesh.
-        width: Side along y (m); ``None`` with a mesh.
-        mesh: Absolute path of a gmsh file with the physical groups ``clamped`` and ``plate``, or ``None``.
-        thickness: Number (m), taper ((x, thickness), …), or with a mesh a dictionary region → thickness.
+        type: "plate".
+        length: side along x (m); None with a mesh.
+        width: side along y (m); None with a mesh.
+        mesh: absolute path of a gmsh file with the physical groups "clamped" and "plate", or None.
+        thickness: number (m), taper ((x, thickness), …), or with a mesh a dictionary region → thickness.
         E: Young's modulus (Pa), isotropic.
         nu: Poisson's ratio, isotropic.
         E1: Young's modulus in direction 1 (Pa), orthotropic; so are E2, nu12, G12.
-        G13: Transverse shear modulus (Pa), orthotropic; G12 if not given. So is G23.
-        rho: Density (kg/m³).
-        shear_correction: Shear correction factor.
-        hub_radius: Distance of the clamped edge from the origin of the frame along direction 1 (m).
-        hub_offset: Position of the plate's origin in the frame (m), instead of the hub radius; ``None`` if not given.
-        point_masses: Rows (x, y, m) in m, m, kg.
-        line_masses: Named edge → mass per length (kg/m); a rectangle has clamped, tip, lower and upper.
-        damping: Damping coefficients.
+        G13: transverse shear modulus (Pa), orthotropic; G12 if not given. So is G23.
+        rho: density (kg/m³).
+        shear_correction: shear correction factor.
+        hub_radius: distance of the clamped edge from the origin of the frame along direction 1 (m).
+        hub_offset: position of the plate's origin in the frame (m), instead of the hub radius; None if not given.
+        point_masses: rows (x, y, m) in m, m, kg.
+        line_masses: named edge → mass per length (kg/m); a rectangle has clamped, tip, lower and upper.
+        damping: damping coefficients.
     """
 
     WAYS: ClassVar[tuple[Way, ...]] = (
@@ -161,16 +161,13 @@ class PlateStructure(SceneModel):
         return True
 
     def thickness_at(self, x: npt.ArrayLike) -> Array:
-        """Thickness at positions along the plate.
+        """Return the thickness (m) at positions along the plate, shape of x.
 
         Args:
-            x: Coordinate from the clamped edge (m), or of the mesh, any shape.
-
-        Returns:
-            Thickness (m), shape of x.
+            x: coordinate from the clamped edge (m), or of the mesh, any shape.
 
         Raises:
-            TypeError: If the thickness is given by region.
+            TypeError: the thickness is given by region.
         """
         if isinstance(self.thickness, dict):
             raise TypeError("the thickness is given by region of the mesh, not along x")

@@ -77,16 +77,16 @@ class Scene(SceneModel):
     """A validated scene. Immutable; `replace` makes variants.
 
     Attributes:
-        structure: What moves: planar beam, spatial beam or plate.
-        motion: How the hub turns and moves.
-        model: Theory, effects and frame.
-        initial: Initial state.
-        loads: Gravity and applied loads.
-        mesh: Discretisation, `BeamMesh` or `PlateMesh`.
-        time: Time interval and scheme, or ``None``.
-        modes: What modes to compute.
-        solver: Settings of Newton's method.
-        output: What to compute beside what is always recorded.
+        structure: what moves: planar beam, spatial beam or plate.
+        motion: how the hub turns and moves.
+        model: theory, effects and frame.
+        initial: initial state.
+        loads: gravity and applied loads.
+        mesh: discretisation, `BeamMesh` or `PlateMesh`.
+        time: time interval and scheme, or None.
+        modes: what modes to compute.
+        solver: settings of Newton's method.
+        output: what to compute beside what is always recorded.
     """
 
     structure: Structure = Field(description="a table [structure]")
@@ -107,18 +107,15 @@ class Scene(SceneModel):
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], name: str = "scene", directory: str | Path = ".") -> Self:
-        """Makes a scene from nested tables.
+        """Return the validated scene of nested tables.
 
         Args:
-            data: The tables as in a TOML file; NumPy arrays and Python functions are welcome.
-            name: Name of the scene, used in errors and for the folder of results.
-            directory: Where relative paths in the scene start.
-
-        Returns:
-            The validated scene.
+            data: the tables as in a TOML file; NumPy arrays and Python functions are welcome.
+            name: name of the scene, used in errors and for the folder of results.
+            directory: where relative paths in the scene start.
 
         Raises:
-            SceneError: If anything in it is not valid.
+            SceneError: anything in it is not valid.
         """
         return cls._validate(to_builtin(data), name, name, str(directory))
 
@@ -152,16 +149,13 @@ class Scene(SceneModel):
         return self._tables
 
     def replace(self, changes: Mapping[str, Any]) -> Self:
-        """Makes a variant of the scene.
+        """Return a variant of the scene, validated from what the user set, with the changes and fresh defaults.
 
         Args:
-            changes: Dotted key → new value, e.g. ``{"model.theory": "linear"}``; ``None`` removes what was set.
-
-        Returns:
-            A new scene, validated from what the user set, with the changes and fresh defaults.
+            changes: dotted key → new value, e.g. `{"model.theory": "linear"}`; None removes what was set.
 
         Raises:
-            SceneError: If the result is not valid.
+            SceneError: the result is not valid.
         """
         tables = self._tables
         for key, value in changes.items():
@@ -169,7 +163,7 @@ class Scene(SceneModel):
         return type(self)._validate(tables, self._name, self._file, self._directory)
 
     def to_dict(self) -> dict[str, Any]:
-        """Tables of everything that was set and all defaults, fit for JSON and TOML; functions become their names."""
+        """Return tables of what was set and of all defaults, fit for JSON and TOML; functions become their names."""
         tables: dict[str, Any] = _plain(self)
         if not self.output.quantities:
             del tables["output"]
@@ -179,27 +173,24 @@ class Scene(SceneModel):
         return tables
 
     def is_dead(self, load: str) -> bool:
-        """Returns whether a load (``tip_force``, ``tip_moment``, ``distributed``) is given and is a dead one."""
+        """Return whether a load (`tip_force`, `tip_moment`, `distributed`) is given and is a dead one."""
         applied: Load | None = getattr(self.loads, load)
         return applied is not None and applied.kind == "dead"
 
     @property
     def frame(self) -> str:
-        """Frame to which displacements refer: ``rotating`` or ``inertial``."""
+        """Frame to which displacements refer: "rotating" or "inertial"."""
         return self.model.frame
 
     def effective_effects(self, spinning: bool | None = None) -> tuple[str, ...]:
-        """Effects that this scene includes.
+        """Return the names of the effects that this scene includes, in the order in which they are registered.
 
-        With ``effects = "auto"`` these are all for which the scene has data (a speed, a tip mass, …); with a list,
+        With `effects = "auto"` these are all for which the scene has data (a speed, a tip mass, …); with a list,
         those of the list for which it has.
 
         Args:
-            spinning: Whether the structure spins; by default what the motion says. A speed sweep, which does not use
+            spinning: whether the structure spins; by default what the motion says. A speed sweep, which does not use
                 the scene's own speed, says True.
-
-        Returns:
-            Names in the order in which effects are registered.
         """
         seen = self if spinning is None else self.model_copy(update={"motion": Swept(self.motion, spinning)})
         listed, rotates = self.model.effects, self.frame == "rotating"
@@ -211,10 +202,10 @@ class Scene(SceneModel):
         )
 
     def check_run(self) -> None:
-        """Checks that the scene can be run: a time history needs times, a steady state a constant speed.
+        """Check that the scene can be run: a time history needs times, a steady state a constant speed.
 
         Raises:
-            SceneError: If there is no ``[time]`` table though the motion is not constant.
+            SceneError: there is no [time] table though the motion is not constant.
         """
         if self.time is None and not self.motion.is_steady:
             raise SceneError(
@@ -247,18 +238,15 @@ class Scene(SceneModel):
 
 
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
-    """Reads a scene from a TOML file.
+    """Return the validated scene of a TOML file.
 
     Args:
-        path: The file; relative paths inside it start at its folder.
-        overrides: Changes such as ``"model.theory=linear"``, applied in order. The value is read as TOML where
+        path: the file; relative paths inside it start at its folder.
+        overrides: changes such as "model.theory=linear", applied in order. The value is read as TOML where
             possible and as a string otherwise.
 
-    Returns:
-        The validated scene.
-
     Raises:
-        SceneError: If the file cannot be read, an override is malformed, or anything in the scene is not valid.
+        SceneError: the file cannot be read, an override is malformed, or anything in the scene is not valid.
     """
     path = Path(path)
     tables = apply_overrides(path.name, read_toml(path), overrides)
@@ -266,7 +254,7 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
 
 
 def as_scene(scene: Scene | str | Path | Mapping[str, Any]) -> Scene:
-    """Returns a validated scene from a scene, the path of a file or nested tables."""
+    """Return a validated scene from a scene, the path of a file or nested tables."""
     if isinstance(scene, Scene):
         return scene
     return Scene.from_dict(scene) if isinstance(scene, Mapping) else load_scene(scene)

@@ -42,10 +42,10 @@ class Section(SceneModel):
     Attributes:
         E: Young's modulus (Pa).
         nu: Poisson's ratio.
-        rho: Density (kg/m³).
-        area: Cross-section area (m²).
-        shape: Name of a registered shape.
-        shear_correction: Shear correction factor; Cowper's for a shape, else 5/6.
+        rho: density (kg/m³).
+        area: cross-section area (m²).
+        shape: name of a registered shape.
+        shear_correction: shear correction factor; Cowper's for a shape, else 5/6.
     """
 
     WAYS: ClassVar[tuple[Way, ...]] = ()
@@ -63,13 +63,13 @@ class Section(SceneModel):
 
     @classmethod
     def keys(cls) -> list[str]:
-        """Returns the keys of the table and the dimensions of all shapes."""
+        """Return the keys of the table and the dimensions of all shapes."""
         dimensions = (key for shape in registry.shapes for keys in shape.choices for key in keys)
         return list(dict.fromkeys([*super().keys(), *dimensions]))
 
     @classmethod
     def ways(cls) -> tuple[Way, ...]:
-        """Returns all ways of giving the section."""
+        """Return all ways of giving the section."""
         return *cls.WAYS, *shape_ways(cls.WITH_SHAPE)
 
     @property
@@ -103,12 +103,12 @@ class Section(SceneModel):
         }
 
     def _at(self, name: str, x: Array) -> Array:
-        """Returns the profile of that name at x; the caller knows from `way` that it is set."""
+        """Return the profile of that name at x; the caller knows from `way` that it is set."""
         profile: Profile = getattr(self, name)
         return evaluate(profile, x)
 
     def _dimensions(self, x: Array) -> dict[str, Array]:
-        """Returns the dimensions of the shape at x; the caller knows from `way` that there is one."""
+        """Return the dimensions of the shape at x; the caller knows from `way` that there is one."""
         return {name: self._at(name, x) for name in self.way.required if name not in MATERIAL_AND_SHAPE}
 
     def _geometry(self, x: Array) -> Geometry:
@@ -117,7 +117,7 @@ class Section(SceneModel):
     @model_validator(mode="before")
     @classmethod
     def _check_shape(cls, data: Any) -> Any:
-        """Checks the name of the shape before the keys, as it says which there are."""
+        """Check the name of the shape before the keys, as it says which there are."""
         if isinstance(data, Mapping) and data.get("shape") is not None:
             as_name(data["shape"], registry.shapes, "shape")
         return data
@@ -136,12 +136,12 @@ class PlanarSection(Section):
     """Cross-section of a planar beam.
 
     Attributes:
-        EA: Axial stiffness (N).
-        GA: Effective shear stiffness GA_s, shear correction included (N).
-        EI: Bending stiffness (N·m²).
+        EA: axial stiffness (N).
+        GA: effective shear stiffness GA_s, shear correction included (N).
+        EI: bending stiffness (N·m²).
         mass_per_length: A_ρ (kg/m).
         rotary_inertia: I_ρ (kg·m).
-        second_moment: Second moment of area for bending in the plane (m⁴).
+        second_moment: second moment of area for bending in the plane (m⁴).
     """
 
     WAYS: ClassVar[tuple[Way, ...]] = (
@@ -166,14 +166,12 @@ class PlanarSection(Section):
         return any(value > 0.0 for _, value in profile) if isinstance(profile, tuple) else profile > 0.0
 
     def at(self, x: npt.ArrayLike) -> dict[str, Array]:
-        """Section properties at positions along the beam.
+        """Return the section properties at positions along the beam, by name, each of the shape of x.
+
+        They are EA (N), GA (N), EI (N·m²), mass_per_length (kg/m) and rotary_inertia (kg·m).
 
         Args:
-            x: Positions from the clamp (m), any shape.
-
-        Returns:
-            ``EA`` (N), ``GA`` (N), ``EI`` (N·m²), ``mass_per_length`` (kg/m) and ``rotary_inertia`` (kg·m), each of
-            the shape of x.
+            x: positions from the clamp (m), any shape.
         """
         x = np.asarray(x, dtype=np.float64)
         way = self.way

@@ -48,10 +48,10 @@ class Shape:
     """A shape of cross-sections, which a section table names and gives the dimensions of.
 
     Attributes:
-        name: What a scene calls it.
-        dimensions: Keys of its dimensions (m), each a number or a taper greater than 0.
+        name: what a scene calls it.
+        dimensions: keys of its dimensions (m), each a number or a taper greater than 0.
         geometry: (nu, **dimensions) ↦ properties; ν and the dimensions are arrays over positions along the beam.
-        alternatives: Further complete sets of keys, any of which may be given instead of `dimensions`.
+        alternatives: further complete sets of keys, any of which may be given instead of `dimensions`.
         check: dimensions ↦ what is allowed, by name of those that are not; asked at the knots of all tapers.
     """
 
@@ -78,15 +78,15 @@ class Shape:
 
 
 def rectangle(nu: Array, width: Array, height: Array) -> Geometry:
-    """Returns the geometry of a solid rectangle, shear correction 10(1+ν)/(12+11ν).
+    """Return the geometry of a solid rectangle, shear correction 10(1+ν)/(12+11ν).
 
     The torsion constant is Saint-Venant's series (Timoshenko & Goodier, Theory of Elasticity, §109)
     J = (a b³/3) [1 − (192/π⁵)(b/a) Σ_{n odd} tanh(nπa/2b)/n⁵] with a ≥ b.
 
     Args:
         nu: Poisson's ratio.
-        width: Side along axis 2 (m).
-        height: Side along axis 3 (m).
+        width: side along axis 2 (m).
+        height: side along axis 3 (m).
     """
     a, b = np.maximum(width, height), np.minimum(width, height)
     series = np.sum(np.tanh(_ODD * np.pi * (a / (2.0 * b))[..., None]) / _ODD**5, axis=-1)
@@ -100,20 +100,20 @@ def rectangle(nu: Array, width: Array, height: Array) -> Geometry:
 
 
 def circle(nu: Array, radius: Array) -> Geometry:
-    """Returns the geometry of a solid circle of the given radius (m), shear correction 6(1+ν)/(7+6ν)."""
+    """Return the geometry of a solid circle of the given radius (m), shear correction 6(1+ν)/(7+6ν)."""
     return tube(nu, radius, np.zeros_like(radius))
 
 
 def tube(nu: Array, outer_radius: Array, inner_radius: Array | None = None, wall: Array | float = 0.0) -> Geometry:
-    """Returns the geometry of a hollow circle.
+    """Return the geometry of a hollow circle.
 
     The shear correction is 6(1+ν)(1+m²)² / [(7+6ν)(1+m²)² + (20+12ν)m²] with m = inner/outer radius.
 
     Args:
         nu: Poisson's ratio.
-        outer_radius: Outer radius (m).
-        inner_radius: Inner radius (m), or None.
-        wall: Thickness of the wall (m), where there is no inner radius.
+        outer_radius: outer radius (m).
+        inner_radius: inner radius (m), or None.
+        wall: thickness of the wall (m), where there is no inner radius.
     """
     inner_radius = outer_radius - wall if inner_radius is None else inner_radius
     second_moment = np.pi / 4.0 * (outer_radius**4 - inner_radius**4)
@@ -129,7 +129,7 @@ def tube(nu: Array, outer_radius: Array, inner_radius: Array | None = None, wall
 
 
 def _hole_fits(outer_radius: Array, **hole: Array) -> dict[str, str]:
-    """Returns what is allowed of an inner radius or a wall thickness that leaves no hole, or no tube."""
+    """Return what is allowed of an inner radius or a wall thickness that leaves no hole, or no tube."""
     return {key: "must be less than outer_radius everywhere" for key, r in hole.items() if np.any(r >= outer_radius)}
 
 

@@ -51,23 +51,23 @@ class SpatialSection(Section):
     For a rectangle the width is along axis 2 and the height along axis 3.
 
     Attributes:
-        EA: Axial stiffness (N).
-        GA2: Effective shear stiffness in direction 2 (N).
-        GA3: Effective shear stiffness in direction 3 (N).
-        GJ: Torsional stiffness (N·m²), about the shear center.
-        EI2: Bending stiffness about axis 2 through the tension center (N·m²).
-        EI3: Bending stiffness about axis 3 through the tension center (N·m²).
-        mass_per_length: Mass per length (kg/m).
+        EA: axial stiffness (N).
+        GA2: effective shear stiffness in direction 2 (N).
+        GA3: effective shear stiffness in direction 3 (N).
+        GJ: torsional stiffness (N·m²), about the shear center.
+        EI2: bending stiffness about axis 2 through the tension center (N·m²).
+        EI3: bending stiffness about axis 3 through the tension center (N·m²).
+        mass_per_length: mass per length (kg/m).
         rotary_inertia2: ∫ρz² dA about axis 2 through the mass center (kg·m).
         rotary_inertia3: ∫ρy² dA about axis 3 through the mass center (kg·m). The polar one is the sum.
         second_moment2: ∫z² dA (m⁴).
         second_moment3: ∫y² dA (m⁴).
         torsion_constant: Saint-Venant's J (m⁴).
-        mass_center: Position (y, z) in the section (m).
-        shear_center: Position (y, z) in the section (m).
-        tension_center: Position (y, z) in the section (m).
-        stiffness: Full 6×6 stiffness matrix.
-        mass: Full 6×6 mass matrix of (velocity, angular velocity) in section axes.
+        mass_center: position (y, z) in the section (m).
+        shear_center: position (y, z) in the section (m).
+        tension_center: position (y, z) in the section (m).
+        stiffness: full 6×6 stiffness matrix.
+        mass: full 6×6 mass matrix of (velocity, angular velocity) in section axes.
     """
 
     WAYS: ClassVar[tuple[Way, ...]] = (
@@ -106,13 +106,12 @@ class SpatialSection(Section):
         return bool(np.any(self.at(knots)["mass"][..., 3:, 3:] != 0.0))
 
     def at(self, x: npt.ArrayLike) -> dict[str, Array]:
-        """Section matrices at positions along the beam.
+        """Return the section matrices `stiffness` and `mass` at positions along the beam, each of shape (…, 6, 6).
+
+        They are in SI units and section axes.
 
         Args:
-            x: Positions from the clamp (m), any shape (…).
-
-        Returns:
-            ``stiffness`` and ``mass``, each of shape (…, 6, 6), in SI units and section axes.
+            x: positions from the clamp (m), any shape (…).
         """
         x = np.asarray(x, dtype=np.float64)
         if self.stiffness is not None and self.mass is not None:
@@ -133,14 +132,13 @@ class SpatialSection(Section):
         }
 
     def central(self, x: npt.ArrayLike) -> dict[str, Array]:
-        """Section properties about their own centers, where both matrices are diagonal; not for full matrices.
+        """Return the section properties about their own centers, each of the shape of x; not for full matrices.
+
+        Both matrices are diagonal there: EA, GA2, GA3 (N), GJ, EI2, EI3 (N·m²), mass_per_length (kg/m),
+        rotary_inertia2 and rotary_inertia3 (kg·m).
 
         Args:
-            x: Positions from the clamp (m), any shape.
-
-        Returns:
-            ``EA``, ``GA2``, ``GA3`` (N), ``GJ``, ``EI2``, ``EI3`` (N·m²), ``mass_per_length`` (kg/m),
-            ``rotary_inertia2`` and ``rotary_inertia3`` (kg·m), each of the shape of x.
+            x: positions from the clamp (m), any shape.
         """
         x = np.asarray(x, dtype=np.float64)
         return dict(zip((*_STIFFNESSES, *_INERTIAS), self._stiffnesses_and_inertias(x), strict=True))
@@ -166,7 +164,7 @@ class SpatialSection(Section):
 
 
 def _offset(axial: tuple[float, float] | None, transverse: tuple[float, float] | None) -> Array:
-    """Returns B (6, 6): motion (v, ω) of the reference axis ↦ axial motion at one center, transverse at another.
+    """Return B (6, 6): motion (v, ω) of the reference axis ↦ axial motion at one center, transverse at another.
 
     It is v + ω×(0, y, z) row by row; the same map holds for strains, with (Γ, K) for (v, ω).
     """

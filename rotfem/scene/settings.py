@@ -38,14 +38,14 @@ Integration = Literal["reduced", "full"]
 
 
 class Model(SceneModel):
-    """The ``[model]`` table.
+    """The [model] table.
 
     Attributes:
-        theory: Name of a registered theory, the order of the strain measure.
-        effects: ``"auto"``, or names of registered effects, those to include.
-        frame: Frame to which displacements refer.
-        tolerance: Relative model error up to which effects are left out and the theory may be poorer, or ``None``.
-        on_exceed: What a run does that leaves the range its model was chosen for.
+        theory: name of a registered theory, the order of the strain measure.
+        effects: "auto", or names of registered effects, those to include.
+        frame: frame to which displacements refer.
+        tolerance: relative model error up to which effects are left out and the theory may be poorer, or None.
+        on_exceed: what a run does that leaves the range its model was chosen for.
     """
 
     theory: Annotated[str, PlainValidator(_as_theory)] = "reissner"
@@ -66,11 +66,11 @@ class Model(SceneModel):
 
 
 class Initial(SceneModel):
-    """The ``[initial]`` table.
+    """The [initial] table.
 
     Attributes:
-        tip_displacement: u₂ of the tip (m) of the static shape from which a planar beam is released, or ``None``.
-        state: ``undeformed``, or ``steady`` to start from the equilibrium at the (constant) speed.
+        tip_displacement: u₂ of the tip (m) of the static shape from which a planar beam is released, or None.
+        state: "undeformed", or "steady" to start from the equilibrium at the (constant) speed.
     """
 
     tip_displacement: Number | None = None
@@ -84,12 +84,12 @@ class Initial(SceneModel):
 
 
 class BeamMesh(SceneModel):
-    """The ``[mesh]`` table of a beam.
+    """The [mesh] table of a beam.
 
     Attributes:
-        elements: Number of elements.
-        degree: Polynomial degree, 1 to 6.
-        integration: Quadrature of the elastic terms; ``reduced`` avoids locking.
+        elements: number of elements.
+        degree: polynomial degree, 1 to 6.
+        integration: quadrature of the elastic terms; "reduced" avoids locking.
     """
 
     elements: Count = 16
@@ -97,18 +97,18 @@ class BeamMesh(SceneModel):
     integration: Integration = "reduced"
 
     def at_most(self, nodes: int) -> Self:
-        """The mesh, with no more elements than so many nodes along the beam need."""
+        """Return the mesh, with no more elements than so many nodes along the beam need."""
         return self.model_copy(update={"elements": min(self.elements, math.ceil(nodes / self.degree))})
 
 
 class PlateMesh(SceneModel):
-    """The ``[mesh]`` table of a plate.
+    """The [mesh] table of a plate.
 
     Attributes:
         elements: (nx, ny) of a rectangle; without meaning if the structure has a mesh file.
-        degree: Polynomial degree, 1 to 6; if not given, 2 on quadrilaterals and 3 on triangles (see `degree_on`).
-        cell: Cell shape of a rectangle; without meaning if the structure has a mesh file.
-        integration: Quadrature of the membrane and shear terms; ``reduced`` avoids locking.
+        degree: polynomial degree, 1 to 6; if not given, 2 on quadrilaterals and 3 on triangles (see `degree_on`).
+        cell: cell shape of a rectangle; without meaning if the structure has a mesh file.
+        integration: quadrature of the membrane and shear terms; "reduced" avoids locking.
     """
 
     elements: Annotated[tuple[int, int], PlainValidator(_as_plate_elements)] = (8, 8)
@@ -119,30 +119,30 @@ class PlateMesh(SceneModel):
     @model_validator(mode="before")
     @classmethod
     def _fill_degree(cls, data: Any) -> Any:
-        """Adds the degree that does not lock on triangles."""
+        """Add the degree that does not lock on triangles."""
         triangles = isinstance(data, Mapping) and data.get("cell") == "triangle"
         return {"degree": 3, **data} if triangles else data
 
     def degree_on(self, cell: str) -> int:
-        """Polynomial degree on cells of a shape: as given, else 2 on quadrilaterals and 3 on triangles."""
+        """Return the polynomial degree on cells of a shape: as given, else 2 on quadrilaterals and 3 on triangles."""
         return 3 if cell == "triangle" and "degree" not in self.model_fields_set else self.degree
 
     def at_most(self, nodes: int) -> Self:
-        """The mesh of a rectangle, with no more elements than so many nodes in each direction need."""
+        """Return the mesh of a rectangle, with no more elements than so many nodes in each direction need."""
         enough = math.ceil(nodes / self.degree)
         return self.model_copy(update={"elements": tuple(min(n, enough) for n in self.elements)})
 
     def locking_on(self, cell: str) -> str | None:
-        """Why the elements lock on cells of a shape; ``None`` if they do not (see `locking`)."""
+        """Return why the elements lock on cells of a shape; None if they do not (see `locking`)."""
         return locking(cell, self.degree_on(cell), self.integration)
 
 
 class Modes(SceneModel):
-    """The ``[modes]`` table.
+    """The [modes] table.
 
     Attributes:
-        count: Number of modes.
-        about: State about which the motion is small: ``steady`` (deformed equilibrium) or ``undeformed``.
+        count: number of modes.
+        about: state about which the motion is small: "steady" (deformed equilibrium) or "undeformed".
     """
 
     count: Count = 6
@@ -150,11 +150,11 @@ class Modes(SceneModel):
 
 
 class Solver(SceneModel):
-    """The ``[solver]`` table.
+    """The [solver] table.
 
     Attributes:
         increment_tolerance: Newton's method stops at this relative size of the increment.
-        max_iterations: Most Newton iterations per solve.
+        max_iterations: most Newton iterations per solve.
     """
 
     increment_tolerance: Positive = 1e-9
@@ -162,10 +162,10 @@ class Solver(SceneModel):
 
 
 class OutputTable(SceneModel):
-    """The ``[output]`` table.
+    """The [output] table.
 
     Attributes:
-        quantities: Names of registered outputs, to be computed beside what is always recorded.
+        quantities: names of registered outputs, to be computed beside what is always recorded.
     """
 
     quantities: Annotated[tuple[str, ...], PlainValidator(_as_outputs)] = ()

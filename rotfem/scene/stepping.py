@@ -1,4 +1,4 @@
-"""The ``[time]`` table: how long, in which steps and by which scheme, whose parameters are keys of the table too."""
+"""The [time] table: how long, in which steps and by which scheme, whose parameters are keys of the table too."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from rotfem.scene.values import Count, Number, Positive, SceneModel, problem
 
 
 def parameters_of(scheme: type) -> dict[str, Field[Any]]:
-    """Returns name ↦ field of the parameters of a class of `Scheme`."""
+    """Return name ↦ field of the parameters of a class of `Scheme`."""
     return {field.name: field for field in fields(scheme) if field.init} if is_dataclass(scheme) else {}
 
 
 def estimates_error(scheme: type) -> bool:
-    """Returns whether a class of `Scheme` says `local_error` itself, rather than have what all schemes inherit."""
+    """Return whether a class of `Scheme` says `local_error` itself, rather than have what all schemes inherit."""
     base: Any = next(parent for parent in scheme.__mro__ if "registry" in vars(parent))
     own: Any = scheme
     return own.local_error is not base.local_error
 
 
 class Time(SceneModel):
-    """The ``[time]`` table. Either step or tolerance is given; the parameters of the scheme are keys as well.
+    """The [time] table. Either step or tolerance is given; the parameters of the scheme are keys as well.
 
     Attributes:
-        end: Final time (s).
-        step: Time step (s), or ``None`` for adaptive steps.
-        tolerance: Error of all adaptive steps together, relative to the largest displacement, or ``None``.
-        max_step: Longest adaptive step (s), or ``None``.
-        min_step: Shortest adaptive step (s), or ``None``.
-        scheme: Name of a registered scheme.
-        output_every: Number of steps from one output to the next.
+        end: final time (s).
+        step: time step (s), or None for adaptive steps.
+        tolerance: error of all adaptive steps together, relative to the largest displacement, or None.
+        max_step: longest adaptive step (s), or None.
+        min_step: shortest adaptive step (s), or None.
+        scheme: name of a registered scheme.
+        output_every: number of steps from one output to the next.
     """
 
     model_config = ConfigDict(extra="allow")
@@ -53,7 +53,7 @@ class Time(SceneModel):
 
     @classmethod
     def keys(cls) -> list[str]:
-        """Returns the keys of the table and the parameters of all schemes."""
+        """Return the keys of the table and the parameters of all schemes."""
         return list(dict.fromkeys([*super().keys(), *(key for s in registry.schemes for key in parameters_of(s))]))
 
     @property
@@ -63,23 +63,23 @@ class Time(SceneModel):
 
     @property
     def spectral_radius(self) -> float | None:
-        """ρ∞ of generalised-α; ``None`` for a scheme without."""
+        """ρ∞ of generalised-α; None for a scheme without."""
         return self.parameters.get("spectral_radius")
 
     @property
     def beta(self) -> float | None:
-        """Newmark's β; ``None`` for a scheme without."""
+        """Newmark's β; None for a scheme without."""
         return self.parameters.get("beta")
 
     @property
     def gamma(self) -> float | None:
-        """Newmark's γ; ``None`` for a scheme without."""
+        """Newmark's γ; None for a scheme without."""
         return self.parameters.get("gamma")
 
     @model_validator(mode="before")
     @classmethod
     def _fill_scheme(cls, data: Any) -> Any:
-        """Adds the parameters of the chosen scheme that are not given; a slip in its name comes before all others."""
+        """Add the parameters of the chosen scheme that are not given; a slip in its name comes before all others."""
         if not isinstance(data, Mapping):
             return data
         given = {key: value for key, value in data.items() if value is not None}

@@ -24,10 +24,10 @@ _KEY = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Returns the content of a TOML file.
+    """Return the content of a TOML file.
 
     Raises:
-        SceneError: If the file is missing, cannot be read or is not valid TOML, saying where.
+        SceneError: the file is missing, cannot be read or is not valid TOML, saying where.
     """
     try:
         text = path.read_bytes().decode("utf-8-sig")
@@ -48,12 +48,12 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def parse_override(file: str, override: str) -> tuple[str, Any]:
-    """Returns key and value of an override such as ``model.theory=linear``.
+    """Return key and value of an override such as `model.theory=linear`.
 
     The value is read as TOML where that is possible and is a string otherwise.
 
     Raises:
-        SceneError: If it is not of the form ``table.key=value``.
+        SceneError: it is not of the form `table.key=value`.
     """
     key, equals, text = (part.strip() for part in override.partition("="))
     if not equals or not text or not _KEY.fullmatch(key):
@@ -67,16 +67,16 @@ def parse_override(file: str, override: str) -> tuple[str, Any]:
 
 
 def set_key(file: str, data: dict[str, Any], key: str, value: Any) -> dict[str, Any]:
-    """Returns a copy of nested tables with one key set, or removed if the value is ``None``.
+    """Return a copy of nested tables with one key set, or removed if the value is None.
 
     Args:
-        file: Name for error messages.
-        data: Nested dictionaries; not changed.
-        key: Dotted path; missing tables on the way are created.
-        value: New value.
+        file: name for error messages.
+        data: nested dictionaries; not changed.
+        key: dotted path; missing tables on the way are created.
+        value: new value.
 
     Raises:
-        SceneError: If a part of the path is not a table.
+        SceneError: a part of the path is not a table.
     """
     *parents, last = key.split(".")
     result = table = dict(data)
@@ -94,7 +94,7 @@ def set_key(file: str, data: dict[str, Any], key: str, value: Any) -> dict[str, 
 
 
 def to_builtin(value: Any) -> Any:
-    """Returns the value with NumPy arrays and numbers, at any depth, as lists and Python numbers."""
+    """Return the value with NumPy arrays and numbers, at any depth, as lists and Python numbers."""
     if isinstance(value, Mapping):
         return {str(key): to_builtin(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
@@ -105,7 +105,7 @@ def to_builtin(value: Any) -> Any:
 
 
 def scene_error(file: str, error: ValidationError) -> SceneError:
-    """Returns the problems found by validation as one error."""
+    """Return the problems found by validation as one error."""
     first, *others = [_problem(dict(details)) for details in error.errors(include_url=False)]
     return SceneError(file, *first, others)
 
@@ -145,10 +145,10 @@ def _problem(details: dict[str, Any]) -> Problem:
 
 
 def apply_overrides(file: str, data: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
-    """Returns a copy of the scene's tables with the overrides applied in order.
+    """Return a copy of the scene's tables with the overrides applied in order.
 
     Raises:
-        SceneError: If an override is malformed or leads through something that is not a table.
+        SceneError: an override is malformed or leads through something that is not a table.
     """
     for override in overrides:
         data = set_key(file, data, *parse_override(file, override))

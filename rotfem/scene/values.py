@@ -26,18 +26,18 @@ Profile: TypeAlias = float | Taper
 
 
 def problem(key: str, value: Any, allowed: str) -> PydanticCustomError:
-    """Returns a validation error that names a key.
+    """Return a validation error that names a key.
 
     Args:
-        key: Dotted path relative to the table being validated; empty for the validated value itself.
-        value: The offending value, ``None`` if the key is absent.
-        allowed: What is wrong and what is allowed.
+        key: dotted path relative to the table being validated; empty for the validated value itself.
+        value: the offending value, None if the key is absent.
+        allowed: what is wrong and what is allowed.
     """
     return PydanticCustomError("scene", "{reason}", {"reason": allowed, "key": key, "value": value})
 
 
 def did_you_mean(name: object, names: Iterable[str]) -> str:
-    """Returns ``'did you mean "x"? '`` for the name closest to `name`, or an empty string if none is close."""
+    """Return 'did you mean "x"? ' for the name closest to `name`, or an empty string if none is close."""
     matches = difflib.get_close_matches(str(name), list(names), n=1)
     return f'did you mean "{matches[0]}"? ' if matches else ""
 
@@ -49,7 +49,7 @@ class SceneModel(BaseModel):
 
     @classmethod
     def keys(cls) -> list[str]:
-        """Returns all keys that the table may have."""
+        """Return all keys that the table may have."""
         return list(cls.model_fields)
 
     @model_validator(mode="before")
@@ -72,7 +72,7 @@ class SceneModel(BaseModel):
 
 @dataclass(frozen=True)
 class Bounds:
-    """An interval of numbers; ``None`` means unbounded. The methods read values and raise if they lie outside."""
+    """An interval of numbers; None means unbounded. The methods read values and raise if they lie outside."""
 
     gt: float | None = None
     ge: float | None = None
@@ -80,7 +80,7 @@ class Bounds:
     le: float | None = None
 
     def contains(self, number: float) -> bool:
-        """Returns whether the number lies in the interval."""
+        """Return whether the number lies in the interval."""
         return (
             (self.gt is None or number > self.gt)
             and (self.ge is None or number >= self.ge)
@@ -93,14 +93,14 @@ class Bounds:
         return " and ".join(f"{word} {bound:g}" for word, bound in words.items() if bound is not None)
 
     def number(self, value: Any) -> float:
-        """Returns the value as a float. Raises if it is not a finite number in the interval."""
+        """Return the value as a float; raise if it is not a finite number in the interval."""
         number = as_number(value)
         if not self.contains(number):
             raise problem("", value, f"must be {self}")
         return number
 
     def integer(self, value: Any) -> int:
-        """Returns the value. Raises if it is not an integer in the interval."""
+        """Return the value; raise if it is not an integer in the interval."""
         if not isinstance(value, int) or isinstance(value, bool):
             raise problem("", value, f"must be an integer {self}")
         # Before the bound check: an integer too long to print, or to become a float, is not a count of anything.
@@ -109,7 +109,7 @@ class Bounds:
         return value
 
     def profile(self, value: Any) -> Profile:
-        """Returns a number or a taper ((x, value), …) with x from 0 upwards. Raises on anything else."""
+        """Return a number or a taper ((x, value), …) with x from 0 upwards; raise on anything else."""
         if not isinstance(value, list | tuple):
             if not isinstance(value, int | float) or isinstance(value, bool):
                 raise problem("", value, f"must be {f'a number {self}'.rstrip()}, or a taper [[x, value], …]")
@@ -124,7 +124,7 @@ class Bounds:
 
 
 def as_number(value: Any) -> float:
-    """Returns the value as a float. Raises if it is not a finite number (booleans and strings are not)."""
+    """Return the value as a float; raise if it is not a finite number (booleans and strings are not)."""
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise problem("", value, "must be a number")
     try:
@@ -139,16 +139,16 @@ def as_number(value: Any) -> float:
 def as_rows(
     value: Any, columns: Sequence[int], shape: str, row_name: Callable[[int], str] = "row {}".format
 ) -> tuple[tuple[float, ...], ...]:
-    """Returns a rectangular table of numbers as a tuple of rows.
+    """Return a rectangular table of numbers as a tuple of rows.
 
     Args:
-        value: A sequence of rows.
-        columns: Allowed numbers of columns; all rows must have the same.
-        shape: The expected form in words, for the error message.
-        row_name: Number of a row, from 1 ↦ what the error message calls it.
+        value: a sequence of rows.
+        columns: allowed numbers of columns; all rows must have the same.
+        shape: the expected form in words, for the error message.
+        row_name: number of a row, from 1 ↦ what the error message calls it.
 
     Raises:
-        PydanticCustomError: If it is not such a table.
+        PydanticCustomError: it is not such a table.
     """
     if not isinstance(value, list | tuple) or not value or not all(isinstance(row, list | tuple) for row in value):
         raise problem("", value, f"must be {shape}")
@@ -169,7 +169,7 @@ def as_rows(
 def as_increasing_rows(
     value: Any, columns: Sequence[int], shape: str, row_name: Callable[[int], str] = "row {}".format
 ) -> tuple[tuple[float, ...], ...]:
-    """Returns `as_rows`, at least two rows of them with a strictly increasing first column, or raises."""
+    """Return `as_rows`, at least two of them with a strictly increasing first column; raise on anything else."""
     rows = as_rows(value, columns, shape, row_name)
     if len(rows) < 2:
         raise problem("", value, f"must be {shape} with at least two rows")
@@ -181,13 +181,13 @@ def as_increasing_rows(
 
 
 def as_taper(value: Any) -> Taper:
-    """Returns a taper ((x, value), …) with x (m) strictly increasing. Raises on anything else."""
+    """Return a taper ((x, value), …) with x (m) strictly increasing; raise on anything else."""
     rows = as_increasing_rows(value, (2,), "a taper [[x, value], …]")
     return tuple((x, number) for x, number in rows)
 
 
 def as_vector(value: Any, sizes: Sequence[int]) -> tuple[float, ...]:
-    """Returns a vector as a tuple of floats. Raises if it has not one of the allowed sizes."""
+    """Return a vector as a tuple of floats; raise if it has not one of the allowed sizes."""
     wanted = " or ".join(str(size) for size in sizes)
     if not isinstance(value, list | tuple) or len(value) not in sizes:
         raise problem("", value, f"must be a list of {wanted} numbers")
@@ -200,27 +200,27 @@ def as_vector(value: Any, sizes: Sequence[int]) -> tuple[float, ...]:
 
 
 def as_vector3(value: Any) -> Vector3:
-    """Returns a vector of three components. Raises on any other size."""
+    """Return a vector of three components; raise on any other size."""
     a, b, c = as_vector(value, (3,))
     return a, b, c
 
 
 def as_padded_vector3(value: Any) -> Vector3:
-    """Returns a vector of three components, the third zero if only two are given. Raises on any other size."""
+    """Return a vector of three components, the third zero if only two are given; raise on any other size."""
     a, b, c = (*as_vector(value, (2, 3)), 0.0)[:3]
     return a, b, c
 
 
 def as_symmetric_matrix(value: Any, size: int, *, definite: bool) -> Matrix:
-    """Returns a symmetric matrix as a tuple of rows.
+    """Return a symmetric matrix as a tuple of rows.
 
     Args:
-        value: A sequence of rows.
-        size: Number of rows and columns.
-        definite: Whether it must be positive definite; positive semidefinite otherwise.
+        value: a sequence of rows.
+        size: number of rows and columns.
+        definite: whether it must be positive definite; positive semidefinite otherwise.
 
     Raises:
-        PydanticCustomError: If the size, the symmetry (to 1e-9 of the largest entry) or the definiteness is wrong.
+        PydanticCustomError: the size, the symmetry (to 1e-9 of the largest entry) or the definiteness is wrong.
     """
     shape = f"a symmetric {size}×{size} matrix"
     rows = as_rows(value, (size,), shape)
@@ -243,7 +243,7 @@ def as_symmetric_matrix(value: Any, size: int, *, definite: bool) -> Matrix:
 
 
 def evaluate(profile: Profile, x: npt.ArrayLike) -> Array:
-    """Returns the profile at positions x (m), shape of x; linear between the knots of a taper."""
+    """Return the profile at positions x (m), shape of x; linear between the knots of a taper."""
     positions = np.asarray(x, dtype=np.float64)
     if isinstance(profile, float | int):
         return np.full(positions.shape, float(profile))
@@ -252,7 +252,7 @@ def evaluate(profile: Profile, x: npt.ArrayLike) -> Array:
 
 
 def check_profile_length(key: str, profile: Profile, length: float) -> None:
-    """Raises a problem at `key` if a taper does not end at the length (m), to a relative 1e-9."""
+    """Refuse a taper that does not end at the length (m), to a relative 1e-9; the problem is at `key`."""
     if isinstance(profile, tuple) and not math.isclose(profile[-1][0], length, rel_tol=1e-9):
         reason = f"the taper must run from x = 0 to the length {length:g}; it ends at {profile[-1][0]:g}"
         raise problem(key, [list(row) for row in profile], reason)

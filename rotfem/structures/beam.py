@@ -61,7 +61,7 @@ class Beam(Structure):
         self.tip_values = TipValues(self.V, np.array([self.length, 0.0, 0.0]))
 
     def stretch(self, strains: list[Strain]) -> Any:
-        """1 + Γ₁, Γ₁ the axial strain."""
+        """Return 1 + Γ₁, Γ₁ the axial strain."""
         return 1 + next(s.value for s in strains if s.name == "axial")
 
     def profile(self, name: str, at: Callable[[Array], Array]) -> Any:

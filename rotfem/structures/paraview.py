@@ -43,16 +43,13 @@ def writer(V: fem.FunctionSpace, name: str, states: Iterable[tuple[float, Array]
 
 
 def write(V: fem.FunctionSpace, name: str, states: list[tuple[float, Array]], folder: Path) -> list[Path]:
-    """Write the displacements of local dof arrays as name.bp (VTX), or as name.xdmf where ADIOS2 is missing.
+    """Write the displacements of local dof arrays as name.bp (VTX), or name.xdmf without ADIOS2; return the path.
 
     Args:
         V: space of the plate's five unknowns.
         name: of the file, without ending.
         states: (time in s or number of the mode, dof array); a complex one gives the fields of both its parts.
         folder: where the file goes.
-
-    Returns:
-        The path.
 
     Raises:
         OutputError: it cannot be written.

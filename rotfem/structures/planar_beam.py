@@ -50,12 +50,12 @@ class PlanarBeam(Beam):
         return ufl.as_vector((self.scalars["hub_radius"] + X + q[0], q[1], 0))
 
     def triad(self, q: Any) -> tuple[Any, Any]:
-        """(t_1, t_2), the section axes turned by alpha, Simo & Vu-Quoc 1986 eq. (1b)."""
+        """Return (t_1, t_2), the section axes turned by alpha, Simo & Vu-Quoc 1986 eq. (1b)."""
         c, s = ufl.cos(q[2]), ufl.sin(q[2])
         return ufl.as_vector((c, s, 0)), ufl.as_vector((-s, c, 0))
 
     def turned(self, q: Any, v: Any) -> Any:
-        """v_1 t_1 + v_2 t_2."""
+        """Return v_1 t_1 + v_2 t_2."""
         t_1, t_2 = self.triad(q)
         return v[0] * t_1 + v[1] * t_2
 

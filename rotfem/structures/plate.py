@@ -45,7 +45,7 @@ def _moment(load: Load, t: float) -> Array:
 
 
 def _voigt(tensor: Any) -> Any:
-    """(e_11, e_22, 2 e_12) of a symmetric tensor."""
+    """Return (e_11, e_22, 2 e_12) of a symmetric tensor."""
     return ufl.as_vector((tensor[0, 0], tensor[1, 1], 2 * tensor[0, 1]))
 
 
@@ -139,16 +139,16 @@ class Plate(Structure):
         return ufl.as_vector([self._root[i] + (x[i] if i < 2 else 0) + q[i] for i in range(3)])
 
     def director(self, q: Any) -> Any:
-        """t, to second order in linear theories, exact in the others."""
+        """Return t, to second order in linear theories, exact in the others."""
         return director(PlateGradients(q).alpha, exact=not self.problem.theory.linear)
 
     def turned(self, q: Any, v: Any) -> Any:
-        """v_1 t_1 + v_2 t_2 + v_3 t."""
+        """Return v_1 t_1 + v_2 t_2 + v_3 t."""
         t = triad(PlateGradients(q).alpha)
         return sum(v[i] * t[i] for i in range(3))
 
     def stretch(self, strains: list[Strain]) -> Any:
-        """(r,1 × r,2)·t."""
+        """Return (r,1 × r,2)·t."""
         p = PlateGradients(self.k.q)
         return ufl.dot(ufl.cross(p.dr[:, 0], p.dr[:, 1]), triad(p.alpha)[2])
 

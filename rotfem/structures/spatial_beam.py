@@ -77,7 +77,7 @@ class SpatialBeam(Beam):
     # --- the undeformed beam ------------------------------------------------------------------------------------
 
     def _undeformed_triad(self) -> tuple[Any, Any, Any]:
-        """t_1⁰, t_2⁰, t_3⁰; without precone and pretwist they are unit vectors that vanish from the forms."""
+        """Return t_1⁰, t_2⁰, t_3⁰; without precone and pretwist they are unit vectors that vanish from the forms."""
         cone, twist = self.data.precone, self.data.pretwist
         beta = self.scalar("precone", cone) if cone != 0.0 else 0
         c, s = (ufl.cos(beta), ufl.sin(beta)) if cone != 0.0 else (1, 0)
@@ -101,11 +101,11 @@ class SpatialBeam(Beam):
         return e_1, c * e_2 + s * e_3, c * e_3 - s * e_2
 
     def _along_triad(self, v: Any) -> Any:
-        """Components of v along t_i⁰."""
+        """Return the components of v along t_i⁰."""
         return ufl.as_vector([sum(t[i] * v[i] for i in range(3)) for t in self._triad])
 
     def _from_triad(self, components: Any) -> Any:
-        """Vector with these components along t_i⁰."""
+        """Return the vector with these components along t_i⁰."""
         return ufl.as_vector([sum(c * t[i] for c, t in zip(components, self._triad, strict=True)) for i in range(3)])
 
     def oriented(self, values: Array) -> Array:
@@ -121,7 +121,7 @@ class SpatialBeam(Beam):
         return self._root + self._axis + ufl.as_vector([q[i] for i in (0, 1, 2)])
 
     def turned(self, q: Any, v: Any) -> Any:
-        """Λ(θ) v."""
+        """Return Λ(θ) v."""
         return SectionTurn(rotation_part(q), self._turn.exact).rotate(v)
 
     def strains(self, measures: Callable[..., tuple[Any, Any]]) -> list[Strain]:
@@ -141,7 +141,7 @@ class SpatialBeam(Beam):
         return bodies + self._tip_bodies() if "tip_mass" in effects else bodies
 
     def _mass(self, density: Any, center: tuple[Any, ...], measure: Any, effect: str = "") -> Body:
-        """Mass at r + Λ c; c has these components along t_i⁰."""
+        """Return mass at r + Λ c; c has these components along t_i⁰."""
         r = self.position(self.k.q)
         if all(isinstance(c, int) for c in center):
             return Body(r, density, measure, effect=effect)

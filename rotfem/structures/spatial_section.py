@@ -123,7 +123,7 @@ class SectionForms:
         return [Strain(n, e, c, measure) for n, e, c in zip(STRAINS, epsilon, stiffness, strict=True)]
 
     def _full_strains(self, epsilon: list[Any], measure: Any) -> list[Strain]:
-        """½ ε·C ε = ½ C_11 (ε_1 + Σ_j C_1j ε_j / C_11)² + ½ Σ_ij (C_ij − C_1i C_1j / C_11) ε_i ε_j, i, j > 1.
+        """Return ½ ε·C ε = ½ C_11 (ε_1 + Σ_j C_1j ε_j / C_11)² + ½ Σ_ij (C_ij − C_1i C_1j / C_11) ε_i ε_j, i, j > 1.
 
         The first strain is the axial one of the section's own tension centre: the axial force is C_11 times it.
         """

@@ -30,15 +30,14 @@ Groups = dict[int, dict[str, int]]
 
 
 def read(gmsh: Any, path: Path, surfaces: Sequence[str]) -> Groups:
-    """Load a file into gmsh, check it, and leave there a model of the plate alone, its nodes numbered from 1.
+    """Return the physical curves and surfaces of a file, of which gmsh then holds a model of the plate alone.
+
+    The file is checked; the nodes of that model are numbered from 1.
 
     Args:
         gmsh: the module; it is initialised here.
         path: the file.
         surfaces: names of the physical surfaces that must make up the plate.
-
-    Returns:
-        The physical curves and surfaces of that model.
 
     Raises:
         BadMesh: the file is not the mesh of a plate.
