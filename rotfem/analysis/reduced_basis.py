@@ -14,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
-from scipy.linalg import block_diag, eig
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.errors import ComputationError
@@ -53,9 +52,12 @@ class SmallPencil(Pencil):
         n = len(k)
         unit = np.sqrt(max(float(np.trace(k)) / max(float(np.trace(m)), 1e-300), 1e-300))
         shifted = [k + target * c + target**2 * m, unit * (c + 2 * target * m), unit**2 * m]
-        nu, vectors = eig(np.block([[-shifted[1], -shifted[2]], [np.eye(n, 2 * n)]]), block_diag(shifted[0], np.eye(n)))
-        if not np.all(np.isfinite(nu)):
-            raise ComputationError("the stiffness matrix is singular", advice="a slightly different speed")
+        # Not as a pencil with K on the right: its stiff directions would set the size of the error for all.
+        try:
+            right_side = np.linalg.solve(shifted[0], np.hstack(shifted[1:]))
+        except np.linalg.LinAlgError:
+            raise ComputationError("the stiffness matrix is singular", advice="a slightly different speed") from None
+        nu, vectors = np.linalg.eig(np.vstack([-right_side, np.eye(n, 2 * n)]))
         order = np.argsort(-np.abs(nu), kind="stable")[: min(2 * count + 2, 2 * n - 2)]
         values = target + unit / nu[order]
         x = vectors[n:, order]
