@@ -22,6 +22,9 @@ import ufl
 from dolfinx import fem
 from dolfinx import jit as dolfinx_jit
 from ufl.algorithms import expand_derivatives
+from ufl.algorithms.map_integrands import map_integrand_dags
+from ufl.constantvalue import Zero
+from ufl.corealg.multifunction import MultiFunction
 
 #: What FFCx says when it has waited in vain, with the file that is in the way; what dolfinx says on the other ranks.
 IN_VAIN, ELSEWHERE = re.compile(r"remove (.*\.c)\)"), "Compilation failed on root node"
@@ -64,7 +67,19 @@ def without(f: Any, *functions: Any) -> Any:
     expanded = expand_derivatives(f)
     if isinstance(expanded, ufl.Form) and expanded.empty():
         return expanded
-    return ufl.replace(expanded, {u: ufl.as_vector([0] * u.ufl_shape[0]) for u in functions})
+    zero = {u: ufl.as_vector([0] * u.ufl_shape[0]) for u in functions}
+    return map_integrand_dags(_NoEmptyBranches(), ufl.replace(expanded, zero))
+
+
+class _NoEmptyBranches(MultiFunction):  # type: ignore[misc]
+    """Makes a conditional zero whose branches are both zero: UFL leaves it, and does not know what to add it to."""
+
+    expr = MultiFunction.reuse_if_untouched
+
+    def conditional(self, o: Any, condition: Any, true: Any, false: Any) -> Any:
+        if isinstance(true, Zero) and isinstance(false, Zero):
+            return Zero(o.ufl_shape, o.ufl_free_indices, o.ufl_index_dimensions)
+        return self.reuse_if_untouched(o, condition, true, false)
 
 
 def quadrature_points(domain: Any, number: int) -> Any:
