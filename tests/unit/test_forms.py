@@ -1,0 +1,45 @@
+"""Forms with functions set to zero: what vanishes is gone, what is left has the same value."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+from basix.ufl import element
+from dolfinx import fem, mesh
+from mpi4py import MPI
+
+from rotfem.numerics import forms
+
+
+@pytest.fixture(scope="module")
+def space() -> Any:
+    line = mesh.create_interval(MPI.COMM_SELF, 2, [0.0, 1.0])
+    return fem.functionspace(line, element("Lagrange", line.basix_cell(), 1, shape=(2,)))
+
+
+def test_a_form_that_vanishes_is_empty(space: Any) -> None:
+    u, v = fem.Function(space), ufl.TestFunction(space)
+    assert forms.without(ufl.inner(ufl.dot(u, u) * u, v) * ufl.dx, u).empty()
+
+
+def test_what_is_left_has_the_value_at_zero(space: Any) -> None:
+    """(1 + |u|²) w·v at u = 0, assembled, is w·v."""
+    u, w, v = fem.Function(space), fem.Function(space), ufl.TestFunction(space)
+    w.x.array[:] = np.arange(len(w.x.array))
+    f = (1 + ufl.dot(u, u)) * ufl.inner(w, v) * ufl.dx
+    found, exact = (fem.assemble_vector(forms.form(g)).array for g in (forms.without(f, u), ufl.inner(w, v) * ufl.dx))
+    np.testing.assert_allclose(found, exact, rtol=1e-14)
+
+
+def test_branches_that_vanish_leave_no_conditional(space: Any) -> None:
+    """The derivative of a rate like θ̇ f(θ), f of two branches, is a sum in which UFL misses the argument otherwise."""
+    q, rate = fem.Function(space), fem.Function(space)
+    v, du = ufl.TestFunction(space), ufl.TrialFunction(space)
+    s = ufl.dot(q, q)
+    factor = ufl.conditional(ufl.lt(s, 1.0), 1 - s, ufl.cos(s))
+    moving = ufl.inner(ufl.derivative(factor * q, q, rate), v) * ufl.dx
+    at_rest = forms.without(ufl.derivative(moving, q, du) + ufl.inner(du, v) * ufl.dx, rate)
+    assert forms.form(at_rest).rank == 2
