@@ -12,7 +12,7 @@ import numpy as np
 
 from rotfem.listeners import Hint
 from rotfem.registry import theories
-from rotfem.scene.scene import ConstantMotion, PlateStructure, Scene, SpatialBeamStructure, SpinUpMotion, TableMotion
+from rotfem.scene.scene import Scene
 
 #: Steps a period, below which the first mode's frequency is off by more than 1 %, and those to be advised.
 FEW_STEPS, GOOD_STEPS = 18, 40
@@ -38,23 +38,11 @@ def estimates(scene: Scene, speed: float, count: int) -> list[Estimate]:
     The spin raises the square of a bending frequency across the plane of rotation by about (n(2n − 1) + 0.2) Ω², and by
     1.5 n(2n − 1) Ω² R/L more with a hub; in the plane by Ω² less. For a chain without hub n(2n − 1) is exact.
     """
-    structure = scene.structure
-    if isinstance(structure, PlateStructure):
+    beam = scene.structure.mean_beam()
+    if beam is None:
         return []
-    x = np.linspace(0.0, structure.length, 33)
-    L, hub = structure.length, structure.hub_radius
-    if isinstance(structure, SpatialBeamStructure):
-        if structure.section.given.keys() & {"stiffness", "mass"}:
-            return []
-        s = {name: float(np.mean(values)) for name, values in structure.section.central(x).items()}
-        bending = {"flap": (s["EI2"], 1.0), "lag": (s["EI3"], 0.0)}
-    else:
-        s = {name: float(np.mean(values)) for name, values in structure.section.at(x).items()}
-        bending = {"lag": (s["EI"], 0.0)}
-    mass = s["mass_per_length"] + structure.tip_mass / L
-    out = [
-        Estimate("axial", n - 0.5, float((n - 0.5) * np.pi / L * np.sqrt(s["EA"] / mass))) for n in range(1, count + 1)
-    ]
+    L, hub, EA, mass, bending = beam
+    out = [Estimate("axial", n - 0.5, float((n - 0.5) * np.pi / L * np.sqrt(EA / mass))) for n in range(1, count + 1)]
     for family, (EI, across) in bending.items():
         for n in range(1, count + 1):
             beta = CANTILEVER[n - 1] if n <= len(CANTILEVER) else (n - 0.5) * np.pi
@@ -62,17 +50,6 @@ def estimates(scene: Scene, speed: float, count: int) -> list[Estimate]:
             spin = (n * (2 * n - 1) * (1 + 1.5 * hub / L) - 0.8 + across) * speed**2
             out.append(Estimate(family, n - 0.5, float(np.sqrt(at_rest + spin))))
     return sorted(out, key=lambda mode: mode.frequency)[:count]
-
-
-def top_speed(scene: Scene) -> float:
-    """Return the largest |Ω| a scene prescribes, rad/s; of a free hub or a Python function 0, which is not known."""
-    motion = scene.motion
-    if isinstance(motion, ConstantMotion):
-        return abs(motion.speed)
-    if isinstance(motion, SpinUpMotion):
-        reached = 1.0 if scene.time is None else min(1.0, scene.time.end / motion.duration)
-        return abs(motion.speed) * (reached - np.sin(2 * np.pi * reached) / (2 * np.pi))
-    return max(abs(row[1]) for row in motion.table) if isinstance(motion, TableMotion) else 0.0
 
 
 def advise(
@@ -89,7 +66,8 @@ def advise(
     """
     if hint is None:
         return []
-    speed = top_speed(scene) if speed is None else abs(speed)
+    end = None if scene.time is None else scene.time.end
+    speed = scene.motion.top_speed(end) if speed is None else abs(speed)
     out = []
     if command == "run":
         out += _step(scene, speed)

@@ -12,6 +12,7 @@ from rotfem.scene.clamp_and_damping import Damping, check_one_hub
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.section import PlanarSection
 from rotfem.scene.section_spatial import SpatialSection
+from rotfem.scene.structure import MeanBeam, StructureTable, means
 from rotfem.scene.values import (
     AnyProfile,
     Array,
@@ -21,7 +22,6 @@ from rotfem.scene.values import (
     Number,
     Positive,
     Profile,
-    SceneModel,
     Vector,
     as_rows,
     as_symmetric_matrix,
@@ -47,7 +47,7 @@ def _as_sweep(value: Any) -> Profile:
     return tuple((row[0], row[1]) for row in rows)
 
 
-class PlanarBeamStructure(SceneModel):
+class PlanarBeamStructure(StructureTable):
     """A beam that moves in the plane (1, 2) of the rotating frame, clamped at X = 0.
 
     Attributes:
@@ -69,6 +69,16 @@ class PlanarBeamStructure(SceneModel):
     damping: Damping = Damping()
 
     @property
+    def is_planar(self) -> bool:
+        """Whether it moves in the plane (1, 2) of the frame only: it does."""
+        return True
+
+    @property
+    def release_limit(self) -> float:
+        """Length (m), which a displacement of the tip to be released from must stay below."""
+        return self.length
+
+    @property
     def has_tip_mass(self) -> bool:
         """Whether there is anything at the tip that has inertia."""
         return self.tip_mass > 0.0 or self.tip_inertia > 0.0
@@ -78,13 +88,19 @@ class PlanarBeamStructure(SceneModel):
         """Whether the sections have rotary inertia."""
         return self.section.has_rotary_inertia
 
+    def mean_beam(self) -> MeanBeam:
+        """Return the uniform beam with the mean of its section."""
+        s = means(self.section.at, self.length)
+        mass = s["mass_per_length"] + self.tip_mass / self.length
+        return MeanBeam(self.length, self.hub_radius, s["EA"], mass, {"lag": (s["EI"], 0.0)})
+
     @model_validator(mode="after")
     def _check_tapers(self) -> Self:
         _check_section_length(self.section, self.length)
         return self
 
 
-class SpatialBeamStructure(SceneModel):
+class SpatialBeamStructure(StructureTable):
     """A beam in space, its axis along direction 1 of the rotating frame (before precone), clamped at X = 0.
 
     Attributes:
@@ -137,6 +153,15 @@ class SpatialBeamStructure(SceneModel):
     def has_rotary_inertia(self) -> bool:
         """Whether the sections have rotary inertia."""
         return self.section.has_rotary_inertia
+
+    def mean_beam(self) -> MeanBeam | None:
+        """Return the uniform beam with the mean of its section; None if that is given by full matrices."""
+        if self.section.given.keys() & {"stiffness", "mass"}:
+            return None
+        s = means(self.section.central, self.length)
+        mass = s["mass_per_length"] + self.tip_mass / self.length
+        bending = {"flap": (s["EI2"], 1.0), "lag": (s["EI3"], 0.0)}
+        return MeanBeam(self.length, self.hub_radius, s["EA"], mass, bending)
 
     @model_validator(mode="before")
     @classmethod

@@ -6,8 +6,8 @@ from rotfem import registry
 from rotfem.errors import show
 from rotfem.scene.beams import PlanarBeamStructure, SpatialBeamStructure
 from rotfem.scene.loads import Loads
-from rotfem.scene.motion import Motion, TorqueMotion
-from rotfem.scene.plates import PlateStructure, locking
+from rotfem.scene.motion import Motion
+from rotfem.scene.plates import PlateStructure
 from rotfem.scene.settings import BeamMesh, Initial, Model, PlateMesh
 from rotfem.scene.values import problem
 
@@ -36,22 +36,21 @@ def check_loads(structure: AnyStructure, loads: Loads) -> None:
     moment = loads.tip_moment
     if moment is None:
         return
-    if isinstance(structure, PlanarBeamStructure) and moment.components != 1 and moment.function is None:
+    if structure.is_planar and moment.components != 1 and moment.function is None:
         raise problem("loads.tip_moment", None, "must have one component, about axis 3, for a planar_beam")
-    if not isinstance(structure, PlanarBeamStructure) and moment.components != 3:
+    if not structure.is_planar and moment.components != 3:
         raise problem("loads.tip_moment", None, f"must have three components for a {structure.type}")
 
 
 def check_mesh(structure: AnyStructure, mesh: BeamMesh | PlateMesh) -> None:
     """Refuse a mesh that is given both as a file and by numbers of elements, and elements that lock."""
-    if isinstance(structure, PlateStructure) and isinstance(mesh, PlateMesh) and structure.mesh is None:
-        why = locking(mesh.cell, mesh.degree_on(mesh.cell), mesh.integration)
-        if why is not None:
-            raise problem("mesh.degree", mesh.degree_on(mesh.cell), why)
-    if isinstance(structure, PlateStructure) and structure.mesh is not None:
-        for key in ("elements", "cell"):
-            if key in mesh.model_fields_set:
-                raise problem(f"mesh.{key}", getattr(mesh, key), "has no meaning with structure.mesh")
+    if structure.mesh_file is None:
+        if (why := mesh.locking) is not None:
+            raise problem("mesh.degree", mesh.degree, why)
+        return
+    for key in ("elements", "cell"):
+        if key in mesh.model_fields_set:
+            raise problem(f"mesh.{key}", getattr(mesh, key), "has no meaning with structure.mesh")
 
 
 def check_theory(structure: AnyStructure, model: Model) -> None:
@@ -67,7 +66,7 @@ def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:
     """Refuse the inertial-frame form where there is none."""
     if model.frame != "inertial":
         return
-    if not isinstance(structure, PlanarBeamStructure) or not registry.theories[model.theory].exact:
+    if not structure.is_planar or not registry.theories[model.theory].exact:
         exact = (show(theory.name) for theory in registry.theories if theory.exact and theory.holds_for("planar_beam"))
         raise problem(
             "model.frame",
@@ -75,7 +74,7 @@ def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:
             f'needs structure.type = "planar_beam" and model.theory = {" or ".join(exact)}: displacements relative to '
             "the inertial frame are large, which only exact strains allow",
         )
-    if isinstance(motion, TorqueMotion):
+    if motion.is_free:
         raise problem("model.frame", model.frame, 'is not available with motion.type = "torque"; use "rotating"')
     if structure.damping.rayleigh[0] > 0.0:
         raise problem(
@@ -95,12 +94,12 @@ def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:
 
 def check_initial(structure: AnyStructure, motion: Motion, initial: Initial) -> None:
     """Refuse an initial state that the scene cannot have."""
-    displacement = initial.tip_displacement
+    displacement, limit = initial.tip_displacement, structure.release_limit
     if displacement is not None:
-        if not isinstance(structure, PlanarBeamStructure):
+        if limit is None:
             raise problem("initial.tip_displacement", displacement, "is allowed only for a planar_beam")
-        if abs(displacement) >= structure.length:
-            reason = f"must be less than the length {structure.length:g} in size"
+        if abs(displacement) >= limit:
+            reason = f"must be less than the length {limit:g} in size"
             raise problem("initial.tip_displacement", displacement, reason)
     if initial.state == "steady" and not motion.is_steady:
         raise problem("initial.state", initial.state, 'needs motion.type = "constant"')

@@ -71,6 +71,11 @@ class Motion(SceneModel):
         return True
 
     @property
+    def is_free(self) -> bool:
+        """Whether the hub is free, its angle an unknown."""
+        return False
+
+    @property
     def is_accelerated(self) -> bool:
         """Whether the origin has an acceleration."""
         return self.base_acceleration is not None and not self.base_acceleration.is_zero
@@ -79,6 +84,10 @@ class Motion(SceneModel):
     def is_coupled(self) -> bool:
         """Whether the structure moves a free hub."""
         return False
+
+    def top_speed(self, end: float | None) -> float:
+        """Return the largest |Ω| (rad/s) that is prescribed until `end` (s), or ever; 0 if it is not known."""
+        return 0.0
 
 
 class Swept:
@@ -112,6 +121,10 @@ class ConstantMotion(Motion):
         """Whether the spin rate changes: it does not."""
         return False
 
+    def top_speed(self, end: float | None) -> float:
+        """Return |Ω| (rad/s)."""
+        return abs(self.speed)
+
 
 class SpinUpMotion(Motion):
     """Smooth spin-up from rest, Ω(t) = speed (t/T − sin(2πt/T)/2π), then constant.
@@ -134,6 +147,11 @@ class SpinUpMotion(Motion):
     def changes_speed(self) -> bool:
         """Whether the hub starts at all."""
         return self.speed != 0.0
+
+    def top_speed(self, end: float | None) -> float:
+        """Return the |Ω| (rad/s) that is reached until `end` (s)."""
+        reached = 1.0 if end is None else min(1.0, end / self.duration)
+        return abs(self.speed) * (reached - math.sin(2 * math.pi * reached) / (2 * math.pi))
 
 
 class TableMotion(Motion):
@@ -160,6 +178,10 @@ class TableMotion(Motion):
         """Whether there are two speeds in the table."""
         return len({speed for _, speed in self.table}) > 1
 
+    def top_speed(self, end: float | None) -> float:
+        """Return the largest |Ω| (rad/s) of the table."""
+        return max(abs(speed) for _, speed in self.table)
+
 
 class TorqueMotion(Motion):
     """Free hub under a torque; the hub angle is an unknown.
@@ -180,6 +202,11 @@ class TorqueMotion(Motion):
     coupled: Annotated[bool, Field(strict=True)] = True
     hub_damping: NonNegative = 0.0
     speed: Number = 0.0
+
+    @property
+    def is_free(self) -> bool:
+        """Whether the hub is free: it is."""
+        return True
 
     @property
     def is_coupled(self) -> bool:

@@ -12,6 +12,7 @@ from pydantic_core import PydanticCustomError
 from rotfem.scene.alternatives import Way, choose_way
 from rotfem.scene.clamp_and_damping import Damping, check_one_hub
 from rotfem.scene.files import existing_file
+from rotfem.scene.structure import StructureTable
 from rotfem.scene.values import (
     Array,
     Bounds,
@@ -21,7 +22,6 @@ from rotfem.scene.values import (
     PoissonRatio,
     Positive,
     Profile,
-    SceneModel,
     ShearCorrection,
     Taper,
     Vector,
@@ -86,7 +86,7 @@ def _as_mesh_file(value: Any, info: ValidationInfo) -> str:
     return str(existing_file(value, info))
 
 
-class PlateStructure(SceneModel):
+class PlateStructure(StructureTable):
     """A plate in the plane (1, 2) of the rotating frame: a rectangle clamped at x = 0, or a mesh file.
 
     Attributes:
@@ -139,6 +139,11 @@ class PlateStructure(SceneModel):
     point_masses: Annotated[Matrix, PlainValidator(_as_point_masses)] = ()
     line_masses: dict[str, Positive] = Field(default_factory=dict)
     damping: Damping = Damping()
+
+    @property
+    def mesh_file(self) -> str | None:
+        """Absolute path of the file that its mesh is in, None of a rectangle."""
+        return self.mesh
 
     @property
     def is_orthotropic(self) -> bool:

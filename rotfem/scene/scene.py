@@ -167,7 +167,7 @@ class Scene(SceneModel):
         tables: dict[str, Any] = _plain(self)
         if not self.output.quantities:
             del tables["output"]
-        if isinstance(self.structure, PlateStructure) and self.structure.mesh is not None:
+        if self.structure.mesh_file is not None:
             without = {"elements", "cell"} | ({"degree"} - self.mesh.model_fields_set)
             tables["mesh"] = {key: value for key, value in tables["mesh"].items() if key not in without}
         return tables
@@ -227,7 +227,7 @@ class Scene(SceneModel):
 
     @model_validator(mode="after")
     def _check_combinations(self) -> Self:
-        if isinstance(self.structure, PlanarBeamStructure):
+        if self.structure.is_planar:
             check_planar(self.motion, self.loads)
         check_loads(self.structure, self.loads)
         check_mesh(self.structure, self.mesh)

@@ -96,6 +96,11 @@ class BeamMesh(SceneModel):
     degree: Degree = 3
     integration: Integration = "reduced"
 
+    @property
+    def locking(self) -> str | None:
+        """Why the elements lock; None, as those of beams are not refused."""
+        return None
+
     def at_most(self, nodes: int) -> Self:
         """Return the mesh, with no more elements than so many nodes along the beam need."""
         return self.model_copy(update={"elements": min(self.elements, math.ceil(nodes / self.degree))})
@@ -115,6 +120,11 @@ class PlateMesh(SceneModel):
     degree: Degree = 2
     cell: Literal["quadrilateral", "triangle"] = "quadrilateral"
     integration: Integration = "reduced"
+
+    @property
+    def locking(self) -> str | None:
+        """Why the elements of a rectangle lock; None if they do not."""
+        return self.locking_on(self.cell)
 
     @model_validator(mode="before")
     @classmethod

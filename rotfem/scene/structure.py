@@ -1,0 +1,60 @@
+"""What every structure of a scene is asked, whatever its type."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.scene.values import Array, SceneModel
+
+#: Places along a beam that a mean of its section is taken over.
+PLACES = 33
+
+
+class MeanBeam(NamedTuple):
+    """The uniform beam that a structure is, roughly.
+
+    Attributes:
+        length: L (m).
+        hub_radius: distance of the clamp from the axis of rotation (m).
+        EA: axial stiffness (N).
+        mass_per_length: kg/m, with the tip mass spread over the length.
+        bending: family of modes ↦ bending stiffness EI (N·m²), and 1 across the plane of rotation, 0 in it.
+    """
+
+    length: float
+    hub_radius: float
+    EA: float
+    mass_per_length: float
+    bending: dict[str, tuple[float, float]]
+
+
+def means(properties: Callable[[npt.ArrayLike], dict[str, Array]], length: float) -> dict[str, float]:
+    """Return the means over a length (m) of section properties, a function of the places (m)."""
+    return {name: float(np.mean(values)) for name, values in properties(np.linspace(0.0, length, PLACES)).items()}
+
+
+class StructureTable(SceneModel):
+    """The [structure] table."""
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether it moves in the plane (1, 2) of the frame only, and has rotations about axis 3 only."""
+        return False
+
+    @property
+    def mesh_file(self) -> str | None:
+        """Absolute path of the file that its mesh is in, None if [mesh] has numbers of elements."""
+        return None
+
+    @property
+    def release_limit(self) -> float | None:
+        """Size (m) that a displacement of the tip must stay below to be released from; None if it cannot be."""
+        return None
+
+    def mean_beam(self) -> MeanBeam | None:
+        """Return the uniform beam that it is, roughly; None if it is like none, or that is not known."""
+        return None
