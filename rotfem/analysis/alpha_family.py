@@ -57,7 +57,8 @@ class AlphaFamily(Scheme):
         Zienkiewicz & Xie 1991, eq. (14): the term of the Taylor series that Newmark's β does not match.
         """
         h, beta = new.t - old.t, self.coefficients[2]
-        return abs(beta - 1 / 6) * h * h * (new.memory - old.memory)
+        change: Array = new.memory - old.memory
+        return abs(beta - 1 / 6) * h * h * change
 
     def resized(self, new: State, old: State, h: float) -> State:
         """Return the state with the auxiliary acceleration moved to where the next step takes it.

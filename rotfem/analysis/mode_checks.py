@@ -39,7 +39,7 @@ def linearisation_error(analysis: ModalAnalysis, spinning: Spinning) -> float:
 
     def residual(q: Array, v: Array, a: Array) -> Array:
         system.set_state(q, v, a)
-        return -system.residual_in_motion().array.copy()
+        return -np.asarray(system.residual_in_motion().array)
 
     owned = system.V.dofmap.index_map.size_local * system.V.dofmap.index_map_bs
     direction[system.clamped] = 0.0

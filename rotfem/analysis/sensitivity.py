@@ -89,7 +89,8 @@ class Sensitivity:
         b = system.residual().copy()
         DirectSolver(system.material).solve(b, x)
         solution.x.scatter_forward()
-        return solution.x.array.copy()
+        static: Array = solution.x.array.copy()
+        return static
 
     # --- the forms ---------------------------------------------------------------------------------------------------
 

@@ -30,12 +30,12 @@ class Moment:
     @property
     def angle(self) -> float:
         """Angle psi of the frame, rad."""
-        return self._set().motion.angle(self.t)
+        return float(self._set().motion.angle(self.t))
 
     @property
     def speed(self) -> float:
         """Speed of the frame, rad/s."""
-        return self._set().motion.speed(self.t)
+        return float(self._set().motion.speed(self.t))
 
     def energies(self) -> dict[str, float]:
         """Return kinetic and strain energy and the Jacobi integral, J."""

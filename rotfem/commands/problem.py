@@ -220,7 +220,7 @@ def motion_of(scene: Scene) -> Motion:
         "is_accelerated": m.is_accelerated,
         "base_knots": None if base is None else base.knots,
     }
-    motion = _MOTIONS[m.type](m, {"axis": m.axis, **more})
+    motion: Motion = _MOTIONS[m.type](m, {"axis": m.axis, **more})
     return motion if base is None or base.constant else motion.with_changing_base()
 
 

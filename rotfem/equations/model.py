@@ -138,4 +138,4 @@ class Model:
             self._stretch = forms.expression(self.structure.stretch(self.mechanics.strains), points, self.comm)
         cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local)
         lowest = float(self._stretch.eval(mesh, cells).min()) if len(cells) else 1.0
-        return self.comm.allreduce(lowest, op=MPI.MIN) <= 0.0
+        return bool(self.comm.allreduce(lowest, op=MPI.MIN) <= 0.0)

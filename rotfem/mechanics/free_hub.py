@@ -45,8 +45,7 @@ class Torque:
         if self.table is not None:
             rows = np.array(self.table)
             return float(np.interp(t, rows[:, 0], rows[:, 1]))
-        inside = (lambda a, b: a <= t < b) if after else (lambda a, b: a < t <= b)
-        return float(sum(torque for start, end, torque in self._pulses if inside(start, end)))
+        return float(sum(M for start, end, M in self._pulses if (start <= t < end if after else start < t <= end)))
 
 
 @dataclass(frozen=True)

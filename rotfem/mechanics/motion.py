@@ -180,7 +180,7 @@ def tabulated(table: npt.ArrayLike, kind: str) -> tuple[Scalar, Scalar, Scalar]:
 
     def angle(s: float) -> float:
         inside = float(area(np.clip(s, first, last)))
-        return inside + omega[0] * min(s - first, 0.0) + omega[-1] * max(s - last, 0.0) - at_zero
+        return float(inside + omega[0] * min(s - first, 0.0) + omega[-1] * max(s - last, 0.0) - at_zero)
 
     return (
         lambda s: float(curve(np.clip(s, first, last))),

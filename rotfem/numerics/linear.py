@@ -93,7 +93,8 @@ class Increment:
 
     def __init__(self, V: fem.FunctionSpace):
         self.function = fem.Function(V)
-        self._x, self._array = compat.wrap(self.function.x), self.function.x.array
+        self._x = compat.wrap(self.function.x)
+        self._array: Array = self.function.x.array
         self._shared = V.mesh.comm.size > 1
 
     def solve(self, solver: DirectSolver, b: Any) -> Array:

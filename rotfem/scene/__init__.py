@@ -28,6 +28,36 @@ from rotfem.scene.scene import (
 )
 from rotfem.scene.section_shapes import Geometry, Shape
 
+__all__ = [
+    "EFFECTS",
+    "THEORIES",
+    "BeamMesh",
+    "CallableMotion",
+    "ConstantMotion",
+    "Geometry",
+    "Initial",
+    "Load",
+    "Loads",
+    "Model",
+    "Modes",
+    "MomentLoad",
+    "OutputTable",
+    "PlanarBeamStructure",
+    "PlateMesh",
+    "PlateStructure",
+    "Scene",
+    "Shape",
+    "Signal",
+    "Solver",
+    "SpatialBeamStructure",
+    "SpinUpMotion",
+    "TableMotion",
+    "Time",
+    "TorqueMotion",
+    "as_scene",
+    "load_scene",
+]
+
 #: Names of all effects, and of all theories from the poorest to the richest, as they are registered when asked for.
 EFFECTS: tuple[str, ...]
 THEORIES: tuple[str, ...]

@@ -90,8 +90,8 @@ class Candidate:
         pencil = Pencil(*matrices)
         if self.system.hub is None:
             return pencil.solve(count).values[:count]
-        values = Pencil(*self.system.with_hub(matrices)).solve(count, pencil.scale()).values
-        flexible = np.abs(values) > ZERO * np.median(np.abs(values))
+        values: Array = Pencil(*self.system.with_hub(matrices)).solve(count, pencil.scale()).values
+        flexible: Array = np.abs(values) > ZERO * np.median(np.abs(values))
         return values[flexible][: count - int(not flexible.all())]
 
     def history(self, steps: Steps, q: Array | None, out: Outputs, watch: Watch) -> None:

@@ -12,7 +12,8 @@ from mpi4py import MPI
 
 from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
 from rotfem.mechanics.problem import Problem
-from rotfem.structures.beam import Array, Beam
+from rotfem.structures.beam import Beam
+from rotfem.structures.structure import Array
 
 
 class PlanarBeam(Beam):
@@ -40,7 +41,8 @@ class PlanarBeam(Beam):
         self.scalar("hub_radius", s.hub_radius)
 
     def _property(self, name: str, x: Array) -> Array:
-        return self.data.section.at(x)[name]
+        properties: dict[str, Array] = self.data.section.at(x)
+        return properties[name]
 
     # --- kinematics ---------------------------------------------------------------------------------------------
 

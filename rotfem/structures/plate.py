@@ -276,7 +276,7 @@ class Plate(Structure):
         pattern = Delaunay(self.V.element.basix_element.points).simplices  # of one cell, between its nodes
         here = dofmap.index_map.local_to_global(cells[:, pattern].reshape(-1).astype(np.int32)).reshape(-1, 3)
         # The nodes that `gather` returns are in the order of their global numbers.
-        triangles = np.concatenate(self.comm.allgather(here))
+        triangles: npt.NDArray[np.int64] = np.concatenate(self.comm.allgather(here))
         place = np.empty(dofmap.index_map.size_global, dtype=np.int64)
         place[self._order[1]] = np.arange(len(place))
         return place[triangles]

@@ -27,8 +27,9 @@ from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
 from rotfem.mechanics.loads import Load
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.rotations import FULL_TURN
-from rotfem.structures.beam import Array, Beam
+from rotfem.structures.beam import Beam
 from rotfem.structures.spatial_section import SectionForms, euler_tensor
+from rotfem.structures.structure import Array
 from rotfem.structures.swept_axis import swept_axis
 from rotfem.structures.turning_bodies import AppliedMoment, Director, OffsetMass, SectionTurn, rotation_part
 
@@ -112,7 +113,7 @@ class SpatialBeam(Beam):
         """Return components along the undeformed beam, without its pretwist, of nodal values (n, 6, …)."""
         c, s = np.cos(self.data.precone), np.sin(self.data.precone)
         R = np.kron(np.eye(2), np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]))
-        return np.einsum("ij,nj...->ni...", R, values)
+        return np.asarray(np.einsum("ij,nj...->ni...", R, values))
 
     # --- kinematics ---------------------------------------------------------------------------------------------
 

@@ -16,7 +16,8 @@ import ufl
 
 from rotfem.errors import InputError
 from rotfem.mechanics.bodies import Strain
-from rotfem.structures.beam import Array, Beam
+from rotfem.structures.beam import Beam
+from rotfem.structures.structure import Array
 
 #: Strains in the order of the section matrices, and the stiffness of each.
 STRAINS = {
@@ -80,7 +81,8 @@ class SectionForms:
         ]
 
     def _central(self, name: str, x: Array) -> Array:
-        return self._data.central(x)[name]
+        central: dict[str, Array] = self._data.central(x)
+        return central[name]
 
     def _read_full(self) -> None:
         beam, data = self._beam, self._data

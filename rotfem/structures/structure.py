@@ -106,7 +106,7 @@ class Structure:
         """Return how many unknowns are not clamped, over all processes."""
         owned = self.V.dofmap.index_map.size_local
         clamped = int(np.count_nonzero(self.clamped < owned))
-        return self.size * (self.V.dofmap.index_map.size_global - int(self.comm.allreduce(clamped)))
+        return self.size * int(self.V.dofmap.index_map.size_global - self.comm.allreduce(clamped))
 
     def position(self, q: Any) -> Any:
         """Return the axis or mid-surface r(q), frame components (m)."""

@@ -9,7 +9,8 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
-from rotfem.structures.beam import Array, Beam
+from rotfem.structures.beam import Beam
+from rotfem.structures.structure import Array
 
 #: Degree of the polynomials the axis of an arc is held in; strains see its exact angle, only inertia sees these.
 AXIS_DEGREE = 5

@@ -130,9 +130,9 @@ class Study:
 
     def measure(self, setting: Setting, repeat: int) -> Measurement:
         """Return the measurement of a setting, from the record where it has it."""
-        found, earlier = self.comm.bcast((self.record.get(setting, repeat), self.record.is_earlier(setting)))
+        found: Measurement | None = self.comm.bcast(self.record.get(setting, repeat))
         if found is not None:
-            if earlier:
+            if self.comm.bcast(self.record.is_earlier(setting)):
                 self.taken.add(setting)
             return found
         measurement: Measurement = self.comm.bcast(self.bench.measure(setting, repeat))
