@@ -22,10 +22,9 @@ from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
 from rotfem.mechanics.loads import Load
 from rotfem.mechanics.mindlin import PlateGradients, director, triad
 from rotfem.mechanics.problem import Problem
-from rotfem.numerics import forms
 from rotfem.structures.meshes.plate_mesh import PlateGrid, plate_grid
 from rotfem.structures.mode_names import plate_mode_name, turning
-from rotfem.structures.plate_loads import EdgeMoment, PointPlace, locate, point_measure
+from rotfem.structures.plate_loads import PointPlace, TipEdge, locate, point_measure
 from rotfem.structures.plate_section import constants, plane_stress, shear_moduli, thickness_field
 from rotfem.structures.structure import Array, Structure
 from rotfem.structures.tip_values import TipValues
@@ -216,8 +215,8 @@ class Plate(Structure):
     def loads(self) -> list[AppliedLoad]:
         """Return the problem's non-zero loads: tip force and moment are spread over the edge "tip".
 
-        A director has no rotation about itself: the third component of the moment is a couple of forces in the plane,
-        e_3×(X − X_c) in direction and growing with the distance from the middle X_c of the edge.
+        Raises:
+            InputError: there is no such edge for them.
         """
         loads = self.problem.loads
         for name in ("tip_force", "tip_moment"):
@@ -230,36 +229,13 @@ class Plate(Structure):
                 )
         moment, out = loads.tip_moment, self.forces()
         if moment is not None and not moment.is_zero:
-            m, dead, q = self.add_load("tip_moment", 3, partial(_moment, moment)), moment.kind == "dead", self.k.q
-            tilting, alpha = ufl.as_vector((m[0], m[1], 0)), PlateGradients(q).alpha
-            density = self.spread("tip_moment", tilting if dead else self.turned(q, tilting))
-            about = ufl.as_vector((alpha[1], -alpha[0], 0))
-            out.append(EdgeMoment("tip_moment", density, about, self.tip, dead, director=self.director(q)))
-            couple = m[2] * self._couple()
-            force = couple if dead else self.turned(q, couple)
-            out.append(AppliedLoad("tip_moment", force, self.position(q), self.tip, dead))
+            m = self.add_load("tip_moment", 3, partial(_moment, moment))
+            out += TipEdge(self).moment(m, moment.kind == "dead", self.director(self.k.q))
         return out
 
     def spread(self, name: str, load: Any) -> Any:
         """Return a load of the tip over the length of its edge."""
-        if name == "distributed":
-            return load
-        if "tip_length" not in self.scalars:
-            self.scalar("tip_length", self._along_tip(self.constant(1.0)))
-        return load / self.scalars["tip_length"]
-
-    def _couple(self) -> Any:
-        """Return the forces along the edge "tip" (per length, in the plane) that make a couple of one."""
-        x = ufl.SpatialCoordinate(self.mesh)
-        length = self._along_tip(self.constant(1.0))
-        middle = [self._along_tip(x[i]) / length for i in range(2)]
-        arm = ufl.as_vector([x[i] - self.scalar(f"tip_middle_{i + 1}", middle[i]) for i in range(2)])
-        inertia = self.scalar("tip_inertia", self._along_tip(ufl.dot(arm, arm)))
-        return ufl.as_vector((-arm[1], arm[0], 0)) / inertia
-
-    def _along_tip(self, density: Any) -> float:
-        """Return the integral of a density over the edge "tip"."""
-        return float(self.comm.allreduce(float(fem.assemble_scalar(forms.form(density * self.tip)))))
+        return load if name == "distributed" else TipEdge(self).spread(load)
 
     # --- values -----------------------------------------------------------------------------------------------------
 

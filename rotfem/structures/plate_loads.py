@@ -1,4 +1,4 @@
-"""What works on a plate at a point or along an edge: the measure of a point, a moment spread over an edge."""
+"""What works on a plate at a point or along an edge: the measure of a point, loads spread over the edge "tip"."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import ufl
-from dolfinx import geometry
+from dolfinx import fem, geometry
 
 from rotfem.mechanics.bodies import AppliedLoad, Kinematics
+from rotfem.mechanics.mindlin import PlateGradients
+from rotfem.numerics import forms
+from rotfem.structures.structure import Structure
 
 #: Distance from a cell, relative to the size of the mesh, at which a point still counts as in it.
 NEAR = 1e-9
@@ -100,3 +103,61 @@ class EdgeMoment(AppliedLoad):
     def rigid_turn(self, e: Any) -> Any:
         """Return the turn in a unit rigid turn about e, without its part along t."""
         return e - ufl.dot(e, self.director) * self.director
+
+
+class TipEdge:
+    """The edge "tip" of a plate, along which the loads of the tip are spread.
+
+    Args:
+        plate: the discretised plate; its `tip` is the measure of the edge.
+    """
+
+    def __init__(self, plate: Structure):
+        self._plate = plate
+
+    def spread(self, load: Any) -> Any:
+        """Return a load over the length of the edge."""
+        scalars = self._plate.scalars
+        if "tip_length" not in scalars:
+            self._plate.scalar("tip_length", self._length())
+        return load / scalars["tip_length"]
+
+    def moment(self, m: Any, dead: bool, director: Any) -> list[AppliedLoad]:
+        """Return what a moment is on the edge: one on its directors, and a couple of forces in the plane.
+
+        A director has no rotation about itself: the third component of the moment is the couple, e_3×(X − X_c) in
+        direction and growing with the distance from the middle X_c of the edge.
+
+        Args:
+            m: components of the moment, N·m.
+            dead: whether its direction does not depend on q.
+            director: the unit director t(q).
+        """
+        plate, q = self._plate, self._plate.k.q
+        tilting, alpha = ufl.as_vector((m[0], m[1], 0)), PlateGradients(q).alpha
+        density = self.spread(tilting if dead else plate.turned(q, tilting))
+        about = ufl.as_vector((alpha[1], -alpha[0], 0))
+        couple = m[2] * self._couple()
+        force = couple if dead else plate.turned(q, couple)
+        return [
+            EdgeMoment("tip_moment", density, about, plate.tip, dead, director=director),
+            AppliedLoad("tip_moment", force, plate.position(q), plate.tip, dead),
+        ]
+
+    def _couple(self) -> Any:
+        """Return the forces along the edge (per length, in the plane) that make a couple of one."""
+        plate, x = self._plate, ufl.SpatialCoordinate(self._plate.mesh)
+        length = self._length()
+        middle = [self._integral(x[i]) / length for i in range(2)]
+        arm = ufl.as_vector([x[i] - plate.scalar(f"tip_middle_{i + 1}", middle[i]) for i in range(2)])
+        inertia = plate.scalar("tip_inertia", self._integral(ufl.dot(arm, arm)))
+        return ufl.as_vector((-arm[1], arm[0], 0)) / inertia
+
+    def _length(self) -> float:
+        """Return the length of the edge, m."""
+        return self._integral(self._plate.constant(1.0))
+
+    def _integral(self, density: Any) -> float:
+        """Return the integral of a density over the edge."""
+        here = float(fem.assemble_scalar(forms.form(density * self._plate.tip)))
+        return float(self._plate.comm.allreduce(here))
