@@ -234,17 +234,17 @@ def test_debug_shows_the_traceback(rotfem: Run) -> None:
 #: Runs the command line with a signal to itself after the step numbered 30.
 SIGNALLED = """
 import os, signal, sys
-from rotfem.commands import run as simulation
+from rotfem.commands.simulation import Simulation
 from rotfem.commands.cli import main
 
-check = simulation.Simulation._check
+check = Simulation._check
 
 def signalled(self, state):
     check(self, state)
     if self.steps == 30:
         os.kill(os.getpid(), signal.{name})
 
-simulation.Simulation._check = signalled
+Simulation._check = signalled
 main()
 """
 
