@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import rotfem
+from rotfem.commands.problem import Problem
 from rotfem.scene import Scene
 
 #: Their beam: EI = 5.50 N·m², L = 0.5 m, hub radius 0.05 m; J = ρA((a+L)³ − a³)/3 about the axis.
@@ -144,3 +145,36 @@ def test_exact_history() -> None:
     assert h["tip_u2"][i] == pytest.approx(-14.1945e-3, rel=1e-3)
     assert h["psi_dot"][i] == pytest.approx(7.2071, rel=1e-3)
     assert np.min(h["tip_u2"]) == pytest.approx(-14.3691e-3, rel=1e-3)
+
+
+@pytest.mark.parametrize("coupled", [True, False])
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+def test_border_is_the_derivative_of_both_equations(theory: str, coupled: bool) -> None:
+    """M, C, K with the angle as last unknown against central differences of F and of the hub's equation."""
+    changes = {"model.theory": theory, "motion.coupled": coupled, "motion.hub_damping": 1e-3, "mesh.elements": 3}
+    changes |= {
+        "structure.tip_mass": 0.01,
+        "structure.damping.kelvin_voigt": 1e-4,
+        "structure.damping.rayleigh": [0.2, 0.0],
+    }
+    system = Problem.of(hub_scene(changes)).system()
+    system.set_time(0.03)
+    random, free = np.random.default_rng(3), np.ones(len(system.zeros()), dtype=bool)
+    free[system.clamped] = False
+    size = np.append(system.scale, 1.0) * free
+    state = [random.normal(size=free.size) * size * s for s in (1e-3, 1.0, 100.0)]
+    direction = random.normal(size=free.size) * size
+
+    def equations(which: int, step: float) -> np.ndarray:
+        system.set_state(*(x + step * direction * (i == which) for i, x in enumerate(state)))
+        return np.append(-system.residual().array, system.row.residual(0.03))
+
+    for which, (name, step) in enumerate((("K", 1e-6), ("C", 1e-2), ("M", 1.0))):
+        difference = (equations(which, step) - equations(which, -step)) / (2 * step)
+        system.set_state(*state)
+        matrices = dict(zip("MCK", system.with_hub(system.held.mass_damping_stiffness()), strict=True))
+        bordered = matrices[name].convert("dense").getDenseArray()
+        off = np.abs(bordered @ direction - difference)[free]
+        assert np.max(off[:-1]) < 1e-6 * np.max(np.abs(difference[:-1]))
+        assert off[-1] < 1e-6 * abs(difference[-1]) + 1e-12
+        assert np.any(bordered[-1, :-1] != 0.0) == coupled
