@@ -16,11 +16,13 @@ from rotfem.analysis.equilibrium import check_steady
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
-from rotfem.commands.modes import advice, analysis_of, hints_of, instabilities, mode_rows, unstiffened
+from rotfem.commands.mode_tables import advice, instabilities, mode_rows, unstiffened
+from rotfem.commands.modes import analysis_of, hints_of
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import SceneError, input_of
 from rotfem.listeners import Hint, Progress, silent
+from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.results import CampbellResult
 from rotfem.scene import Scene, as_scene
@@ -61,6 +63,7 @@ def campbell(
     orders: int | None = None,
     progress: Progress | None = None,
     hint: Hint | None = silent,
+    terms: Mapping[str, Work] | None = None,
 ) -> CampbellResult:
     """Return the modes of a scene followed over speed.
 
@@ -71,6 +74,7 @@ def campbell(
         orders: per-rev lines 1Ω … orders·Ω to cross; by default as many as meet a branch in the range, at most 4.
         progress: called with the share of the speeds done, between 0 and 1.
         hint: called with every line of advice before the computation starts; None asks for none.
+        terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form (see `rotfem.Effect`).
 
     Raises:
         SceneError: the scene or the speeds are not valid.
@@ -80,7 +84,7 @@ def campbell(
     scene = as_scene(scene)
     values = parse_speeds(speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds))
     with input_of(scene.file):
-        sweep = Diagram(scene, values, comm, hint)
+        sweep = Diagram(scene, Problem.of(scene, terms=terms), values, comm, hint)
         return sweep.result(orders, progress or (lambda share: None), started)
 
 
@@ -89,21 +93,21 @@ class Diagram:
 
     Args:
         scene: validated scene.
+        problem: of the scene.
         values: increasing speeds, rad/s.
         comm: MPI communicator.
         hint: called with every line of advice; None asks for none.
     """
 
-    def __init__(self, scene: Scene, values: Sequence[float], comm: MPI.Comm, hint: Hint | None):
+    def __init__(self, scene: Scene, problem: ProblemData, values: Sequence[float], comm: MPI.Comm, hint: Hint | None):
         self.scene, self.values, self.choice = scene, values, None
-        problem: ProblemData = Problem.of(scene)
         if scene.modes.about == "steady":
             last = problem.motion.at_speed(values[-1])
             check_steady(problem.replace(motion=last) if any(scene.loads.gravity) else problem)
         if scene.model.tolerance is not None:
-            case = case_of(scene)
-            if not problem.motion.is_spinning:
-                case = case.replace(problem=problem.replace(motion=problem.motion.at_speed(values[-1] or values[0])))
+            turning = problem.motion.at_speed(values[-1] or values[0])
+            spinning = problem if problem.motion.is_spinning else problem.replace(motion=turning)
+            case = case_of(scene).replace(problem=spinning)
             speeds = (values[0], 0.5 * (values[0] + values[-1]), values[-1])
             self.choice = choose(case, (MODES,), speeds, comm)
             problem = self.choice.applied(problem)

@@ -95,9 +95,7 @@ def command(advice: bool = True) -> Callable[[Callable[..., None]], Callable[...
 
         ordered = [shared[0], *own, *shared[1:]]
         call.__name__, call.__doc__ = work.__name__, work.__doc__
-        call.__signature__ = Signature(  # type: ignore[attr-defined]
-            [p.replace(kind=Parameter.KEYWORD_ONLY) for p in ordered]
-        )
+        vars(call)["__signature__"] = Signature([p.replace(kind=Parameter.KEYWORD_ONLY) for p in ordered])
         app.command()(call)
         return work
 

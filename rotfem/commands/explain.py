@@ -11,15 +11,16 @@ import numpy as np
 from mpi4py import MPI
 
 from rotfem.commands.modes import modes
-from rotfem.commands.problem import case_of
+from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.run import run
 from rotfem.commands.summary import summary
-from rotfem.errors import ComputationError, input_of
+from rotfem.errors import ComputationError, SceneError, input_of
 from rotfem.listeners import Progress
-from rotfem.mechanics.effects import Effect
+from rotfem.mechanics.effects import Effect, Work
 from rotfem.mechanics.theories import Theory
 from rotfem.results import ExplainResult
 from rotfem.scene import Scene, as_scene
+from rotfem.selection.case import Case
 from rotfem.selection.coarse_model import INCREMENT, Trial
 from rotfem.selection.dimensionless import MEANING, groups
 from rotfem.selection.distance import HISTORY, MODES, STEADY, Outputs, change, notes, outputs_of
@@ -40,6 +41,7 @@ def explain(
     check: bool = False,
     comm: MPI.Comm = MPI.COMM_WORLD,
     progress: Progress | None = None,
+    terms: Mapping[str, Work] | None = None,
 ) -> ExplainResult:
     """Return how much every effect and every theory changes the outputs of a scene.
 
@@ -48,18 +50,21 @@ def explain(
         check: also run the full models of every row, so that the true change stands beside the estimate.
         comm: MPI communicator; every rank gets the whole result.
         progress: called with the share of the work done, between 0 and 1.
+        terms: further terms of the residual by name, in every model, (mechanics, variation) ↦ UFL form.
 
     Raises:
-        SceneError: the scene is not valid.
+        SceneError: the scene is not valid, or a check is asked for with terms that are not registered.
     """
     scene = as_scene(scene)
+    if check and terms:
+        raise SceneError(scene.file, "--check", None, "runs the scene's own models; register the terms as effects")
     with input_of(scene.file):
-        return _explained(scene, check, comm, progress or (lambda share: None))
+        case = case_of(scene).replace(problem=Problem.of(scene, terms=terms))
+        return _explained(scene, case, check, comm, progress or (lambda share: None))
 
 
-def _explained(scene: Scene, check: bool, comm: MPI.Comm, progress: Progress) -> ExplainResult:
+def _explained(scene: Scene, case: Case, check: bool, comm: MPI.Comm, progress: Progress) -> ExplainResult:
     started = perf_counter()
-    case = case_of(scene)
     trial, theory = Trial(case, comm=comm), case.problem.theory
     effects = case.problem.replace(frame="rotating").effective_effects()
     estimates = Estimates(trial, theory.name, effects)

@@ -47,12 +47,7 @@ class Moment:
         Torque (N·m) and kinetic energy of the hub (J), angular momentum of hub and structure, angular impulse of all
         forces from outside (N·m·s) and work of torque and brake (J) since t = 0.
         """
-        system = self._set()
-        if system.hub is None:
-            return {}
-        work, impulse = (0.0, 0.0) if self.state.given is None else map(float, self.state.given[:2])
-        own = {"torque": system.hub.torque.at(self.t, after=True), "hub_kinetic": system.row.kinetic()}
-        return {**own, "angular_momentum": system.row.angular_momentum(), "impulse": impulse, "work": work}
+        return hub_values(self._set(), self.state)
 
     def outputs(self) -> dict[str, float]:
         """Return the output functionals of the problem."""
@@ -67,3 +62,12 @@ class Moment:
         self.system.set_time(self.t)
         self.system.set_state(self.state.q, self.state.v, self.state.a)
         return self.system
+
+
+def hub_values(system: Any, state: State) -> dict[str, float]:
+    """Return the values of a free hub at a state that is written into the system (see `Moment.hub`)."""
+    if system.hub is None:
+        return {}
+    work, impulse = (0.0, 0.0) if state.given is None else map(float, state.given[:2])
+    own = {"torque": system.hub.torque.at(state.t, after=True), "hub_kinetic": system.row.kinetic()}
+    return {**own, "angular_momentum": system.row.angular_momentum(), "impulse": impulse, "work": work}

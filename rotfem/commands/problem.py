@@ -13,6 +13,7 @@ from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import Array, Scheme, State
 from rotfem.analysis.time_loop import March, Steps
+from rotfem.commands.mode_tables import mode_tables
 from rotfem.commands.moment import Moment
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import InputError, SceneError, input_of
@@ -56,7 +57,7 @@ class Problem(ProblemData):
                 structure=scene.structure,
                 motion=motion_of(scene),
                 mesh=scene.mesh,
-                theory=scene.model.theory,  # type: ignore[arg-type]
+                theory=scene.model.theory,
                 effects=None if scene.model.effects == "auto" else tuple(scene.model.effects),
                 loads=scene.loads,
                 frame=scene.model.frame,
@@ -145,9 +146,6 @@ class Problem(ProblemData):
             InputError: more modes than unknowns; no such state; a mesh or a section that cannot be computed with.
             ComputationError: no equilibrium, or eigenpairs that fail the check of their backward error.
         """
-        # The tables of modes are made by the command, which starts from a problem.
-        from rotfem.commands.modes import advice, instabilities, mode_rows, rigid_row, scaled_shape, unstiffened
-
         if about not in ("steady", "undeformed"):
             raise InputError("modes.about", about, 'must be "steady" or "undeformed"')
         speed = self.motion.final_speed(0.0) if speed is None else speed
@@ -156,17 +154,13 @@ class Problem(ProblemData):
             check_steady(problem)
         analysis = ModalAnalysis(problem, about, comm=comm)
         analysis.check_count(count)
-        spinning = analysis.at(speed, count)
-        rigid = int(spinning.rigid)
-        spinning.pairs = spinning.pairs.select(np.arange(min(count - rigid, len(spinning.pairs.values))))
-        rows = [{**row, "mode": row["mode"] + rigid} for row in mode_rows(analysis, spinning)]
-        shapes = {f"mode {r['mode']}: {r['label']}": scaled_shape(analysis, spinning, i) for i, r in enumerate(rows)}
-        warnings = [*advice(analysis, speed), *unstiffened(analysis, speed, rows), *instabilities(rows)]
-        rows = [rigid_row(rows), *rows] if rigid else rows
+        found = mode_tables(analysis, speed, count)
         summary = {"command": "modes", "status": "done", "theory": self.theory.name, "speed": speed}
-        summary |= {"effects": list(analysis.model.effects), "modes": rows, "warnings": warnings}
+        summary |= {"effects": list(analysis.model.effects), "modes": found.rows, "warnings": found.warnings}
         surface = analysis.structure.surface()
-        return ModesResult(summary, rows, shapes, triangles=surface, analysis=analysis, spinning=spinning)
+        result = ModesResult(summary, found.rows, found.shapes, triangles=surface)
+        result.analysis, result.spinning = analysis, found.spinning
+        return result
 
 
 def check_steps(end: float, step: float | None, tolerance: float | None, scheme: Scheme) -> None:

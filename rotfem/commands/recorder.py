@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.schemes import State
+from rotfem.commands.moment import hub_values
 from rotfem.results.run import RunResult, Table
 from rotfem.structures.paraview import Snapshots, writer
 
@@ -40,10 +41,7 @@ class Recorder:
         energy, motion = system.energies(), system.motion
         row = [t, motion.angle(t), motion.speed(t), *system.tip(state.q, t)]
         row += [energy[name] for name in ("kinetic", "strain", "jacobi")]
-        if system.hub is not None:
-            work, impulse = (0.0, 0.0) if state.given is None else state.given[:2]
-            hub = system.row
-            row += [system.hub.torque.at(t, after=True), hub.kinetic(), hub.angular_momentum(), impulse, work]
+        row += hub_values(system, state).values()
         self.history.append([*row, *system.outputs().values()])
         if self.snapshots is not None:
             self.snapshots.add(t, state.q)

@@ -72,7 +72,7 @@ class Simulation:
         except (ComputationError, KeyboardInterrupt) as error:
             failure = error if isinstance(error, ComputationError) else None
             status = "interrupted" if failure is None else "failed"
-            error.result = self.result(status, failure)  # type: ignore[union-attr]
+            vars(error)["result"] = self.result(status, failure)
             raise
         return self.result("done")
 

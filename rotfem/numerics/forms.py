@@ -34,7 +34,7 @@ PATIENCE = 1
 
 
 #: Flags of the C compiler for what is assembled often, and for what is assembled a few times on a few cells.
-OFTEN, SELDOM = ["-O2", "-g0"], ["-O0", "-g0"]
+OFTEN, SELDOM = ["-O2", "-g0", "-w"], ["-O0", "-g0", "-w"]
 
 
 def form(f: Any, once: bool = False) -> Any:

@@ -1,0 +1,131 @@
+"""The tables of modes, of any modal analysis: rows, shapes, and what is to be warned of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from rotfem.analysis.modal import PURE, ModalAnalysis, Spinning, stability
+from rotfem.mechanics.theories import richest
+
+Array = npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class ModeTables:
+    """What is said of the modes at one speed.
+
+    Attributes:
+        spinning: equilibrium and the eigenpairs kept.
+        rows: one dictionary a mode (see `rotfem.ModesResult`), that of a rigid body first.
+        shapes: title ↦ columns along the structure.
+        warnings: of the model, and of instabilities.
+    """
+
+    spinning: Spinning
+    rows: list[dict[str, Any]]
+    shapes: dict[str, dict[str, Array]]
+    warnings: list[str]
+
+
+def mode_tables(analysis: ModalAnalysis, speed: float, count: int, *, keep: bool = True) -> ModeTables:
+    """Return the first modes at a speed.
+
+    Args:
+        analysis: compiled problem.
+        speed: rad/s.
+        count: number of modes, that of a rigid body among them.
+        keep: whether the matrices must outlast another solution.
+
+    Raises:
+        ComputationError: no equilibrium, or eigenpairs that fail the check of their backward error.
+    """
+    spinning = analysis.at(speed, count, keep=keep)
+    rigid = int(spinning.rigid)
+    spinning.pairs = spinning.pairs.select(np.arange(min(count - rigid, len(spinning.pairs.values))))
+    rows = mode_rows(analysis, spinning)
+    warnings = [*advice(analysis, speed), *unstiffened(analysis, speed, rows), *instabilities(rows)]
+    rows = [{**row, "mode": row["mode"] + rigid} for row in rows]
+    shapes = {f"mode {row['mode']}: {row['label']}": scaled_shape(analysis, spinning, i) for i, row in enumerate(rows)}
+    return ModeTables(spinning, [rigid_row(rows), *rows] if rigid else rows, shapes, warnings)
+
+
+def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any]]:
+    """Return one row a mode: frequency (rad/s, Hz), damping ratio, growth (1/s), label, shares, backward error."""
+    shares, names, turning = analysis.shares(spinning), analysis.names(spinning), analysis.turning(spinning)
+    rows = []
+    for i, (lam, error) in enumerate(zip(spinning.pairs.values, spinning.pairs.errors, strict=True)):
+        size = abs(lam)
+        rows.append(
+            {
+                "mode": i + 1,
+                "label": names[i],
+                "frequency": float(lam.imag),
+                "frequency_hz": float(lam.imag / (2 * np.pi)),
+                "damping": float(-lam.real / size) if size > 0 else 0.0,
+                "growth": float(lam.real),
+                "stability": stability(lam),
+                **{f"share_{name}": float(share[i]) for name, share in shares.items()},
+                **({"turning": turning[i]} if turning else {}),
+                "residual": float(error),
+            }
+        )
+    return rows
+
+
+def rigid_row(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the row of the rigid-body mode: hub and structure turn together, λ = 0."""
+    row: dict[str, Any] = dict.fromkeys(rows[0] if rows else (), 0.0)
+    return {**row, "mode": 1, "label": "rigid body", "stability": "neutral", "share_hub": 1.0}
+
+
+def instabilities(rows: list[dict[str, Any]]) -> list[str]:
+    """Return a warning for every unstable mode."""
+    return [
+        f"{row['stability']}: {row['label']} grows as exp({row['growth']:.6g} t)"
+        for row in rows
+        if row["stability"] not in ("stable", "neutral")
+    ]
+
+
+def advice(analysis: ModalAnalysis, speed: float) -> list[str]:
+    """Return warnings about the model: a rotating-frame frequency without Coriolis forces is not one."""
+    if speed != 0.0 and "coriolis" not in analysis.model.effects:
+        return [
+            "coriolis is not among model.effects: frequencies in the rotating frame are wrong without it, and ω² can "
+            "come out negative"
+        ]
+    return []
+
+
+def unstiffened(analysis: ModalAnalysis, speed: float, rows: list[dict[str, Any]]) -> list[str]:
+    """Return a warning if modes are among the rows whose stiffening by the spin the theory does not hold."""
+    families, theory = analysis.structure.unstiffened, analysis.problem.theory
+    found = sorted({row["label"] for row in rows for f in families if row.get(f"share_{f}", 0.0) > PURE})
+    if speed == 0.0 or theory.exact or not found:
+        return []
+    return [
+        f"{', '.join(found)}: the strains of {theory.name} for this structure leave out the stiffening of such modes "
+        f'by the spin, so their frequencies are too low; model.theory = "{richest().name}" has it'
+    ]
+
+
+def scaled(comm: MPI.Comm, x: Array) -> Array:
+    """Return an eigenvector (owned unknowns) whose largest entry, over all ranks, is 1."""
+    largest = x[np.argmax(np.abs(x))] if x.size else 0.0
+    return np.asarray(x / max(comm.allgather(complex(largest)), key=abs))
+
+
+def scaled_shape(analysis: ModalAnalysis, spinning: Spinning, i: int) -> dict[str, Array]:
+    """Return a mode shape along the structure: x (m) and the real and imaginary part of each component, largest 1."""
+    coordinates, values = analysis.shape(spinning.pairs.right[:, i])
+    peak = values.ravel()[np.argmax(np.abs(values))]
+    values = values / peak
+    columns: dict[str, Array] = dict(coordinates)
+    for c, name in enumerate(analysis.structure.components):
+        columns[name], columns[f"{name}_imag"] = values[:, c].real, values[:, c].imag
+    return columns
