@@ -52,9 +52,9 @@ class StateSpace:
         Raises:
             OutputError: it cannot be written.
         """
-        names = {"inputs": np.array(self.inputs), "outputs": np.array(self.outputs), "speed": np.array(self.speed)}
+        inputs, outputs = np.array(self.inputs), np.array(self.outputs)
         try:
-            np.savez(path, A=self.A, B=self.B, C=self.C, D=self.D, **names)  # type: ignore[arg-type]
+            np.savez(path, A=self.A, B=self.B, C=self.C, D=self.D, inputs=inputs, outputs=outputs, speed=self.speed)
         except OSError as error:
             raise OutputError(path, error.strerror or str(error)) from None
         return path

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, Self, cast, overload
 
 from rotfem.errors import InputError
 from rotfem.mechanics.effects import Effect, Work, present_effects
@@ -13,6 +13,24 @@ from rotfem.mechanics.loads import Applied, Loads
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.outputs import Functional
 from rotfem.mechanics.theories import Theory
+
+
+class TheoryByName:
+    """An attribute that is given as a theory or by the name of a registered one, and read as a theory."""
+
+    @overload
+    def __get__(self, problem: None, owner: type) -> str: ...
+
+    @overload
+    def __get__(self, problem: object, owner: type) -> Theory: ...
+
+    def __get__(self, problem: object | None, owner: type) -> str | Theory:
+        """Return the theory of a problem; of the class its default."""
+        return "reissner" if problem is None else cast(Theory, vars(problem)["theory"])
+
+    def __set__(self, problem: object, given: str | Theory) -> None:
+        """Set the theory of a problem."""
+        vars(problem)["theory"] = Theory.registry[given] if isinstance(given, str) else given
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +52,7 @@ class Problem:
     structure: Any
     motion: Motion
     mesh: Any
-    theory: Theory = "reissner"  # type: ignore[assignment]
+    theory: TheoryByName = TheoryByName()
     effects: tuple[str, ...] | None = None
     loads: Applied = field(default_factory=Loads)
     frame: str = "rotating"
@@ -42,8 +60,6 @@ class Problem:
     outputs: Mapping[str, Functional] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if isinstance(self.theory, str):
-            object.__setattr__(self, "theory", Theory.registry[self.theory])
         for name in ("terms", "outputs"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
         if not self.theory.holds_for(self.structure.type):
