@@ -30,6 +30,8 @@ class TheoryByName:
 
     def __set__(self, problem: object, given: str | Theory) -> None:
         """Set the theory of a problem."""
+        if isinstance(given, str) and given not in Theory.registry:
+            raise InputError("model.theory", given, f"allowed: {', '.join(Theory.registry.names)}")
         vars(problem)["theory"] = Theory.registry[given] if isinstance(given, str) else given
 
 
@@ -66,6 +68,12 @@ class Problem:
             kinds = ", ".join(self.theory.strains)
             why = f"has no strains for a {self.structure.type}; it has them for {kinds}"
             raise InputError("model.theory", self.theory.name, why)
+        if self.frame not in ("rotating", "inertial"):
+            raise InputError("model.frame", self.frame, "allowed: rotating, inertial")
+        flat_and_exact = self.structure.type == "planar_beam" and self.theory.exact and self.motion.hub is None
+        if self.frame == "inertial" and not flat_and_exact:
+            why = "needs a planar_beam, a theory that holds for any displacement, and a prescribed rotation"
+            raise InputError("model.frame", self.frame, why)
         for name in self.effects or ():
             if name not in Effect.registry:
                 raise InputError("model.effects", name, f"is no effect; allowed: {', '.join(Effect.registry.names)}")
