@@ -80,23 +80,11 @@ class System(Solutions, ABC):
         #: Whether a factor is kept for the steps that follow, where factorising is dear.
         self.keeps_factor = self.A.getSize()[0] > KEPT_FROM[self.structure.mesh.topology.dim]
 
-    # --- what kinds of systems differ in -----------------------------------------------------------------------------
+    # --- what kinds of systems differ in, besides `Solutions` --------------------------------------------------------
 
     @abstractmethod
     def _compile(self) -> Any:
         """Compile the forms; return a matrix of the pattern of all tangents."""
-
-    @abstractmethod
-    def residual(self) -> Any:
-        """Return −F at the state in q, v, a as a PETSc vector (reused), zero at clamped unknowns."""
-
-    @abstractmethod
-    def tangent(self, c_k: float, c_v: float, c_m: float) -> tuple[Any, bool]:
-        """Return (c_k K + c_v C + c_m M at the state, whether it changed); clamped rows are identity rows."""
-
-    @abstractmethod
-    def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
-        """Return a new matrix c_k K + c_v C + c_m M at the state with `diagonal` at clamped unknowns."""
 
     @abstractmethod
     def spin_derivative(self, c_v: float, c_m: float) -> Any:

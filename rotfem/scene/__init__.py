@@ -1,32 +1,14 @@
 """What a user says: the scene, validated once. No dolfinx in it."""
 
 from rotfem import registry
-from rotfem.scene.scene import (
-    BeamMesh,
-    CallableMotion,
-    ConstantMotion,
-    Initial,
-    Load,
-    Loads,
-    Model,
-    Modes,
-    MomentLoad,
-    OutputTable,
-    PlanarBeamStructure,
-    PlateMesh,
-    PlateStructure,
-    Scene,
-    Signal,
-    Solver,
-    SpatialBeamStructure,
-    SpinUpMotion,
-    TableMotion,
-    Time,
-    TorqueMotion,
-    as_scene,
-    load_scene,
-)
+from rotfem.scene.beams import PlanarBeamStructure, SpatialBeamStructure
+from rotfem.scene.loads import Load, Loads, MomentLoad, Signal
+from rotfem.scene.motion import CallableMotion, ConstantMotion, SpinUpMotion, TableMotion, TorqueMotion
+from rotfem.scene.plates import PlateStructure
+from rotfem.scene.scene import Scene, as_scene, load_scene
 from rotfem.scene.section_shapes import Geometry, Shape
+from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver
+from rotfem.scene.stepping import Time
 
 __all__ = [
     "EFFECTS",

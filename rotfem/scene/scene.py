@@ -14,7 +14,7 @@ from pydantic import BaseModel, Discriminator, Field, PrivateAttr, Tag, Validati
 
 from rotfem import registry
 from rotfem.errors import SceneError
-from rotfem.scene.beams import PlanarBeamStructure, SpatialBeamStructure, Structure
+from rotfem.scene.beams import Structure
 from rotfem.scene.consistency import (
     check_frame,
     check_initial,
@@ -23,46 +23,15 @@ from rotfem.scene.consistency import (
     check_planar,
     check_theory,
 )
-from rotfem.scene.loads import Load, Loads, MomentLoad, Signal
+from rotfem.scene.loads import Load, Loads
 from rotfem.scene.motion import (
     AnyMotion,
-    CallableMotion,
-    ConstantMotion,
-    SpinUpMotion,
     Swept,
-    TableMotion,
-    TorqueMotion,
 )
-from rotfem.scene.plates import PlateStructure
 from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver
 from rotfem.scene.stepping import Time
 from rotfem.scene.toml import apply_overrides, read_toml, scene_error, set_key, to_builtin
 from rotfem.scene.values import SceneModel
-
-__all__ = [
-    "BeamMesh",
-    "CallableMotion",
-    "ConstantMotion",
-    "Initial",
-    "Load",
-    "Loads",
-    "Model",
-    "Modes",
-    "MomentLoad",
-    "OutputTable",
-    "PlanarBeamStructure",
-    "PlateMesh",
-    "PlateStructure",
-    "Scene",
-    "Signal",
-    "Solver",
-    "SpatialBeamStructure",
-    "SpinUpMotion",
-    "TableMotion",
-    "Time",
-    "TorqueMotion",
-    "load_scene",
-]
 
 
 class _PlateTable(dict[str, Any]):
