@@ -13,7 +13,7 @@ from types import ModuleType
 import pytest
 
 import rotfem
-from rotfem.scene import scene
+from rotfem import scene
 from rotfem.scene.clamp_and_damping import Damping
 from rotfem.scene.section import PlanarSection
 from rotfem.scene.section_spatial import SpatialSection
