@@ -70,7 +70,8 @@ class Problem:
             raise InputError("model.theory", self.theory.name, why)
         if self.frame not in ("rotating", "inertial"):
             raise InputError("model.frame", self.frame, "allowed: rotating, inertial")
-        flat_and_exact = self.structure.is_planar and self.theory.exact and self.motion.hub is None
+        is_planar = getattr(self.structure, "is_planar", False)  # a structure of a user's own need not say it
+        flat_and_exact = is_planar and self.theory.exact and self.motion.hub is None
         if self.frame == "inertial" and not flat_and_exact:
             why = "needs a planar_beam, a theory that holds for any displacement, and a prescribed rotation"
             raise InputError("model.frame", self.frame, why)
