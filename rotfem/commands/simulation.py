@@ -52,6 +52,7 @@ class Simulation:
             self.warnings.append("a steady state is one only in the rotating frame, where it was computed")
         self.problem = problem
         self.system: Any = compile_system(problem, comm, moving=scene.time is not None)
+        self.system.compile_readings()
         self.compiled = perf_counter() - self.started
         self.record = Recorder(self.system)
         self.newton = Newton.of(scene.solver)

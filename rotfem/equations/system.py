@@ -211,6 +211,10 @@ class System(Solutions, ABC):
     def _outputs(self) -> dict[str, Any]:
         return {name: forms.form(form) for name, form in self.model.outputs().items()}
 
+    def compile_readings(self) -> None:
+        """Compile what is read of states, energies and outputs, which is otherwise done when first asked for."""
+        _ = self._energies, self._outputs
+
     def total(self, form: Any) -> float:
         """Return the value of a compiled functional over all ranks; 0 of None."""
         if form is None:
