@@ -17,6 +17,7 @@ from mpi4py import MPI
 from rotfem.analysis.equilibrium import check_steady, critical_speed
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.mode_checks import self_checks
+from rotfem.analysis.stability import stability_of_pencil
 from rotfem.commands.mode_tables import advice, mode_tables, scaled
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.summary import modal_summary
@@ -33,6 +34,9 @@ from rotfem.selection.model_choice import choose
 from rotfem.structures.paraview import writer
 
 Array = npt.NDArray[Any]
+
+#: An instability that grows by more than this, relative to the modes that are asked for, is none of them.
+GROWS_AS_SAID = 1.001
 
 
 def modes(
@@ -78,9 +82,13 @@ def _modes(
     spinning, warnings = found.spinning, found.warnings
     if choice is not None:  # a choice knows what it left out
         warnings = [line for line in warnings if line not in advice(analysis, speed)]
+    stability = stability_of_pencil(spinning.pencil, spinning.clamped)
+    if stability.held_by_spin or stability.growth > GROWS_AS_SAID * max(row["growth"] for row in found.rows):
+        warnings = [*warnings, stability.warning()]
     result = {
         **modal_summary("modes", analysis, scene, choice, started),
         "speed": speed,
+        "stability": stability.summary(),
         "modes": found.rows,
         "checks": self_checks(analysis, spinning),
         "warnings": warnings,

@@ -28,7 +28,8 @@ def run_report(summary: dict[str, Any], folder: Path) -> list[str]:
     else:
         finals = {k.removesuffix("_final").replace("_", " "): v for k, v in f.items() if k.endswith("_final")}
         values = (f"{name} = {value:.6g}" for name, value in finals.items())
-        lines.append(f"steady state in {time['total']:.2f} s: {', '.join(values)}")
+        held = {True: "stable", False: "unstable", None: ""}[summary.get("stability", {}).get("stable")]
+        lines.append(f"{held} steady state in {time['total']:.2f} s: {', '.join(values)}".lstrip())
     return [*lines, f"results in {folder}"]
 
 

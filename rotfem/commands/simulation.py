@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import critical_speed, static_tip_shape, steady_state
 from rotfem.analysis.schemes import State
+from rotfem.analysis.stability import Stability, stability_of
 from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
 from rotfem.commands.problem import scheme_of
@@ -59,6 +60,7 @@ class Simulation:
         self.stepper: Stepper | None = None
         self.steps = 0
         self.critical = critical_speed(self.system)
+        self.stability: Stability | None = None
         self._critical_since: float | None = None
         self._exceeded = ""
 
@@ -82,13 +84,16 @@ class Simulation:
     def _steady(self) -> None:
         omega = self.problem.motion.speed(0.0)
         q = steady_state(self.system, omega, self.newton)
+        self.stability = stability_of(self.system, q, omega)
         q, v = self.system.start(q)
         self._keep(State(0.0, q, v, np.zeros_like(q)))
-        if self.critical is not None and abs(omega) > self.critical:
-            self.warnings.append(
-                f"the equilibrium is unstable: {abs(omega):g} rad/s is above the speed {self.critical:.6g} rad/s at "
-                f"which the {self.problem.theory.name} stiffness is singular"
-            )
+        if said := self.stability.warning():
+            if self.critical is not None and abs(omega) > self.critical:
+                said += (
+                    f"; {abs(omega):g} rad/s is above the speed {self.critical:.6g} rad/s at which the "
+                    f"{self.problem.theory.name} stiffness is singular"
+                )
+            self.warnings.append(said)
 
     def _march(self, progress: Progress) -> None:
         time = self.scene.time
@@ -112,7 +117,12 @@ class Simulation:
         system = self.system
         if self.problem.frame == "inertial":
             system = compile_system(self.problem.replace(frame="rotating"), self.comm, moving=False)
-        return steady_state(system, self.problem.motion.speed(0.0), Newton.of(self.scene.solver))
+        speed = self.problem.motion.speed(0.0)
+        q = steady_state(system, speed, Newton.of(self.scene.solver))
+        self.stability = stability_of(system, q, speed)
+        if said := self.stability.warning():
+            self.warnings.append(f"the motion starts from an equilibrium of its own: {said}")
+        return q
 
     # --- what is watched ---------------------------------------------------------------------------------------------
 

@@ -97,6 +97,8 @@ def run_summary(run: Simulation, status: str, history: dict[str, npt.NDArray[np.
     }
     if stepper is not None and stepper.rejected:
         out["rejected_steps"] = stepper.rejected
+    if run.stability is not None:
+        out["stability"] = run.stability.summary()
     if run.critical is not None:
         out["figures"]["critical_speed"] = run.critical
     return out

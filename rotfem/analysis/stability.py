@@ -1,0 +1,183 @@
+"""Whether an equilibrium in the rotating frame is stable: by its energy, and where that does not decide, by motions.
+
+K = ∂F/∂q at an equilibrium of a conservative structure is the second derivative of the amended potential W + V − T0.
+If it is positive, the equilibrium is stable (Lagrange and Dirichlet), with damping or without. If n of its eigenvalues
+are negative, then by the theorems of Kelvin, Tait and Chetaev an odd n means instability, any n does with complete
+damping, and an even n may be held by gyroscopic forces. That is decided by the eigenvalues λ of λ² M + λ C + K, and
+whether all that matter have been found is counted: without damping
+
+    n = k_r + 2 k_c + 2 k_i
+
+with k_r real λ > 0, k_c pairs of complex λ with a positive real part and k_i pairs of imaginary λ of negative energy;
+with complete damping n is the number of λ with a positive real part (Merkin 1997, chapter 6; Kapitula & Promislow 2013,
+section 7.1). Where follower forces make K unsymmetric, there is no such count, and the first eigenvalues decide.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.modal import GROWTH
+from rotfem.errors import ComputationError
+from rotfem.numerics.eigenproblem import SAME, ZERO, Eigenpairs, Pencil
+from rotfem.numerics.inertia import negative_eigenvalues
+
+Array = npt.NDArray[np.float64]
+
+#: Relative asymmetry of K up to which it is that of round-off.
+ROUND_OFF = 1e-13
+
+#: Eigenvalues that are looked at where none can be counted, and the most that are looked at where they can.
+FIRST, MOST = 8, 64
+
+
+@dataclass(frozen=True)
+class Stability:
+    """What becomes of small disturbances of an equilibrium.
+
+    Attributes:
+        negative: number of negative eigenvalues of K; None where K is not symmetric.
+        growth: largest growth rate found, 1/s; 0 where nothing grows.
+        frequency: of the motion that grows at that rate, rad/s; 0 for a divergence.
+        complete: whether no faster growth can have been missed.
+    """
+
+    negative: int | None = 0
+    growth: float = 0.0
+    frequency: float = 0.0
+    complete: bool = True
+
+    @property
+    def stable(self) -> bool:
+        """Whether no small disturbance grows."""
+        return self.growth == 0.0 and (self.complete or not self.negative)
+
+    @property
+    def held_by_spin(self) -> bool:
+        """Whether the energy has no minimum there, and gyroscopic forces alone hold the equilibrium."""
+        return self.stable and bool(self.negative)
+
+    def warning(self) -> str:
+        """Return what is to be said of it; empty of one that is plainly stable."""
+        if self.held_by_spin:
+            return (
+                "the equilibrium is no minimum of the energy (negative eigenvalues of the stiffness: "
+                f"{self.negative}): gyroscopic forces alone hold it, and any damping makes it unstable"
+            )
+        if self.stable:
+            return ""
+        if self.growth == 0.0:
+            return (
+                f"unstable equilibrium: the stiffness has {self.negative} negative eigenvalues; the growth rate could "
+                "not be computed"
+            )
+        kind = "static instability" if self.frequency == 0.0 else f"flutter at {self.frequency:.6g} rad/s"
+        count = "" if self.negative is None else f", negative eigenvalues of the stiffness: {self.negative}"
+        return f"unstable equilibrium: a small disturbance grows as exp({self.growth:.6g} t) ({kind}{count})"
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a summary has of it."""
+        out: dict[str, Any] = {"stable": self.stable, "growth_rate": self.growth}
+        if self.negative is not None:
+            out["negative_eigenvalues"] = self.negative
+        if self.growth > 0.0:
+            out["frequency"] = self.frequency
+        return out | ({"held_by_gyroscopic_forces": True} if self.held_by_spin else {})
+
+
+def stability_of(system: Any, q: Array, speed: float) -> Stability:
+    """Return the stability of an equilibrium q (local dof array) at constant speed (rad/s), hub held or free.
+
+    The state and the speed are left in the system's functions.
+    """
+    held = system.held
+    held.set_time(0.0, held.motion.at_speed(speed))
+    held.set_state(q[: len(held.q.x.array)])
+    K = held.matrix(1.0, 0.0, 0.0, 1.0)
+    negative = _negative(K)
+    if negative == 0:
+        return Stability()
+    matrices = (held.matrix(0.0, 0.0, 1.0, 0.0), held.matrix(0.0, 1.0, 0.0, 0.0), K)
+    if system.hub is None:
+        return by_motions(Pencil(*matrices), negative)
+    # A free hub keeps its momentum, not its speed: K of the structure alone decides nothing.
+    return by_motions(Pencil(*system.with_hub(matrices)), None, Pencil(*matrices).scale())
+
+
+def stability_of_pencil(pencil: Pencil, clamped: Pencil) -> Stability:
+    """Return the stability of the equilibrium that M, C and K are about.
+
+    Args:
+        pencil: with the unknown of a free hub, if there is one.
+        clamped: without it.
+    """
+    negative = _negative(clamped.K)
+    if negative == 0:
+        return Stability()
+    return by_motions(pencil, negative) if pencil is clamped else by_motions(pencil, None, clamped.scale())
+
+
+def _negative(K: Any) -> int | None:
+    """Return how many eigenvalues of K are negative; None where K is not symmetric, or singular."""
+    if not K.isSymmetric(ROUND_OFF * K.norm()):
+        return None
+    try:
+        return negative_eigenvalues(K)
+    except ComputationError:
+        return None
+
+
+def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Stability:
+    """Return the stability that the eigenvalues of M, C and K decide.
+
+    Args:
+        pencil: M, C, K.
+        negative: number of negative eigenvalues of a symmetric K; None where it says nothing.
+        target: where to aim, beside the zero eigenvalue of a free hub (1/s).
+    """
+    count = FIRST if negative is None else max(FIRST, 2 * negative + 2)
+    growth = frequency = 0.0
+    while True:
+        try:
+            pairs = pencil.solve(count, target)
+        except ComputationError:
+            return Stability(negative, growth, frequency, complete=False)
+        values = pairs.values
+        if target > 0.0:
+            values = values[np.abs(values) > ZERO * np.median(np.abs(values))]
+        grows = values[values.real > GROWTH * np.abs(values)]
+        if len(grows):
+            fastest = grows[np.argmax(grows.real)]
+            growth = float(fastest.real)
+            frequency = float(fastest.imag) if fastest.imag > SAME * abs(fastest) else 0.0
+        if negative is None:
+            return Stability(None, growth, frequency)
+        if _counted(pencil, pairs) >= negative:
+            return Stability(negative, growth, frequency)
+        if count >= MOST or count >= pencil.K.getSize()[0]:
+            return Stability(negative, growth, frequency, complete=False)
+        count *= 2
+
+
+def _counted(pencil: Pencil, pairs: Eigenpairs) -> int:
+    """Return for how many negative eigenvalues of K eigenpairs have been found that come of them."""
+    values = pairs.values
+    real = values.imag <= SAME * np.abs(values)
+    grows = values.real > GROWTH * np.abs(values)
+    found = int(np.sum(grows & real)) + 2 * int(np.sum(grows & ~real))
+    if not pencil.conservative:
+        return found
+    swings = ~real & (np.abs(values.real) <= GROWTH * np.abs(values))
+    return found + 2 * int(np.sum(_energies(pencil, pairs)[swings] < 0.0))
+
+
+def _energies(pencil: Pencil, pairs: Eigenpairs) -> Array:
+    """Return x^H (|λ|² M + K) x of every eigenpair, twice the energy of the motion."""
+    X = pairs.right
+    kinetic, potential = (np.real(X.conj() * pencil.apply(A, X)).sum(axis=0) for A in (pencil.M, pencil.K))
+    local = np.abs(pairs.values) ** 2 * kinetic + potential
+    return np.asarray(pencil.comm.allreduce(local) if pencil.comm.size > 1 else local)

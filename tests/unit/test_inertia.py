@@ -1,0 +1,40 @@
+"""The count of negative eigenvalues against the eigenvalues themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from petsc4py import PETSc
+
+from rotfem.errors import ComputationError
+from rotfem.numerics import inertia
+
+
+def matrix(A: np.ndarray) -> PETSc.Mat:
+    out = PETSc.Mat().createAIJ(A.shape, nnz=A.shape[1], comm=PETSc.COMM_SELF)
+    rows = np.arange(A.shape[0], dtype=PETSc.IntType)
+    out.setValues(rows, rows, A)
+    out.assemble()
+    return out
+
+
+@pytest.mark.parametrize("small", [0, 10_000])
+@pytest.mark.parametrize("shift", [-20.0, 0.0, 0.4, 20.0])
+def test_as_many_as_eigenvalues(monkeypatch: pytest.MonkeyPatch, small: int, shift: float) -> None:
+    # By MUMPS alone, and by PETSc's factor first.
+    monkeypatch.setattr(inertia, "SMALL", small)
+    A = np.random.default_rng(3).standard_normal((40, 40))
+    A = A + A.T + shift * np.eye(40)
+    assert inertia.negative_eigenvalues(matrix(A)) == np.sum(np.linalg.eigvalsh(A) < 0.0)
+
+
+@pytest.mark.parametrize("small", [0, 10_000])
+def test_zero_diagonal(monkeypatch: pytest.MonkeyPatch, small: int) -> None:
+    # A saddle point: without pivoting there is no factor.
+    monkeypatch.setattr(inertia, "SMALL", small)
+    assert inertia.negative_eigenvalues(matrix(np.array([[0.0, 1.0], [1.0, 0.0]]))) == 1
+
+
+def test_singular_matrix_has_no_count() -> None:
+    with pytest.raises(ComputationError, match="singular|factored"):
+        inertia.negative_eigenvalues(matrix(np.diag([1.0, 0.0, 2.0])))

@@ -1,0 +1,150 @@
+"""Stability of equilibria: buckling, flutter, growth rates and gyroscopic stabilisation against closed forms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq, root
+
+import rotfem
+
+LENGTH, EI, MASS = 10.0, 1.4e4, 1.2
+UNIT = EI / LENGTH**2  # of forces, N
+RATE = np.sqrt(EI / MASS) / LENGTH**2  # 1/s
+
+
+def beam(load: tuple[float, float] | None = None, **tables: Any) -> dict[str, Any]:
+    """Return a scene of a planar beam so slender and so stiff in shear that it is Euler's column to 1e-4."""
+    section = {"EA": 2.8e7, "GA": 1.0e7, "EI": EI, "mass_per_length": MASS}
+    scene: dict[str, Any] = {
+        "structure": {"type": "planar_beam", "length": LENGTH, "section": section},
+        "motion": {"type": "constant", "speed": 0.0},
+        "mesh": {"elements": 8},
+    }
+    return {**scene, **({"loads": {"tip_force": list(load)}} if load else {}), **tables}
+
+
+def growth_of_column(p: float) -> float:
+    """Return the growth rate of a cantilever under a dead axial force p EI/L² above Euler's, 1/s.
+
+    w'''' + p w'' + s² w = 0 in units of L and RATE, w = w' = 0 at the clamp, w'' = w''' + p w' = 0 at the tip.
+    """
+
+    def determinant(s: float) -> float:
+        roots = np.roots([1, 0, p, 0, s**2])
+        rows = [[1] * 4, roots, roots**2 * np.exp(roots), (roots**3 + p * roots) * np.exp(roots)]
+        value = np.linalg.det(np.array(rows)) / np.prod([roots[i] - roots[j] for i in range(4) for j in range(i)])
+        return float(np.real(value))
+
+    return float(brentq(determinant, 1e-3, p)) * RATE
+
+
+@pytest.mark.parametrize("theory", ["reissner", "von_karman", "second_order", "consistent_linear", "von_karman_linear"])
+def test_column_buckles_at_eulers_load(theory: str) -> None:
+    # Shear and stretch change Euler's load by 345/1e7 and the like; 1e-3 is far above that.
+    euler = np.pi**2 / 4 * UNIT
+    for share, stable in ((0.999, True), (1.001, False)):
+        summary = rotfem.run(beam((-share * euler, 0.0), model={"theory": theory})).summary
+        assert summary["stability"]["stable"] is stable
+        assert any("unstable equilibrium" in line for line in summary["warnings"]) is not stable
+
+
+def test_growth_rate_of_a_buckling_column() -> None:
+    # 3.7 EI/L² is 520 N, half as much again as Euler's. The lateral force moves the beam by 1e-4 of its length only.
+    summary = rotfem.run(beam((-3.7 * UNIT, 0.0))).summary
+    assert summary["stability"]["negative_eigenvalues"] == 1
+    assert summary["stability"]["growth_rate"] == pytest.approx(growth_of_column(3.7), rel=1e-3)
+    assert summary["stability"]["frequency"] == 0.0
+
+
+def test_column_under_its_own_weight() -> None:
+    # Greenhill 1881: rho a L³/EI = 7.8373, from the zero of a Bessel function; here the base is accelerated.
+    for share, stable in ((7.83, True), (7.85, False)):
+        motion = {"type": "constant", "speed": 0.0, "base_acceleration": [share * UNIT / (MASS * LENGTH), 0.0, 0.0]}
+        assert rotfem.run(beam(motion=motion)).summary["stability"]["stable"] is stable
+
+
+def becks_flutter(p: float) -> complex:
+    """Return the eigenvalue λ of Beck's column (w'' = w''' = 0 at the tip) of the larger real part, 1/s."""
+
+    def determinant(x: Any) -> list[float]:
+        roots = np.roots([1, 0, p, 0, complex(*x) ** 2])
+        rows = [[1] * 4, roots, roots**2 * np.exp(roots), roots**3 * np.exp(roots)]
+        value = np.linalg.det(np.array(rows)) / np.prod([roots[i] - roots[j] for i in range(4) for j in range(i)])
+        return [value.real, value.imag]
+
+    return complex(*root(determinant, [1.0, 11.0], tol=1e-12).x) * RATE
+
+
+def test_becks_column_flutters() -> None:
+    # Beck 1952: 20.05 EI/L². No static instability ever.
+    for p, stable in ((19.9, True), (20.2, False)):
+        loads = {"tip_force": {"value": [-p * UNIT, 0.0], "kind": "follower"}}
+        assert rotfem.run(beam(loads=loads)).summary["stability"]["stable"] is stable
+    loads = {"tip_force": {"value": [-23.0 * UNIT, 0.0], "kind": "follower"}}
+    found = rotfem.run(beam(loads=loads)).summary
+    # Shear and stretch change the exact eigenvalue by some 1e-4.
+    wanted = becks_flutter(23.0)
+    assert found["stability"]["growth_rate"] == pytest.approx(wanted.real, rel=3e-3)
+    assert found["stability"]["frequency"] == pytest.approx(wanted.imag, rel=3e-3)
+    assert any("flutter" in line for line in found["warnings"])
+
+
+SHAFT = {
+    "type": "spatial_beam",
+    "length": 1.0,
+    "section": {"EA": 1e6, "GA2": 4e5, "GA3": 4e5, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0, "mass_per_length": 1.0},
+}
+
+
+def shaft(damping: float) -> dict[str, Any]:
+    """Return a cantilever shaft that spins about its own axis above its critical speed 3.516."""
+    motion = {"type": "constant", "speed": 5.0, "axis": [1.0, 0.0, 0.0]}
+    structure = {**SHAFT, "damping": {"rayleigh": [damping, 0.0]}}
+    return {
+        "structure": structure,
+        "motion": motion,
+        "model": {"theory": "consistent_linear"},
+        "mesh": {"elements": 6},
+    }
+
+
+def test_supercritical_shaft_is_held_by_gyroscopic_forces() -> None:
+    # In the inertial frame it just vibrates at ±3.516, in the turning one at 5 ± 3.516: stable, no minimum of energy.
+    result = rotfem.modes({**shaft(0.0), "modes": {"count": 2}})
+    assert result.summary["stability"] == {
+        "stable": True,
+        "growth_rate": 0.0,
+        "negative_eigenvalues": 2,
+        "held_by_gyroscopic_forces": True,
+    }
+    assert any("gyroscopic forces alone hold it" in line for line in result.summary["warnings"])
+    assert rotfem.run(shaft(0.0)).summary["stability"]["stable"]
+
+
+def test_damping_that_turns_with_a_supercritical_shaft_makes_it_unstable() -> None:
+    # z'' + (2 i Ω + a0) z' + (ω² − Ω²) z = 0 with z = u2 + i u3.
+    a0, speed, omega = 0.1, 5.0, 1.8751040687**2
+    wanted = max(np.roots([1, 2j * speed + a0, omega**2 - speed**2]), key=lambda x: x.real)
+    found = rotfem.run(shaft(a0)).summary["stability"]
+    assert not found["stable"]
+    assert found["growth_rate"] == pytest.approx(wanted.real, rel=1e-3)
+    assert found["frequency"] == pytest.approx(abs(wanted.imag), rel=1e-3)
+
+
+def test_an_instability_above_the_modes_asked_for_is_said() -> None:
+    # At 4000 N two modes buckle; the second grows five times as fast and is not among one mode.
+    result = rotfem.modes(beam((-4000.0, 0.0), modes={"count": 1}))
+    assert result.summary["stability"]["negative_eigenvalues"] == 2
+    assert result.summary["stability"]["growth_rate"] > 3 * result.rows[0]["growth"]
+    assert any("unstable equilibrium" in line for line in result.summary["warnings"])
+
+
+def test_history_from_an_unstable_equilibrium() -> None:
+    tables = {"initial": {"state": "steady"}, "time": {"end": 0.02, "step": 0.01}}
+    for load, stable in ((-500.0, False), (-300.0, True)):
+        summary = rotfem.run(beam((load, 0.0), **tables)).summary
+        assert summary["stability"]["stable"] is stable
+        assert any("starts from an equilibrium" in line for line in summary["warnings"]) is not stable
