@@ -9,7 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-_LONGEST_VALUE = 72
+#: Characters of a value or a key that a message shows, and problems that it lists.
+_LONGEST_VALUE, _MOST_PROBLEMS = 72, 20
 
 
 class Problem(NamedTuple):
@@ -28,9 +29,10 @@ class Problem(NamedTuple):
     def __str__(self) -> str:
         if not self.key:
             return self.allowed
+        key = printable(self.key, _LONGEST_VALUE)
         if self.value is None:
-            return f"{self.key}: {self.allowed}"
-        return f"{self.key} = {show(self.value)}: {self.allowed}"
+            return f"{key}: {self.allowed}"
+        return f"{key} = {show(self.value)}: {self.allowed}"
 
 
 class InputError(ValueError):
@@ -99,9 +101,11 @@ class SceneError(InputError):
 
     def __str__(self) -> str:
         first, *others = self.problems
+        file = printable(self.file)
         if not others:
-            return f"{self.file}: {first}"
-        return "\n".join([f"{self.file}: {first} (and {len(others)} more)", *(f"  {problem}" for problem in others)])
+            return f"{file}: {first}"
+        lines = [f"{file}: {first} (and {len(others)} more)", *(f"  {problem}" for problem in others[:_MOST_PROBLEMS])]
+        return "\n".join(lines if len(others) <= _MOST_PROBLEMS else [*lines, "  …"])
 
 
 class ComputationError(RuntimeError):
@@ -143,10 +147,15 @@ class OutputError(OSError):
 
 def show(value: Any) -> str:
     """Return a value as it would stand in a TOML file, in one line of readable length; a path in full, to be found."""
-    text = _full_text(value)
-    if isinstance(value, Path):
-        return text
-    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 1] + "…"
+    text = printable(_full_text(value))
+    return text if isinstance(value, Path) else _cut(text, _LONGEST_VALUE)
+
+
+def printable(text: str, longest: int | None = None) -> str:
+    """Return a text in one line, without characters that steer a terminal; cut to a length if that is given."""
+    if longest is not None:
+        text = _cut(text, longest)
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def shown(path: str | Path) -> Path:
@@ -154,14 +163,23 @@ def shown(path: str | Path) -> Path:
     return Path(min(str(path), os.path.relpath(path), key=len))
 
 
-def _full_text(value: Any) -> str:
+def _cut(text: str, longest: int) -> str:
+    return text if len(text) <= longest else text[: longest - 1] + "…"
+
+
+def _full_text(value: Any, depth: int = 0) -> str:
+    """Return a value in full, but for what `show` cuts off in any case: of a large table only the beginning."""
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, str | Path):
+    if isinstance(value, str):
+        return json.dumps(value[: 2 * _LONGEST_VALUE], ensure_ascii=False)
+    if isinstance(value, Path):
         return json.dumps(str(value), ensure_ascii=False)
     if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_full_text, value))}]"
+        if depth > _LONGEST_VALUE:
+            return "[…]"
+        return f"[{', '.join(_full_text(entry, depth + 1) for entry in value[:_LONGEST_VALUE])}]"
     try:
         return " ".join(repr(value).split())
-    except ValueError:  # Python refuses to print integers of several thousand digits
+    except (ValueError, RecursionError):  # Python refuses to print integers of several thousand digits
         return f"<{type(value).__name__}>"

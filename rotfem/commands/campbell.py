@@ -26,31 +26,44 @@ from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.results import CampbellResult
 from rotfem.scene import Scene, as_scene
+from rotfem.scene.limits import Limits
+from rotfem.scene.values import LARGEST
 from rotfem.selection.distance import MODES
 from rotfem.selection.model_choice import choose
 
 Array = npt.NDArray[Any]
 
 
-def parse_speeds(text: str) -> list[float]:
+def parse_speeds(text: str, limits: Limits | None = None) -> list[float]:
     """Return speeds (rad/s) from "first:last:number" or "s1,s2,…".
 
+    Args:
+        text: what was asked for.
+        limits: of the scene; the usual ones if None.
+
     Raises:
-        SceneError: the text is neither, or the speeds do not increase.
+        SceneError: the text is neither, the speeds do not increase, or are too many.
     """
+    limits = limits or Limits()
     allowed = (
         "must be first:last:number (number at least 2) or a list s1,s2,… of at least two increasing speeds (rad/s)"
     )
     try:
         if ":" in text:
             first, last, number = text.split(":")
-            ends = float(first), float(last)
-            speeds = [float(s) for s in np.linspace(*ends, int(number))] if np.all(np.isfinite(ends)) else []
+            ends, count = (float(first), float(last)), int(number)
+            if (why := limits.refusal("speeds", count)) is not None:
+                raise SceneError("command line", "--speeds", text, why)
+            speeds = [float(s) for s in np.linspace(*ends, count)] if max(map(abs, ends)) <= LARGEST else []
         else:
             speeds = [float(s) for s in text.split(",")]
+    except SceneError:
+        raise
     except ValueError:
         raise SceneError("command line", "--speeds", text, allowed) from None
-    if len(speeds) < 2 or not np.all(np.isfinite(speeds)) or np.any(np.diff(speeds) <= 0):
+    if (why := limits.refusal("speeds", len(speeds))) is not None:
+        raise SceneError("command line", "--speeds", text, why)
+    if len(speeds) < 2 or not all(abs(s) <= LARGEST for s in speeds) or np.any(np.diff(speeds) <= 0):
         raise SceneError("command line", "--speeds", text, allowed)
     return speeds
 
@@ -82,7 +95,8 @@ def campbell(
     """
     started = perf_counter()
     scene = as_scene(scene)
-    values = parse_speeds(speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds))
+    text = speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds)
+    values = parse_speeds(text, scene.limits)
     with input_of(scene.file):
         sweep = Diagram(scene, Problem.of(scene, terms=terms), values, comm, hint)
         return sweep.result(orders, progress or (lambda share: None), started)

@@ -30,7 +30,7 @@ def summary(command: str, scene: Scene, comm: MPI.Comm, choice: Choice | None = 
         choice: how it was, if so.
     """
     out: dict[str, Any] = {"command": command, "status": "done", "name": scene.name}
-    out |= {"versions": versions(), "ranks": comm.size, "scene": scene.to_dict()}
+    out |= {"versions": versions(), "ranks": comm.size, "scene": scene.digest()}
     return out if choice is None else {**out, "choice": choice.summary()}
 
 

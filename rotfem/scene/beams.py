@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -9,6 +10,7 @@ from pydantic import Field, PlainValidator, model_validator
 from pydantic_core import PydanticCustomError
 
 from rotfem.scene.clamp_and_damping import Damping, check_one_hub
+from rotfem.scene.magnitudes import check_magnitudes
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.section import PlanarSection
 from rotfem.scene.section_spatial import SpatialSection
@@ -42,7 +44,8 @@ def _as_sweep(value: Any) -> Profile:
         return Bounds().profile(value)
     rows = as_rows(value, (2,), "a profile [[x, angle], …]")
     x = [row[0] for row in rows]
-    if len(x) < 2 or x[0] != 0.0 or sorted(x) != x or any(x.count(v) > (1 if v in (x[0], x[-1]) else 2) for v in x):
+    times = Counter(x)
+    if len(x) < 2 or x[0] != 0.0 or sorted(x) != x or max(times.values()) > 2 or times[x[0]] + times[x[-1]] > 2:
         raise problem("", value, "must be [[x, angle], …] from x = 0, x not decreasing; two rows of one x are a kink")
     return tuple((row[0], row[1]) for row in rows)
 
@@ -96,7 +99,7 @@ class PlanarBeamStructure(StructureTable):
 
     @model_validator(mode="after")
     def _check_tapers(self) -> Self:
-        _check_section_length(self.section, self.length)
+        _check_section(self.section, self.length)
         return self
 
 
@@ -184,7 +187,7 @@ class SpatialBeamStructure(StructureTable):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _check_section_length(self.section, self.length)
+        _check_section(self.section, self.length)
         check_profile_length("pretwist", self.pretwist, self.length)
         check_profile_length("sweep", self.sweep, self.length)
         check_one_hub(self.hub_radius, self.hub_offset)
@@ -194,6 +197,10 @@ class SpatialBeamStructure(StructureTable):
 Structure = Annotated[PlanarBeamStructure | SpatialBeamStructure | PlateStructure, Field(discriminator="type")]
 
 
-def _check_section_length(section: PlanarSection | SpatialSection, length: float) -> None:
+def _check_section(section: PlanarSection | SpatialSection, length: float) -> None:
     for name, taper in section.tapers.items():
         check_profile_length(f"section.{name}", taper, length)
+    knots = sorted({0.0, *(x for taper in section.tapers.values() for x, _ in taper)})
+    if section.way.name != "matrix":
+        properties = section.central if isinstance(section, SpatialSection) else section.at
+        check_magnitudes(lambda: properties(knots), "section")

@@ -5,10 +5,12 @@ from __future__ import annotations
 from rotfem import registry
 from rotfem.errors import show
 from rotfem.scene.beams import PlanarBeamStructure, SpatialBeamStructure
+from rotfem.scene.limits import Limits
 from rotfem.scene.loads import Loads
 from rotfem.scene.motion import Motion
 from rotfem.scene.plates import PlateStructure
-from rotfem.scene.settings import BeamMesh, Initial, Model, PlateMesh
+from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh
+from rotfem.scene.stepping import Time
 from rotfem.scene.values import problem
 
 AnyStructure = PlanarBeamStructure | SpatialBeamStructure | PlateStructure
@@ -103,3 +105,10 @@ def check_initial(structure: AnyStructure, motion: Motion, initial: Initial) -> 
             raise problem("initial.tip_displacement", displacement, reason)
     if initial.state == "steady" and not motion.is_steady:
         raise problem("initial.state", initial.state, 'needs motion.type = "constant"')
+
+
+def check_limits(limits: Limits, time: Time | None, modes: Modes) -> None:
+    """Refuse more steps and modes than the scene's limits allow."""
+    if time is not None and time.step is not None:
+        limits.check("steps", time.end / time.step, "time.step", time.step)
+    limits.check("modes", modes.count, "modes.count", modes.count)

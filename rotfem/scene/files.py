@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationInfo
 
-from rotfem.scene.values import Matrix, as_increasing_rows, problem
+from rotfem.scene.limits import limits_in
+from rotfem.scene.reading import Unreadable, read_bytes
+from rotfem.scene.values import Array, Matrix, are_numbers, as_increasing_rows, problem, rows_of
+
+#: Bytes of a table, at most, for each row that it may have.
+ROW_BYTES = 400
+
+#: Characters of a cell that a message shows. A file may be anything that can be read here, and so a secret.
+SHOWN_CELL = 12
 
 
 def existing_file(value: Any, info: ValidationInfo) -> Path:
@@ -47,35 +57,75 @@ def as_time_table(value: Any, info: ValidationInfo, columns: Sequence[int], shap
     Raises:
         PydanticCustomError: it is not such a table, or the file cannot be read; of a file it names the line.
     """
+    limits = limits_in(info)
     if not isinstance(value, str | Path):
+        if isinstance(value, list | tuple):
+            limits.check("rows", len(value), value=value)
         return as_increasing_rows(value, columns, shape)
-    rows = read_csv(existing_file(value, info))
-    lines = tuple(rows)
-    return as_increasing_rows(tuple(rows.values()), columns, shape, lambda row: f"line {lines[row - 1]}")
+    path = existing_file(value, info)
+    text = read_text(path, ROW_BYTES * limits.rows)
+    limits.check("rows", text.count("\n"), value=str(path))
+    table = quick_rows(text)
+    if table is not None and table.shape[1] in columns and len(table) > 1 and np.all(table[1:, 0] > table[:-1, 0]):
+        return rows_of(table)
+    by_line = read_rows(text, path)
+    lines = tuple(by_line)
+    return as_increasing_rows(tuple(by_line.values()), columns, shape, lambda row: f"line {lines[row - 1]}")
 
 
-def read_csv(path: Path) -> dict[int, tuple[float, ...]]:
-    """Return number of the line ↦ row of a CSV file of finite numbers, all of one length.
+def read_text(path: Path, most: int) -> str:
+    """Return the text of a table.
+
+    Args:
+        path: file with comma-separated columns.
+        most: bytes that it may have.
+
+    Raises:
+        PydanticCustomError: it cannot be read as text, or has more.
+    """
+    try:
+        text = read_bytes(path, most).decode("utf-8-sig")
+    except Unreadable as error:
+        raise problem("", str(path), f"cannot be read: {error.reason}") from None
+    except UnicodeDecodeError as error:
+        raise problem("", str(path), f"cannot be read: byte {error.start} is not UTF-8 text") from None
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def quick_rows(text: str) -> Array | None:
+    """Return the rows of a table of finite numbers, shape (n, columns); None where `read_rows` has to look closer."""
+    lines = text.split("\n")
+    top = next((i for i, line in enumerate(lines) if _cells(line)), len(lines))
+    first = _cells(lines[top]) if top < len(lines) else []
+    rows = lines[top + all(_number(cell) is None for cell in first) :]
+    if not any(first) or not all(map(str.isascii, rows)) or any("_" in row for row in rows):
+        return None
+    try:
+        with warnings.catch_warnings(action="error"):
+            table = np.loadtxt(rows, delimiter=",", ndmin=2)
+    except (ValueError, UserWarning):
+        return None
+    return table if len(first) == table.shape[1] and are_numbers(table) else None
+
+
+def read_rows(text: str, path: Path) -> dict[int, tuple[float, ...]]:
+    """Return number of the line ↦ row of a table of finite numbers, all of one length.
 
     `#` starts a comment. The first row may be a header, and is one if none of its cells is a number.
 
     Args:
-        path: file with comma-separated columns.
+        text: content of the file, lines ended by line feeds.
+        path: the file, for errors.
 
     Raises:
-        PydanticCustomError: it cannot be read or holds anything else or nothing, naming the line and the cell.
+        PydanticCustomError: it holds anything else or nothing, naming the line and the column.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise problem("", str(path), f"cannot be read: {error}") from None
     rows: dict[int, tuple[float, ...]] = {}
     width, top = 0, 0  # columns of the first row, and its line
-    for number, line in enumerate(text.splitlines(), start=1):
-        content = line.split("#", 1)[0].strip()
-        if not content:
+    for number, line in enumerate(text.split("\n"), start=1):
+        cells = _cells(line)
+        if not cells:
             continue
-        cells = [cell.strip() for cell in content.split(",")]
         values = [_number(cell) for cell in cells]
         if not top:
             width, top = len(cells), number
@@ -83,7 +133,9 @@ def read_csv(path: Path) -> dict[int, tuple[float, ...]]:
                 continue
         for column, (cell, value) in enumerate(zip(cells, values, strict=True), start=1):
             if value is None or not math.isfinite(value):
-                reason = f'line {number}, column {column}: "{cell}" must be a finite number'
+                short = len(cell) <= SHOWN_CELL and cell.isprintable()
+                what = f'"{cell}"' if short else f"a text of {len(cell)} characters"
+                reason = f"line {number}, column {column}: {what} must be a finite number"
                 raise problem("", str(path), f"{reason} (only the first row may be a header, one without any number)")
         if len(cells) != width:
             raise problem("", str(path), f"line {number} has {len(cells)} columns; must be {width}, as in line {top}")
@@ -93,8 +145,16 @@ def read_csv(path: Path) -> dict[int, tuple[float, ...]]:
     return rows
 
 
+def _cells(line: str) -> list[str]:
+    """Return the cells of a line, none of one that is empty but for a comment."""
+    content = line.split("#", 1)[0].strip()
+    return [cell.strip() for cell in content.split(",")] if content else []
+
+
 def _number(cell: str) -> float | None:
     """Return the number in a cell, None if there is none."""
+    if not cell.isascii() or "_" in cell:  # which Python takes for digits and between them
+        return None
     try:
         return float(cell)
     except ValueError:

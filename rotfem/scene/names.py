@@ -6,7 +6,8 @@ from typing import Any
 
 from rotfem.errors import show
 from rotfem.registry import Registry
-from rotfem.scene.values import did_you_mean, problem
+from rotfem.scene.problems import did_you_mean
+from rotfem.scene.values import problem
 
 
 def as_name(value: Any, registry: Registry[Any], key: str = "") -> str:

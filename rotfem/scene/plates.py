@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, ClassVar, Literal, Self
 
+import numpy as np
 import numpy.typing as npt
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
@@ -12,6 +13,7 @@ from pydantic_core import PydanticCustomError
 from rotfem.scene.alternatives import Way, choose_way
 from rotfem.scene.clamp_and_damping import Damping, check_one_hub
 from rotfem.scene.files import existing_file
+from rotfem.scene.magnitudes import check_magnitudes
 from rotfem.scene.structure import StructureTable
 from rotfem.scene.values import (
     Array,
@@ -84,6 +86,10 @@ def locking(cell: str, degree: int, integration: str) -> str | None:
 
 def _as_mesh_file(value: Any, info: ValidationInfo) -> str:
     return str(existing_file(value, info))
+
+
+#: What a stiffness of a plate is called ↦ the power of the thickness that a modulus is multiplied with.
+_POWERS = {" h": 1, " h³": 3}
 
 
 class PlateStructure(StructureTable):
@@ -198,7 +204,28 @@ class PlateStructure(StructureTable):
             limit = math.sqrt(self.E1 / self.E2)
             if abs(self.nu12) >= limit:
                 raise problem("nu12", self.nu12, f"must be less than √(E1/E2) = {limit:g} in size, else not stable")
+        check_magnitudes(self._stiffnesses, "thickness")
         return self
+
+    def _stiffnesses(self) -> dict[str, Array]:
+        """Return membrane and bending stiffnesses (N/m, N·m) and the mass per area (kg/m²) at all given thicknesses."""
+        given = self.thickness
+        rows = (
+            given.values()
+            if isinstance(given, dict)
+            else (h for _, h in given)
+            if isinstance(given, tuple)
+            else (given,)
+        )
+        h = np.array(list(rows))
+        moduli = {name: getattr(self, name) for name in ("E", "E1", "E2", "G12", "G13", "G23")}
+        stiffnesses = {
+            f"{name}{of}": value * h**power
+            for name, value in moduli.items()
+            if value is not None
+            for of, power in _POWERS.items()
+        }
+        return {**stiffnesses, "mass per area": self.rho * h, "rotary inertia": self.rho * h**3}
 
     def _way(self, ways: tuple[Way, ...]) -> Way:
         names = dict.fromkeys(key for way in ways for key in (*way.required, *way.optional))

@@ -18,19 +18,23 @@ from rotfem.scene.beams import Structure
 from rotfem.scene.consistency import (
     check_frame,
     check_initial,
+    check_limits,
     check_loads,
     check_mesh,
     check_planar,
     check_theory,
 )
+from rotfem.scene.digest import abridged
+from rotfem.scene.limits import Limits, limits_of
 from rotfem.scene.loads import Load, Loads
 from rotfem.scene.motion import (
     AnyMotion,
     Swept,
 )
+from rotfem.scene.problems import scene_error
 from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver
 from rotfem.scene.stepping import Time
-from rotfem.scene.toml import apply_overrides, read_toml, scene_error, set_key, to_builtin
+from rotfem.scene.toml import apply_overrides, read_toml, set_key, to_builtin
 from rotfem.scene.values import SceneModel
 
 
@@ -56,6 +60,7 @@ class Scene(SceneModel):
         modes: what modes to compute.
         solver: settings of Newton's method.
         output: what to compute beside what is always recorded.
+        limits: how much may be asked for.
     """
 
     structure: Structure = Field(description="a table [structure]")
@@ -68,6 +73,7 @@ class Scene(SceneModel):
     modes: Modes = Modes()
     solver: Solver = Solver()
     output: OutputTable = OutputTable()
+    limits: Limits = Limits()
 
     _name: str = PrivateAttr("scene")
     _file: str = PrivateAttr("scene")
@@ -91,7 +97,7 @@ class Scene(SceneModel):
     @classmethod
     def _validate(cls, tables: dict[str, Any], name: str, file: str, directory: str) -> Self:
         try:
-            scene = cls.model_validate(tables, context={"directory": directory})
+            scene = cls.model_validate(tables, context={"directory": directory, "limits": limits_of(tables)})
         except ValidationError as error:
             raise scene_error(file, error) from None
         scene._name, scene._file, scene._directory, scene._tables = name, file, directory, tables
@@ -136,10 +142,16 @@ class Scene(SceneModel):
         tables: dict[str, Any] = _plain(self)
         if not self.output.quantities:
             del tables["output"]
+        if self.limits == Limits():
+            del tables["limits"]
         if self.structure.mesh_file is not None:
             without = {"elements", "cell"} | ({"degree"} - self.mesh.model_fields_set)
             tables["mesh"] = {key: value for key, value in tables["mesh"].items() if key not in without}
         return tables
+
+    def digest(self) -> dict[str, Any]:
+        """Return `to_dict` with long tables referred to instead of repeated (see `abridged`)."""
+        return abridged(self.to_dict(), self._tables)
 
     def is_dead(self, load: str) -> bool:
         """Return whether a load (`tip_force`, `tip_moment`, `distributed`) is given and is a dead one."""
@@ -203,6 +215,7 @@ class Scene(SceneModel):
         check_theory(self.structure, self.model)
         check_frame(self.structure, self.motion, self.model)
         check_initial(self.structure, self.motion, self.initial)
+        check_limits(self.limits, self.time, self.modes)
         return self
 
 
@@ -236,6 +249,8 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _plain(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
+        if value and isinstance(value[0], tuple):  # a table of numbers, maybe a long one
+            return list(map(list, value))
         return [_plain(entry) for entry in value]
     if callable(value):
         return f"<callable {getattr(value, '__name__', type(value).__name__)}>"

@@ -1,4 +1,4 @@
-"""From a TOML file and overrides to a plain dictionary, and from validation errors to one readable error."""
+"""From a TOML file and overrides to a plain dictionary."""
 
 from __future__ import annotations
 
@@ -9,17 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
-from rotfem.errors import Problem, SceneError, show
-from rotfem.scene.values import did_you_mean
+from rotfem.errors import SceneError, printable, show
+from rotfem.scene.reading import Unreadable, read_bytes
 
-# Names that validation puts into the path of an error to say which kind of table it tried.
-_TAGS = {
-    "structure": {"planar_beam", "spatial_beam", "plate"},
-    "motion": {"constant", "spin_up", "table", "torque", "callable"},
-    "mesh": {"beam", "plate"},
-}
+#: Bytes of a scene file, at most.
+LARGEST_SCENE = 50_000_000
+
 _KEY = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
 
 
@@ -30,20 +26,16 @@ def read_toml(path: Path) -> dict[str, Any]:
         SceneError: the file is missing, cannot be read or is not valid TOML, saying where.
     """
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        text = read_bytes(path, LARGEST_SCENE).decode("utf-8-sig")
         return tomllib.loads(text)
-    except FileNotFoundError:
-        reason = "no such file"
-    except IsADirectoryError:
-        reason = "is a directory; a scene is a TOML file"
-    except OSError as error:
-        reason = f"cannot be read: {error.strerror or error}"
+    except Unreadable as error:
+        reason = error.reason
     except UnicodeDecodeError as error:
         reason = f"not valid TOML: byte {error.start} is not UTF-8 text"
     except tomllib.TOMLDecodeError as error:
-        reason = f"not valid TOML: {error}"
-    except (RecursionError, ValueError) as error:  # nesting without end; a path with a null character
-        reason = f"cannot be read: {error}"
+        reason = f"not valid TOML: {printable(str(error))}"
+    except (RecursionError, ValueError) as error:  # nesting without end; an integer of thousands of digits
+        reason = f"cannot be read: {printable(str(error))}"
     raise SceneError(str(path), allowed=reason) from None
 
 
@@ -102,46 +94,6 @@ def to_builtin(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.tolist()
     return value.item() if isinstance(value, np.generic) else value
-
-
-def scene_error(file: str, error: ValidationError) -> SceneError:
-    """Return the problems found by validation as one error."""
-    first, *others = [_problem(dict(details)) for details in error.errors(include_url=False)]
-    return SceneError(file, *first, others)
-
-
-def _problem(details: dict[str, Any]) -> Problem:
-    path = list(details["loc"])
-    if len(path) > 1 and path[1] in _TAGS.get(str(path[0]), ()):
-        del path[1]
-    context: dict[str, Any] = details.get("ctx", {})
-    value, kind = details["input"], details["type"]
-    if kind == "scene":
-        if context["key"]:
-            path.append(context["key"])
-            value = context["value"]
-        elif context["value"] is None:
-            value = None
-        reason = context["reason"]
-    elif kind in ("literal_error", "union_tag_invalid"):
-        names = re.findall(r"'([^']*)'", context.get("expected") or context.get("expected_tags", ""))
-        if kind == "union_tag_invalid":
-            path.append("type")
-            value = value.get("type") if isinstance(value, Mapping) else value
-        reason = f"{did_you_mean(value, names)}allowed: {', '.join(show(name) for name in names)}"
-    elif kind == "union_tag_not_found":
-        path.append("type")
-        value, reason = None, f"required key is missing; allowed: {', '.join(map(show, sorted(_TAGS[str(path[0])])))}"
-    elif kind in ("model_type", "model_attributes_type", "dict_type"):
-        reason = "must be a table of key = value pairs"
-    elif kind == "bool_type":
-        reason = "must be true or false"
-    else:
-        message = str(details["msg"])
-        reason = message[0].lower() + message[1:]
-    if isinstance(value, Mapping):
-        value = None  # a whole table says nothing that its key does not
-    return Problem(".".join(str(part) for part in path), value, reason)
 
 
 def apply_overrides(file: str, data: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:

@@ -6,10 +6,9 @@ become tuples, so that a validated scene cannot be changed by accident.
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias
 
@@ -18,11 +17,16 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, PlainValidator, model_validator
 from pydantic_core import PydanticCustomError
 
+from rotfem.scene.problems import InputErrors, did_you_mean
+
 Array: TypeAlias = npt.NDArray[np.float64]
 Vector3: TypeAlias = tuple[float, float, float]
 Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 Taper: TypeAlias = tuple[tuple[float, float], ...]
 Profile: TypeAlias = float | Taper
+
+#: Sizes that a number may have, if it is not 0: beyond them squares and products are none any more.
+SMALLEST, LARGEST = 1e-100, 1e100
 
 
 def problem(key: str, value: Any, allowed: str) -> PydanticCustomError:
@@ -36,13 +40,7 @@ def problem(key: str, value: Any, allowed: str) -> PydanticCustomError:
     return PydanticCustomError("scene", "{reason}", {"reason": allowed, "key": key, "value": value})
 
 
-def did_you_mean(name: object, names: Iterable[str]) -> str:
-    """Return 'did you mean "x"? ' for the name closest to `name`, or an empty string if none is close."""
-    matches = difflib.get_close_matches(str(name), list(names), n=1)
-    return f'did you mean "{matches[0]}"? ' if matches else ""
-
-
-class SceneModel(BaseModel):
+class SceneModel(BaseModel, metaclass=InputErrors):
     """A table of the scene: immutable, and unknown or missing keys are errors that say what is allowed."""
 
     model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
@@ -133,6 +131,8 @@ def as_number(value: Any) -> float:
         number = math.inf
     if not math.isfinite(number):
         raise problem("", value, "must be a finite number")
+    if number != 0.0 and not SMALLEST <= abs(number) <= LARGEST:
+        raise problem("", value, f"must be 0 or from {SMALLEST:g} to {LARGEST:g} in size")
     return number
 
 
@@ -154,6 +154,8 @@ def as_rows(
         raise problem("", value, f"must be {shape}")
     if len(value[0]) not in columns:
         raise problem("", value, f"must be {shape}; {row_name(1)} has {len(value[0])} entries")
+    if (quick := _quick_rows(value)) is not None:
+        return quick
     for i, row in enumerate(value, start=1):
         if len(row) != len(value[0]):
             reason = f"{row_name(i)} has {len(row)} entries, {row_name(1)} has {len(value[0])}"
@@ -173,11 +175,36 @@ def as_increasing_rows(
     rows = as_rows(value, columns, shape, row_name)
     if len(rows) < 2:
         raise problem("", value, f"must be {shape} with at least two rows")
-    for i, (before, after) in enumerate(itertools.pairwise(rows), start=2):
-        if after[0] <= before[0]:
-            reason = f"{row_name(i)}: {after[0]:g} ≤ {before[0]:g}"
-            raise problem("", value, f"the first column must increase strictly; {reason}")
+    first = np.fromiter((row[0] for row in rows), dtype=np.float64, count=len(rows))
+    bad = np.flatnonzero(first[1:] <= first[:-1])
+    if len(bad):
+        i = int(bad[0])
+        reason = f"{row_name(i + 2)}: {first[i + 1]:g} ≤ {first[i]:g}"
+        raise problem("", value, f"the first column must increase strictly; {reason}")
     return rows
+
+
+def are_numbers(table: Array) -> bool:
+    """Return whether all numbers are 0 or of a size that is allowed."""
+    size = np.abs(table)
+    return bool(np.all((size == 0.0) | ((size >= SMALLEST) & (size <= LARGEST))))
+
+
+def rows_of(table: Array) -> Matrix:
+    """Return the rows of an array (n, columns)."""
+    rows: Any = table.tolist()
+    return tuple(map(tuple, rows))
+
+
+def _quick_rows(value: Sequence[Sequence[Any]]) -> Matrix | None:
+    """Return a table of good numbers as a tuple of rows; None where it has to be looked at entry by entry."""
+    if set(map(len, value)) != {len(value[0])} or not set(map(type, itertools.chain(*value))) <= {int, float}:
+        return None
+    try:
+        table = np.array(value, dtype=np.float64)
+    except OverflowError:
+        return None
+    return rows_of(table) if are_numbers(table) else None
 
 
 def as_taper(value: Any) -> Taper:

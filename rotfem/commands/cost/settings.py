@@ -11,7 +11,7 @@ from rotfem.errors import SceneError
 from rotfem.mechanics.theories import ladder as theory_ladder
 from rotfem.mechanics.theories import theories as all_theories
 from rotfem.scene import Scene
-from rotfem.scene.values import did_you_mean
+from rotfem.scene.problems import did_you_mean
 
 Elements = int | tuple[int, int] | None
 

@@ -267,5 +267,5 @@ class Study:
             "warnings": warnings,
             "versions": versions(),
             "ranks": self.comm.size,
-            "scene": self.scene.to_dict(),
+            "scene": self.scene.digest(),
         }
