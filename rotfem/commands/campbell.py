@@ -16,6 +16,7 @@ from rotfem.analysis.equilibrium import check_steady
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
+from rotfem.commands.finite import check_rows
 from rotfem.commands.mode_tables import advice, instabilities, mode_rows, unstiffened
 from rotfem.commands.modes import analysis_of, hints_of
 from rotfem.commands.problem import Problem, case_of
@@ -144,6 +145,7 @@ class Diagram:
             orders = int(np.clip(np.ceil(max(found, default=lowest) / max(fastest, 1e-300)), 1, 4))
         labels = branch_labels(analysis, sweep.nodes[0], count)
         rows = [row for node in sweep.nodes for row in node_rows(analysis, node, labels)]
+        check_rows(rows)
         crossings, onsets = sweep.crossings(orders), sweep.onsets()
         for crossing in crossings:
             crossing["label"] = labels[crossing["branch"] - 1]

@@ -59,10 +59,26 @@ class Job:
         self.session.say(lines(result.summary, self.folder))
 
 
+def as_path(text: str) -> Path:
+    """Return the path that an option gives.
+
+    Raises:
+        BadParameter: it is empty, which would mean the working directory, or no path.
+    """
+    if not text or "\0" in text:
+        raise typer.BadParameter("must be a path, not an empty text")
+    return Path(text)
+
+
 @contextmanager
 def job(
-    scene: Annotated[Path, typer.Argument(metavar="SCENE", help="scene file (TOML)", show_default=False)],
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="result folder [results/<scene name>]")] = None,
+    scene: Annotated[
+        Path, typer.Argument(metavar="SCENE", parser=as_path, help="scene file (TOML)", show_default=False)
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", parser=as_path, help="result folder [results/<scene name>]"),
+    ] = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="change a scene key, repeatable")
     ] = None,
@@ -77,8 +93,19 @@ def job(
     """Give a command its job; these are the options of all commands."""
     with Session(as_json, quiet, debug) as session:
         loaded = load_scene(scene, overrides or ())
-        folder = session.folder(output or Path("results") / loaded.name)
+        folder = session.folder(output or Path("results") / folder_name(loaded.name))
         yield Job(loaded, folder, session, not no_plots, session.hint(no_advice))
+
+
+def folder_name(scene: str) -> str:
+    """Return the name of the folder of a scene's results: the scene's own, if that is the name of one.
+
+    Raises:
+        SceneError: it is not.
+    """
+    if scene in ("", ".", ".."):
+        raise SceneError("command line", "-o", None, f'must be given for a scene of the name "{scene}"')
+    return scene
 
 
 def command(advice: bool = True) -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -179,7 +206,9 @@ def cost(
     todo: Job,
     quick: Annotated[bool, typer.Option("--quick", help="a small grid")] = False,
     accuracy: Annotated[float, typer.Option("--accuracy", help="relative error wanted, the model's included")] = 1e-4,
-    write: Annotated[Path | None, typer.Option("--write", metavar="FILE", help="write the tuned scene there")] = None,
+    write: Annotated[
+        Path | None, typer.Option("--write", metavar="FILE", parser=as_path, help="write the tuned scene there")
+    ] = None,
     of: Annotated[str | None, typer.Option("--of", metavar="OUTPUT", help="tip or frequencies")] = None,
     theories: Annotated[str | None, typer.Option("--theories", metavar="A,B,…", help="theories to try")] = None,
     elements: Annotated[str | None, typer.Option("--elements", metavar="N,…", help="numbers of elements")] = None,

@@ -5,6 +5,7 @@ Exit status 0 done, 2 bad input, 3 the computation failed, 130 interrupted.
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import sys
@@ -12,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
-from rotfem.errors import ComputationError, OutputError, SceneError
+from rotfem.errors import ComputationError, InputError, OutputError, SceneError
 
 
 class Session:
@@ -33,6 +34,9 @@ class Session:
         self._made: list[Path] = []
 
     def __enter__(self) -> Session:
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, io.TextIOWrapper):
+                stream.reconfigure(errors="backslashreplace")  # not every terminal has every letter
         signal.signal(signal.SIGTERM, _interrupt)
         return self
 
@@ -41,10 +45,12 @@ class Session:
             self._tidy()
         if error is None or (self.debug and not isinstance(error, SystemExit)):
             return
-        if isinstance(error, SceneError | OutputError):
+        if isinstance(error, InputError | OutputError):
             self._end(str(error), 2)
         if isinstance(error, ComputationError):
             self._end(f"the computation failed: {error}", 3)
+        if isinstance(error, MemoryError):
+            self._end("the computation failed: there is not enough memory; use fewer elements, or fewer modes", 3)
         if isinstance(error, KeyboardInterrupt):
             self._end("interrupted", 130)
         if self.comm.size > 1 and not isinstance(error, SystemExit):

@@ -18,6 +18,7 @@ from rotfem.analysis.equilibrium import check_steady, critical_speed
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.stability import stability_of_pencil
+from rotfem.commands.finite import check_rows
 from rotfem.commands.mode_tables import advice, mode_tables, scaled
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.summary import modal_summary
@@ -79,6 +80,7 @@ def _modes(
     speed = problem.motion.final_speed(scene.time.end if scene.time is not None else 0.0)
     hints = hints_of(analysis, scene, "modes", hint, speed)
     found = mode_tables(analysis, speed, scene.modes.count, keep=False)
+    check_rows(found.rows)
     spinning, warnings = found.spinning, found.warnings
     if choice is not None:  # a choice knows what it left out
         warnings = [line for line in warnings if line not in advice(analysis, speed)]

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.schemes import State
+from rotfem.commands.finite import check_finite
 from rotfem.commands.moment import hub_values
 from rotfem.results.run import RunResult, Table
 from rotfem.structures.paraview import Snapshots, writer
@@ -31,10 +32,15 @@ class Recorder:
         free = ("torque", "hub_kinetic", "angular_momentum", "impulse", "work") if system.hub is not None else ()
         further = tuple(system.model.problem.outputs)
         self.history = Table(("t", "psi", "psi_dot", *names, "kinetic", "strain", "jacobi", *free, *further))
+        self._last: State | None = None
         self.snapshots = Snapshots() if system.structure.mesh.topology.dim == 2 else None
 
     def __call__(self, state: State) -> None:
-        """Add a row for a state."""
+        """Add a row for a state.
+
+        Raises:
+            ComputationError: a number of it is not finite.
+        """
         system, t = self.system, state.t
         system.set_time(t)
         system.set_state(state.q, state.v, state.a)
@@ -42,13 +48,19 @@ class Recorder:
         row = [t, motion.angle(t), motion.speed(t), *system.tip(state.q, t)]
         row += [energy[name] for name in ("kinetic", "strain", "jacobi")]
         row += hub_values(system, state).values()
-        self.history.append([*row, *system.outputs().values()])
+        row += system.outputs().values()
+        check_finite(zip(self.history.columns, row, strict=True), t)
+        self.history.append(row)
+        self._last = state
         if self.snapshots is not None:
             self.snapshots.add(t, state.q)
 
     def result(self, summary: dict[str, Any], history: dict[str, Array]) -> RunResult:
         """Return a result with the last shape and the fields kept."""
         structure = self.system.structure
+        if self._last is not None:  # a state after it may have been refused
+            self.system.set_time(self._last.t)
+            self.system.set_state(self._last.q, self._last.v, self._last.a)
         shape = self.system.shape() if len(self.history) else {}
         out = RunResult(summary, history, shape, triangles=structure.surface())
         if self.snapshots is not None:

@@ -102,6 +102,8 @@ class Simulation:
         march = March(self.system, scheme_of(time), Steps.of(time), newton, self._initial())
         self.stepper = march.stepper
         for self.steps, state in enumerate(march):
+            if (why := self.scene.limits.refusal("steps", self.steps)) is not None:
+                raise ComputationError(f"the motion {why}", time=state.t)
             self._check(state)
             if self.steps % time.output_every == 0 or state.t >= time.end * (1 - 1e-9):
                 self._keep(state)

@@ -37,11 +37,12 @@ def existing_file(value: Any, info: ValidationInfo) -> Path:
     directory = Path((info.context or {}).get("directory", "."))
     try:
         path = (directory / value).resolve()
-        found = path.is_file()
+        found, there = path.is_file(), path.exists()
     except (OSError, ValueError) as error:
         raise problem("", str(value), f"must be the path of a file: {error}") from None
     if not found:
-        raise problem("", str(value), f"file not found (looked for {path})")
+        what = "is no regular file" if there else "file not found"
+        raise problem("", str(value), f"{what} (looked for {path})")
     return path
 
 

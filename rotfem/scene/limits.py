@@ -37,7 +37,7 @@ class Limits(SceneModel):
         most = getattr(self, name)
         if wanted <= most:
             return None
-        return f"makes {wanted:.4g} {name}; limits.{name} = {most} allows no more (raise it with [limits] or --set)"
+        return f"makes {wanted:.4g} {name}, more than limits.{name} = {most}; a larger one in [limits] allows them"
 
     def check(self, name: str, wanted: float, key: str = "", value: object = None) -> None:
         """Refuse more than a limit.

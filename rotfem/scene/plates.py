@@ -210,14 +210,8 @@ class PlateStructure(StructureTable):
     def _stiffnesses(self) -> dict[str, Array]:
         """Return membrane and bending stiffnesses (N/m, N·m) and the mass per area (kg/m²) at all given thicknesses."""
         given = self.thickness
-        rows = (
-            given.values()
-            if isinstance(given, dict)
-            else (h for _, h in given)
-            if isinstance(given, tuple)
-            else (given,)
-        )
-        h = np.array(list(rows))
+        rows = given if isinstance(given, dict) else dict(given) if isinstance(given, tuple) else {"": given}
+        h = np.array(list(rows.values()))
         moduli = {name: getattr(self, name) for name in ("E", "E1", "E2", "G12", "G13", "G23")}
         stiffnesses = {
             f"{name}{of}": value * h**power

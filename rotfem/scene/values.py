@@ -132,7 +132,7 @@ def as_number(value: Any) -> float:
     if not math.isfinite(number):
         raise problem("", value, "must be a finite number")
     if number != 0.0 and not SMALLEST <= abs(number) <= LARGEST:
-        raise problem("", value, f"must be 0 or from {SMALLEST:g} to {LARGEST:g} in size")
+        raise problem("", value, f"must be from {SMALLEST:g} to {LARGEST:g} in size")
     return number
 
 

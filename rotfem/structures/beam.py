@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from rotfem.mechanics.bodies import Strain
 from rotfem.mechanics.problem import Problem
+from rotfem.structures.memory import check_memory
 from rotfem.structures.meshes.line import beam_nodes
 from rotfem.structures.mode_names import in_phase, sign_changes
 from rotfem.structures.structure import Array, Structure
@@ -41,6 +42,7 @@ class Beam(Structure):
         super().__init__(problem, comm)
         grid, s = problem.mesh, self.data
         self.length, self.hub_radius, self._section = s.length, s.hub_radius, s.section
+        check_memory("mesh.elements", grid.elements, grid.elements * grid.degree + 1, self.size, 1, comm)
         nodes = beam_nodes(self.length, grid.elements, knots)
         interval = mesh.create_interval(comm, len(nodes) - 1, [0.0, self.length])
         x = interval.geometry.x

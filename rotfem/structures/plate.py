@@ -6,6 +6,7 @@ shear energy are integrated with 2k − 1, bending and inertia fully: the elemen
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection
 from functools import cached_property, partial
 from typing import Any, ClassVar
@@ -22,6 +23,7 @@ from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
 from rotfem.mechanics.loads import Load
 from rotfem.mechanics.mindlin import PlateGradients, director, triad
 from rotfem.mechanics.problem import Problem
+from rotfem.structures.memory import check_memory
 from rotfem.structures.meshes.plate_mesh import PlateGrid, plate_grid
 from rotfem.structures.mode_names import plate_mode_name, turning
 from rotfem.structures.plate_loads import PointPlace, TipEdge, locate, point_measure
@@ -72,6 +74,9 @@ class Plate(Structure):
     def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):
         super().__init__(problem, comm)
         s, settings = self.data, problem.mesh
+        if s.mesh is None:
+            nodes = math.prod(n * settings.degree + 1 for n in settings.elements)
+            check_memory("mesh.elements", list(settings.elements), nodes, self.size, 2, comm)
         self.grid: PlateGrid = plate_grid(problem, comm)
         cell = self.grid.mesh.topology.cell_name()
         k = settings.degree_on(cell)

@@ -15,6 +15,7 @@ import pytest
 import rotfem
 from rotfem import scene
 from rotfem.scene.clamp_and_damping import Damping
+from rotfem.scene.limits import Limits
 from rotfem.scene.section import PlanarSection
 from rotfem.scene.section_spatial import SpatialSection
 from rotfem.scene.values import SceneModel
@@ -56,7 +57,7 @@ TABLES: list[type[SceneModel]] = [
     *(PlanarSection, SpatialSection),
     *(scene.ConstantMotion, scene.SpinUpMotion, scene.TableMotion, scene.TorqueMotion, scene.CallableMotion),
     *(scene.Model, scene.Initial, scene.Loads, scene.Load, scene.BeamMesh, scene.PlateMesh),
-    *(scene.Time, scene.Modes, scene.Solver),
+    *(scene.Time, scene.Modes, scene.Solver, Limits),
 ]
 
 
