@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from inspect import Parameter, Signature, signature
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,6 +14,7 @@ import typer
 
 from rotfem.commands.console import Session
 from rotfem.commands.printed import campbell_report, explain_report, modes_report, run_report
+from rotfem.commands.result_folder import ResultFolder, Writer
 from rotfem.errors import ComputationError, SceneError, input_of
 from rotfem.scene import Scene, load_scene
 
@@ -37,14 +39,14 @@ class Job:
 
     Attributes:
         scene: the scene, with the changes of --set.
-        folder: where its results go; it is there.
+        results: folder where its results go.
         session: who speaks.
         plots: whether figures are wanted.
         hint: what tells advice; None where none is wanted.
     """
 
     scene: Scene
-    folder: Path
+    results: ResultFolder
     session: Session
     plots: bool
     hint: Callable[[str], None] | None
@@ -53,10 +55,12 @@ class Job:
         """Return the progress bar of the computation."""
         return self.session.progress(f"{self.scene.name}: {what or self.scene.model.theory}")
 
-    def finish(self, result: Any, lines: Callable[[dict[str, Any], Path], list[str]]) -> None:
-        """Write a result and print its report."""
-        self.session.write(result, self.folder, self.plots)
-        self.session.say(lines(result.summary, self.folder))
+    def finish(
+        self, result: Any, lines: Callable[[dict[str, Any], Path], list[str]], further: Sequence[Writer] = ()
+    ) -> None:
+        """Write a result, and what else is wanted, and print its report."""
+        self.session.write(result, self.plots, further)
+        self.session.say(lines(result.summary, self.results.path))
 
 
 def as_path(text: str) -> Path:
@@ -72,6 +76,7 @@ def as_path(text: str) -> Path:
 
 @contextmanager
 def job(
+    command: str,
     scene: Annotated[
         Path, typer.Argument(metavar="SCENE", parser=as_path, help="scene file (TOML)", show_default=False)
     ],
@@ -90,10 +95,10 @@ def job(
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False,
 ) -> Iterator[Job]:
-    """Give a command its job; these are the options of all commands."""
+    """Give a command its job; these are, but for its name, the options of all commands."""
     with Session(as_json, quiet, debug) as session:
         loaded = load_scene(scene, overrides or ())
-        folder = session.folder(output or Path("results") / folder_name(loaded.name))
+        folder = session.folder(output or Path("results") / folder_name(loaded.name), command)
         yield Job(loaded, folder, session, not no_plots, session.hint(no_advice))
 
 
@@ -112,12 +117,13 @@ def command(advice: bool = True) -> Callable[[Callable[..., None]], Callable[...
     """Make a command of a function of a job and its own options; `advice` says whether it gives any."""
 
     def decorate(work: Callable[..., None]) -> Callable[..., None]:
-        shared = [p for name, p in signature(job, eval_str=True).parameters.items() if advice or name != "no_advice"]
+        options_of_all = list(signature(job, eval_str=True).parameters.values())[1:]
+        shared = [p for p in options_of_all if advice or p.name != "no_advice"]
         own = list(signature(work, eval_str=True).parameters.values())[1:]
 
         def call(**given: Any) -> None:
             options = {p.name: given.pop(p.name) for p in own}
-            with job(**given) as todo:
+            with job(work.__name__, **given) as todo:
                 work(todo, **options)
 
         ordered = [shared[0], *own, *shared[1:]]
@@ -132,15 +138,17 @@ def command(advice: bool = True) -> Callable[[Callable[..., None]], Callable[...
 @command()
 def run(todo: Job) -> None:
     """Compute the steady state or the time history of SCENE."""
-    from rotfem.commands.run import run as simulate
+    from rotfem.commands.keeper import Keeper
+    from rotfem.commands.run import simulate
 
+    keeper = Keeper(todo.session.comm, todo.results)
     try:
         with todo.progress() as progress:
-            result = simulate(todo.scene, progress=progress, hint=todo.hint)
+            result = simulate(todo.scene, keeper, progress, todo.hint)
     except (ComputationError, KeyboardInterrupt) as error:
-        partial = getattr(error, "result", None)
-        if partial is not None:
-            todo.session.write(partial, todo.folder, todo.plots)
+        so_far = getattr(error, "result", None)
+        if so_far is not None:
+            todo.session.write(so_far, todo.plots)
         raise
     todo.finish(result, run_report)
 
@@ -159,19 +167,23 @@ def modes(
     from rotfem.commands.modes import modes as analyse
 
     result = analyse(todo.scene, sensitivities=sensitivities, hint=todo.hint)
+    further: list[Writer] = []
     if state_space or matrices:
+        from rotfem.analysis.state_space import serial, write_matrices
         from rotfem.analysis.state_space import state_space as reduce
-        from rotfem.analysis.state_space import write_matrices
 
         with input_of(todo.scene.file):
             if state_space:
                 model = reduce(result.analysis, result.spinning, todo.scene.modes.count)
-                model.write(todo.folder / "state_space.npz")
+                further.append(lambda folder: model.write(folder / "state_space.npz"))
             if matrices:
-                write_matrices(result.analysis, result.spinning, todo.folder)
+                serial(result.analysis, "the export of matrices")
+                further.append(partial(write_matrices, result.analysis, result.spinning))
     if animate is not None:
-        todo.session.animate(result, animate, todo.folder)
-    todo.finish(result, modes_report)
+        from rotfem.results.plots_plate import animate as draw
+
+        further.append(partial(draw, result, animate))
+    todo.finish(result, modes_report, further)
 
 
 @command()
@@ -230,7 +242,7 @@ def cost(
             accuracy=accuracy,
             output=of,
             repeat=repeat,
-            folder=todo.folder,
+            folder=todo.results.path,
             resume=resume,
             theories=listed("--theories", theories, str),
             elements=listed("--elements", elements, int),

@@ -9,11 +9,14 @@ import io
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from rotfem.commands.interrupts import Interrupted
+from rotfem.commands.result_folder import ResultFolder, Writer
 from rotfem.errors import ComputationError, InputError, OutputError, SceneError
+from rotfem.results.files import json_text
 
 
 class Session:
@@ -31,6 +34,7 @@ class Session:
         self.comm = MPI.COMM_WORLD
         self.as_json, self.quiet, self.debug = as_json, quiet, debug
         self.first = self.comm.rank == 0
+        self._folder: ResultFolder | None = None
         self._made: list[Path] = []
 
     def __enter__(self) -> Session:
@@ -41,6 +45,8 @@ class Session:
         return self
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        if self._folder is not None:
+            self._folder.close()
         if error is not None:
             self._tidy()
         if error is None or (self.debug and not isinstance(error, SystemExit)):
@@ -52,6 +58,8 @@ class Session:
         if isinstance(error, MemoryError):
             self._end("the computation failed: there is not enough memory; use fewer elements, or fewer modes", 3)
         if isinstance(error, KeyboardInterrupt):
+            if self.comm.size > 1 and not isinstance(error, Interrupted):
+                self._leave("interrupted", 130)
             self._end("interrupted", 130)
         if self.comm.size > 1 and not isinstance(error, SystemExit):
             # A rank that fails alone would leave the others waiting for it.
@@ -65,6 +73,12 @@ class Session:
             print(f"rotfem: {message}", file=sys.stderr)
         raise SystemExit(status) from None
 
+    def _leave(self, message: str, status: int) -> NoReturn:
+        """End this process at once: the others may be waiting for it, or gone, so that it must not wait for them."""
+        if self.first:
+            print(f"rotfem: {message}", file=sys.stderr, flush=True)
+        os._exit(status)
+
     def _tidy(self) -> None:
         """Remove the folders that this command made, the innermost first, as far as they are empty."""
         for made in self._made:
@@ -73,25 +87,16 @@ class Session:
             except OSError:
                 return
 
-    def folder(self, path: Path) -> Path:
-        """Return the result folder, made by rank 0.
+    def folder(self, path: Path, command: str) -> ResultFolder:
+        """Return the result folder, made and locked.
 
         Raises:
-            OutputError: it cannot be written.
+            OutputError: it cannot be written, or another process writes its results there.
         """
-        from rotfem.results.files import prepare_folder
-
-        problem = None
         if self.first:
             self._made = [p for p in (path, *path.parents) if not os.path.exists(p)]  # Path.exists may raise
-            try:
-                prepare_folder(path)
-            except OutputError as error:
-                problem = error
-        problem = self.comm.bcast(problem)
-        if problem is not None:
-            raise problem
-        return path
+        self._folder = ResultFolder(self.comm, path, command)
+        return self._folder
 
     def check_writable(self, option: str, path: Path) -> None:
         """See that the file of an option can be written, before anything is computed.
@@ -115,46 +120,27 @@ class Session:
             return None
         return lambda line: print(f"hint: {line}", file=sys.stderr) if self.first else None
 
-    def write(self, result: Any, folder: Path, plots: bool) -> None:
-        """Write a result and its figures from rank 0, its fields from all; print its summary if --json asks for it."""
-        fields = getattr(result, "fields", None)
-        if fields is not None:
-            fields(folder)
-        if not self.first:
-            return
-        result.write(folder)
-        if plots:
-            from rotfem.results.plots import plot
+    def write(self, result: Any, plots: bool, further: Sequence[Writer] = ()) -> None:
+        """Write a result and its figures; print its summary if --json asks for it.
 
-            plot(result, folder)
-        if self.as_json:
-            from rotfem.results.files import json_text
-
-            sys.stdout.write(json_text(result.summary))
-        for warning in result.summary["warnings"]:
-            if not self.quiet:
-                print(f"warning: {warning}", file=sys.stderr)
-
-    def animate(self, result: Any, mode: int, folder: Path) -> None:
-        """Write the picture and the animation of a plate's mode from rank 0.
+        Args:
+            result: the result.
+            plots: whether its figures are wanted.
+            further: what else is to be written.
 
         Raises:
-            SceneError: there is no such mode, or the structure is no plate.
-            OutputError: they cannot be written.
+            OutputError: a file cannot be written; those that can are.
+            SceneError: something further cannot be made.
         """
-        if result.triangles is None:
-            raise SceneError("command line", "--animate", mode, 'needs structure.type = "plate"')
-        from rotfem.results.plots_plate import animate
-
-        problem: Exception | None = None
-        if self.first:
-            try:
-                animate(result, mode, folder)
-            except (SceneError, OutputError) as error:
-                problem = error
-        problem = self.comm.bcast(problem)
-        if problem is not None:
-            raise problem
+        assert self._folder is not None
+        problems = self._folder.write(result, plots, further)
+        if self.first and self.as_json:
+            sys.stdout.write(json_text(result.summary))
+        for warning in result.summary["warnings"]:
+            if self.first and not self.quiet:
+                print(f"warning: {warning}", file=sys.stderr)
+        if problems:
+            raise problems[0]
 
     def say(self, lines: list[str]) -> None:
         """Print what was done."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,9 @@ import numpy as np
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady
+from rotfem.commands.keeper import Keeper
 from rotfem.commands.problem import Problem, case_of
+from rotfem.commands.result_folder import ResultFolder
 from rotfem.commands.simulation import Simulation
 from rotfem.errors import ComputationError, input_of
 from rotfem.listeners import Hint, Progress, silent
@@ -31,6 +34,7 @@ def run(
     hint: Hint | None = silent,
     terms: Mapping[str, Work] | None = None,
     outputs: Mapping[str, Functional] | None = None,
+    folder: str | Path | None = None,
 ) -> RunResult:
     """Return the time history of a scene, or its steady state where the spin is constant and [time] absent.
 
@@ -41,20 +45,48 @@ def run(
         hint: called with every line of advice before the computation starts; None asks for none.
         terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form (see `rotfem.Effect`).
         outputs: functionals to record, by name, mechanics ↦ UFL form; columns of the history.
+        folder: where the results go, the history as it grows, all of them but figures at the end; None writes nothing.
 
     Raises:
         SceneError: the scene is not valid or cannot be run.
         ComputationError: it failed; its attribute `result` holds what was computed until then.
+        OutputError: the folder cannot be written.
     """
     scene = as_scene(scene)
+    if folder is None:
+        return simulate(scene, Keeper(comm), progress, hint, terms, outputs)
+    with closing(ResultFolder(comm, Path(folder), "run")) as results:
+        try:
+            done = simulate(scene, Keeper(comm, results), progress, hint, terms, outputs)
+        except (ComputationError, KeyboardInterrupt) as error:
+            so_far = getattr(error, "result", None)
+            if so_far is not None:
+                results.write(so_far, plots=False)
+            raise
+        problems = results.write(done, plots=False)
+        if problems:
+            raise problems[0]
+        return done
+
+
+def simulate(
+    scene: Scene,
+    keeper: Keeper,
+    progress: Progress | None,
+    hint: Hint | None,
+    terms: Mapping[str, Work] | None = None,
+    outputs: Mapping[str, Functional] | None = None,
+) -> RunResult:
+    """Return the result of a scene (see `run`), with what is kept of it on disk while it goes on."""
+    comm = keeper.comm
     scene.check_run()
     problem = Problem.of(scene, terms=terms, outputs=outputs)
     with input_of(scene.file):
         if scene.time is None or scene.initial.state == "steady":
             check_steady(problem)
         if scene.model.tolerance is not None:
-            return run_chosen(scene, problem, comm, progress, hint)
-        return hinted(Simulation(scene, problem, comm), hint).run(progress)
+            return run_chosen(scene, problem, keeper, progress, hint)
+        return hinted(Simulation(scene, problem, comm, keeper=keeper), hint).run(progress)
 
 
 def hinted(simulation: Simulation, hint: Hint | None) -> Simulation:
@@ -64,17 +96,18 @@ def hinted(simulation: Simulation, hint: Hint | None) -> Simulation:
 
 
 def run_chosen(
-    scene: Scene, problem: Problem, comm: MPI.Comm, progress: Progress | None, hint: Hint | None
+    scene: Scene, problem: Problem, keeper: Keeper, progress: Progress | None, hint: Hint | None
 ) -> RunResult:
     """Return the result of the cheapest model within model.tolerance, and of richer ones where it does not hold.
 
     Raises:
         ComputationError: the full model failed, or one of them with on_exceed = "stop" or "warn".
     """
-    choice = choose(case_of(scene).replace(problem=problem), (HISTORY, STEADY), comm=comm)
+    choice = choose(case_of(scene).replace(problem=problem), (HISTORY, STEADY), comm=keeper.comm)
     while True:
         try:
-            return hinted(Simulation(scene, choice.applied(problem), comm, choice), hint).run(progress)
+            simulation = Simulation(scene, choice.applied(problem), keeper.comm, choice, keeper)
+            return hinted(simulation, hint).run(progress)
         except ComputationError as error:
             if choice.full or scene.model.on_exceed != "upgrade":
                 raise

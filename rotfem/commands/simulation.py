@@ -14,6 +14,8 @@ from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability, stability_of
 from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
+from rotfem.commands.interrupts import Interrupted
+from rotfem.commands.keeper import Keeper
 from rotfem.commands.problem import scheme_of
 from rotfem.commands.recorder import Recorder
 from rotfem.commands.summary import run_summary
@@ -24,7 +26,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.theories import Theory, richest, theories
 from rotfem.numerics.newton import Newton
 from rotfem.results.run import RunResult
-from rotfem.scene import Scene
+from rotfem.scene import Scene, Time
 from rotfem.selection.model_choice import Choice, RangeExceeded
 
 Array = npt.NDArray[np.float64]
@@ -41,10 +43,19 @@ class Simulation:
         problem: its problem, with the model it is run with.
         comm: MPI communicator.
         choice: how this model was chosen, if it was.
+        keeper: what is kept of it on disk while it goes on.
     """
 
-    def __init__(self, scene: Scene, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, choice: Choice | None = None):
+    def __init__(
+        self,
+        scene: Scene,
+        problem: Problem,
+        comm: MPI.Comm = MPI.COMM_WORLD,
+        choice: Choice | None = None,
+        keeper: Keeper | None = None,
+    ):
         self.started = perf_counter()
+        self.keeper = keeper or Keeper(comm)
         self.scene, self.comm, self.choice = scene, comm, choice
         self.warnings: list[str] = [] if choice is None else upgrade_warnings(choice)
         self.advice: list[str] = []
@@ -74,6 +85,8 @@ class Simulation:
             self._steady() if self.scene.time is None else self._march(progress or (lambda share: None))
         except (ComputationError, KeyboardInterrupt) as error:
             failure = error if isinstance(error, ComputationError) else None
+            if self.comm.size > 1 and failure is None and not isinstance(error, Interrupted):
+                raise  # the others may be anywhere
             status = "interrupted" if failure is None else "failed"
             vars(error)["result"] = self.result(status, failure)
             raise
@@ -101,13 +114,20 @@ class Simulation:
         newton = Newton.of(self.scene.solver, monotone=True)
         march = March(self.system, scheme_of(time), Steps.of(time), newton, self._initial())
         self.stepper = march.stepper
-        for self.steps, state in enumerate(march):
-            if (why := self.scene.limits.refusal("steps", self.steps)) is not None:
-                raise ComputationError(f"the motion {why}", time=state.t)
-            self._check(state)
-            if self.steps % time.output_every == 0 or state.t >= time.end * (1 - 1e-9):
-                self._keep(state)
-                progress(state.t / time.end)
+        self.keeper.start(self.record.history)
+        with self.keeper.interrupts():
+            for self.steps, state in enumerate(march):
+                self._stepped(state, time, progress)
+
+    def _stepped(self, state: State, time: Time, progress: Progress) -> None:
+        """Look at a state of the march, and keep what is to be kept of it."""
+        if (why := self.scene.limits.refusal("steps", self.steps)) is not None:
+            raise ComputationError(f"the motion {why}", time=state.t)
+        self._check(state)
+        if self.steps % time.output_every == 0 or state.t >= time.end * (1 - 1e-9):
+            self._keep(state)
+            progress(state.t / time.end)
+        self.keeper.stepped()
 
     def _initial(self) -> Array | None:
         """Return q at t = 0 in the turning frame; None where it is undeformed."""

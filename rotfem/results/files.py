@@ -7,7 +7,7 @@ import io
 import json
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,9 @@ import numpy.typing as npt
 from rotfem.errors import OutputError
 
 Array = npt.NDArray[np.float64]
+
+#: How the names of hidden files begin that are not whole yet; what a killed process leaves of them may be removed.
+PART = ".rotfem-"
 
 
 def prepare_folder(folder: str | Path) -> Path:
@@ -53,10 +56,14 @@ def unwritable(path: Path) -> str:
 def csv_text(columns: dict[str, Array]) -> str:
     """Return columns as CSV with a header; numbers keep all their digits."""
     buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*([repr(float(v)) for v in column] for column in columns.values()), strict=True))
+    csv.writer(buffer, lineterminator="\n").writerow(columns)
+    buffer.writelines(map(line, zip(*columns.values(), strict=True)))
     return buffer.getvalue()
+
+
+def line(row: Iterable[float]) -> str:
+    """Return numbers as a line of CSV, with all their digits."""
+    return ",".join([repr(float(value)) for value in row]) + "\n"
 
 
 def rows_text(rows: list[dict[str, Any]]) -> str:
@@ -70,9 +77,9 @@ def rows_text(rows: list[dict[str, Any]]) -> str:
 
 
 def read_csv(path: str | Path) -> dict[str, Array]:
-    """Return the columns of a CSV file that `csv_text` made."""
+    """Return the columns of a CSV file that `csv_text` made; a last line that was cut short is not read."""
     with open(path, encoding="utf-8", newline="") as file:
-        rows = list(csv.reader(file))
+        rows = list(csv.reader(line for line in file if line.endswith("\n")))
     values = np.array(rows[1:], dtype=np.float64).reshape(len(rows) - 1, len(rows[0]))
     return {name: values[:, i].copy() for i, name in enumerate(rows[0])}
 
@@ -96,15 +103,6 @@ def _jsonable(data: Any) -> Any:
     return data
 
 
-def write_files(folder: Path, texts: Mapping[str, str]) -> list[Path]:
-    """Write files into a folder, each whole or not at all, in their order; return their paths.
-
-    Raises:
-        OutputError: one cannot be written; those before it are there.
-    """
-    return [write_text(folder / name, text) for name, text in texts.items()]
-
-
 def write_text(path: Path, text: str) -> Path:
     """Write a text file, in UTF-8, whole or not at all; return its path.
 
@@ -121,7 +119,7 @@ def write_whole(path: Path, content: bytes) -> Path:
         OutputError: it cannot be written.
     """
     try:
-        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
+        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f"{PART}{path.name}-", suffix=".part")
         try:
             with os.fdopen(descriptor, "wb") as file:
                 file.write(content)

@@ -106,9 +106,11 @@ def animate(result: ModesResult, mode: int, folder: Path) -> list[Path]:
         folder: where the files go.
 
     Raises:
-        SceneError: there is no such mode.
+        SceneError: there is no such mode, or the structure is no plate.
         OutputError: PyVista is not installed, or a file cannot be written.
     """
+    if result.triangles is None:
+        raise SceneError("command line", "--animate", mode, 'needs structure.type = "plate"')
     titles = list(result.shapes)
     if not 1 <= mode <= len(titles):
         raise SceneError("command line", "--animate", mode, f"must be a mode from 1 to {len(titles)}")
@@ -118,7 +120,6 @@ def animate(result: ModesResult, mode: int, folder: Path) -> list[Path]:
         from PIL import Image
     except ImportError:
         raise OutputError(folder / f"mode_{mode}.gif", "PyVista is not installed (pip install rotfem[plots])") from None
-    assert result.triangles is not None
     mesh = surface(columns, result.triangles)
     z = np.column_stack([columns[n] + 1j * columns[f"{n}_imag"] for n in ("u1", "u2", "u3")])
     size = float(np.max(np.ptp(mesh.points, axis=0)))

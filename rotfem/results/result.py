@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotfem.results.files import write_files
-
 if TYPE_CHECKING:
     import pandas
     import xarray
@@ -67,12 +65,15 @@ class Result(ABC):
         """
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write the files into a folder, each whole or not at all; return their paths.
+        """Write the files into a folder, in the place of the results that are there; return their paths.
 
         Raises:
-            OutputError: the folder cannot be written.
+            OutputError: the folder cannot be written, or another process writes its results there.
         """
-        return write_files(Path(folder), self.files())
+        from rotfem.results.result_set import ResultSet
+
+        with ResultSet(Path(folder), self.summary.get("command", "")) as results:
+            return results.publish(self)
 
     def plot(self, path: str | Path | None = None, drawing: str = "") -> Figure:
         """Return a figure, a Matplotlib one of its own that pyplot does not know of.

@@ -41,6 +41,10 @@ class Table:
     def __len__(self) -> int:
         return len(self._rows)
 
+    def rows(self, first: int = 0) -> list[tuple[float, ...]]:
+        """Return the rows from the one of that number on."""
+        return self._rows[first:]
+
     def arrays(self) -> dict[str, Array]:
         """Return name ↦ array of all values so far."""
         values = np.array(self._rows, dtype=np.float64).reshape(len(self._rows), len(self.columns))

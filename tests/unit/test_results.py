@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rotfem.errors import OutputError
-from rotfem.results.files import csv_text, json_text, prepare_folder, read_csv, write_files, write_text
+from rotfem.results.files import csv_text, json_text, prepare_folder, read_csv, write_text
 from rotfem.results.run import RunResult, Table
 
 
@@ -60,14 +60,6 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.
         write_text(path, "new")
     assert path.read_text() == "old"
     assert os.listdir(tmp_path) == ["summary.json"]
-
-
-def test_files_are_written_in_their_order_each_whole(tmp_path: Path) -> None:
-    (tmp_path / "b.json").mkdir()  # a file of that name cannot be written
-    with pytest.raises(OutputError, match="b.json.*cannot be written"):
-        write_files(tmp_path, {"a.csv": "t\n0.5\n", "b.json": "{}\n", "c.csv": "t\n"})
-    assert sorted(os.listdir(tmp_path)) == ["a.csv", "b.json"]
-    assert (tmp_path / "a.csv").read_bytes() == b"t\n0.5\n"
 
 
 def test_files_get_the_usual_permissions(tmp_path: Path) -> None:

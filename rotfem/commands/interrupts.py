@@ -1,0 +1,50 @@
+"""Ctrl-C and SIGTERM in a march: heard at once, obeyed between steps, by all ranks at the same one."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable
+from types import FrameType
+from typing import Any, Self
+
+from mpi4py import MPI
+
+#: The signals that ask a run to end.
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Interrupted(KeyboardInterrupt):
+    """All ranks have agreed to end, so that what they do together can still be done."""
+
+
+class Interrupts:
+    """Context in which the signals that end a run wait for the end of a step. A second one does not wait.
+
+    Without it a rank would leave the others in the middle of what they do together.
+
+    Args:
+        comm: communicator of the run.
+        at_once: called when a signal comes, whatever is being computed: mpirun gives a quarter of a second only.
+        wanted: whether signals are to wait; otherwise this is no context at all.
+    """
+
+    def __init__(self, comm: MPI.Comm, at_once: Callable[[], None], wanted: bool):
+        self.comm, self.asked, self._at_once = comm, False, at_once
+        self.active = wanted and threading.current_thread() is threading.main_thread()
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> Self:
+        if self.active:
+            self._before = {number: signal.signal(number, self._hear) for number in SIGNALS}
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _hear(self, number: int, frame: FrameType | None) -> None:
+        if self.asked and self.comm.size == 1:
+            raise KeyboardInterrupt
+        self.asked = True
+        self._at_once()

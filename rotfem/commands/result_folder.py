@@ -1,0 +1,127 @@
+"""The result folder of a command on any number of processes: rank 0 has the files, all ranks have its errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+from mpi4py import MPI
+
+from rotfem.errors import OutputError, SceneError
+from rotfem.results.result import Result
+from rotfem.results.result_set import ResultSet
+
+T = TypeVar("T")
+
+#: Writes files into a folder.
+Writer = Callable[[Path], Any]
+
+
+class ResultFolder:
+    """Result folder, locked until it is closed. All methods are called on all ranks together.
+
+    Args:
+        comm: communicator of the command.
+        path: the folder, made where it is not there.
+        command: its verb.
+
+    Attributes:
+        set: the files, on rank 0.
+
+    Raises:
+        OutputError: the folder cannot be written, or another process writes its results there.
+    """
+
+    def __init__(self, comm: MPI.Comm, path: Path, command: str):
+        self.comm, self.path = comm, path
+        self.set: ResultSet | None = None
+        self.set = self._on_first(lambda: ResultSet(path, command), shared=False)
+
+    def close(self) -> None:
+        """Give the folder free."""
+        if self.set is not None:
+            self.set.close()
+
+    def first_does(self, work: Callable[[ResultSet], T]) -> T:
+        """Return on every rank what rank 0 makes of some work with the files.
+
+        Raises:
+            OutputError: on every rank, if it fails there.
+            SceneError: likewise.
+        """
+
+        def with_files() -> T:
+            assert self.set is not None
+            return work(self.set)
+
+        done: T = self._on_first(with_files)
+        return done
+
+    def _on_first(self, work: Callable[[], T], shared: bool = True) -> Any:
+        done, problem = None, None
+        if self.comm.rank == 0:
+            try:
+                done = work()
+            except (OutputError, SceneError) as error:
+                problem = error
+        told, problem = self.comm.bcast((done if shared else None, problem))
+        if problem is not None:
+            raise problem
+        return told if shared else done
+
+    def write(self, result: Result, plots: bool, further: Sequence[Writer] = ()) -> list[OutputError | SceneError]:
+        """Write a result, small files first and large ones last; return what went wrong with the large ones.
+
+        Args:
+            result: the result.
+            plots: whether its figures are wanted.
+            further: what else is to be written, on rank 0.
+
+        Raises:
+            OutputError: the small files cannot be written.
+        """
+        fields: Writer | None = getattr(result, "fields", None)
+        writers = [self._of_first(write) for write in further]
+        if plots:
+            writers.append(self._of_first(partial(_plot, result)))
+        if fields is not None:
+            writers.append(partial(self._of_all, fields))
+        self.first_does(lambda files: files.publish(result, not writers))
+        problems: list[OutputError | SceneError] = []
+        for write in writers:
+            try:
+                write()
+            except (OutputError, SceneError) as problem:
+                problems.append(problem)
+        if writers:
+            lost = [f"not written: {problem}" for problem in problems if isinstance(problem, OutputError)]
+            result.summary["warnings"] = [*result.summary["warnings"], *lost]
+            self.first_does(lambda files: files.finish(result.summary))
+        return problems
+
+    def _of_first(self, write: Writer) -> Callable[[], None]:
+        def staged(files: ResultSet) -> None:
+            with files.stage() as new:
+                write(new)
+
+        return lambda: self.first_does(staged)
+
+    def _of_all(self, write: Writer) -> None:
+        new = self.first_does(lambda files: files.open_stage())
+        problem = None
+        try:
+            write(new)
+        except OutputError as error:
+            problem = error
+        problem = next((p for p in self.comm.allgather(problem) if p is not None), None)
+        self.first_does(lambda files: files.close_stage(new, problem is None))
+        if problem is not None:
+            raise problem
+
+
+def _plot(result: Result, folder: Path) -> None:
+    from rotfem.results.plots import plot
+
+    plot(result, folder)

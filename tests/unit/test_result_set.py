@@ -1,0 +1,254 @@
+"""A result folder holds one whole set, or says that it does not, whatever happens while it is written."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotfem.errors import OutputError
+from rotfem.results import ModesResult, RunResult
+from rotfem.results.files import csv_text, read_csv
+from rotfem.results.live import LiveTable
+from rotfem.results.lock import NAME, FolderLock
+from rotfem.results.result_set import OURS, ResultSet, read_summary
+from rotfem.results.run import Table
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def run_result(value: float, shape: bool = True) -> RunResult:
+    history = {"t": np.array([0.0, 0.5]), "tip_u1": np.array([0.0, value])}
+    summary = {"command": "run", "status": "done", "value": value, "warnings": []}
+    return RunResult(summary, history, {"x": np.array([0.0, value])} if shape else {})
+
+
+def modes_result() -> ModesResult:
+    summary = {"command": "modes", "status": "done", "speed": 1.0, "warnings": []}
+    return ModesResult(summary, [{"mode": 1, "frequency": 2.0}], {"mode 1": {"x": np.zeros(2)}})
+
+
+def files(folder: Path) -> set[str]:
+    return set(os.listdir(folder))
+
+
+def test_a_set_takes_the_place_of_the_one_before_and_of_nothing_else(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "measured.csv").write_text("mine")
+    run_result(1.0).write(tmp_path)
+    assert files(tmp_path) == {"notes.txt", "measured.csv", "history.csv", "shape.csv", "summary.json"}
+    modes_result().write(tmp_path)
+    assert files(tmp_path) == {
+        "notes.txt",
+        "measured.csv",
+        "modes.csv",
+        "mode_shapes.csv",
+        "modes.json",
+        "summary.json",
+    }
+    run_result(2.0, shape=False).write(tmp_path)
+    assert files(tmp_path) == {"notes.txt", "measured.csv", "history.csv", "summary.json"}
+    assert (tmp_path / "notes.txt").read_text() == (tmp_path / "measured.csv").read_text() == "mine"
+
+
+def test_files_like_results_in_a_folder_without_any_stay(tmp_path: Path) -> None:
+    (tmp_path / "modes.csv").write_text("mine")
+    run_result(1.0).write(tmp_path)
+    assert (tmp_path / "modes.csv").read_text() == "mine"
+
+
+def test_names_of_all_files_are_known() -> None:
+    """So that the next set finds them even if this one is killed before it can list them."""
+    results = (run_result(1.0), modes_result())
+    for result in results:
+        assert all(OURS.fullmatch(name) for name in result.files() if name != "summary.json")
+    for name in (
+        "fields.bp",
+        "modes.xdmf",
+        "mode_12.gif",
+        "M.npz",
+        "K.mtx",
+        "cost.csv",
+        "campbell.png",
+        "checkpoint.h5",
+    ):
+        assert OURS.fullmatch(name), name
+    for name in ("notes.txt", "my_history.csv", "history.csv.bak", "cost.jsonl", "scene.toml", "mode_x.gif"):
+        assert not OURS.fullmatch(name), name
+
+
+def test_a_file_of_another_name_is_listed_and_goes_with_its_set(tmp_path: Path) -> None:
+    with ResultSet(tmp_path, "run") as results:
+        results.put({"path.csv": "t\n"})
+        results.finish({"command": "run", "status": "done"})
+    assert read_summary(tmp_path)["files"] == ["path.csv"]
+    modes_result().write(tmp_path)
+    assert "path.csv" not in files(tmp_path)
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+sys.path.insert(0, {root!r})
+import rotfem.results.result_set as module
+from tests.unit.test_result_set import run_result
+
+def counted(name):
+    real = getattr(os, name)
+    def call(*arguments, **options):
+        global left
+        left -= 1
+        if left < 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return real(*arguments, **options)
+    setattr(os, name, call)
+
+left = int(sys.argv[2])
+for name in ("replace", "unlink", "open", "chmod", "mkdir", "close"):
+    counted(name)
+run_result(2.0).write(Path(sys.argv[1]))
+"""
+
+
+def test_killed_at_any_call_the_folder_never_mixes_two_sets(tmp_path: Path) -> None:
+    """Killed before its first, second, … call that changes files until one start gets through."""
+    states = set()
+    for count in range(0, 400, 3):
+        folder = tmp_path / str(count)
+        folder.mkdir()
+        modes_result().write(folder)
+        done = subprocess.run(
+            [sys.executable, "-c", KILLED.format(root=str(ROOT)), str(folder), str(count)], check=False, timeout=60
+        )
+        summary, there = read_summary(folder), {name for name in files(folder) if OURS.fullmatch(name)}
+        states.add(summary["status"])
+        if summary["status"] == "done":
+            whole = {"run": {"history.csv", "shape.csv"}, "modes": {"modes.csv", "mode_shapes.csv", "modes.json"}}
+            assert there == whole[summary["command"]], f"killed at call {count}"
+        run_result(3.0).write(folder)  # what the killed one left is no obstacle, and goes
+        assert files(folder) == {"history.csv", "shape.csv", "summary.json"}
+        assert read_csv(folder / "history.csv")["tip_u1"][-1] == 3.0
+        if done.returncode == 0:
+            break
+    else:
+        pytest.fail("no start got through")
+    assert states == {"done", "writing"}
+
+
+def test_a_full_disk_leaves_the_set_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run_result(1.0).write(tmp_path)
+    before = {name: (tmp_path / name).read_bytes() for name in files(tmp_path)}
+    real = os.fdopen
+
+    class Full:
+        def __init__(self, descriptor: int, mode: str):
+            self.file = real(descriptor, mode)
+
+        def __enter__(self) -> Full:
+            return self
+
+        def __exit__(self, *_: object) -> None:
+            self.file.close()
+
+        def write(self, content: bytes) -> None:
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fdopen", Full)
+    with pytest.raises(OutputError, match="No space left on device"):
+        run_result(2.0).write(tmp_path)
+    monkeypatch.undo()
+    assert {name: (tmp_path / name).read_bytes() for name in files(tmp_path)} == before
+
+
+def test_a_folder_in_the_place_of_a_file_is_no_end_of_the_set_before(tmp_path: Path) -> None:
+    modes_result().write(tmp_path)
+    (tmp_path / "shape.csv").mkdir()
+    with pytest.raises(OutputError, match=r"shape\.csv.*Is a directory"):
+        run_result(1.0).write(tmp_path)
+    assert read_summary(tmp_path)["command"] == "modes"
+    assert {"modes.csv", "mode_shapes.csv", "modes.json"} <= files(tmp_path)
+
+
+HOLDER = """
+import sys, time
+from pathlib import Path
+from rotfem.results.lock import FolderLock
+FolderLock(Path(sys.argv[1])).acquire()
+print("locked", flush=True)
+time.sleep(60)
+"""
+
+
+def test_another_process_is_refused_until_the_first_has_ended_or_was_killed(tmp_path: Path) -> None:
+    holder = subprocess.Popen(
+        [sys.executable, "-c", HOLDER, str(tmp_path)],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )
+    try:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == "locked\n"
+        with pytest.raises(OutputError, match=rf"{tmp_path}.*process {holder.pid} on .* is writing its results there"):
+            run_result(1.0).write(tmp_path)
+    finally:
+        holder.kill()
+        holder.wait()
+    assert NAME in files(tmp_path)  # left behind, and no obstacle
+    run_result(1.0).write(tmp_path)
+    assert NAME not in files(tmp_path)
+
+
+def test_one_process_may_hold_a_lock_several_times_over(tmp_path: Path) -> None:
+    outer, inner = FolderLock(tmp_path), FolderLock(tmp_path)
+    outer.acquire()
+    inner.acquire()
+    inner.release()
+    assert NAME in files(tmp_path)
+    outer.release()
+    assert files(tmp_path) == set()
+
+
+def test_a_growing_table_is_whole_lines_and_ends_as_if_written_at_once(tmp_path: Path) -> None:
+    table, path = Table(("t", "x")), tmp_path / "history.csv"
+    live = LiveTable(path, table)
+    assert path.read_text() == "t,x\n"
+    for i in range(5):
+        table.append((0.1 * i, 1e-17 * i))
+        live.update()
+    assert live.flush()
+    assert path.read_text() == csv_text(table.arrays())
+    table.append((1.0, np.nan))
+    assert live.flush()
+    assert path.read_text() == csv_text(table.arrays())
+
+
+def test_a_growing_table_outlives_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    table, path = Table(("t", "x")), tmp_path / "history.csv"
+    live = LiveTable(path, table)
+    table.append((0.0, 1.0))
+    real = os.pwrite
+    monkeypatch.setattr(os, "pwrite", lambda descriptor, data, at: real(descriptor, data[:4], at))
+    assert not live.flush()
+    assert path.read_text() == "t,x\n", "a torn line"
+    monkeypatch.undo()
+    table.append((1.0, 2.0))
+    assert live.flush()
+    assert path.read_text() == csv_text(table.arrays())
+
+
+def test_a_line_that_was_cut_short_is_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "history.csv"
+    path.write_text("t,x\n0.0,1.0\n0.5,2.12")
+    assert {name: list(values) for name, values in read_csv(path).items()} == {"t": [0.0], "x": [1.0]}
+
+
+def test_a_summary_that_cannot_be_read_is_none(tmp_path: Path) -> None:
+    for text in ("", "{", "[1]", json.dumps("x")):
+        (tmp_path / "summary.json").write_text(text)
+        assert read_summary(tmp_path) == {}
