@@ -82,7 +82,7 @@ class ModalAnalysis:
         self.structure.check_shared()  # SLEPc waits for ever where a process has no unknowns
         self.free = self.system.hub is not None
         self.newton = newton or Newton()
-        self._unit = 1.0
+        self._unit: float | None = None
         assembled = self.system.assembled
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
         self.seconds |= {"equilibrium": 0.0, "factor": 0.0, "eigen": 0.0}

@@ -22,6 +22,7 @@ from scipy.sparse import csr_array
 from slepc4py import SLEPc
 
 from rotfem.errors import ComputationError
+from rotfem.numerics.balance import balanced, least_frequency, power_of_two
 from rotfem.numerics.linear import SMALL, use_direct_solver
 
 Array = npt.NDArray[Any]
@@ -84,8 +85,8 @@ class Pencil:
         self.comm: MPI.Comm = M.comm.tompi4py()
         self._x, self._y = K.createVecs()
         self._smallest = 1.0
-        #: Unit of λ in the eigensolver, 1/s, a power of two: numbers of order one keep all digits.
-        self.unit = 1.0
+        #: Unit of λ in the eigensolver, 1/s, a power of two: numbers of order one keep all digits. None: not known yet.
+        self.unit: float | None = None
         #: Time of factorisations, s.
         self.factored = 0.0
         self.spectrum_error: float | None = None
@@ -115,9 +116,10 @@ class Pencil:
         Of large matrices they are estimates from a few random signs r: the mean of ‖A r‖² is the norm's square.
         """
         out = {}
-        for name, A, sign in (("M", self.M, -1.0), ("C", self.C, 1.0), ("K", self.K, -1.0)):
-            size = A.norm()
-            out[name] = self._distance_from_transpose(A, sign) / size if size > 0 else 0.0
+        with balanced(self.M, self.C, self.K):  # else the unit of length would say which entries count
+            for name, A, sign in (("M", self.M, -1.0), ("C", self.C, 1.0), ("K", self.K, -1.0)):
+                size = A.norm()
+                out[name] = self._distance_from_transpose(A, sign) / size if size > 0 else 0.0
         return out
 
     def _distance_from_transpose(self, A: Any, sign: float) -> float:
@@ -162,8 +164,8 @@ class Pencil:
 
     def _solve(self, count: int, target: float) -> Eigenpairs:
         values, right, errors = self._right(self.M, self.C, self.K, count, target)
-        unit = 2.0 ** np.round(np.log2(max(float(np.median(np.abs(values))), 1e-300)))
-        if float(np.max(errors)) > GOOD and not 0.25 <= unit / self.unit <= 4.0:
+        unit = power_of_two(float(np.median(np.abs(values))))
+        if float(np.max(errors)) > GOOD and not 0.25 <= unit / (self.unit or unit) <= 4.0:
             self.unit = unit
             values, right, errors = self._right(self.M, self.C, self.K, count, target)
         self._smallest = float(np.median(np.abs(values)))
@@ -192,41 +194,59 @@ class Pencil:
 
     def _right(self, M: Any, C: Any, K: Any, count: int, target: float) -> tuple[Array, Array, Array]:
         """Return (λ, x, backward error) of the pairs nearest to the target, both signs of the imaginary part."""
-        unit = self.unit
-        C.scale(unit)
-        M.scale(unit**2)
-        try:
+        unit = self.unit or 1.0
+        with balanced(M, C, K, unit) as d:
             values, right, errors = self._nearest(M, C, K, count, target / unit)
-        finally:  # exact, as the unit is a power of two
-            C.scale(1 / unit)
-            M.scale(1 / unit**2)
-        return unit * values, right, errors
+        return (self.unit or 1.0) * values, d[:, None] * right, errors
 
     def _nearest(self, M: Any, C: Any, K: Any, count: int, target: float) -> tuple[Array, Array, Array]:
-        """Return (λ, x, backward error) nearest to the target, of matrices in the unit of λ."""
+        """Return (λ, x, backward error) nearest to the target, of balanced matrices."""
         n = K.getSize()[0]
         wanted = min(2 * count + 2, 2 * n - 2)
+        symmetric = target == 0.0 and self.conservative
+        pep = self._solver(M, C, K, wanted, target)
+        st = pep.getST()
+        if symmetric:
+            K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        use_direct_solver(st.getKSP(), n, symmetric)
+        started, scaled = perf_counter(), 1.0
+        try:
+            pep.setUp()
+            self.factored += perf_counter() - started
+            if self.unit is None and target == 0.0:
+                # P(0) = K is factorised in any unit of time, so what the factor tells of it costs nothing more.
+                lowest = least_frequency(M, K, st.getKSP())
+                self.unit = scaled = float(power_of_two(2 * count * lowest)) if lowest > 0.0 else 1.0
+                C.scale(scaled)
+                M.scale(scaled**2)
+            pep.solve()
+            return self._found(pep, K, count, wanted)
+        except ComputationError:
+            raise
+        except Exception as error:
+            raise ComputationError(f"the eigensolver failed: {error}", advice="a slightly different speed") from None
+        finally:
+            C.scale(1 / scaled)
+            M.scale(1 / scaled**2)
+            pep.destroy()
+
+    @staticmethod
+    def _solver(M: Any, C: Any, K: Any, wanted: int, target: float) -> Any:
+        """Return SLEPc's solver for so many eigenvalues nearest to the target."""
         pep = SLEPc.PEP().create(K.comm)
         pep.setOperators([K, C, M])
         pep.setProblemType(SLEPc.PEP.ProblemType.GENERAL)
         pep.setType(SLEPc.PEP.Type.TOAR)
-        pep.setDimensions(wanted, min(max(3 * wanted, wanted + 20), 2 * n))
+        pep.setDimensions(wanted, min(max(3 * wanted, wanted + 20), 2 * K.getSize()[0]))
         pep.setTarget(target)
         pep.setWhichEigenpairs(SLEPc.PEP.Which.TARGET_MAGNITUDE)
         pep.setTolerances(1e-11, 300)
-        st = pep.getST()
-        st.setType(SLEPc.ST.Type.SINVERT)
-        symmetric = target == 0.0 and self.conservative
-        if symmetric:
-            K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        use_direct_solver(st.getKSP(), n, symmetric)
-        started = perf_counter()
-        try:
-            pep.setUp()
-            self.factored += perf_counter() - started
-            pep.solve()
-        except Exception as error:
-            raise ComputationError(f"the eigensolver failed: {error}", advice="a slightly different speed") from None
+        pep.getST().setType(SLEPc.ST.Type.SINVERT)
+        return pep
+
+    @staticmethod
+    def _found(pep: Any, K: Any, count: int, wanted: int) -> tuple[Array, Array, Array]:
+        """Return (λ, x, backward error) of all pairs that have converged."""
         found = pep.getConverged()
         if found < min(count, wanted):
             raise ComputationError(
@@ -235,12 +255,9 @@ class Pencil:
         values, vectors, errors = [], [], []
         real, imaginary = K.createVecs()
         for i in range(found):
-            lam = pep.getEigenpair(i, real, imaginary)
-            vector = real.array + 1j * imaginary.array
-            values.append(complex(lam))
-            vectors.append(vector)
+            values.append(complex(pep.getEigenpair(i, real, imaginary)))
+            vectors.append(real.array + 1j * imaginary.array)
             errors.append(pep.computeError(i, SLEPc.PEP.ErrorType.BACKWARD))
-        pep.destroy()
         return np.array(values), np.array(vectors).T.copy(), np.array(errors)
 
     def _mirrored(self, values: Array, right: Array) -> Array:

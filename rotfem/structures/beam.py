@@ -13,7 +13,7 @@ from mpi4py import MPI
 from rotfem.mechanics.bodies import Strain
 from rotfem.mechanics.problem import Problem
 from rotfem.structures.memory import check_memory
-from rotfem.structures.meshes.line import beam_nodes
+from rotfem.structures.meshes.line import END, beam_nodes
 from rotfem.structures.mode_names import in_phase, sign_changes
 from rotfem.structures.structure import Array, Structure
 from rotfem.structures.tip_values import TipValues
@@ -52,8 +52,10 @@ class Beam(Structure):
         reduced = 2 * k - 2 if grid.integration == "reduced" else 2 * k
         self.dx_elastic = ufl.dx(self.mesh, metadata={"quadrature_degree": reduced})
         self.dx = ufl.dx(self.mesh, metadata={"quadrature_degree": 2 * k})
+        near = self.length * END
         ends = [
-            mesh.locate_entities_boundary(self.mesh, 0, lambda p, x=x: np.isclose(p[0], x)) for x in (self.length, 0.0)
+            mesh.locate_entities_boundary(self.mesh, 0, lambda p, x=x: np.abs(p[0] - x) < near)
+            for x in (self.length, 0.0)
         ]
         places, order = np.unique(np.concatenate(ends), return_index=True)
         tags = np.repeat(np.array([1, 2], dtype=np.int32), [len(end) for end in ends])[order]

@@ -7,6 +7,9 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
+#: Part of the length within which a node is an end of the line.
+END = 1e-9
+
 
 def beam_nodes(length: float, elements: int, knots: tuple[float, ...]) -> Array:
     """Return elements + 1 node positions on [0, length], evenly spaced between knots that are all nodes (m)."""

@@ -18,7 +18,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.numerics import compat
 from rotfem.structures.meshes.checks import BadMesh
 from rotfem.structures.meshes.gmsh_file import read
-from rotfem.structures.meshes.line import beam_nodes
+from rotfem.structures.meshes.line import END, beam_nodes
 
 Array = npt.NDArray[np.float64]
 
@@ -79,8 +79,10 @@ def rectangle(data: Any, grid: Any, comm: MPI.Comm) -> PlateGrid:
     names = {name: i for i, name in enumerate(EDGES, start=1)}
     edges, tags = [], []
     for name, (axis, end) in EDGES.items():
-        at = (corners[0][axis], corners[1][axis])[end]
-        found = mesh.locate_entities_boundary(out, 1, lambda p, axis=axis, at=at: np.isclose(p[axis], at))
+        at, near = (corners[0][axis], corners[1][axis])[end], END * (corners[1][axis] - corners[0][axis])
+        found = mesh.locate_entities_boundary(
+            out, 1, lambda p, axis=axis, at=at, near=near: np.abs(p[axis] - at) < near
+        )
         edges.append(found)
         tags.append(np.full(len(found), names[name], dtype=np.int32))
     flat, order = np.unique(np.concatenate(edges), return_index=True)
