@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq, linear_sum_assignment
 
-from rotfem.analysis.modal import GROWTH, ModalAnalysis, Spinning, stability
+from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
 from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
 from rotfem.numerics.eigenproblem import SAME
@@ -205,9 +205,13 @@ class Sweep:
     def onsets(self) -> list[dict[str, Any]]:
         """Return the ranges in which a mode is unstable, and how: `speed` where each begins, `kind`, and `until`.
 
-        A range that the sweep begins with has the first speed; `until` is None where none of the speeds ends it.
+        A range that the sweep begins with has the first speed; `until` is None where none of the speeds ends it. One in
+        which no growth is above the error bound of its mode is none.
         """
-        kinds = [unstable(node.spinning) for node in self.nodes]
+        sure = [node.speed for node in self.nodes if unstable(node.spinning) is not None]
+        if not sure:
+            return []
+        kinds = [unstable(node.spinning, bounded=False) for node in self.nodes]
         out: list[dict[str, Any]] = []
         if kinds[0] is not None:
             out.append({"speed": self.nodes[0].speed, "kind": kinds[0], "until": None})
@@ -221,7 +225,8 @@ class Sweep:
                 out[-1]["until"] = speed
             if after is not None:
                 out.append({"speed": speed, "kind": after, "until": None})
-        return out
+        ends = [np.inf if r["until"] is None else r["until"] for r in out]
+        return [r for r, end in zip(out, ends, strict=True) if any(r["speed"] <= s <= end for s in sure)]
 
     def _change(self, left: Node, right: Node, before: str | None, after: str | None) -> float | None:
         """Return the speed where the kind of instability changes; None if it only left the computed modes."""
@@ -250,7 +255,7 @@ class Sweep:
         low, high = left.spinning, right.speed
         while high - low.speed > 1e-9 * max(abs(high), abs(low.speed)):
             middle = self.solve(0.5 * (low.speed + high), low.q, False).spinning
-            if unstable(middle) == before:
+            if unstable(middle, bounded=False) == before:
                 low = middle
             else:
                 high = middle.speed
@@ -258,9 +263,14 @@ class Sweep:
         return None if after is None and worst.real > 1e-2 * abs(worst) else high
 
 
-def unstable(spinning: Spinning) -> str | None:
-    """Return the kind of instability of the worst mode at a speed, None if all are stable."""
-    values = spinning.pairs.values
-    size = float(np.max(np.abs(values), initial=0.0))
-    worst = max(values, key=lambda lam: lam.real, default=0.0)
-    return stability(complex(worst)) if worst.real > GROWTH * min(abs(worst), size) else None
+def unstable(spinning: Spinning, bounded: bool = True) -> str | None:
+    """Return the kind of instability of the worst mode at a speed, None if all are stable.
+
+    Args:
+        spinning: modes at one speed.
+        bounded: whether growth within the error bound of its mode is none; a search for a speed takes it as it is.
+    """
+    values, bounds = spinning.pairs.values, spinning.pairs.bounds if bounded else np.zeros(len(spinning.pairs.values))
+    kinds = [stability(complex(lam), float(bound)) for lam, bound in zip(values, bounds, strict=True)]
+    growing = [j for j, kind in enumerate(kinds) if kind.endswith("instability")]
+    return kinds[max(growing, key=lambda j: values[j].real)] if growing else None

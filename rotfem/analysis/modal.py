@@ -118,6 +118,7 @@ class ModalAnalysis:
         pencil = Pencil(*self.system.with_hub(matrices)) if self.free else clamped
         t2 = perf_counter()
         clamped.unit = pencil.unit = self._unit
+        pencil.sizes = self.stiffness_sizes(pencil.K)
         pairs = pencil.solve(count, clamped.scale() if self.free else 0.0)
         self._unit = pencil.unit
         t3 = perf_counter()
@@ -133,6 +134,21 @@ class ModalAnalysis:
         flexible = np.flatnonzero(np.abs(pairs.values) > ZERO * np.median(np.abs(pairs.values)))
         rigid = len(flexible) < len(pairs.values)
         return Spinning(speed, q, pencil, pairs.select(flexible[:finite]), clamped, rigid)
+
+    def stiffness_sizes(self, K: Any) -> Array | None:
+        """Return √ of what the entries of K are sums of, for each owned unknown; None where the diagonal says it.
+
+        In a deformed state all displacements of a node have a part of the axial stiffness in their entries, or of the
+        force it makes of a strain that is the difference of far larger numbers.
+        """
+        if self.system.linear:
+            return None
+        sizes = np.sqrt(np.abs(K.getDiagonal().array))
+        moves = [name.startswith("u") for name in self.structure.components]
+        owned = self.system.V.dofmap.index_map.size_local * len(moves)
+        nodes = sizes[:owned].reshape(-1, len(moves))
+        nodes[:, moves] = nodes[:, moves].max(axis=1, keepdims=True)
+        return np.asarray(sizes)
 
     def needs_fixed_hub(self, what: str) -> None:
         """Refuse what is not there for a free hub.
@@ -223,8 +239,16 @@ def massed(M: Any) -> int:
     return int(M.comm.tompi4py().allreduce(len(np.unique(rows[data != 0.0]))))
 
 
-def stability(lam: complex) -> str:
-    """Return "stable", "static instability" (real growth) or "dynamic instability" (growing oscillation)."""
-    if lam.real <= GROWTH * abs(lam):
+def stability(lam: complex, bound: float = 0.0) -> str:
+    """Return "stable", "static instability" (real growth), "dynamic instability" (growing oscillation) or "unresolved".
+
+    Args:
+        lam: eigenvalue, 1/s.
+        bound: how far it can be off, relative to its size; growth within it is none, and where it is all of the
+            eigenvalue nothing is known.
+    """
+    if bound >= 1.0:
+        return "unresolved"
+    if lam.real <= max(GROWTH, bound) * abs(lam):
         return "stable"
     return "static instability" if lam.imag <= SAME * abs(lam) else "dynamic instability"

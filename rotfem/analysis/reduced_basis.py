@@ -17,6 +17,7 @@ from petsc4py import PETSc
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.errors import ComputationError
+from rotfem.numerics.bounds import RoundOff, relative
 from rotfem.numerics.eigenproblem import Eigenpairs, Pencil
 
 Array = npt.NDArray[Any]
@@ -142,6 +143,7 @@ class ReducedAnalysis(ModalAnalysis):
         self._grams = np.array([[self._sum(A.T @ B) for B in products] for A in products])
         self._metric = self._sum(self.V.T @ self.V)
         self._norms = [float(p.operator.norm()) for p in pieces]
+        self._round_off = RoundOff(Pencil(*system.mass_damping_stiffness(keep=False)))
 
     def _sum(self, local: Any) -> Any:
         return self.comm.allreduce(local, op=MPI.SUM) if self.comm.size > 1 else local
@@ -166,6 +168,9 @@ class ReducedAnalysis(ModalAnalysis):
         pencil = SmallPencil(*(PETSc.Mat().createAIJ(m.shape, csr=_csr(m), comm=MPI.COMM_SELF) for m in small.values()))
         pairs = pencil.solve(min(count, self.V.shape[1] - 1))
         pairs.errors = self._backward_errors(pairs, c)
+        n = np.diag(pencil.gram(pairs.left, pairs.values, pairs.right, pairs.values))
+        lost = self._round_off.stiffness(self.V @ pairs.left, self.V @ pairs.right)
+        pairs.bounds = relative(lost / np.maximum(np.abs(n * pairs.values), 1e-300)) + pairs.bounds
         pencil.owner = self
         return Spinning(speed, zero, pencil, pairs, pencil)
 

@@ -146,10 +146,12 @@ def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Sta
             pairs = pencil.solve(count, target)
         except ComputationError:
             return Stability(negative, growth, frequency, complete=False)
-        values = pairs.values
+        values, bounds = pairs.values, pairs.bounds
         if target > 0.0:
-            values = values[np.abs(values) > ZERO * np.median(np.abs(values))]
-        grows = values[values.real > GROWTH * np.abs(values)]
+            flexible = np.abs(values) > ZERO * np.median(np.abs(values))
+            values, bounds = values[flexible], bounds[flexible]
+        # Growth that round-off can have made is none.
+        grows = values[values.real > np.maximum(GROWTH, bounds) * np.abs(values)]
         if len(grows):
             fastest = grows[np.argmax(grows.real)]
             growth = float(fastest.real)

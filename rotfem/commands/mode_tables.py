@@ -15,6 +15,10 @@ from rotfem.mechanics.theories import richest
 Array = npt.NDArray[Any]
 
 
+#: Relative error that round-off may cause in a frequency before it is said.
+RELIABLE = 1e-4
+
+
 @dataclass(frozen=True)
 class ModeTables:
     """What is said of the modes at one speed.
@@ -48,17 +52,17 @@ def mode_tables(analysis: ModalAnalysis, speed: float, count: int, *, keep: bool
     rigid = int(spinning.rigid)
     spinning.pairs = spinning.pairs.select(np.arange(min(count - rigid, len(spinning.pairs.values))))
     rows = mode_rows(analysis, spinning)
-    warnings = [*advice(analysis, speed), *unstiffened(analysis, speed, rows), *instabilities(rows)]
+    warnings = [*advice(analysis, speed), *unstiffened(analysis, speed, rows), *instabilities(rows), *unreliable(rows)]
     rows = [{**row, "mode": row["mode"] + rigid} for row in rows]
     shapes = {f"mode {row['mode']}: {row['label']}": scaled_shape(analysis, spinning, i) for i, row in enumerate(rows)}
     return ModeTables(spinning, [rigid_row(rows), *rows] if rigid else rows, shapes, warnings)
 
 
 def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any]]:
-    """Return one row a mode: frequency (rad/s, Hz), damping ratio, growth (1/s), label, shares, backward error."""
+    """Return one row a mode: frequency (rad/s, Hz), damping ratio, growth (1/s), label, shares, errors."""
     shares, names, turning = analysis.shares(spinning), analysis.names(spinning), analysis.turning(spinning)
-    rows = []
-    for i, (lam, error) in enumerate(zip(spinning.pairs.values, spinning.pairs.errors, strict=True)):
+    rows, pairs = [], spinning.pairs
+    for i, (lam, error, bound) in enumerate(zip(pairs.values, pairs.errors, pairs.bounds, strict=True)):
         size = abs(lam)
         rows.append(
             {
@@ -68,10 +72,11 @@ def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any
                 "frequency_hz": float(lam.imag / (2 * np.pi)),
                 "damping": float(-lam.real / size) if size > 0 else 0.0,
                 "growth": float(lam.real),
-                "stability": stability(lam),
+                "stability": stability(lam, float(bound)),
                 **{f"share_{name}": float(share[i]) for name, share in shares.items()},
                 **({"turning": turning[i]} if turning else {}),
                 "residual": float(error),
+                "error_bound": float(bound),
             }
         )
     return rows
@@ -88,7 +93,19 @@ def instabilities(rows: list[dict[str, Any]]) -> list[str]:
     return [
         f"{row['stability']}: {row['label']} grows as exp({row['growth']:.6g} t)"
         for row in rows
-        if row["stability"] not in ("stable", "neutral")
+        if row["stability"].endswith("instability")
+    ]
+
+
+def unreliable(rows: list[dict[str, Any]]) -> list[str]:
+    """Return a warning if round-off may have changed frequencies by more than RELIABLE of them."""
+    found = {row["label"]: row["error_bound"] for row in rows if row["error_bound"] > RELIABLE}
+    if not found:
+        return []
+    listed = ", ".join(f"{label} by up to {100 * min(bound, 9.99):.2g} %" for label, bound in found.items())
+    return [
+        f"unreliable: round-off may have changed {listed} (error_bound), as axial or shear stiffness outweighs what "
+        "these modes feel; fewer elements, or stiffnesses that are lower but still without influence"
     ]
 
 

@@ -45,7 +45,7 @@ def modes_report(summary: dict[str, Any], folder: Path) -> list[str]:
     for row in summary["modes"]:
         lines.append(
             f"{row['mode']:>4}  {row['label']:<16}{row['frequency']:>14.6f}{row['frequency_hz']:>12.6f}"
-            f"{row['damping']:>12.3e}{row['residual']:>10.1e}"
+            f"{row['damping']:>12.3e}{row['error_bound']:>10.1e}"
         )
     return [*lines, f"results in {folder}"]
 

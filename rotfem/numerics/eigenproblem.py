@@ -23,6 +23,7 @@ from slepc4py import SLEPc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics.balance import balanced, least_frequency, power_of_two
+from rotfem.numerics.bounds import RoundOff
 from rotfem.numerics.linear import SMALL, use_direct_solver
 
 Array = npt.NDArray[Any]
@@ -57,16 +58,19 @@ class Eigenpairs:
         right: x, shape (n_local, m), complex.
         left: y, shape (n_local, m), complex.
         errors: normwise backward errors, shape (m,).
+        bounds: how far λ can be off by round-off, relative to |λ|, shape (m,) (see `rotfem.numerics.bounds`).
     """
 
     values: Array
     right: Array
     left: Array
     errors: Array
+    bounds: Array
 
     def select(self, index: Array) -> Eigenpairs:
         """Return the pairs of an index array, in its order."""
-        return Eigenpairs(self.values[index], self.right[:, index], self.left[:, index], self.errors[index])
+        vectors = self.right[:, index], self.left[:, index]
+        return Eigenpairs(self.values[index], *vectors, self.errors[index], self.bounds[index])
 
 
 class Pencil:
@@ -87,6 +91,8 @@ class Pencil:
         self._smallest = 1.0
         #: Unit of λ in the eigensolver, 1/s, a power of two: numbers of order one keep all digits. None: not known yet.
         self.unit: float | None = None
+        #: Sizes of what the entries of K are sums of (see `rotfem.numerics.bounds.RoundOff`).
+        self.sizes: Array | None = None
         #: Time of factorisations, s.
         self.factored = 0.0
         self.spectrum_error: float | None = None
@@ -176,7 +182,8 @@ class Pencil:
         else:
             M, C, K = (transposed(A) for A in (self.M, self.C, self.K))
             left = self._matched(values, *self._right(M, C, K, count, target)[:2])
-        pairs = Eigenpairs(values, right, left, errors)
+        values, bounds = RoundOff(self, self.sizes).corrected(values, left, right)
+        pairs = Eigenpairs(values, right, left, errors, bounds)
         # A double zero eigenvalue (a rigid-body mode) is known beforehand, and never met to full accuracy.
         trusted = np.abs(values) > (ZERO * np.median(np.abs(values)) if target > 0.0 else 0.0)
         worst = float(np.max(pairs.errors[trusted], initial=0.0))

@@ -63,9 +63,10 @@ class CampbellResult(Result):
     Attributes:
         summary: scene, branches, critical speeds, instabilities, self-checks, warnings, timings; JSON-able.
         rows: one dictionary a speed and branch: `speed` (rad/s), `branch`, `label`, `mode` (its name at this speed),
-            `frequency` (rad/s), `frequency_hz`, `damping`, `growth` (1/s), `residual`, `share_…`, `confidence` (squared
-            correlation with the speed before), `refined` (1 where the speed was not asked for); of a disk `turning` (1
-            for a wave that travels with the spin, −1 against it, 0 for a standing one).
+            `frequency` (rad/s), `frequency_hz`, `damping`, `growth` (1/s), `residual`, `error_bound`,
+            `share_…`, `confidence` (squared correlation with the speed before), `refined` (1 where the speed was not
+            asked for); of a disk `turning` (1 for a wave that travels with the spin, −1 against it, 0 for a standing
+            one).
     """
 
     rows: list[dict[str, Any]]
