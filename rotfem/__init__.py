@@ -17,6 +17,7 @@ from rotfem.version import __version__
 
 if TYPE_CHECKING:
     from rotfem.analysis.alpha_family import GeneralisedAlpha, Newmark
+    from rotfem.analysis.esdirk import ESDIRK4
     from rotfem.analysis.schemes import Scheme, Stage, State
     from rotfem.commands.campbell import campbell
     from rotfem.commands.cost.result import CostResult
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 #: Module ↦ public names it has: imported when one is first asked for, as most of them load FEniCSx.
 _HOMES = {
     "analysis.alpha_family": ("GeneralisedAlpha", "Newmark"),
+    "analysis.esdirk": ("ESDIRK4",),
     "analysis.schemes": ("Scheme", "Stage", "State"),
     "commands.campbell": ("campbell",),
     "commands.cost.study": ("cost",),
@@ -67,6 +69,7 @@ _LATER |= {
 }
 
 __all__ = [
+    "ESDIRK4",
     "BeamMesh",
     "CampbellResult",
     "ComputationError",

@@ -36,11 +36,11 @@ class Registry(Generic[E]):
 
     Args:
         kind: what an entry is, for messages.
-        home: module that registers the package's own entries when it is imported.
+        homes: modules that register the package's own entries when they are imported.
     """
 
-    def __init__(self, kind: str, home: str):
-        self.kind, self._home = kind, home
+    def __init__(self, kind: str, *homes: str):
+        self.kind, self._homes = kind, homes
         self._entries: dict[str, E] = {}
 
     def add(self, entry: E) -> None:
@@ -61,8 +61,8 @@ class Registry(Generic[E]):
         del self._entries[name]
 
     def _load(self) -> None:
-        home, self._home = self._home, ""
-        if home:
+        homes, self._homes = self._homes, ()
+        for home in homes:
             import_module(home)
 
     @property
@@ -86,7 +86,7 @@ class Registry(Generic[E]):
 # The registries themselves are here, on the ground, so that a scene knows the names of what lies above it.
 theories: Registry[Theory] = Registry("theory", "rotfem.mechanics.theories")
 effects: Registry[Effect] = Registry("effect", "rotfem.mechanics.effects")
-schemes: Registry[Any] = Registry("scheme", "rotfem.analysis.alpha_family")
+schemes: Registry[Any] = Registry("scheme", "rotfem.analysis.alpha_family", "rotfem.analysis.esdirk")
 shapes: Registry[Shape] = Registry("section shape", "rotfem.scene.section_shapes")
 outputs: Registry[Output] = Registry("output", "rotfem.mechanics.outputs")
 

@@ -1,0 +1,85 @@
+"""A scheme of fourth order with an error estimate: an explicit first stage and five singly diagonal implicit ones.
+
+The stages are, with V_1 = v_n, A_1 = q̈_n,
+
+    Q_i = q_n + h Σ_j a_ij V_j,    V_i = v_n + h Σ_j a_ij A_j,    a_ii = γ = ¼ (i > 1),
+
+and the last is the end of the step (Kennedy & Carpenter 2003, appendix C, the implicit part of ARK4(3)6L[2]SA):
+L-stable, stiffly accurate, of stage order two. All stages of steps of one length share one tangent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
+
+import numpy as np
+
+from rotfem.analysis.schemes import Array, Scheme, Stage, State
+from rotfem.registry import register
+
+GAMMA = 0.25
+
+#: a_ij below the diagonal, row by row.
+ROWS = (
+    (),
+    ("1/4",),
+    ("8611/62500", "-1743/31250"),
+    ("5012029/34652500", "-654441/2922500", "174375/388108"),
+    ("15267082809/155376265600", "-71443401/120774400", "730878875/902184768", "2285395/8070912"),
+    ("82889/524892", "0", "15625/83664", "69875/102672", "-2260/8211"),
+)
+
+#: Weights of the embedded method of third order.
+EMBEDDED = (
+    "4586570599/29645900160",
+    "0",
+    "178811875/945068544",
+    "814220225/1159782912",
+    "-3700637/11593932",
+    "61727/225920",
+)
+
+
+def _numbers(row: Sequence[str]) -> list[float]:
+    return [float(Fraction(text)) for text in row]
+
+
+A = np.array([[*_numbers(row), GAMMA if row else 0.0, *[0.0] * (5 - len(row))] for row in ROWS])
+C = A.sum(axis=1)
+B_DIFFERENCE = A[-1] - np.array(_numbers(EMBEDDED))
+
+
+@dataclass(frozen=True)
+class ESDIRK4(Scheme):
+    """Fourth order in smooth motions; what it does not resolve is damped within a few steps."""
+
+    name: ClassVar[str] = "esdirk4"
+    order: ClassVar[int] = 4
+    stages: ClassVar[int] = 5
+
+    def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
+        """Return stage i + 2 of the method, predicted by the acceleration of the stage before."""
+        row, t = A[i + 1], end if i == self.stages - 1 else state.t + C[i + 1] * h
+        q_known, v_known = state.q + h * row[0] * state.v, state.v + h * row[0] * state.a
+        for weight, before in zip(row[1:], done, strict=False):
+            q_known, v_known = q_known + h * weight * before.v, v_known + h * weight * before.a
+        a = (done[-1] if done else state).a.copy()
+        v = v_known + GAMMA * h * a
+        return Stage(t, q_known + GAMMA * h * v, v, a, 1 / (GAMMA * h), 1 / (GAMMA * h) ** 2)
+
+    def finish(self, state: State, h: float, done: Sequence[Stage]) -> State:
+        """Return the last stage, and with it the estimate of the step's error of q."""
+        end = done[-1]
+        velocities = (state.v, *(stage.v for stage in done))
+        error = h * sum(weight * v for weight, v in zip(B_DIFFERENCE, velocities, strict=True))
+        return State(end.t, end.q, end.v, end.a, error)
+
+    def local_error(self, new: State, old: State) -> Array:
+        """Return the difference from the embedded method of third order, h Σ (b_j − b̂_j) V_j."""
+        return np.asarray(new.memory)
+
+
+register(ESDIRK4)
