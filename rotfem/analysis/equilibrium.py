@@ -17,7 +17,7 @@ from rotfem.mechanics.loads import ConstantLoad, Loads
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.linear import DirectSolver, Increment, use_direct_solver
-from rotfem.numerics.newton import Newton
+from rotfem.numerics.newton import REACH, Newton
 
 Array = npt.NDArray[np.float64]
 
@@ -111,32 +111,63 @@ def check_steady(problem: Problem) -> None:
 def static_tip_shape(problem: Problem, displacement: float, newton: Newton, comm: MPI.Comm = MPI.COMM_WORLD) -> Array:
     """Return q (local dof array) of the beam at rest under the tip force F_2 that gives u_2(L) = displacement (m).
 
+    The tip is led there in one step where Newton allows, and in smaller ones where not.
+
     Raises:
-        ComputationError: no equilibrium with this displacement was found.
+        ComputationError: no equilibrium with this displacement was found; says how far the tip was led.
     """
     still, force = Motion.constant_speed(0.0), Loads(tip_force=ConstantLoad((0.0, 1.0, 0.0)))
     resting = problem.replace(frame="rotating", effects=(), motion=still, loads=force, terms={}, outputs={})
     system = compile_system(resting, comm, moving=False)
-    tip, q, F = system.structure.tip_values, system.zeros(), 0.0
+    q: Array = system.zeros()
+    F, done, share = 0.0, 0.0, 1.0
+    while done < 1.0:
+        target = min(1.0, done + share)
+        try:
+            q, F = _led(system, target * displacement, q, F, newton)
+        except ComputationError as error:
+            share /= 2
+            if share < SMALLEST_SHARE:
+                raise ComputationError(
+                    f"no static shape with a tip displacement of {displacement:g} m: the tip was led to "
+                    f"{done * displacement:.4g} m; {error.what}",
+                    advice="a smaller initial.tip_displacement, or a theory that holds at large deflection",
+                ) from None
+            continue
+        done = target
+        share *= 1.5
+    return q
+
+
+def _led(system: System, displacement: float, q: Array, F: float, newton: Newton) -> tuple[Array, float]:
+    """Return (q, F) of the equilibrium with u_2(L) = displacement (m), from that of another displacement."""
+    tip, q, before = system.structure.tip_values, q.copy(), q
     under_load, under_residual = Increment(system.V), Increment(system.V)
 
     def increment() -> float:
-        nonlocal F
+        nonlocal F, before
         system.set_state(q)
         system.set_time(0.0, load_factor=F + 1.0)
         loaded = system.residual().copy()
         system.set_time(0.0, load_factor=F)
         residual = system.residual()
         loaded.axpy(-1.0, residual)
-        solver = DirectSolver(system.tangent(1.0, 0.0, 0.0)[0])
+        solver = DirectSolver(system.tangent(1.0, 0.0, 0.0, before)[0])
         dq, per_force = under_residual.solve(solver, residual), under_load.solve(solver, loaded)
         dF = (displacement - tip(q)[1] - tip(dq)[1]) / tip(per_force)[1]
-        F += dF
-        q[:] += dq + dF * per_force
-        return float(system.size(dq + dF * per_force))
+        correction = dq + dF * per_force
+        size = float(system.size(correction))
+        part = min(1.0, REACH / size) if size > 0.0 and not system.linear else 1.0
+        before = q.copy()
+        F += part * dF
+        q[:] += part * correction
+        return size
 
     newton.solve(increment, lambda: float(system.size(q)))
-    return np.asarray(q)
+    system.set_state(q)
+    if not system.linear and system.model.inside_out():
+        raise ComputationError("Newton met a state that is turned inside out (an axial strain below −1)")
+    return q, F
 
 
 def critical_speed(system: Any) -> float | None:

@@ -8,13 +8,22 @@ import numpy as np
 
 from rotfem.analysis.schemes import Array, Scheme, Shifts, Stage, State
 from rotfem.errors import ComputationError
-from rotfem.numerics.newton import Newton
+from rotfem.numerics.newton import REACH, Newton
 
 #: Iterations with an old factor after which the next step gets a new one.
 LONG = 5
 
 #: After an old factor has failed k times in a row, none is tried for 2^k steps; k grows to this.
 PATIENCE = 5
+
+#: Newton iterations after which a way is long.
+SOON = 4
+
+#: Newton iterations after which the prediction of the next step is questioned, and its share that is taken for all.
+MANY, WHOLE = 3, 0.9
+
+#: Part of the kinetic and strain energy by which a root that Newton strayed to may exceed the energy there was.
+MORE_ENERGY = 0.03
 
 #: A linear step is refined with an old factor up to this relative error, as long as that shrinks at this rate, or to
 #: where it stays at round-off.
@@ -37,6 +46,10 @@ class Stepper:
         self.system, self.scheme, self.newton = system, scheme, newton
         self.substeps = self.rejected = 0
         self._held: Shifts | None = None
+        #: Whether Newton's way is a long one, so that tangents that know where it came from are worth compiling.
+        self._far = False
+        #: Share of the last predicted move that came true.
+        self._share = 1.0
         #: How often in a row an old factor has failed, and for how many steps none is tried for that.
         self._failed = self._pause = 0
 
@@ -76,19 +89,19 @@ class Stepper:
             if self.system.clamp is not None:  # a prediction that turns with the hub is the better one
                 turned = self.system.clamp.turned(state.q, state.v, state.t, stage.t)
                 stage.correct(turned - stage.q)
-            self._solve(stage)
+            self._solve(stage, state)
             stages.append(stage)
         new = self.scheme.finish(state, h, stages)
         new.given = self.system.given(new, state)
         return new
 
-    def _solve(self, stage: Stage) -> None:
-        """Solve a stage, with the factor of an earlier one if that serves."""
+    def _solve(self, stage: Stage, state: State) -> None:
+        """Solve a stage of a step from a state, with the factor of an earlier one if that serves."""
         if self._held == stage.shifts and self.system.keeps_factor and not self._new_factor_pays(stage.t):
             if self._pause == 0:
                 predicted = stage.q.copy(), stage.v.copy(), stage.a.copy()
                 try:
-                    self._iterate(stage, chord=True)
+                    self._iterate(stage, state, chord=True)
                 except ComputationError:  # the old factor does not serve here; nor will the next ones, perhaps
                     self._held, self._failed = None, min(self._failed + 1, PATIENCE)
                     self._pause = 2**self._failed
@@ -97,7 +110,57 @@ class Stepper:
                     self._failed = 0
                     return
             self._pause = max(self._pause - 1, 0)
-        self._iterate(stage)
+        if self.system.linear:
+            self._iterate(stage, state)
+            return
+        move = stage.q - state.q
+        if self._share < WHOLE:
+            stage.correct((self._share - 1.0) * move)
+        v, a = stage.v - stage.c_v * stage.q, stage.a - stage.c_a * stage.q
+        try:
+            iterations = self._root(stage, state)
+        except ComputationError:
+            if self._share == 0.0:
+                raise
+            stage.q[:], self._share, self._far = (
+                state.q,
+                0.0,
+                True,
+            )  # from where the step starts, whatever was predicted
+            stage.v[:], stage.a[:] = v + stage.c_v * stage.q, a + stage.c_a * stage.q
+            iterations = self._root(stage, state)
+        if self._share < WHOLE or iterations > MANY:
+            self._share = came_true(self.system, stage.q - state.q, move)
+
+    def _root(self, stage: Stage, state: State) -> int:
+        """Solve a stage of a nonlinear system, see that it is the motion's and return the iterations."""
+        iterations = self._iterate(stage, state)
+        if self.newton.strayed:
+            self._check_root(stage, state)
+        return iterations
+
+    def _check_root(self, stage: Stage, state: State) -> None:
+        """Refuse a root of a stage that is not the motion's.
+
+        Raises:
+            ComputationError: it is turned inside out, or has energy that nothing has given it.
+        """
+        s = self.system
+        s.set_state(stage.q, stage.v, stage.a)
+        if s.model.inside_out():
+            raise ComputationError(
+                "Newton met a state that is turned inside out (an axial strain below −1)", time=stage.t
+            )
+        if not s.model.closed:
+            return
+        new = s.energies()
+        s.set_state(state.q, state.v, state.a)
+        old = s.energies()
+        grown, there = new["jacobi"] - old["jacobi"], max(e["kinetic"] + e["strain"] for e in (old, new))
+        if grown > MORE_ENERGY * there:
+            raise ComputationError(
+                f"Newton met a state with {grown:.2g} J more than there were, of {there:.2g} J", time=stage.t
+            )
 
     def _new_factor_pays(self, t: float) -> bool:
         """Return whether the matrix stays as it is from now on, while the factor is that of another."""
@@ -107,17 +170,24 @@ class Stepper:
         s.set_time(t)
         return bool(s.settled and not s.current)
 
-    def _iterate(self, stage: Stage, chord: bool = False) -> None:
-        """Solve a stage by Newton's method, or with the factor of an earlier step throughout."""
-        s = self.system
+    def _iterate(self, stage: Stage, state: State, chord: bool = False) -> int:
+        """Solve a stage by Newton's method, or with the factor of an earlier step throughout; return the iterations."""
+        s, before = self.system, state.q
+        followed = 0
         s.set_time(stage.t)
         s.prescribe(stage.t, stage.q, stage.v, stage.a)
 
         def increment() -> float:
+            nonlocal before, followed
             s.set_state(stage.q, stage.v, stage.a)
-            dq = s.chord() if chord else s.correction(stage.shifts)
-            stage.correct(dq)
-            return float(s.increment_size(dq))
+            self._far |= followed >= SOON or self.newton.strayed
+            dq = s.chord() if chord else s.correction(stage.shifts, before if self._far else None)
+            followed += 1
+            size = float(s.increment_size(dq))
+            if not s.linear:
+                before = stage.q.copy()
+            stage.correct(dq if s.linear or size <= REACH else dq * (REACH / size))
+            return size
 
         try:
             if s.solved_at_once:
@@ -127,6 +197,8 @@ class Stepper:
         except ComputationError as error:
             raise ComputationError(error.what, time=stage.t, advice=error.advice) from None
         self._held = stage.shifts if s.keeps_factor and not (chord and iterations > LONG) else None
+        self._far = iterations > SOON
+        return iterations
 
     def _solve_linear(self, increment: Any, stage: Stage, chord: bool) -> int:
         """Solve the linear equations of a stage; return the iterations: one, or those that refine with an old factor.
@@ -176,3 +248,13 @@ class Stepper:
         error = self.scheme.local_error(new, old)
         assert error is not None
         return float(self.system.size(error))
+
+
+def came_true(system: Any, move: Array, predicted: Array) -> float:
+    """Return the share of a predicted move that makes it closest to the one that came, between 0 and 1.
+
+    Where the motion is smooth it is 1. Where vibrations are faster than the steps resolve a prediction of constant
+    acceleration is worse than none: they are elsewhere after every step, and h²q̈ is much larger than they are.
+    """
+    length = system.product(predicted, predicted)
+    return float(np.clip(system.product(move, predicted) / length, 0.0, 1.0)) if length > 0.0 else 1.0

@@ -105,7 +105,7 @@ class Problem(ProblemData):
         scheme = scheme or Scheme.registry["generalised_alpha"]()
         check_steps(end, step, tolerance, scheme)
         system = self.system(comm=comm)
-        march = March(system, scheme, Steps(end, step, tolerance), Newton(monotone=True), start)
+        march = March(system, scheme, Steps(end, step, tolerance), Newton(), start)
         return (Moment(system, state) for state in march)
 
     def steady(self, *, speed: float | None = None, comm: MPI.Comm = MPI.COMM_WORLD) -> Moment:

@@ -111,7 +111,7 @@ class Simulation:
     def _march(self, progress: Progress) -> None:
         time = self.scene.time
         assert time is not None
-        newton = Newton.of(self.scene.solver, monotone=True)
+        newton = Newton.of(self.scene.solver)
         march = March(self.system, scheme_of(time), Steps.of(time), newton, self._initial())
         self.stepper = march.stepper
         self.keeper.start(self.record.history)

@@ -129,7 +129,7 @@ class AffineSystem(System):
         """Whether the last tangent is that of this time, but for its shifts (see `System`)."""
         return not self._changed
 
-    def tangent(self, c_k: float, c_v: float, c_m: float) -> tuple[Any, bool]:
+    def tangent(self, c_k: float, c_v: float, c_m: float, before: Array | None = None) -> tuple[Any, bool]:
         """Return (c_k K + c_v C + c_m M, whether it changed since the last call)."""
         shift = (c_k, c_v, c_m)
         changed = self._changed or shift != self._shift

@@ -173,12 +173,12 @@ class BorderedSystem:
 
     # --- solutions ---------------------------------------------------------------------------------------------------
 
-    def correction(self, shifts: tuple[float, float, float]) -> Array:
+    def correction(self, shifts: tuple[float, float, float], before: Array | None = None) -> Array:
         """Return Newton's correction of (q, psi): A y = R, A z = b, dpsi = (r − c·y)/(d − c·z)."""
         s, row, (_, c_v, c_m) = self.inner, self.row, shifts
         started = perf_counter()
         R = s.residual()
-        A, changed = s.tangent(*shifts)
+        A, changed = s.tangent(*shifts, None if before is None else before[:-1])
         b, c = s.spin_derivative(c_v, c_m), row.row(shifts)
         r, d = -row.residual(s.time), row.diagonal(c_v, c_m)
         assembled_at = perf_counter()
@@ -224,6 +224,10 @@ class BorderedSystem:
     def size(self, x: Array) -> float:
         """Return the largest entry of the structure's unknowns in units of their scale, over all ranks."""
         return self.inner.size(x[:-1])
+
+    def product(self, x: Array, y: Array) -> float:
+        """Return the product of the structure's unknowns (see `System.product`)."""
+        return self.inner.product(x[:-1], y[:-1])
 
     def increment_size(self, dq: Array) -> float:
         """Return the size of a correction by which Newton is judged, the angle's among them."""

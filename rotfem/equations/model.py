@@ -126,6 +126,20 @@ class Model:
             out["potential"] = sum(potentials)
         return out
 
+    @cached_property
+    def closed(self) -> bool:
+        """Whether nothing gives energy to the structure, so that its Jacobi integral stays, or falls by damping."""
+        motion, gravity = self.motion, np.asarray(self.problem.loads.gravity)
+        turning = motion.is_spinning and bool(np.any(np.cross(gravity, motion.axis)))
+        given = (self.problem.loads.tip_force, self.problem.loads.tip_moment, self.problem.loads.distributed)
+        steady = all(load is None or load.is_zero or load.constant for load in given)
+        dead = all(load.dead and load.conservative for load in self.mechanics.loads)
+        known = all(
+            effect.work is None or effect.momentum or effect.passive or effect.potential is not None
+            for effect in self.acting.values()
+        )
+        return motion.hub is None and motion.constant and not turning and steady and dead and known
+
     def outputs(self) -> dict[str, Any]:
         """Return name ↦ UFL form of the functionals that are to be recorded."""
         return {name: resolved(form)(self.mechanics) for name, form in self.problem.outputs.items()}

@@ -6,13 +6,17 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import ufl
 from dolfinx import fem, la
 from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms import expand_derivatives
 
+from rotfem.equations.point_stresses import PointStresses
 from rotfem.equations.system import System
 from rotfem.numerics import compat, forms
+
+Array = npt.NDArray[np.float64]
 
 
 class NonlinearSystem(System):
@@ -34,6 +38,19 @@ class NonlinearSystem(System):
         F, du = self.model.residual, ufl.TrialFunction(self.V)
         parts = (ufl.derivative(F, x, du) for x in (self.q, self.v, self.a))
         return sum(c * form for c, form in zip(self._shifts, parts, strict=True))
+
+    @cached_property
+    def _stresses(self) -> PointStresses:
+        return PointStresses(self.model.mechanics, self.V)
+
+    @cached_property
+    def _on_the_way(self) -> Any:
+        """The tangent with stresses of their own, compiled: of a system that is not moving K alone at v = a = 0."""
+        change = self._stresses.change(ufl.TrialFunction(self.V))
+        if self.moving:
+            return forms.form(self._tangent_form + self._shifts[0] * change)
+        K = self._at_rest(ufl.derivative(self.model.residual, self.q, ufl.TrialFunction(self.V)))
+        return forms.form(K + change, once=True)
 
     def _at_rest(self, form: Any) -> Any:
         return forms.without(form, self.v, self.a)
@@ -75,10 +92,23 @@ class NonlinearSystem(System):
         b[self.clamped] = 0.0
         return self.b
 
-    def tangent(self, c_k: float, c_v: float, c_m: float) -> tuple[Any, bool]:
-        """Return (c_k K + c_v C + c_m M at the state, True); clamped rows are identity rows."""
+    def tangent(self, c_k: float, c_v: float, c_m: float, before: Array | None = None) -> tuple[Any, bool]:
+        """Return (c_k K + c_v C + c_m M at the state, True); clamped rows are identity rows.
+
+        Args:
+            c_k: factor of K; of a system that is not moving one factor is 1 and the others are 0.
+            c_v: factor of C.
+            c_m: factor of M.
+            before: q from which a correction has led to the state (see `PointStresses`); None for the true tangent.
+        """
         self.A.zeroEntries()
-        self._assemble(self.A, (c_k, c_v, c_m), 1.0)
+        if before is None:
+            self._assemble(self.A, (c_k, c_v, c_m), 1.0)
+        else:
+            self._stresses.come_from(before)
+            self._shift((c_k, c_v, c_m))
+            fem_petsc.assemble_matrix(self.A, self._on_the_way, self.bcs)
+            self.A.assemble()
         return self.A, True
 
     def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
@@ -96,12 +126,15 @@ class NonlinearSystem(System):
         A.zeroEntries()
         return A
 
+    def _shift(self, shifts: tuple[float, float, float]) -> None:
+        if shifts != self._shift_values:
+            for constant, value in zip(self._shifts, shifts, strict=True):
+                constant.value = value
+            self._shift_values = shifts
+
     def _assemble(self, A: Any, shifts: tuple[float, float, float], diagonal: float) -> None:
         if self.moving:
-            if shifts != self._shift_values:
-                for constant, value in zip(self._shifts, shifts, strict=True):
-                    constant.value = value
-                self._shift_values = shifts
+            self._shift(shifts)
             fem_petsc.assemble_matrix(A, self._J, self.bcs, diagonal)
             A.assemble()
             return

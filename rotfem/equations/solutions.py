@@ -35,18 +35,26 @@ class Solutions:
         """Return −F at the state in q, v, a as a PETSc vector (reused), zero at clamped unknowns."""
 
     @abstractmethod
-    def tangent(self, c_k: float, c_v: float, c_m: float) -> tuple[Any, bool]:
-        """Return (c_k K + c_v C + c_m M at the state, whether it changed); clamped rows are identity rows."""
+    def tangent(self, c_k: float, c_v: float, c_m: float, before: Array | None = None) -> tuple[Any, bool]:
+        """Return (c_k K + c_v C + c_m M at the state, whether it changed); clamped rows are identity rows.
+
+        With the q from which a correction has led to the state it may be another one that leads on better.
+        """
 
     @abstractmethod
     def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
         """Return a new matrix c_k K + c_v C + c_m M at the state with `diagonal` at clamped unknowns."""
 
-    def correction(self, shifts: tuple[float, float, float]) -> Array:
-        """Return −(c_k K + c_v C + c_m M)⁻¹ F at the state, Newton's correction of q (a local array, reused)."""
+    def correction(self, shifts: tuple[float, float, float], before: Array | None = None) -> Array:
+        """Return −(c_k K + c_v C + c_m M)⁻¹ F at the state, Newton's correction of q (a local array, reused).
+
+        Args:
+            shifts: c_k, c_v, c_m.
+            before: q from which a correction has led to the state, if it is known (see `tangent`).
+        """
         started = perf_counter()
         b = self.residual()
-        A, changed = self.tangent(*shifts)
+        A, changed = self.tangent(*shifts, before)
         assembled = perf_counter()
         dq = self._dx.solve(self.factor(A, changed), b)
         self.seconds["assemble"] += assembled - started

@@ -180,6 +180,12 @@ class System(Solutions, ABC):
         here = float(np.max(np.abs(x) / self.scale)) if x.size else 0.0
         return here if self.comm.size == 1 else self.comm.allreduce(here, op=MPI.MAX)
 
+    def product(self, x: Array, y: Array) -> float:
+        """Return the sum of the products of the entries of two local dof arrays in units of `scale`, over all ranks."""
+        owned = slice(0, self.V.dofmap.index_map.size_local * self.V.dofmap.index_map_bs)
+        here = float((x[owned] / self.scale[owned]) @ (y[owned] / self.scale[owned]))
+        return here if self.comm.size == 1 else self.comm.allreduce(here)
+
     def increment_size(self, dq: Array) -> float:
         """Return the size of a correction by which Newton is judged."""
         return self.size(dq)

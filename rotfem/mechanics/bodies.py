@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import ufl
 
@@ -90,6 +90,8 @@ class AppliedLoad:
     x: Any
     measure: Any
     dead: bool = True
+    #: Whether −force·x is a potential of it, where it is dead.
+    conservative: ClassVar[bool] = True
 
     def variation(self, k: Kinematics) -> Any:
         """Return what the force works on in a variation of q, δx."""

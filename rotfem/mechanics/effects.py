@@ -38,6 +38,7 @@ class Effect:
         internal: whether its forces act between structure and frame, so that they do no work in a rigid turn.
         momentum: whether its work in a rigid turn is a change of angular momentum; the moments of all others are the
             impulse that hub and structure are given.
+        passive: whether its forces store energy or take it, and never give any that was not there.
         kinetic: the part "T1" or "T0" of the kinetic energy that belongs to it.
         potential: mechanics ↦ its potential energy (J), a UFL form; None if it has none.
     """
@@ -52,6 +53,7 @@ class Effect:
     of_rotation: bool = False
     internal: bool = False
     momentum: bool = False
+    passive: bool = False
     kinetic: str = ""
     potential: Potential | None = None
 
@@ -78,7 +80,7 @@ def _work(name: str) -> str:
 
 
 # What every model has.
-INTERNAL = Effect("internal", _work("internal"), constants=(), internal=True)
+INTERNAL = Effect("internal", _work("internal"), constants=(), internal=True, passive=True)
 INERTIA = Effect("inertia", _work("inertia"), constants=(), momentum=True)
 LOADS = Effect("loads", _work("loads"), constants=("loads",), potential=_work("potential_of_loads"))
 
@@ -140,6 +142,7 @@ for _effect in (
         ("there is a damping coefficient", "no damping"),
         (),
         internal=True,
+        passive=True,
     ),
     Effect(
         "tip_mass",

@@ -18,6 +18,16 @@ CHORD = 1e-2
 #: Increment, in the units of the unknowns, that round-off lets an old factor reach.
 SMALLEST = 1e-12
 
+#: Longest correction that is taken whole, in the units of the unknowns (the length of a structure, 1 rad): of what is
+#: farther away a tangent says nothing.
+REACH = 0.5
+
+#: Correction, in these units, after which a root may be another than the one that was close to the start.
+FAR = 0.1
+
+#: Increment, in the units of the unknowns, below which growth is no matter of another root.
+STRAYS = 1e-3
+
 
 @dataclass
 class Newton:
@@ -30,23 +40,23 @@ class Newton:
     Attributes:
         tolerance: largest accepted increment, relative to the scale of each unknown.
         max_iterations: iterations before failure.
-        monotone: whether an increment that grows is a failure. A time step starts close to its solution; where the
-            increments grow there, Newton is on its way to another root, and a shorter step is the remedy.
         iterations: total over all solves.
+        strayed: whether increments were large or grew on the way of the last solve. They do where a structure is
+            slender, on the way to the right root too; but that it is close to the start is no argument for it then.
         roundoff: largest increment accepted because it had stopped shrinking at round-off level.
     """
 
     tolerance: float = 1e-9
     max_iterations: int = 25
-    monotone: bool = False
     iterations: int = 0
+    strayed: bool = False
     roundoff: float = 0.0
     _kappa: float = field(default=np.inf, repr=False)
 
     @classmethod
-    def of(cls, settings: Any, monotone: bool = False) -> Newton:
-        """Return the control that settings (`increment_tolerance`, `max_iterations`) ask for; monotone for steps."""
-        return cls(settings.increment_tolerance, settings.max_iterations, monotone)
+    def of(cls, settings: Any) -> Newton:
+        """Return the control that settings (`increment_tolerance`, `max_iterations`) ask for."""
+        return cls(settings.increment_tolerance, settings.max_iterations)
 
     def solve(self, increment: Callable[[], float], size: Callable[[], float], chord: bool = False) -> int:
         """Repeat `increment` (solve, apply, return the scaled increment) until it is small; return the iterations.
@@ -60,6 +70,7 @@ class Newton:
         Raises:
             ComputationError: not finite, growing, or too many iterations; says which.
         """
+        self.strayed = False
         previous, first, stalled = np.inf, np.inf, 0
         for k in range(1, self.max_iterations + 1):
             d = increment()
@@ -82,8 +93,7 @@ class Newton:
             if stalled >= 3 and d <= 1e-4 * max(size(), self.tolerance):
                 self.roundoff = max(self.roundoff, d)
                 return k
-            if self.monotone and k > 1 and d > previous and d > 1e-6 * size():
-                raise ComputationError(f"Newton's increments grew from {previous:.1e} to {d:.1e} (scaled)")
+            self.strayed |= d > FAR or (k > 1 and d > max(previous, STRAYS))
             if k > 4 and d > 10 * first and d > 1:
                 raise ComputationError(f"Newton diverged: increments grew from {first:.1e} to {d:.1e} (scaled)")
             previous = d

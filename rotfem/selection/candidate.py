@@ -110,7 +110,7 @@ class Candidate:
         """
         system, scheme = self.switched(), self.case.scheme
         assert scheme is not None
-        march = March(system, scheme, steps, self.case.newton(monotone=True), q)
+        march = March(system, scheme, steps, self.case.newton(), q)
         tips: list[Array] = []
         out.sizes = np.zeros(len(system.structure.components))
         try:

@@ -45,6 +45,6 @@ class Case:
         """Return a variant with other values of some attributes."""
         return replace(self, **changes)
 
-    def newton(self, monotone: bool = False) -> Newton:
-        """Return the iteration control, monotone for time steps."""
-        return Newton(self.increment_tolerance, self.max_iterations, monotone)
+    def newton(self) -> Newton:
+        """Return the iteration control."""
+        return Newton(self.increment_tolerance, self.max_iterations)

@@ -8,7 +8,7 @@ first derivatives of T instead of second ones of Λ, which compile to much less 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import ufl
 from ufl import cross
@@ -105,6 +105,7 @@ class AppliedMoment(AppliedLoad):
     """
 
     section: SectionTurn
+    conservative: ClassVar[bool] = False
 
     def variation(self, k: Kinematics) -> Any:
         """Return k(δθ)."""

@@ -77,11 +77,12 @@ def test_divergence() -> None:
         Newton().solve(*methods(Scalar(np.arctan, lambda x: 1 / (1 + x * x), 2.0)))
 
 
-def test_monotone_gives_up_at_the_first_growth() -> None:
-    values = [1e-2, 1e-3, 5e-3, 1e-12]
-    assert Newton().solve(iter(values).__next__, lambda: 1.0) == 4
-    with pytest.raises(ComputationError, match=r"grew from 1.0e-03 to 5.0e-03"):
-        Newton(monotone=True).solve(iter(values).__next__, lambda: 1.0)
+def test_growth_on_the_way_is_remembered() -> None:
+    """The root may be another one then; of the next solve it says nothing, nor does growth at the level of noise."""
+    newton = Newton()
+    for values, strayed in (([1e-2, 1e-3, 5e-3, 1e-12], True), ([1e-2, 1e-5, 2e-5, 1e-12], False)):
+        assert newton.solve(iter(values).__next__, lambda: 1.0) == 4
+        assert newton.strayed == strayed
 
 
 def test_stops_at_round_off_and_says_so() -> None:

@@ -1,0 +1,173 @@
+"""Newton's method in time steps, and in the shapes a history starts from: slender structures, large and stiff motions.
+
+A slender beam's axial stiffness makes its solution simple (the axis keeps its length) and Newton's way to it hard. So
+what is held here are limits in which the answer is known: the elastica, the slenderness that no longer matters, the
+creep of a beam that is all viscosity.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+from rotfem import ComputationError, run
+from rotfem.analysis.alpha_family import GeneralisedAlpha
+from rotfem.analysis.equilibrium import static_tip_shape
+from rotfem.analysis.schemes import Stage, State
+from rotfem.analysis.stepper import Stepper
+from rotfem.commands.problem import Problem
+from rotfem.equations.compiled import compile_system
+from rotfem.numerics.newton import Newton
+from rotfem.results import RunResult
+from rotfem.scene import Scene
+
+LENGTH, EI, MASS = 10.0, 1.4e4, 1.2
+
+
+def beam(slenderness: float, displacement: float, **changes: Any) -> Scene:
+    """Return the release of a beam with L/r = slenderness from a tip displacement (in L), step 0.02 s."""
+    squared = (LENGTH / slenderness) ** 2
+    section = {"EA": EI / squared, "GA": EI / squared / 2.8, "EI": EI, "mass_per_length": MASS}
+    structure = {"type": "planar_beam", "length": LENGTH, "section": section | {"rotary_inertia": MASS * squared}}
+    tables: dict[str, Any] = {
+        "structure": structure,
+        "motion": {"type": "constant", "speed": 0.0},
+        "mesh": {"elements": 6, "degree": 3},
+        "initial": {"tip_displacement": displacement * LENGTH},
+        "time": {"end": 1.0, "step": 0.02},
+    }
+    return Scene.from_dict(tables).replace(changes)
+
+
+def halved(result: RunResult) -> bool:
+    """Return whether any step was."""
+    return any("halved" in warning for warning in result.summary["warnings"])
+
+
+def elastica(deflection: float) -> tuple[float, float]:
+    """Return (shortening, angle) of the tip of an inextensible cantilever under a dead end force, in L and rad.
+
+    With θ'² = 2k² (sin φ − sin θ), φ the angle of the tip, length and coordinates are integrals over θ; θ = φ − τ²
+    takes the root out of them.
+    """
+
+    def integral(phi: float, f: Any) -> float:
+        def integrand(tau: float) -> float:
+            theta = phi - tau**2
+            rest = np.sin(phi) - np.sin(theta) if tau > 1e-8 else tau**2 * np.cos(phi)
+            return (
+                float(f(theta) * 2 * tau / np.sqrt(2 * rest)) if tau > 0 else float(f(phi) * np.sqrt(2 / np.cos(phi)))
+            )
+
+        return float(quad(integrand, 0.0, np.sqrt(phi), epsabs=1e-12, epsrel=1e-12)[0])
+
+    def relative(phi: float, f: Any) -> float:
+        return integral(phi, f) / integral(phi, lambda theta: 1.0)
+
+    phi = brentq(lambda p: relative(p, np.sin) - deflection, 1e-3, 1.55)
+    return 1.0 - relative(phi, np.cos), float(phi)
+
+
+@pytest.mark.parametrize("slenderness", [1e3, 1e5])
+@pytest.mark.parametrize("deflection", [0.5, 0.8])
+def test_static_shape_is_the_elastica(slenderness: float, deflection: float) -> None:
+    """Shortening and angle of the tip to the stretch that is left, of the order r²/L², and 6 cubic elements' error."""
+    problem = Problem.of(beam(slenderness, deflection))
+    q = static_tip_shape(problem, deflection * LENGTH, Newton())
+    u1, u2, alpha = compile_system(problem).structure.tip_values(q)
+    shortening, angle = elastica(deflection)
+    assert u2 == pytest.approx(deflection * LENGTH, rel=1e-9)
+    assert (-u1 / LENGTH, alpha) == pytest.approx((shortening, angle), rel=6e-5)
+
+
+def test_a_shape_that_is_not_found_says_how_far_the_tip_came() -> None:
+    """One iteration is never enough: it leaves nothing to judge the increment by."""
+    with pytest.raises(
+        ComputationError, match=r"no static shape with a tip displacement of 5 m: the tip was led to 0 m"
+    ):
+        static_tip_shape(Problem.of(beam(1e3, 0.5)), 5.0, Newton(max_iterations=1))
+
+
+@pytest.mark.parametrize("theory", ["reissner", "second_order", "von_karman"])
+@pytest.mark.parametrize("displacement", [0.05, 0.3])
+def test_slenderness_is_no_matter(theory: str, displacement: float) -> None:
+    """Releases in whole steps at any slenderness; the tip follows the same path once the axis cannot stretch.
+
+    A release excites modes that steps of 0.02 s do not resolve; what they do depends on the iteration's last digits, so
+    paths agree to the part they have in the motion, a few per mille, and more where it is large.
+    """
+    paths = []
+    for slenderness in (1e3, 1e4, 1e5):
+        result = run(beam(slenderness, displacement, **{"model.theory": theory}))
+        assert not halved(result)
+        energy = result.history["jacobi"]
+        assert -0.01 < energy[-1] / energy[0] - 1 < 0.0  # what the scheme damps
+        paths.append(result.history["tip_u2"] / (displacement * LENGTH))
+    apart = [float(np.max(np.abs(path - paths[-1]))) for path in paths[:-1]]
+    assert max(apart) < (0.01 if displacement < 0.1 else 0.06)
+
+
+def test_iterations_do_not_grow_with_slenderness() -> None:
+    """With the stress of the state in the tangent they do: 4.5, 11 and more than 40 a step on these beams."""
+    counts = [run(beam(s, 0.1)).summary["newton_iterations"] / 50 for s in (1e2, 1e3, 1e4, 1e5)]
+    assert max(counts) < 8
+
+
+def test_small_release_finds_no_other_root() -> None:
+    """A prediction 3 rad off led to a state of 10⁴ times the energy, by increments that shrank all the way."""
+    soft = {"structure.section.EI": 2.8e5, "structure.section.EA": 2.8e7, "structure.section.GA": 1e7}
+    result = run(beam(1e2, 0.01, **soft, **{"model.theory": "von_karman"}))
+    assert np.max(np.abs(result.history["tip_u2"])) < 0.011 * LENGTH
+    assert -0.02 < result.history["jacobi"][-1] / result.history["jacobi"][0] - 1 < 0.0
+
+
+@pytest.mark.parametrize("displacement", [0.05, 0.3])
+def test_creep_of_a_beam_that_is_all_viscosity(displacement: float) -> None:
+    """With η = 10 s q + η q̇ = 0 but for the inertia, 1/(η ω)² < 1e-3, and an exact theory's shape: u₂ ~ e^(−t/η)."""
+    result = run(beam(450.0, displacement, **{"structure.damping.kelvin_voigt": 10.0}))
+    path = result.history["tip_u2"] / (displacement * LENGTH)
+    assert not halved(result)
+    assert path == pytest.approx(np.exp(-result.history["t"] / 10.0), abs=2e-3 if displacement < 0.1 else 6e-3)
+
+
+def test_roots_that_are_not_the_motions() -> None:
+    """A state turned inside out, and one with energy from nowhere, are refused though they may balance."""
+    system = compile_system(Problem.of(beam(1e3, 0.1)))
+    stepper = Stepper(system, GeneralisedAlpha(), Newton())
+    system.set_time(0.0)
+    zero = system.zeros()
+    rest = State(0.0, zero, zero.copy(), zero.copy())
+
+    def check(q: Any, v: Any = zero) -> None:
+        stepper._check_root(Stage(0.02, q, v, zero, 1.0, 1.0), rest)
+
+    check(zero)
+    x = system.V.tabulate_dof_coordinates()[:, 0]
+    inside_out, moving = zero.copy(), zero.copy()
+    inside_out[::3], moving[1::3] = -2.0 * x, x
+    with pytest.raises(ComputationError, match="inside out"):
+        check(inside_out)
+    with pytest.raises(ComputationError, match=r"2e\+02 J more than there were"):
+        check(zero, moving)  # ½ ∫ ρ x² dx = 200 J
+
+
+def test_tangent_on_the_way_is_the_tangent_where_nothing_moved() -> None:
+    """With the state itself for the one before, stresses are those of the state."""
+    for moving in (True, False):
+        system = compile_system(Problem.of(beam(1e2, 0.1)), moving=moving)
+        system.set_time(0.0)
+        q = 0.1 * np.random.default_rng(1).standard_normal(system.zeros().size)
+        q[system.clamped] = 0.0
+        system.set_state(q)
+        A = system.tangent(1.0, 0.0, 0.0)[0].copy()
+        B = system.tangent(1.0, 0.0, 0.0, q)[0].copy()
+        C = system.tangent(1.0, 0.0, 0.0, 0.9 * q)[0]
+        norm = A.norm()
+        C.axpy(-1.0, A)
+        B.axpy(-1.0, A)
+        assert B.norm() < 1e-13 * norm
+        assert C.norm() > 1e-6 * norm
