@@ -18,6 +18,9 @@ CHORD = 1e-2
 #: Increment, in the units of the unknowns, that round-off lets an old factor reach.
 SMALLEST = 1e-12
 
+#: Increment, relative to the unknowns, that may be round-off where it shrinks no more; larger ones wander.
+LOST = 1e-5
+
 #: Longest correction that is taken whole, in the units of the unknowns (the length of a structure, 1 rad): of what is
 #: farther away a tangent says nothing.
 REACH = 0.5
@@ -90,7 +93,7 @@ class Newton:
             stalled = stalled + 1 if d > 0.3 * previous else 0
             if chord and stalled >= 2:
                 raise ComputationError(f"the old factor gives increments that stay at {d:.1e} (scaled)")
-            if stalled >= 3 and d <= 1e-4 * max(size(), self.tolerance):
+            if stalled >= 3 and d <= LOST * max(size(), self.tolerance):
                 self.roundoff = max(self.roundoff, d)
                 return k
             self.strayed |= d > FAR or (k > 1 and d > max(previous, STRAYS))
