@@ -10,44 +10,88 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
+from rotfem.analysis.arc_length import Path, Tracer
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.loads import ConstantLoad, Loads
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
+from rotfem.numerics.inertia import negative_eigenvalues, symmetric
 from rotfem.numerics.linear import DirectSolver, Increment, use_direct_solver
 from rotfem.numerics.newton import REACH, Newton
 
 Array = npt.NDArray[np.float64]
 
+#: What helps where there is no equilibrium.
+LESS = "a lower speed or load, a stiffer section, or a theory that holds at large deflection"
+
+#: Distance, in the scales of the unknowns, at which two equilibria are one.
+SAME_STATE = 1e-6
+
 #: A continuation that must cut its steps below this share of the whole has met a limit point.
 SMALLEST_SHARE = 1e-3
 
 
-def steady_state(system: Any, omega: float, newton: Newton, start: Array | None = None) -> Array:
+def steady_state(
+    system: Any,
+    omega: float,
+    newton: Newton,
+    start: Array | None = None,
+    past_limits: bool = False,
+    notes: list[str] | None = None,
+) -> Array:
     """Return q (local dof array) with F(q, 0, 0) = 0 at constant speed: the equilibrium in the rotating frame.
 
     Speed and loads are raised together, in one step where Newton allows and in smaller ones where not; the state is
-    left in the system's functions.
+    left in the system's functions. Where that ends at no minimum of the energy, or not at all, the path of equilibria
+    from the unloaded state is followed (`rotfem.analysis.arc_length`): Newton may have left it.
 
     Args:
         system: equations of motion.
         omega: speed, rad/s.
         newton: iteration control.
         start: first guess, the equilibrium at a nearby speed; the whole load is then applied at once.
+        past_limits: whether the path is followed past maxima of the load.
+        notes: receives what there is to be said of the path.
 
     Raises:
         ComputationError: no equilibrium was reached; says how far the load got.
     """
+    notes = [] if notes is None else notes
     system = system.held
-    q = system.zeros() if start is None else start.copy()
     if start is not None:
         try:
-            return _balance(system, omega, 1.0, q, newton)
+            return _balance(system, omega, 1.0, start, newton)
         except ComputationError:
-            q[:] = 0.0
-    done, share = 0.0, 1.0
+            pass
+    if system.linear:
+        return _balance(system, omega, 1.0, system.zeros(), newton)
+    if past_limits:
+        return _followed(system, omega, newton, notes)
+    try:
+        q = _raised(system, omega, newton)
+    except ComputationError as error:
+        path = _path(system, omega, newton, past_limits, notes)
+        if path is None or path.share < 1.0:
+            raise error if path is None or not path.limits else _at_limit(omega, path) from None
+        return np.asarray(path.q)
+    if not _has_descent(system):
+        return q
+    path = _path(system, omega, newton, past_limits, notes)
+    if path is not None and path.limits:
+        raise _at_limit(omega, path)
+    if path is None or path.share < 1.0:
+        system.set_state(q)
+        return q
+    if system.size(path.q - q) > SAME_STATE:
+        notes.append("Newton met another, unstable equilibrium first; this is the one that the growing load leads to")
+    return np.asarray(path.q)
+
+
+def _raised(system: System, omega: float, newton: Newton) -> Array:
+    """Return the equilibrium at full load, in one step or by halved ones."""
+    q, done, share = system.zeros(), 0.0, 1.0
     while done < 1.0:
         target = min(1.0, done + share)
         try:
@@ -58,13 +102,72 @@ def steady_state(system: Any, omega: float, newton: Newton, start: Array | None 
                 raise ComputationError(
                     f"no steady state at {omega:g} rad/s: the last equilibrium was at {done:.3g} of the load "
                     f"({np.sqrt(done) * omega:.4g} rad/s); {error.what}",
-                    advice="a lower speed or load, a stiffer section, or a theory that holds at large deflection",
+                    advice=LESS,
                 ) from None
             continue
         done = target
         share *= 1.5
     system.structure.check_range(q)
     return q
+
+
+def _has_descent(system: Any) -> bool:
+    """Return whether the energy falls in some direction from the equilibrium just found; not, where it has none.
+
+    The tangent of Newton's last iteration is at hand, and as good as that of the equilibrium.
+    """
+    K = system.A
+    try:
+        return symmetric(K) and negative_eigenvalues(K) > 0
+    except ComputationError:
+        return True
+
+
+def _path(system: Any, omega: float, newton: Newton, past_limits: bool, notes: list[str]) -> Path | None:
+    """Return the path from the unloaded state and note what there is on it; None where it cannot be followed."""
+    try:
+        path = Tracer(system, omega, newton).follow(past_limits)
+    except ComputationError:
+        return None
+    if path.branches:
+        notes.append(f"another path of equilibria crosses at {_shares(path.branches)} of the load: a bifurcation")
+    if path.limits and path.share == 1.0:
+        shares = _shares(path.limits)
+        notes.append(f"limit points at {shares} of the load were passed: a growing load makes the structure snap there")
+    return path
+
+
+def _followed(system: System, omega: float, newton: Newton, notes: list[str]) -> Array:
+    """Return the equilibrium at full load at the end of the path, past maxima of the load.
+
+    Raises:
+        ComputationError: the path does not lead there.
+    """
+    path = _path(system, omega, newton, True, notes)
+    if path is None or path.share < 1.0:
+        share, why = (0.0, "its first step failed") if path is None else (path.share, path.why)
+        limits = "" if path is None or not path.limits else f", past limit points at {_shares(path.limits)} of it"
+        raise ComputationError(
+            f"no steady state at {omega:g} rad/s: the path of equilibria ends at {share:.6g} of the load{limits}: "
+            f"{why}",
+            advice=LESS,
+        )
+    return path.q
+
+
+def _shares(shares: list[float]) -> str:
+    return ", ".join(f"{share:.6g}" for share in shares)
+
+
+def _at_limit(omega: float, path: Path) -> ComputationError:
+    """Return what is said of a path with a maximum of the load."""
+    share = path.limits[0]
+    speed = f" ({np.sqrt(share) * omega:.6g} rad/s)" if omega else ""
+    return ComputationError(
+        f"no steady state at {omega:g} rad/s to which a growing load leads: it has a maximum, a limit point, at "
+        f"{share:.6g} of the load{speed}, where the structure snaps",
+        advice=f'solver.continuation = "arc_length" to follow the path past it, or {LESS}',
+    )
 
 
 def _balance(system: System, omega: float, share: float, guess: Array, newton: Newton) -> Array:

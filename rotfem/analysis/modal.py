@@ -66,6 +66,8 @@ class ModalAnalysis:
 
     Attributes:
         free: whether the hub is free, so that its angle is one more unknown.
+        past_limits: whether the path to an equilibrium is followed past maxima of the load.
+        notes: what there is to be said of these paths.
     """
 
     def __init__(
@@ -83,6 +85,7 @@ class ModalAnalysis:
         self.free = self.system.hub is not None
         self.newton = newton or Newton()
         self._unit: float | None = None
+        self.past_limits, self.notes = False, list[str]()
         assembled = self.system.assembled
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
         self.seconds |= {"equilibrium": 0.0, "factor": 0.0, "eigen": 0.0}
@@ -166,7 +169,7 @@ class ModalAnalysis:
             s.set_time(0.0, s.motion.at_speed(speed))
             s.set_state(zero := s.zeros())
             return np.asarray(zero)
-        return steady_state(s, speed, self.newton, start)
+        return steady_state(s, speed, self.newton, start, self.past_limits, self.notes)
 
     def report(self) -> dict[str, Any]:
         """Return what a summary says of how the modes were solved; nothing special here."""

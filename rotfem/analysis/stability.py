@@ -24,12 +24,9 @@ import numpy.typing as npt
 from rotfem.analysis.modal import GROWTH
 from rotfem.errors import ComputationError
 from rotfem.numerics.eigenproblem import SAME, ZERO, Eigenpairs, Pencil
-from rotfem.numerics.inertia import negative_eigenvalues
+from rotfem.numerics.inertia import negative_eigenvalues, symmetric
 
 Array = npt.NDArray[np.float64]
-
-#: Relative asymmetry of K up to which it is that of round-off.
-ROUND_OFF = 1e-13
 
 #: Eigenvalues that are looked at where none can be counted, and the most that are looked at where they can.
 FIRST, MOST = 8, 64
@@ -123,7 +120,7 @@ def stability_of_pencil(pencil: Pencil, clamped: Pencil) -> Stability:
 
 def _negative(K: Any) -> int | None:
     """Return how many eigenvalues of K are negative; None where K is not symmetric, or singular."""
-    if not K.isSymmetric(ROUND_OFF * K.norm()):
+    if not symmetric(K):
         return None
     try:
         return negative_eigenvalues(K)

@@ -84,8 +84,10 @@ def _modes(
     spinning, warnings = found.spinning, found.warnings
     if choice is not None:  # a choice knows what it left out
         warnings = [line for line in warnings if line not in advice(analysis, speed)]
+    warnings = [*analysis.notes, *warnings]
     stability = stability_of_pencil(spinning.pencil, spinning.clamped)
-    if stability.held_by_spin or stability.growth > GROWS_AS_SAID * max(row["growth"] for row in found.rows):
+    said = GROWS_AS_SAID * max(row["growth"] for row in found.rows if row["stability"] != "neutral")
+    if stability.held_by_spin or stability.growth > max(said, 0.0):
         warnings = [*warnings, stability.warning()]
     result = {
         **modal_summary("modes", analysis, scene, choice, started),
@@ -122,6 +124,7 @@ def analysis_of(scene: Scene, problem: ProblemData, comm: MPI.Comm) -> ModalAnal
         InputError: more modes are asked for than there are unknowns, or a mesh that cannot be computed with.
     """
     analysis = ModalAnalysis(problem, scene.modes.about, Newton.of(scene.solver), comm)
+    analysis.past_limits = scene.solver.past_limits
     if "count" in scene.modes.model_fields_set:  # what was not asked for is only an upper limit
         analysis.check_count(scene.modes.count)
     return analysis

@@ -96,7 +96,8 @@ class Simulation:
 
     def _steady(self) -> None:
         omega = self.problem.motion.speed(0.0)
-        q = steady_state(self.system, omega, self.newton)
+        past = self.scene.solver.past_limits
+        q = steady_state(self.system, omega, self.newton, past_limits=past, notes=self.warnings)
         self.stability = stability_of(self.system, q, omega)
         q, v = self.system.start(q)
         self._keep(State(0.0, q, v, np.zeros_like(q)))
@@ -140,7 +141,8 @@ class Simulation:
         if self.problem.frame == "inertial":
             system = compile_system(self.problem.replace(frame="rotating"), self.comm, moving=False)
         speed = self.problem.motion.speed(0.0)
-        q = steady_state(system, speed, Newton.of(self.scene.solver))
+        solver = self.scene.solver
+        q = steady_state(system, speed, Newton.of(solver), past_limits=solver.past_limits, notes=self.warnings)
         self.stability = stability_of(system, q, speed)
         if said := self.stability.warning():
             self.warnings.append(f"the motion starts from an equilibrium of its own: {said}")

@@ -14,6 +14,15 @@ from rotfem.numerics.linear import SMALL
 COUNTING = {24: 1, 13: 1}
 
 
+#: Asymmetry, relative to the norm, up to which it is that of round-off.
+ROUND_OFF = 1e-13
+
+
+def symmetric(A: Any) -> bool:
+    """Return whether a PETSc matrix is symmetric to round-off."""
+    return bool(A.isSymmetric(ROUND_OFF * A.norm()))
+
+
 def negative_eigenvalues(A: Any) -> int:
     """Return how many eigenvalues of a symmetric PETSc matrix are negative, on every rank.
 
@@ -47,6 +56,7 @@ def _whole(A: Any) -> Any:
 
 def _pivots(A: Any, solver: str) -> int:
     """Return how many pivots of a solver's factor are negative."""
+    A = A.copy()  # its entries may be those of another matrix next, that is not symmetric
     A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     pc = PETSc.PC().create(A.comm)
     pc.setOperators(A)

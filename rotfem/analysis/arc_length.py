@@ -1,0 +1,230 @@
+"""The path of equilibria F(q, s) = 0 as speed and loads grow together, past limit points where that is wanted.
+
+s multiplies loads, gravity, base acceleration and Ω², so F is linear in s. The unknown is (q, s), and a step of length
+l along the unit tangent t is corrected in the plane across it (Riks 1979; Keller's pseudo-arclength),
+
+    [ K   F_s ] [dq]     [ F                          ]
+    [ t_q t_s ] [ds] = − [ t·((q, s) − (q_0, s_0)) − l ],
+
+by block elimination with one factor of K. A step is taken back where the tangent turns too far, or where K changes the
+number of its negative eigenvalues though s has not turned: Newton was then on its way to another branch. What remains
+of that at the shortest steps is a branch point on the path itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from rotfem.errors import ComputationError
+from rotfem.numerics.inertia import negative_eigenvalues, symmetric
+from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.newton import Newton
+
+Array = npt.NDArray[np.float64]
+
+#: First, longest and shortest step, in units of s and of the root mean square of q in its scales.
+FIRST, LONGEST, SHORTEST = 0.05, 0.25, 1e-6
+
+#: Least cosine of the angle that the tangent may turn by in a step.
+STRAIGHT = 0.9
+
+#: Steps before the path is given up, and iterations of a step.
+MOST_STEPS, ITERATIONS = 2000, 8
+
+#: Relative accuracy of the load at a limit point.
+LOCATED = 1e-8
+
+
+@dataclass
+class Point:
+    """One equilibrium of the path.
+
+    Attributes:
+        q: local dof array.
+        s: share of speed squared and loads.
+        t_q, t_s: unit tangent.
+        negative: number of negative eigenvalues of K; None where it is not symmetric.
+    """
+
+    q: Array
+    s: float
+    t_q: Array
+    t_s: float
+    negative: int | None
+
+
+@dataclass
+class Path:
+    """Where the path of equilibria led.
+
+    Attributes:
+        q: the equilibrium at the full load; the last one where that was not reached.
+        share: of the load there.
+        limits: shares at which the load has a maximum or minimum on the path, in their order.
+        branches: shares at which another path crosses.
+        why: why the full load was not reached; empty if it was.
+    """
+
+    q: Array
+    share: float = 0.0
+    limits: list[float] = field(default_factory=list)
+    branches: list[float] = field(default_factory=list)
+    why: str = ""
+
+
+class Tracer:
+    """Follows the path of a system at a speed.
+
+    Args:
+        system: equations of motion, the hub held.
+        omega: speed at s = 1, rad/s.
+        newton: tolerance of the corrections; their count is added to.
+    """
+
+    def __init__(self, system: Any, omega: float, newton: Newton):
+        self.system, self.omega, self.newton = system, omega, newton
+        self._owned = system.V.dofmap.index_map.size_local * system.V.dofmap.index_map_bs
+        self._count = system.V.dofmap.index_map.size_global * system.V.dofmap.index_map_bs
+        self._y, self._z = Increment(system.V), Increment(system.V)
+
+    def follow(self, past_limits: bool) -> Path:
+        """Return where the path leads from the unloaded state.
+
+        Args:
+            past_limits: whether to go on where the load has a maximum.
+        """
+        path, point, length = Path(self.system.zeros()), self._point(self.system.zeros(), 0.0, None), FIRST
+        for _ in range(MOST_STEPS):
+            try:
+                new, used = self._step(point, length)
+            except ComputationError as error:
+                if length <= SHORTEST:
+                    path.why = error.what
+                    break
+                length = max(length / 4, SHORTEST)
+                continue
+            turned = new.t_s * point.t_s < 0.0
+            crossed = new.negative != point.negative and not turned
+            if length > SHORTEST and (crossed or self._dot(new, point) < STRAIGHT):
+                length = max(length / 4, SHORTEST)
+                continue
+            if turned:
+                path.limits.append(self._limit(point, length))
+                if not past_limits:
+                    path.why = "limit point"
+                    break
+            elif crossed:
+                path.branches.append((point.s + new.s) / 2)
+            if new.s >= 1.0:
+                path.q, path.share = self._end(point, new), 1.0
+                return path
+            if new.s < 0.0:
+                path.why = "the load would have to be reversed"
+                break
+            point, length = new, min(length * min(2.0, 4.0 / used), LONGEST)
+            path.q, path.share = point.q, point.s
+        else:
+            path.why = f"{MOST_STEPS} steps were not enough"
+        path.q, path.share = point.q, point.s
+        return path
+
+    # --- one step ----------------------------------------------------------------------------------------------------
+
+    def _step(self, point: Point, length: float) -> tuple[Point, int]:
+        """Return the point at a distance along the path, and the iterations that it took."""
+        q, s = point.q + length * point.t_q, point.s + length * point.t_s
+        for iteration in range(1, ITERATIONS + 1):
+            y, z = self._solutions(q, s)
+            ahead = self._product(point.t_q, q - point.q) + point.t_s * (s - point.s) - length
+            ds = -(ahead + self._product(point.t_q, y)) / (point.t_s + self._product(point.t_q, z))
+            dq = y + ds * z
+            q, s = q + dq, s + ds
+            self.newton.iterations += 1
+            size = max(self.system.size(dq), abs(ds))
+            if not np.isfinite(size) or size > 10.0:
+                raise ComputationError("the corrections of a step along the path diverged")
+            if size <= self.newton.tolerance:
+                self._set(q, s)
+                if self.system.model.inside_out():
+                    raise ComputationError("the path met a state that is turned inside out")
+                self.system.structure.check_range(q)
+                return self._point(q, s, point), iteration
+        raise ComputationError(f"a step along the path did not converge in {ITERATIONS} iterations")
+
+    def _set(self, q: Array, s: float) -> None:
+        system = self.system
+        if s < 0.0 and self.omega != 0.0:
+            raise ComputationError("the square of the speed would have to be negative")
+        system.set_time(0.0, system.motion.at_speed(np.sqrt(max(s, 0.0)) * self.omega), s)
+        system.set_state(q)
+
+    def _solutions(self, q: Array, s: float) -> tuple[Array, Array]:
+        """Return −K⁻¹ F and −K⁻¹ F_s; F is linear in s, so a difference over any distance is exact."""
+        self._set(q, s + 1.0)
+        slope = self.system.residual().copy()
+        self._set(q, s)
+        residual = self.system.residual()
+        slope.axpy(-1.0, residual)
+        solver = DirectSolver(self.system.tangent(1.0, 0.0, 0.0)[0])
+        return self._y.solve(solver, residual), self._z.solve(solver, slope)
+
+    def _point(self, q: Array, s: float, before: Point | None) -> Point:
+        """Return an equilibrium with the tangent of the path there, in the direction from the one before."""
+        z = self._solutions(q, s)[1].copy()
+        size = np.sqrt(self._product(z, z) + 1.0)
+        t_q, t_s = z / size, 1.0 / size
+        if before is not None and self._product(t_q, before.t_q) + t_s * before.t_s < 0.0:
+            t_q, t_s = -t_q, -t_s
+        K = self.system.matrix(1.0, 0.0, 0.0, 1.0)
+        return Point(q, s, t_q, t_s, negative_eigenvalues(K) if symmetric(K) else None)
+
+    def _product(self, a: Array, b: Array) -> float:
+        """Return the mean of the products of two arrays in the scales of the unknowns, over all ranks."""
+        n = self._owned
+        here = float(np.sum(a[:n] * b[:n] / self.system.scale[:n] ** 2)) / self._count
+        comm: MPI.Comm = self.system.comm
+        return here if comm.size == 1 else float(comm.allreduce(here))
+
+    def _dot(self, a: Point, b: Point) -> float:
+        return self._product(a.t_q, b.t_q) + a.t_s * b.t_s
+
+    # --- special points ----------------------------------------------------------------------------------------------
+
+    def _limit(self, point: Point, length: float) -> float:
+        """Return the load where the tangent of the path has none in s, between a point and one at a distance.
+
+        ds/dl = t_s has a simple zero there, which is enclosed; the load itself is then accurate to the square.
+        """
+        low, high, share = 0.0, length, point.s
+        for _ in range(60):
+            middle = (low + high) / 2
+            new = self._step(point, middle)[0]
+            change, share = abs(new.s - share), new.s
+            if new.t_s * point.t_s < 0.0:
+                high = middle
+            else:
+                low = middle
+            if change <= LOCATED * abs(share) and abs(new.t_s) < np.sqrt(LOCATED):
+                break
+        return share
+
+    def _end(self, before: Point, after: Point) -> Array:
+        """Return q at the full load, between two points of the path."""
+        part = (1.0 - before.s) / (after.s - before.s)
+        q = before.q + part * (after.q - before.q)
+
+        def increment() -> float:
+            self._set(q, 1.0)
+            solver = DirectSolver(self.system.tangent(1.0, 0.0, 0.0)[0])
+            dq = self._y.solve(solver, self.system.residual())
+            q[:] += dq
+            return float(self.system.size(dq))
+
+        self.newton.solve(increment, lambda: float(self.system.size(q)))
+        self._set(q, 1.0)
+        return np.asarray(q)
