@@ -59,7 +59,7 @@ class Point:
 
 
 @dataclass
-class Path:
+class LoadPath:
     """Where the path of equilibria led.
 
     Attributes:
@@ -92,13 +92,13 @@ class Tracer:
         self._count = system.V.dofmap.index_map.size_global * system.V.dofmap.index_map_bs
         self._y, self._z = Increment(system.V), Increment(system.V)
 
-    def follow(self, past_limits: bool) -> Path:
+    def follow(self, past_limits: bool) -> LoadPath:
         """Return where the path leads from the unloaded state.
 
         Args:
             past_limits: whether to go on where the load has a maximum.
         """
-        path, point, length = Path(self.system.zeros()), self._point(self.system.zeros(), 0.0, None), FIRST
+        path, point, length = LoadPath(self.system.zeros()), self._point(self.system.zeros(), 0.0, None), FIRST
         for _ in range(MOST_STEPS):
             try:
                 new, used = self._step(point, length)

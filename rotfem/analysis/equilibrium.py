@@ -10,7 +10,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
-from rotfem.analysis.arc_length import Path, Tracer
+from rotfem.analysis.arc_length import LoadPath, Tracer
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError, InputError
@@ -123,7 +123,7 @@ def _has_descent(system: Any) -> bool:
         return True
 
 
-def _path(system: Any, omega: float, newton: Newton, past_limits: bool, notes: list[str]) -> Path | None:
+def _path(system: Any, omega: float, newton: Newton, past_limits: bool, notes: list[str]) -> LoadPath | None:
     """Return the path from the unloaded state and note what there is on it; None where it cannot be followed."""
     try:
         path = Tracer(system, omega, newton).follow(past_limits)
@@ -159,7 +159,7 @@ def _shares(shares: list[float]) -> str:
     return ", ".join(f"{share:.6g}" for share in shares)
 
 
-def _at_limit(omega: float, path: Path) -> ComputationError:
+def _at_limit(omega: float, path: LoadPath) -> ComputationError:
     """Return what is said of a path with a maximum of the load."""
     share = path.limits[0]
     speed = f" ({np.sqrt(share) * omega:.6g} rad/s)" if omega else ""

@@ -12,7 +12,7 @@ from scipy.optimize import brentq, minimize_scalar, root
 from scipy.special import ellipe, ellipk
 
 import rotfem
-from rotfem.analysis.arc_length import Path, Tracer
+from rotfem.analysis.arc_length import LoadPath, Tracer
 from rotfem.numerics.newton import Newton
 
 LENGTH, EI, MASS = 10.0, 1.4e4, 1.2
@@ -55,7 +55,7 @@ def test_column_without_a_side_stays_straight_and_is_said_to_be_unstable() -> No
     assert float(line.split(" at ")[1].split(" of ")[0]) == pytest.approx(np.pi**2 / 4 * EI / LENGTH**2 / 520, rel=1e-5)
 
 
-def traced(scene: dict[str, Any], past_limits: bool = False) -> Path:
+def traced(scene: dict[str, Any], past_limits: bool = False) -> LoadPath:
     problem = rotfem.Problem.of(scene)
     system = problem.system(moving=False).held
     return Tracer(system, problem.motion.speed(0.0), Newton()).follow(past_limits)
