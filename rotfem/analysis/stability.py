@@ -41,22 +41,26 @@ class Stability:
         growth: largest growth rate found, 1/s; 0 where nothing grows.
         frequency: of the motion that grows at that rate, rad/s; 0 for a divergence.
         complete: whether no faster growth can have been missed.
+        lost: whether a motion's growth is smaller than what round-off does to it.
     """
 
     negative: int | None = 0
     growth: float = 0.0
     frequency: float = 0.0
     complete: bool = True
+    lost: bool = False
 
     @property
-    def stable(self) -> bool:
-        """Whether no small disturbance grows."""
+    def stable(self) -> bool | None:
+        """Whether no small disturbance grows; None where round-off hides it."""
+        if self.lost and self.growth == 0.0:
+            return None
         return self.growth == 0.0 and (self.complete or not self.negative)
 
     @property
     def held_by_spin(self) -> bool:
         """Whether the energy has no minimum there, and gyroscopic forces alone hold the equilibrium."""
-        return self.stable and bool(self.negative)
+        return self.stable is True and bool(self.negative)
 
     def warning(self) -> str:
         """Return what is to be said of it; empty of one that is plainly stable."""
@@ -67,6 +71,8 @@ class Stability:
             )
         if self.stable:
             return ""
+        if self.stable is None:
+            return "whether the equilibrium is stable is lost in round-off"
         if self.growth == 0.0:
             return (
                 f"unstable equilibrium: the stiffness has {self.negative} negative eigenvalues; the growth rate could "
@@ -149,16 +155,17 @@ def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Sta
             values, bounds = values[flexible], bounds[flexible]
         # Growth that round-off can have made is none.
         grows = values[values.real > np.maximum(GROWTH, bounds) * np.abs(values)]
+        lost = len(grows) < int(np.sum(values.real > GROWTH * np.abs(values)))
         if len(grows):
             fastest = grows[np.argmax(grows.real)]
             growth = float(fastest.real)
             frequency = float(fastest.imag) if fastest.imag > SAME * abs(fastest) else 0.0
         if negative is None:
-            return Stability(None, growth, frequency)
+            return Stability(None, growth, frequency, lost=lost)
         if _counted(pencil, pairs) >= negative:
-            return Stability(negative, growth, frequency)
+            return Stability(negative, growth, frequency, lost=lost)
         if count >= MOST or count >= pencil.K.getSize()[0]:
-            return Stability(negative, growth, frequency, complete=False)
+            return Stability(negative, growth, frequency, complete=False, lost=lost)
         count *= 2
 
 

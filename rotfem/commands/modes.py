@@ -87,7 +87,7 @@ def _modes(
     warnings = [*analysis.notes, *warnings]
     stability = stability_of_pencil(spinning.pencil, spinning.clamped)
     said = GROWS_AS_SAID * max(row["growth"] for row in found.rows if row["stability"] != "neutral")
-    if stability.held_by_spin or stability.growth > max(said, 0.0):
+    if stability.stable is None or stability.held_by_spin or stability.growth > max(said, 0.0):
         warnings = [*warnings, stability.warning()]
     result = {
         **modal_summary("modes", analysis, scene, choice, started),

@@ -14,13 +14,17 @@ from rotfem.numerics.linear import SMALL
 COUNTING = {24: 1, 13: 1}
 
 
-#: Asymmetry, relative to the norm, up to which it is that of round-off.
+#: Asymmetry of an entry, in parts of the root of the two diagonal entries, up to which it is that of round-off.
 ROUND_OFF = 1e-13
 
 
 def symmetric(A: Any) -> bool:
-    """Return whether a PETSc matrix is symmetric to round-off."""
-    return bool(A.isSymmetric(ROUND_OFF * A.norm()))
+    """Return whether a PETSc matrix is symmetric to round-off, whatever the units of its unknowns."""
+    d = A.getDiagonal()
+    d.array[:] = 1.0 / np.sqrt(np.where(d.array == 0.0, 1.0, np.abs(d.array)))
+    scaled = A.copy()
+    scaled.diagonalScale(d, d)
+    return bool(scaled.isSymmetric(ROUND_OFF))
 
 
 def negative_eigenvalues(A: Any) -> int:
