@@ -35,6 +35,13 @@ class AlphaFamily(Scheme):
         """Return the state with the auxiliary acceleration q̈."""
         return state.changed(memory=state.a.copy())
 
+    def jumped(self, state: State, change: Array) -> State:
+        """Return the state whose auxiliary acceleration has jumped too.
+
+        It stands for q̈ at another instant than t, and does so after the jump; a fresh one would lag anew at every knot.
+        """
+        return state.changed(memory=state.memory + change)
+
     def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
         """Return the step that keeps q̈, which is free of residual when the acceleration is constant."""
         alpha_m, alpha_f, beta, gamma = self.coefficients

@@ -110,6 +110,10 @@ class Scheme(ABC):
         """Return a first state, or one after a jump, with the memory that a step from it needs."""
         return state
 
+    def jumped(self, state: State, change: Array) -> State:
+        """Return a state whose acceleration has jumped by a change, with the memory that a step from it needs."""
+        return self.start(state)
+
     def local_error(self, new: State, old: State) -> Array | None:
         """Return an estimate of the error of q that the step from old to new made; None if there is none."""
         return None

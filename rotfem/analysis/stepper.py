@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from rotfem.analysis.schemes import Array, Scheme, Shifts, Stage, State
 from rotfem.errors import ComputationError
+from rotfem.mechanics.courses import View
 from rotfem.numerics.newton import REACH, Newton
 
 #: Iterations with an old factor after which the next step gets a new one.
@@ -28,6 +31,19 @@ MORE_ENERGY = 0.03
 #: A linear step is refined with an old factor up to this relative error, as long as that shrinks at this rate, or to
 #: where it stays at round-off.
 REFINED, RATE, ROUND_OFF = 1e-11, 0.3, 1e-8
+
+#: Relative jump of what is prescribed that is none.
+STEADY = 1e-7
+
+
+@contextmanager
+def seen(system: Any, view: View) -> Iterator[None]:
+    """Let a system see what is prescribed as a view shows it."""
+    system.view.side, system.view.window = view.side, view.window
+    try:
+        yield
+    finally:
+        system.view.side, system.view.window = 0, None
 
 
 class Stepper:
@@ -57,19 +73,50 @@ class Stepper:
         """Return the state at t (s) with the acceleration that the equations of motion give."""
         s = self.system
         state = State(t, q.copy(), v.copy(), np.zeros_like(q))
-        s.prescribe(t, state.q, state.v, state.a)
-        s.set_time(t)
-        s.set_state(state.q, state.v, state.a)
-        state.a += s.acceleration(t)
-        state.given = s.given(state)
+        with seen(s, View(1)):
+            s.prescribe(t, state.q, state.v, state.a)
+            s.set_time(t)
+            s.set_state(state.q, state.v, state.a)
+            state.a += s.acceleration(t)
+            state.given = s.given(state)
         return self.scheme.start(state)
 
-    def restart(self, state: State) -> State:
-        """Return a state with the accelerations that hold after a jump of what drives the system."""
-        new = self.start(state.t, state.q, state.v)
+    def restart(self, state: State, before: View, after: View) -> State:
+        """Return a state with the accelerations that hold after a jump of what drives the system.
+
+        Args:
+            state: at the end of a step.
+            before: how that step sees what is prescribed here.
+            after: how the next one does.
+        """
+        s, t = self.system, state.t
+        with seen(s, before):
+            old = s.driven(t)
+        with seen(s, after):
+            if np.allclose(s.driven(t), old, rtol=STEADY, atol=0.0):
+                return state
+            new = state.changed(q=state.q.copy(), v=state.v.copy(), a=state.a.copy())
+            s.prescribe(t, new.q, new.v, new.a)
+            s.set_time(t)
+            s.set_state(new.q, new.v, new.a)
+            new.a += s.acceleration(t)
+            new.given = s.given(new)
         if new.given is not None and state.given is not None:
             new.given[:2] = state.given[:2]
-        return new
+        return self.scheme.jumped(new, new.a - state.a)
+
+    def drift(self, state: State, h: float, end: float) -> State:
+        """Return the state at the end of a step too short to be solved for: round-off of q would spoil a."""
+        q, v = state.q + h * state.v + 0.5 * h * h * state.a, state.v + h * state.a
+        given = state.given
+        if given is not None:
+            given = given + np.array([0.0, self.system.hub.torque.impulse(state.t, end), 0.0])
+        return state.changed(t=end, q=q, v=v, given=given)
+
+    def struck(self, state: State, h: float) -> State:
+        """Return a state that drifted through a blow, with the second half of its impulse from the end of the blow."""
+        after = self.restart(state, View(window=(0.0, h)), View(window=(h, 0.0)))
+        return after.changed(v=after.v + 0.5 * h * (after.a - state.a))
 
     def step(self, state: State, h: float, end: float | None = None) -> State:
         """Return the state at state.t + h.

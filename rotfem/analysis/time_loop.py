@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from rotfem.analysis.itinerary import Itinerary, Leg
 from rotfem.analysis.schemes import Array, Scheme, State
-from rotfem.analysis.stepper import Stepper
+from rotfem.analysis.stepper import Stepper, seen
 from rotfem.errors import ComputationError
+from rotfem.mechanics.courses import View
 from rotfem.numerics.newton import Newton
 
 #: A linear theory has lost its meaning when a displacement exceeds the structure's own length, or a rotation 1 rad.
@@ -83,29 +85,56 @@ def fixed_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[State]
         ComputationError: a step failed, however short.
     """
     assert steps.step is not None
-    end, step, parts = steps.end, steps.step, steps.parts
-    n = int(np.ceil(end / step - 1e-9))
-    close = 1e-9 * step
-    jumps = jumps_of(stepper, end + close)
-    for i in range(1, n + 1):
-        t = end if i == n else i * step
-        m = 1 if parts is None else int(parts[i - 1])
-        begin, length = (i - 1) * step, step / m
-        between = [begin + (t - begin) * j / m for j in range(1, m)]
-        for stop in stops([*between, t], [j for j in jumps if state.t + close < j < t + close], close):
-            h = stop - state.t
-            if abs(h - length) <= close:
-                h = length  # of one length to the last digit, so that the matrix stays
-            state = stepper.advance(state, h, stop)
-            if stop in jumps:
-                state = stepper.restart(state)
-        yield state
+    legs = iter(Itinerary(stepper.system.courses, *grid(steps)))
+    wanted = None if steps.parts is None else set(np.cumsum(steps.parts).tolist())
+    after: Leg | None
+    number, after = next(legs)
+    if after.averaged:
+        state = stepper.restart(state, View(1), View(window=(0.0, after.length)))
+    while after is not None:
+        now, leg = number, after
+        number, after = next(legs, (0, None))
+        state = travel(stepper, state, leg, after)
+        if leg.whole and (wanted is None or now in wanted):
+            yield state
 
 
-def stops(times: Sequence[float], jumps: Sequence[float], close: float) -> list[float]:
-    """Return times and jumps (s) in order; a time closer to a jump than `close` is that jump, exactly."""
-    snapped = (min((j for j in jumps if abs(j - t) <= close), key=lambda j: abs(j - t), default=t) for t in times)
-    return sorted({*snapped, *jumps})
+def grid(steps: Steps) -> tuple[Array, float]:
+    """Return the ends of fixed steps, the first at 0, and their length (s)."""
+    assert steps.step is not None
+    n = int(np.ceil(steps.end / steps.step - 1e-9))
+    times = np.append(np.arange(n) * steps.step, steps.end)
+    if steps.parts is None:
+        return times, steps.step
+    cut = [np.linspace(a, b, m, endpoint=False) for a, b, m in zip(times, times[1:], steps.parts, strict=False)]
+    return np.append(np.concatenate(cut), steps.end), steps.step
+
+
+def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State:
+    """Return the state at the end of a leg, as the one after it starts from it.
+
+    Raises:
+        ComputationError: the step failed, however short.
+    """
+    old: State | None = None
+    if leg.drifts:
+        state = stepper.drift(state, leg.length, leg.end)
+        if leg.averaged:
+            state = stepper.struck(state, leg.length)
+    else:
+        joined = after is not None and leg.joins(after)
+        window = (leg.length, after.length if after is not None and joined else 0.0) if leg.averaged else None
+        with seen(stepper.system, View(-1 if leg.lands else 0, window)):
+            old, state = state, stepper.advance(state, leg.length, leg.end)
+    if after is None:
+        return state
+    if old is not None and not after.drifts and after.length != leg.length:
+        state = stepper.scheme.resized(state, old, after.length)
+    if leg.lands or ((leg.averaged or after.averaged) and not leg.joins(after)):
+        before = View(-1 if leg.lands else 0, (leg.length, 0.0) if leg.averaged else None)
+        ahead = View(1 if leg.lands else 0, (0.0, after.length) if after.averaged else None)
+        state = stepper.restart(state, before, ahead)
+    return state
 
 
 def adaptive_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[State]:
@@ -119,13 +148,14 @@ def adaptive_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[Sta
     shortest = steps.min_step or 1e-9 * steps.end
     h, largest = min(longest, 1e-4 * steps.end), FLOOR
     close = 1e-12 * steps.end
-    jumps = jumps_of(stepper, steps.end + close)
+    jumps = sorted({float(t) for c in stepper.system.courses for t in c.knots if 0.0 < t <= steps.end + close})
     while state.t < steps.end - close:
         stop = min((j for j in jumps if j > state.t), default=steps.end)
         left = stop - state.t
         wanted = min(h, longest)
         h = left if wanted >= left * (1 - 1e-9) else (left / 2 if wanted > 0.6 * left else wanted)
-        new = stepper.advance(state, h, stop if h == left else None)
+        with seen(stepper.system, View(-1)):
+            new = stepper.advance(state, h, stop if h == left else None)
         largest = max(largest, stepper.system.size(new.q))
         allowed = steps.tolerance * largest * h / steps.end  # so that the errors of all steps add up to the tolerance
         error = stepper.local_error(new, state) / allowed
@@ -141,15 +171,10 @@ def adaptive_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[Sta
                 )
             continue
         if new.t in jumps:
-            new = stepper.restart(new)
+            new = stepper.restart(new, View(-1), View(1))
             h = min(h, 1e-4 * steps.end)
         elif not KEEP[0] <= factor <= KEEP[1]:
             new = stepper.scheme.resized(new, state, h * factor)
             h *= factor
         state = new
         yield state
-
-
-def jumps_of(stepper: Stepper, end: float) -> list[float]:
-    """Return the times (s) up to the end at which what drives the system jumps."""
-    return [t for t in stepper.system.jumps if 0.0 < t <= end]

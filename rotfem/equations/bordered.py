@@ -75,11 +75,11 @@ class HubRow:
         system.set_state(*state)
         return value
 
-    def residual(self, t: float, after: bool = False) -> float:
-        """Return I_R psi'' + c psi' + (work in the turn) − M(t), N·m; after a jump of the torque, or before."""
+    def residual(self, t: float) -> float:
+        """Return I_R psi'' + c psi' + (work in the turn) − M(t), N·m."""
         _, speed, rate = self.angle.values
         own = self.hub.inertia * rate + self.hub.damping * speed
-        return float(own + self._value(self._moment) - self.hub.torque.at(t, after))
+        return float(own + self._value(self._moment) - self.hub.torque.at(t))
 
     def diagonal(self, c_v: float, c_m: float) -> float:
         """Return ∂(residual)/∂psi: c_v ∂/∂psi' + c_m ∂/∂psi''."""
@@ -127,7 +127,6 @@ class BorderedSystem:
         self.inner, self.row = inner, HubRow(inner)
         self.angle = self.row.angle
         self.hub = self.row.hub
-        self.jumps = self.hub.torque.jumps
         self._dz = Increment(inner.V)
 
     def __getattr__(self, name: str) -> Any:
@@ -165,6 +164,10 @@ class BorderedSystem:
         """Write the frame and load constants of time t (see `System.set_time`)."""
         self.inner.set_time(t, motion, load_factor)
 
+    def driven(self, t: float) -> Array:
+        """Return all that is prescribed at time t (s), the torque last (see `System.driven`)."""
+        return np.append(self.inner.driven(t), self.hub.torque.at(t))
+
     def leave_out(self, effects: Any) -> None:
         """Switch effects off, all others on, and put the hub back to its start."""
         self.inner.leave_out(effects)
@@ -194,7 +197,7 @@ class BorderedSystem:
         R, b = s.residual(), s.spin_derivative(0.0, 1.0)
         R.array[massless] = 0.0
         b.array[massless] = 0.0
-        return self._eliminated(solver, (R, b), row.row(shifts), -row.residual(t, after=True), row.diagonal(0.0, 1.0))
+        return self._eliminated(solver, (R, b), row.row(shifts), -row.residual(t), row.diagonal(0.0, 1.0))
 
     def _eliminated(self, solver: Any, right: tuple[Any, Any], c: Any, r: float, d: float) -> Array:
         y, z = self.inner._dx.solve(solver, right[0]), self._dz.solve(solver, right[1])
@@ -240,6 +243,8 @@ class BorderedSystem:
     def given(self, new: Any, old: Any = None) -> Array:
         """Return (work, impulse, moment) at the end of a step, by the trapezoidal rule over it, or of a first state.
 
+        The impulse of the torque is exact.
+
         Work (J) is that of torque and brake; the angular impulse (N·m·s) has the moment (N·m) of all forces from
         outside in it too, which is kept for the next step.
         """
@@ -247,10 +252,10 @@ class BorderedSystem:
             return np.array([0.0, 0.0, self.moment(new)])
         turn, h = new.q[-1] - old.q[-1], new.t - old.t
         speed, before = 0.5 * (new.v[-1] + old.v[-1]), old.given
-        mean = 0.5 * (self.hub.torque.at(old.t, after=True) + self.hub.torque.at(new.t))
+        impulse = self.hub.torque.impulse(old.t, new.t)
         brake, moment = self.hub.damping, self.moment(new)
-        work_done = before[0] + mean * turn - brake * speed**2 * h
-        impulse = before[1] + (mean + 0.5 * (before[2] + moment)) * h - brake * turn
+        work_done = before[0] + impulse / h * turn - brake * speed**2 * h
+        impulse += before[1] + 0.5 * (before[2] + moment) * h - brake * turn
         return np.array([work_done, impulse, moment])
 
     def moment(self, state: Any) -> float:

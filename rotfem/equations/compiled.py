@@ -10,6 +10,7 @@ from rotfem.equations.affine import AffineSystem
 from rotfem.equations.bordered import BorderedSystem
 from rotfem.equations.model import Model
 from rotfem.equations.nonlinear import NonlinearSystem
+from rotfem.mechanics.courses import View, watched
 from rotfem.mechanics.problem import Problem
 
 
@@ -24,6 +25,9 @@ def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bo
     Raises:
         InputError: a mesh or a section that cannot be computed with.
     """
-    model = Model(problem, comm)
+    view = View()
+    seen, courses = watched(problem, view) if moving else (problem, [])
+    model = Model(seen, comm)
     system = (AffineSystem if problem.theory.linear else NonlinearSystem)(model, moving)
+    system.view, system.courses = view, tuple(courses)
     return system if model.hub is None else BorderedSystem(system)

@@ -19,6 +19,7 @@ from mpi4py import MPI
 
 from rotfem.equations.model import Model
 from rotfem.equations.solutions import Solutions
+from rotfem.mechanics.courses import Course, View
 from rotfem.mechanics.motion import IDENTITY, Motion
 from rotfem.numerics import compat, forms
 from rotfem.numerics.linear import DirectSolver, Increment
@@ -45,7 +46,8 @@ class System(Solutions, ABC):
         settled: whether M, C and K are those of the time before; a linear theory may know they are.
         scale: size of each local unknown (m or 1), by which increments are judged.
         clamp: motion of the clamp, where the frame does not rotate with it.
-        jumps: times (s) at which what drives the system jumps.
+        courses: what is prescribed and changes with time.
+        view: how these are seen.
         seconds: time spent on assembly and solution of steps.
         assembled: time spent on assembly while compiling, s.
     """
@@ -54,7 +56,8 @@ class System(Solutions, ABC):
     solved_at_once = False
     settled = False
     hub: Any = None
-    jumps: tuple[float, ...] = ()
+    courses: tuple[Course, ...] = ()
+    view: View
 
     def __init__(self, model: Model, moving: bool = True):
         self.model, self.structure, self.motion, self.moving = model, model.structure, model.motion, moving
@@ -152,6 +155,12 @@ class System(Solutions, ABC):
             n = value.size
             values[name] = Q[:n, :n] @ value if name in turning and n > 1 else value
         return values
+
+    def driven(self, t: float) -> Array:
+        """Return all that is prescribed at time t (s) as it is seen now, one after the other."""
+        values = {**self.model.frame.values(self.motion, t), **self.load_values(t, self.motion)}
+        clamp = () if self.clamp is None else self.clamp.at(t)
+        return np.concatenate([np.ravel(v) for v in (*values.values(), *clamp)] or [np.empty(0)])
 
     def prescribe(self, t: float, q: Array, v: Array, a: Array) -> None:
         """Write the motion of the clamp at time t (s), exact in q, v and a, where the frame does not turn with it."""

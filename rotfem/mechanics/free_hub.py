@@ -6,10 +6,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 #: Relative difference of two times that rounding can make.
 ROUNDING = 1e-14
 
+Array = npt.NDArray[np.float64]
 Rows = tuple[tuple[float, ...], ...]
 
 
@@ -35,17 +37,57 @@ class Torque:
             same[t] = last
         return tuple((same[start], same[end], torque) for start, end, torque in self.pulses)
 
-    @property
+    @cached_property
+    def _columns(self) -> tuple[Array, Array, Array]:
+        """Times, torques, and ∫ M dt from the first of them: of the table, or after the jumps of the pulses."""
+        if self.table is not None:
+            t, M = np.array(self.table).T
+            return t, M, np.concatenate([[0.0], np.cumsum(0.5 * (M[1:] + M[:-1]) * np.diff(t))])
+        t = np.array(self.jumps)
+        change = np.zeros(len(t))
+        for start, end, torque in self._pulses:
+            change[np.searchsorted(t, start)] += torque
+            change[np.searchsorted(t, end)] -= torque
+        M = np.cumsum(change)
+        return t, M, np.concatenate([[0.0], np.cumsum(M[:-1] * np.diff(t))])
+
+    @cached_property
     def jumps(self) -> tuple[float, ...]:
         """Times (s) of discontinuity."""
         return tuple(sorted({t for start, end, _ in self._pulses for t in (start, end)}))
 
+    @property
+    def knots(self) -> Array:
+        """Times (s) between which it is linear."""
+        return self._columns[0]
+
+    def many(self, t: Array, after: bool = False) -> Array:
+        """Return M at times (n,), shape (n,): the limits from the left, or from the right with `after`."""
+        knots, M, _ = self._columns
+        if not len(knots):
+            return np.zeros(len(t))
+        if self.table is not None:
+            return np.interp(t, knots, M)
+        index = np.searchsorted(knots, t, side="right" if after else "left")
+        return np.concatenate([[0.0], M])[index]
+
     def at(self, t: float, after: bool = False) -> float:
         """Return M(t): the limit from the left, or from the right with `after` (they differ at a jump)."""
-        if self.table is not None:
-            rows = np.array(self.table)
-            return float(np.interp(t, rows[:, 0], rows[:, 1]))
-        return float(sum(M for start, end, M in self._pulses if (start <= t < end if after else start < t <= end)))
+        return float(self.many(np.array([t]), after)[0])
+
+    def impulse(self, start: float, end: float) -> float:
+        """Return ∫ M dt from start to end (s), N·m·s."""
+        knots, M, area = self._columns
+        if not len(knots):
+            return 0.0
+        t = np.array([start, end])
+        inside = np.clip(t, knots[0], knots[-1])
+        k = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
+        s, outside = inside - knots[k], t - inside
+        slope = np.zeros(2) if self.table is None else (M[k + 1] - M[k]) / (knots[k + 1] - knots[k])
+        held = np.zeros(2) if self.table is None else np.where(outside < 0.0, M[0], M[-1])
+        first, last = area[k] + (M[k] + 0.5 * slope * s) * s + held * outside
+        return float(last - first)
 
 
 @dataclass(frozen=True)

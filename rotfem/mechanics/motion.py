@@ -6,7 +6,7 @@ and its origin has the absolute acceleration a_o(t), both resolved in the frame 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,6 +19,9 @@ Scalar = Callable[[float], float]
 Array = npt.NDArray[np.float64]
 
 IDENTITY = np.eye(3)
+
+#: Parts of a smooth spin-up that are nearly straight.
+SPIN_UP_KNOTS = 16
 
 
 def no_acceleration(t: float) -> Array:
@@ -47,7 +50,10 @@ class Motion:
         changes_speed: whether Omega changes, as far as is known.
         is_accelerated: whether a_o is anything but zero.
         knots: times (s) between which Omega is smooth.
-        smooth: whether it is known to be smooth between them.
+        sharp: those of them at which the rate may jump.
+        breakpoints: of a function, those that its user named; None if it has to be looked for them.
+        smooth: whether Omega is known to be smooth between its knots.
+        arrays: whether speed and rate take arrays of times too.
         base_knots: times (s) between which a_o is linear; None if that is not known.
         settled: time (s) from which on Omega stays as it is, 0 if that is not known.
         hub: what turns freely where the rotation is an unknown; its speed is then only that of the start.
@@ -63,7 +69,10 @@ class Motion:
     changes_speed: bool = True
     is_accelerated: bool = False
     knots: tuple[float, ...] = ()
+    sharp: tuple[float, ...] = ()
+    breakpoints: tuple[float, ...] | None = None
     smooth: bool = True
+    arrays: bool = False
     base_knots: tuple[float, ...] | None = None
     settled: float = 0.0
     hub: FreeHub | None = None
@@ -80,6 +89,7 @@ class Motion:
         """Return the smooth spin-up from rest to a speed (rad/s) in a time (s); see `smooth_spin_up`."""
         turns = speed != 0.0
         state: dict[str, Any] = {"is_spinning": turns, "changes_speed": turns, "settled": duration}
+        state["knots"] = tuple(duration * np.arange(1, SPIN_UP_KNOTS + 1) / SPIN_UP_KNOTS)
         return cls(*smooth_spin_up(speed, duration), about(axis), **(state | more))
 
     @classmethod
@@ -92,6 +102,8 @@ class Motion:
             "is_spinning": bool(np.any(speeds != 0.0)),
             "changes_speed": len(set(speeds)) > 1,
             "knots": tuple(t),
+            "sharp": () if kind in ("pchip", "cubic") else tuple(t),
+            "arrays": True,
         }
         return cls(*tabulated(table, kind), about(axis), **(state | more))
 
@@ -102,10 +114,24 @@ class Motion:
         rate: Scalar | None = None,
         angle: Scalar | None = None,
         axis: npt.ArrayLike = (0, 0, 1),
+        breakpoints: Sequence[float] | None = None,
         **more: Any,
     ) -> Motion:
-        """Return rotation at the speed that a function of time gives; see `from_callable`."""
-        return cls(*from_callable(speed, rate, angle), about(axis), **{"smooth": False, **more})
+        """Return rotation at the speed that a function of time gives; see `from_callable`.
+
+        Args:
+            speed: t (s) ↦ Omega (rad/s).
+            rate: t (s) ↦ dOmega/dt (rad/s²); differences of the speed if None.
+            angle: t (s) ↦ psi (rad); a quadrature of the speed if None.
+            axis: direction of the angular velocity.
+            breakpoints: times (s) between which the function is smooth, which steps then land on; where None, it is
+                looked at for them before a march.
+            more: further attributes of the motion.
+        """
+        points = None if breakpoints is None else tuple(sorted(float(t) for t in breakpoints))
+        known = points or ()
+        state: dict[str, Any] = {"smooth": False, "breakpoints": points, "knots": known, "sharp": known}
+        return cls(*from_callable(speed, rate, angle, known), about(axis), **(state | more))
 
     @classmethod
     def free(cls, hub: FreeHub, axis: npt.ArrayLike = (0, 0, 1), **more: Any) -> Motion:
@@ -175,37 +201,49 @@ def tabulated(table: npt.ArrayLike, kind: str) -> tuple[Scalar, Scalar, Scalar]:
     else:
         curve = interpolate.make_interp_spline(t, omega, k=1)
     slope, area = curve.derivative(), curve.antiderivative()
-    first, last = t[0], t[-1]
+    first, last = t[0], t[-1]  # speed and rate are asked for at arrays of times too
     at_zero = float(area(np.clip(0.0, first, last)) + omega[0] * min(0.0 - first, 0.0))
 
     def angle(s: float) -> float:
         inside = float(area(np.clip(s, first, last)))
         return float(inside + omega[0] * min(s - first, 0.0) + omega[-1] * max(s - last, 0.0) - at_zero)
 
-    return (
-        lambda s: float(curve(np.clip(s, first, last))),
-        lambda s: float(slope(s)) if first <= s < last else 0.0,
-        angle,
-    )
+    def speed(s: Any) -> Any:
+        return curve(np.clip(s, first, last))[()]
+
+    def rate(s: Any) -> Any:
+        return np.where((first <= s) & (s < last), slope(np.clip(s, first, last)), 0.0)[()]
+
+    return speed, rate, angle
 
 
-def from_callable(speed: Scalar, rate: Scalar | None, angle: Scalar | None) -> tuple[Scalar, Scalar, Scalar]:
+def from_callable(
+    speed: Scalar, rate: Scalar | None, angle: Scalar | None, breakpoints: Sequence[float] = ()
+) -> tuple[Scalar, Scalar, Scalar]:
     """Return (Omega, dOmega/dt, psi) for any function Omega(t); what is not given is computed from it.
 
-    The missing rate is a fourth-order central difference, the missing angle an adaptive quadrature that goes on from
-    the last time asked for.
+    The missing rate is a fourth-order difference, central but where a breakpoint is near, which it does not reach over;
+    the missing angle is an adaptive quadrature that goes on from the last time asked for.
     """
+    pieces = np.array([-np.inf, *breakpoints, np.inf])
 
     def difference(t: float) -> float:
-        h = 1e-3
-        return float((8 * (speed(t + h) - speed(t - h)) - (speed(t + 2 * h) - speed(t - 2 * h))) / (12 * h))
+        i = int(np.searchsorted(pieces, t, side="right"))
+        first, last = pieces[i - 1], pieces[min(i, len(pieces) - 1)]
+        h = min(1e-3, (last - first) / 8)
+        if first <= t - 2 * h and t + 2 * h < last:
+            return float((8 * (speed(t + h) - speed(t - h)) - (speed(t + 2 * h) - speed(t - 2 * h))) / (12 * h))
+        h = h if t + 4 * h < last else -h  # forwards from a breakpoint, backwards to the next
+        values = [speed(t + k * h) for k in range(5)]
+        return float(np.dot((-25, 48, -36, 16, -3), values) / (12 * h))
 
     from scipy import integrate  # only a callable needs it, and it is slow to load
 
     last = [0.0, 0.0]
 
     def quadrature(t: float) -> float:
-        last[1] += integrate.quad(speed, last[0], t, epsabs=1e-12, epsrel=1e-12)[0]
+        inside = [p for p in breakpoints if min(last[0], t) < p < max(last[0], t)] or None
+        last[1] += integrate.quad(speed, last[0], t, epsabs=1e-12, epsrel=1e-12, points=inside)[0]
         last[0] = t
         return last[1]
 

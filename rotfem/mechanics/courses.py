@@ -1,0 +1,183 @@
+"""What is prescribed over time, and how a march sees it: from one side of an instant, or as a mean around it.
+
+Speed, base acceleration, torque and loads are *courses*, smooth between their knots. A march lands on knots, and there
+a course has two values: that of the step that ends, t⁻, and that of the step that starts, t⁺. Where knots are closer
+than steps can be, a course is seen through the hat function of an instant and its steps l before and r after it,
+
+    f̄(t) = ∫ f(s) φ(s) ds / ∫ φ(s) ds,    φ = 1 + (s − t)/l before t, 1 − (s − t)/r after it.
+
+Hats add up to one, so the impulse Σ ½ (l + r) f̄ that a scheme of second order passes on is ∫ f dt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.mechanics.free_hub import FreeHub, Torque
+from rotfem.mechanics.loads import Load, Loads
+from rotfem.mechanics.motion import Motion
+from rotfem.mechanics.problem import Problem
+
+Array = npt.NDArray[np.float64]
+
+#: Two times that are closer than this, relative to themselves, are one.
+SAME = 1e-13
+
+#: An instant after 0, s.
+TINY = 1e-300
+
+#: Gauss points and weights on (0, 1): exact for a cubic times a hat.
+POINTS, WEIGHTS = 0.5 + 0.5 * np.sqrt(0.6) * np.array([-1.0, 0.0, 1.0]), np.array([5.0, 8.0, 5.0]) / 18
+
+
+@dataclass
+class View:
+    """How the courses of a problem are seen at present.
+
+    Attributes:
+        side: −1 just before the time asked for, 1 just after it, 0 at it.
+        window: lengths (s) of the steps before and after it that courses are averaged over; None for their values.
+    """
+
+    side: int = 0
+    window: tuple[float, float] | None = None
+
+
+@dataclass
+class Course:
+    """One quantity over time.
+
+    Attributes:
+        name: what it is, for messages.
+        at: time (s) ↦ value, scalar or shape (components,).
+        knots: times (s) between which it is smooth, increasing.
+        marks: further times (s) between which it is nearly straight, where it is known to be fast.
+        many: the same of an array of times, shape (n, components); made of `at` if None.
+        known: whether all knots are known; otherwise it is a function that has to be looked at.
+    """
+
+    name: str
+    at: Callable[[float], Any]
+    knots: Array
+    marks: Array
+    many: Callable[[Array], Array] | None = None
+    known: bool = True
+
+    def values(self, t: Array) -> Array:
+        """Return the values at times (n,), shape (n, components)."""
+        if self.many is not None:
+            return self.many(t)
+        return np.array([np.atleast_1d(self.at(float(s))) for s in t], dtype=float).reshape(len(t), -1)
+
+    def mean(self, t: float, before: float, after: float) -> Any:
+        """Return f̄(t), as a scalar or shape (components,) as `at` does."""
+        points = np.concatenate([self.knots, self.marks])
+        inside = points[(points > t - before) & (points < t + after)]
+        edges = np.unique(np.concatenate([[t - before, t, t + after], inside]))
+        lengths = np.diff(edges)
+        s = (edges[:-1, None] + lengths[:, None] * POINTS).ravel()
+        hat = np.where(s < t, 1 + (s - t) / (before or 1.0), 1 - (s - t) / (after or 1.0))
+        weights = (lengths[:, None] * WEIGHTS).ravel() * hat
+        mean = weights @ self.values(s) / weights.sum()
+        return mean if np.ndim(self.at(t)) else float(mean[0])
+
+    def seen(self, view: View) -> Callable[[float], Any]:
+        """Return the course as a function of time that shows what a view shows."""
+
+        def at(t: float) -> Any:
+            if view.window is not None:
+                return self.mean(t, *view.window)
+            return self.at(t + view.side * max(SAME * abs(t), TINY)) if view.side else self.at(t)
+
+        return at
+
+
+@dataclass(frozen=True)
+class SeenLoad:
+    """A load as a view shows it (see `Load`)."""
+
+    load: Load
+    at: Callable[[float], Array]
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.load, name)
+
+
+@dataclass(frozen=True)
+class SeenTorque(Torque):
+    """A torque as a view shows it."""
+
+    seen: Callable[[float], float] = float
+
+    def at(self, t: float, after: bool = False) -> float:
+        """Return M(t)."""
+        return super().at(t, True) if after else self.seen(t)
+
+
+def watched(problem: Problem, view: View) -> tuple[Problem, list[Course]]:
+    """Return the problem whose courses are seen as a view shows them, and those that change with time."""
+    courses: list[Course] = []
+
+    def see(course: Course) -> Callable[[float], Any]:
+        courses.append(course)
+        return course.seen(view)
+
+    motion = _watched_motion(problem.motion, see)
+    names = ("tip_force", "tip_moment", "distributed")
+    changing = {n: load for n in names if (load := getattr(problem.loads, n)) is not None and not load.constant}
+    loads = problem.loads
+    if changing:
+        kept = {n: getattr(loads, n) for n in names} | {
+            n: SeenLoad(load, see(_load_course(f"loads.{n}", load))) for n, load in changing.items()
+        }
+        loads = Loads(gravity=loads.gravity, **kept)
+    return problem.replace(motion=motion, loads=loads), courses
+
+
+def _watched_motion(motion: Motion, see: Callable[[Course], Callable[[float], Any]]) -> Motion:
+    changes: dict[str, Any] = {}
+    none = np.empty(0)
+    if motion.is_accelerated and not motion.constant:
+        base, at = motion.base_knots, motion.base_acceleration
+        changes["base_acceleration"] = see(
+            Course("motion.base_acceleration", at, _times(base), none, known=base is not None)
+        )
+    if motion.hub is not None:
+        if len(motion.hub.torque.knots):
+            changes["hub"] = _watched_hub(motion.hub, see)
+    elif motion.changes_speed:
+        known = motion.smooth or motion.breakpoints is not None
+        for name, f in (("speed", motion.speed), ("rate", motion.rate)):
+            many = _columns(f) if motion.arrays else None
+            changes[name] = see(Course(f"motion.{name}", f, _times(motion.sharp), _times(motion.knots), many, known))
+    return replace(motion, **changes)
+
+
+def _watched_hub(hub: FreeHub, see: Callable[[Course], Callable[[float], Any]]) -> FreeHub:
+    torque = hub.torque
+    course = Course("motion.torque", torque.at, torque.knots, np.empty(0), lambda t: torque.many(t)[:, None])
+    return replace(hub, torque=SeenTorque(torque.pulses, torque.table, see(course)))
+
+
+def _load_course(name: str, load: Load) -> Course:
+    if load.table is None:
+        return Course(name, load.at, np.empty(0), np.empty(0), known=False)
+    t, *columns = np.array(load.table).T
+
+    def many(s: Array) -> Array:
+        return np.stack([np.interp(s, t, column) for column in columns], axis=1)
+
+    return Course(name, load.at, t, np.empty(0), many)
+
+
+def _times(knots: Iterable[float] | None) -> Array:
+    return np.array(() if knots is None else knots, dtype=float)
+
+
+def _columns(f: Callable[[Any], Any]) -> Callable[[Array], Array]:
+    return lambda t: np.asarray(f(t))[:, None]
