@@ -1,0 +1,136 @@
+"""What is prescribed over time is met: orders after kinks, impulses of pulses, events shorter than a step, dense tables."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from rotfem import run
+from tests.beams import STRUCTURE
+
+Array = npt.NDArray[np.float64]
+
+#: Knots that no step of the tests ends at.
+KNOTS = (0.0, 0.3517, 0.6321, 0.97)
+RAMPS = [[t, 0.0, f] for t, f in zip(KNOTS, (0.0, 0.5, -0.5, 0.0), strict=True)]
+SPEEDS = {"type": "table", "table": [[t, w] for t, w in zip(KNOTS, (0.2, 0.2, 1.0, 0.5), strict=True)]}
+SPEEDS |= {"interpolation": "linear"}
+SPIN = {"type": "constant", "speed": 1.0}
+HUB = {"type": "torque", "hub_inertia": 1.0}
+DATA: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "speeds": (SPEEDS, {}),
+    "speeds, inertial frame": (SPEEDS, {"model": {"frame": "inertial"}}),
+    "load": (SPIN, {"loads": {"distributed": {"table": RAMPS}}}),
+    "base acceleration": (SPIN | {"base_acceleration": RAMPS}, {}),
+    "torque": (HUB | {"table": [[t, f] for t, _, f in RAMPS]}, {}),
+    "pulses": (HUB | {"pulses": [[0.1234, 0.3517, 0.5], [0.6, 0.9, -0.3]]}, {}),
+}
+SCHEMES: dict[str, dict[str, Any]] = {
+    "rho 0.8": {"spectral_radius": 0.8},
+    "rho 0": {"spectral_radius": 0.0},
+    "newmark": {"scheme": "newmark"},
+}
+
+
+@pytest.mark.parametrize("scheme", list(SCHEMES))
+@pytest.mark.parametrize("data", list(DATA))
+def test_second_order_after_kinks(unit_beam: Any, data: str, scheme: str) -> None:
+    """Half the step, a quarter of the change; stiffness-proportional damping leaves only modes that steps resolve."""
+    motion, more = DATA[data]
+    histories = []
+    for k in range(3):
+        time = {"end": 1.6, "step": 0.01 / 2**k, "output_every": 2**k, **SCHEMES[scheme]}
+        scene = unit_beam({"structure.damping": {"kelvin_voigt": 0.02}}, motion=motion, **more, time=time)
+        h = run(scene.replace({"mesh.elements": 2})).history
+        histories.append(np.array([h["tip_u2"], h["tip_alpha"]]))
+    first, second = (np.abs(b - a).max(axis=1) for a, b in pairwise(histories))
+    np.testing.assert_allclose(np.log2(first / second), 2.0, rtol=0, atol=0.2)
+
+
+def krb(motion: dict[str, Any], step: float, end: float, **more: Any) -> Any:
+    """Return the run of Kane's beam on four elements."""
+    tables = {"structure": STRUCTURE, "motion": motion, "mesh": {"elements": 4}, "time": {"end": end, "step": step}}
+    return run(tables | more)
+
+
+def speeds(*rows: tuple[float, float]) -> dict[str, Any]:
+    return {"type": "table", "table": [list(row) for row in rows], "interpolation": "linear"}
+
+
+def test_shifted_knot_shifts_the_answer_as_little() -> None:
+    """A knot at a step's end moved by 1 ns and less, to either side: the answer moves by u̇ times that, and no more."""
+
+    def u(shift: float) -> Array:
+        history = krb(speeds((0.0, 0.2), (1.0 + shift, 0.2), (1.5, 0.0)), 0.01, 2.0).history
+        return np.asarray(history["tip_u2"])
+
+    still = u(0.0)
+    for shift in (1e-9, -1e-9, 1e-12):
+        assert np.abs(u(shift) - still).max() < 10 * abs(shift) * np.abs(still).max()
+
+
+@pytest.mark.parametrize("start", [1.0033, 1.0, 1.01 - 1e-9])
+def test_stop_within_a_step(start: float) -> None:
+    """0.2 rad/s stopped in 1 ms, 1 µs, 1 ns: the same blow, so the same swing of the tip.
+
+    Reference: steps of 0.1 ms for the stop in 1 ms, u₂ = 0.6086 at most; that of 10 ms leaves 0.5 % to the third mode.
+    """
+    tops = []
+    for duration in (1e-3, 1e-6, 1e-9):
+        history = krb(speeds((0.0, 0.2), (start, 0.2), (start + duration, 0.0)), 0.01, 2.2).history
+        tops.append(np.abs(history["tip_u2"]).max())
+    np.testing.assert_allclose(tops, 0.6086, rtol=5e-3)
+    np.testing.assert_allclose(tops[1:], tops[0], rtol=2e-3)
+
+
+def hub(pulses: list[list[float]], step: float, end: float = 2.0) -> Any:
+    """Return the run of a hub that turns as if the beam were rigid."""
+    return krb(HUB | {"hub_inertia": 10.0, "coupled": False, "pulses": pulses}, step, end)
+
+
+@pytest.mark.parametrize("step", [0.1, 0.05, 0.02])
+def test_every_pulse_gives_its_impulse(step: float) -> None:
+    """Rounded products of step and number, pulses between two steps, over one, far shorter: I Δψ̇ = Σ M Δt exactly."""
+    ends = [(i * step, (i + 3) * step) for i in range(1, 40, 4)]
+    ends += [(2.3, 2.6), (2.623, 2.627), (2.7, 2.704), (2.796, 2.8), (2.9, 2.9 + 1e-6), (3.0204, 3.0904)]
+    inertia = 10.0 + 1.2 * 10.0**3 / 3 + 6e-4 * 10.0
+    history = hub([[start, end, 50.0 / (end - start)] for start, end in ends], step, 40 * step + 4.0).history
+    assert history["psi_dot"][-1] * inertia == pytest.approx(50.0 * len(ends), rel=1e-6)
+    assert history["impulse"][-1] == pytest.approx(50.0 * len(ends), rel=1e-10)
+
+
+def test_pulses_denser_than_steps() -> None:
+    """A thousand pulses of 0.4 ms, fifty in a step: every one counts, on the hub and as work done on it."""
+    result = hub([[0.001 * k + 3e-4, 0.001 * k + 7e-4, 30.0] for k in range(1000)], 0.05)
+    inertia = 10.0 + 1.2 * 10.0**3 / 3 + 6e-4 * 10.0
+    assert result.history["psi_dot"][-1] * inertia == pytest.approx(12.0, rel=1e-6)
+    assert result.summary["steps"] == 40
+    assert result.summary["factorisations"] < 200
+
+
+def test_load_pulse_shorter_than_a_step() -> None:
+    """4 ms of load between two steps of 10 ms: its swing is that of steps of 1 ms but for the third mode's share."""
+    table = [[0.0, 0.0, 0.0], [0.502, 0.0, 0.0], [0.504, 0.0, 5.0], [0.506, 0.0, 0.0]]
+    swings = []
+    for step in (0.01, 0.001):
+        history = krb(SPIN, step, 1.5, loads={"distributed": {"table": table}}).history
+        swings.append(np.interp(np.arange(0.0, 1.5, 0.05), history["t"], history["tip_u2"]))
+    coarse, fine = swings
+    assert np.abs(coarse - fine).max() < 5e-2 * np.abs(fine).max()
+
+
+def test_dense_noise_is_averaged() -> None:
+    """A speed table with noise, 100 rows in a step, costs no further steps and is as good as landing on each."""
+    rng = np.random.default_rng(1)
+    t = np.linspace(0.0, 1.0, 5001)
+    rows = np.column_stack([t, t + 1e-3 * rng.standard_normal(len(t))])
+    answers = []
+    for step in (0.02, t[1]):
+        result = krb(speeds(*rows), step, 1.0)
+        answers.append(np.interp(np.arange(0.0, 1.0, 0.02), result.history["t"], result.history["tip_u2"]))
+        assert result.summary["factorisations"] < 4 * result.summary["steps"]
+    assert np.abs(answers[0] - answers[1]).max() < 5e-3 * np.abs(answers[1]).max()
