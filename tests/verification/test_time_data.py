@@ -1,4 +1,4 @@
-"""What is prescribed over time is met: orders after kinks, impulses of pulses, events shorter than a step, dense tables."""
+"""What is prescribed over time is met: orders after kinks, impulses, events shorter than a step, dense tables."""
 
 from __future__ import annotations
 
