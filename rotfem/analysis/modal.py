@@ -15,6 +15,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import steady_state
+from rotfem.analysis.mode_labels import with_overdamped
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import InputError
 from rotfem.mechanics.problem import Problem
@@ -211,7 +212,15 @@ class ModalAnalysis:
             kind, number = structure.mode_name(families[order[0]], *self.shape(right[:, j]))
             mixed = len(order) > 1 and table[order[0], j] < PURE
             out.append(f"{kind}–{families[order[1]]} {number}" if mixed else f"{kind} {number}")
-        return out
+        values = spinning.pairs.values
+        return with_overdamped(out, values, self._energies(spinning)) if np.any(values.imag == 0.0) else out
+
+    def _energies(self, spinning: Spinning) -> tuple[Array, Array]:
+        """Return x^H M x and x^H K x of every mode, over all ranks, shape (m,) each."""
+        p, X = spinning.pencil, spinning.pairs.right
+        local = np.array([np.sum(X.conj() * p.apply(A, X), axis=0) for A in (p.M, p.K)])
+        mass, stiffness = p.comm.allreduce(local) if p.comm.size > 1 else local
+        return mass, stiffness
 
     def turning(self, spinning: Spinning) -> list[float]:
         """Return for every mode of a disk whether it travels with its spin (1), against it (−1) or stands (0).

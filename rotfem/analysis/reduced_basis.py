@@ -16,8 +16,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
-from rotfem.errors import ComputationError
 from rotfem.numerics.bounds import RoundOff, relative
+from rotfem.numerics.damped import quadratic
 from rotfem.numerics.eigenproblem import Eigenpairs, Pencil
 
 Array = npt.NDArray[Any]
@@ -44,25 +44,11 @@ class SmallPencil(Pencil):
     """A pencil of so few unknowns that all its eigenvalues are computed; double ones, as of a disk, do no harm then."""
 
     def _right(self, M: Any, C: Any, K: Any, count: int, target: float) -> tuple[Array, Array, Array]:
-        """Return (λ, x, backward error) of the pairs nearest to the target, by LAPACK from the linear form in 1/λ'.
-
-        With λ = target + λ', the least λ' are the largest eigenvalues, so the stiff directions of the basis do not
-        spoil them.
-        """
+        """Return (λ, x, backward error) of the pairs nearest to the target, by LAPACK."""
         m, c, k = (A.getValues(range(A.getSize()[0]), range(A.getSize()[1])) for A in (M, C, K))
-        n = len(k)
-        unit = np.sqrt(max(float(np.trace(k)) / max(float(np.trace(m)), 1e-300), 1e-300))
-        shifted = [k + target * c + target**2 * m, unit * (c + 2 * target * m), unit**2 * m]
-        # Not as a pencil with K on the right: its stiff directions would set the size of the error for all.
-        try:
-            right_side = np.linalg.solve(shifted[0], np.hstack(shifted[1:]))
-        except np.linalg.LinAlgError:
-            raise ComputationError("the stiffness matrix is singular", advice="a slightly different speed") from None
-        nu, vectors = np.linalg.eig(np.vstack([-right_side, np.eye(n, 2 * n)]))
-        order = np.argsort(-np.abs(nu), kind="stable")[: min(2 * count + 2, 2 * n - 2)]
-        values = target + unit / nu[order]
-        x = vectors[n:, order]
-        x = x / np.linalg.norm(x, axis=0)
+        values, x, _ = quadratic(m, c, k, target)
+        wanted = min(2 * count + 2, 2 * len(k) - 2)
+        values, x = values[:wanted], x[:, :wanted]
         sizes = np.array([np.linalg.norm(a) for a in (k, c, m)])
         powers = np.array([np.ones_like(values), values, values**2])
         residual = np.linalg.norm((k @ x) * powers[0] + (c @ x) * powers[1] + (m @ x) * powers[2], axis=0)

@@ -1,11 +1,4 @@
-"""The quadratic eigenproblem (λ² M + λ C + K) x = 0 with its left vectors, by SLEPc PEP; no physics.
-
-Left vectors satisfy y^H (λ² M + λ C + K) = 0, and two pairs of one pencil are bi-orthogonal,
-
-    y_i^H [(λ_i + λ_j) M + C] x_j = 0   (λ_i ≠ λ_j),
-
-which follows from the two linearised problems; see Tisseur & Meerbergen 2001, sections 3.4 and 3.6.
-"""
+"""The quadratic eigenproblem (λ² M + λ C + K) x = 0 with its left vectors, by SLEPc PEP; no physics."""
 
 from __future__ import annotations
 
@@ -24,6 +17,8 @@ from slepc4py import SLEPc
 from rotfem.errors import ComputationError
 from rotfem.numerics.balance import balanced, least_frequency, power_of_two
 from rotfem.numerics.bounds import RoundOff
+from rotfem.numerics.damped import MORE, damped_pairs, heavily_damped
+from rotfem.numerics.left_vectors import matched, mirror_error, mirrored
 from rotfem.numerics.linear import SMALL, use_direct_solver
 
 Array = npt.NDArray[Any]
@@ -169,35 +164,70 @@ class Pencil:
             return self._solve(count, 0.1 * self._smallest)
 
     def _solve(self, count: int, target: float) -> Eigenpairs:
-        values, right, errors = self._right(self.M, self.C, self.K, count, target)
+        try:
+            values, right, errors = self._right(self.M, self.C, self.K, count, target)
+        except ComputationError:
+            if self.damped:
+                return self._damped(count, target)
+            raise
         unit = power_of_two(float(np.median(np.abs(values))))
         if float(np.max(errors)) > GOOD and not 0.25 <= unit / (self.unit or unit) <= 4.0:
             self.unit = unit
             values, right, errors = self._right(self.M, self.C, self.K, count, target)
         self._smallest = float(np.median(np.abs(values)))
-        conservative = self.conservative
-        if conservative:
-            left = self._mirrored(values, right)
-            self.spectrum_error = self._mirror_error(values)
+        small = ZERO * self._smallest if target > 0.0 else 0.0
+        if not self.conservative and heavily_damped(values, small) and self.damped:
+            return self._damped(count, target)
+        if self.conservative:
+            left = mirrored(values, right)
+            self.spectrum_error = mirror_error(values)
         else:
             M, C, K = (transposed(A) for A in (self.M, self.C, self.K))
-            left = self._matched(values, *self._right(M, C, K, count, target)[:2])
-        values, bounds = RoundOff(self, self.sizes).corrected(values, left, right)
-        pairs = Eigenpairs(values, right, left, errors, bounds)
+            left = matched(values, *self._right(M, C, K, count, target)[:2])
+        pairs = self._checked(values, (right, left), errors, small)
+        values = pairs.values
+        # Of ± pairs of real eigenvalues of a conservative pencil, the growing one tells all.
+        upper = np.flatnonzero(
+            (values.imag > 0.0) | ((values.imag == 0.0) & ((values.real >= 0.0) | (not self.conservative)))
+        )
+        order = upper[np.argsort(np.abs(values[upper]), kind="stable")]
+        return pairs.select(order)
+
+    @cached_property
+    def damped(self) -> bool:
+        """Whether C has a symmetric part."""
+        return self.asymmetries()["C"] > 1e-10
+
+    def _damped(self, count: int, target: float) -> Eigenpairs:
+        """Return pairs in the order of the undamped frequencies of their shapes (see `rotfem.numerics.damped`)."""
+        gyroscopic = transposed(self.C)
+        gyroscopic.aypx(-1.0, self.C)
+        gyroscopic.scale(0.5)
+        undamped = Pencil(self.M, gyroscopic, self.K)
+        shapes = undamped.solve(count + MORE, target).right
+        self.unit = undamped.unit or 1.0
+        with balanced(self.M, self.C, self.K, self.unit) as d:
+            matrices, more = (self.M, self.C, self.K), min(2 * count, count + MORE)
+            values, right, left, errors = damped_pairs(matrices, shapes / d[:, None], more, target / self.unit)
+        vectors = d[:, None] * right, d[:, None] * left
+        return self._checked(self.unit * values, vectors, errors, ZERO * self.unit if target > 0.0 else 0.0)
+
+    def _checked(self, values: Array, vectors: tuple[Array, Array], errors: Array, small: float) -> Eigenpairs:
+        """Return pairs with their bounds, from right and left vectors.
+
+        Raises:
+            ComputationError: the backward error of one is above BACKWARD_TOLERANCE.
+        """
+        right, left = vectors
         # A double zero eigenvalue (a rigid-body mode) is known beforehand, and never met to full accuracy.
-        trusted = np.abs(values) > (ZERO * np.median(np.abs(values)) if target > 0.0 else 0.0)
-        worst = float(np.max(pairs.errors[trusted], initial=0.0))
+        worst = float(np.max(errors[np.abs(values) > small], initial=0.0))
         if worst > BACKWARD_TOLERANCE:
             raise ComputationError(
                 f"an eigenpair has the backward error {worst:.1e}, above {BACKWARD_TOLERANCE:.0e}",
                 advice="fewer modes.count or another mesh",
             )
-        # Of ± pairs of real eigenvalues of a conservative pencil, the growing one tells all.
-        upper = np.flatnonzero(
-            (values.imag > 0.0) | ((values.imag == 0.0) & ((values.real >= 0.0) | (not conservative)))
-        )
-        order = upper[np.argsort(np.abs(values[upper]), kind="stable")]
-        return pairs.select(order)
+        values, bounds = RoundOff(self, self.sizes).corrected(values, left, right)
+        return Eigenpairs(values, right, left, errors, bounds)
 
     def _right(self, M: Any, C: Any, K: Any, count: int, target: float) -> tuple[Array, Array, Array]:
         """Return (λ, x, backward error) of the pairs nearest to the target, both signs of the imaginary part."""
@@ -266,23 +296,3 @@ class Pencil:
             vectors.append(real.array + 1j * imaginary.array)
             errors.append(pep.computeError(i, SLEPc.PEP.ErrorType.BACKWARD))
         return np.array(values), np.array(vectors).T.copy(), np.array(errors)
-
-    def _mirrored(self, values: Array, right: Array) -> Array:
-        """Return the left vectors of a conservative pencil: y(λ) = x(−λ̄)."""
-        return self._pick(right, values, -values.conj())
-
-    def _matched(self, values: Array, others: Array, vectors: Array) -> Array:
-        """Return the left vectors from the right ones of the transposed pencil: y(λ) = conj of its vector at λ."""
-        return self._pick(vectors, others, values).conj()
-
-    @staticmethod
-    def _mirror_error(values: Array) -> float:
-        """Return the largest relative distance of −λ̄ from the spectrum, over the inner half of the computed λ."""
-        inner = values[np.abs(values) <= np.median(np.abs(values))]
-        distance = np.abs(values[None, :] + inner.conj()[:, None]).min(axis=1)
-        return float(np.max(distance / np.abs(inner), initial=0.0))
-
-    @staticmethod
-    def _pick(vectors: Array, values: Array, wanted: Array) -> Array:
-        index = np.array([int(np.argmin(np.abs(values - w))) for w in wanted], dtype=int)
-        return vectors[:, index]

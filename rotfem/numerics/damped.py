@@ -1,0 +1,229 @@
+"""Eigenpairs of a heavily damped pencil, overdamped ones too; no physics.
+
+With much damping the eigenvalues of least |λ| are no longer those of the smoothest shapes: viscosity η of the stiffness
+gives every stiff shape of the mesh a slow eigenvalue at −1/η, where all of them crowd together. What is wanted are the
+eigenvalues of the shapes that vibrate slowest without damping, a conjugate pair or two real ones each. So the undamped
+modes are the first basis of a Rayleigh–Ritz procedure; Ritz pairs are put in the order of ω = √(x^H K x / x^H M x), and
+the basis grows by K⁻¹ times the residuals of right and left vectors (Davidson's method) until these are round-off.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg as sl
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from rotfem.errors import ComputationError
+from rotfem.numerics.linear import DirectSolver
+
+Array = npt.NDArray[Any]
+
+#: Part −Re λ/|λ| from which damping is heavy.
+HEAVY = 0.3
+
+#: Undamped modes, and Ritz pairs, beyond those wanted.
+MORE = 4
+
+#: Backward error at which a pair is done, most rounds, and most columns of the basis.
+DONE, ROUNDS, COLUMNS = 1e-13, 12, 400
+
+#: Relative distance of real eigenvalues that are one.
+EQUAL = 1e-9
+
+#: Part of a column's length below which it is no new direction.
+NEW = 1e-8
+
+
+def heavily_damped(values: Array, small: float) -> bool:
+    """Return whether eigenvalues (1/s), those above `small` in size, have heavy damping among them."""
+    sizes = np.abs(values)
+    return bool(np.any((sizes > small) & (values.real < -HEAVY * sizes)))
+
+
+def quadratic(m: Array, c: Array, k: Array, target: float) -> tuple[Array, Array, Array]:
+    """Return (λ, x, y): all eigenvalues of a small dense pencil, nearest to the target first, and unit vectors.
+
+    With λ = target + λ', the least λ' are the largest eigenvalues of the linear form in 1/λ', so that stiff directions
+    do not spoil them; with K on the right they would set the size of the error for all.
+
+    Raises:
+        ComputationError: the stiffness matrix is singular.
+    """
+    n = len(k)
+    unit = np.sqrt(max(float(np.trace(k)) / max(float(np.trace(m)), 1e-300), 1e-300))
+    shifted = [k + target * c + target**2 * m, unit * (c + 2 * target * m), unit**2 * m]
+    try:
+        right_side = np.linalg.solve(shifted[0], np.hstack(shifted[1:]))
+    except np.linalg.LinAlgError:
+        raise ComputationError("the stiffness matrix is singular", advice="a slightly different speed") from None
+    nu, left, right = sl.eig(np.vstack([-right_side, np.eye(n, 2 * n)]), left=True)
+    order = np.argsort(-np.abs(nu), kind="stable")
+    order = order[np.abs(nu[order]) > 0.0]
+    x, y = right[n:, order], np.linalg.solve(shifted[0].conj().T, left[:n, order])
+    return target + unit / nu[order], x / np.linalg.norm(x, axis=0), y / np.linalg.norm(y, axis=0)
+
+
+def shape_frequencies(X: Array, MX: Array, KX: Array) -> Array:
+    """Return ω = √|x^H K x / x^H M x| of columns, the frequency of their shape without damping (Rayleigh quotient)."""
+    mass, stiffness = (np.abs(np.sum(X.conj() * Y, axis=0)) for Y in (MX, KX))
+    return np.asarray(np.sqrt(stiffness / mass))
+
+
+def place(values: Array, X: Array, MX: Array, KX: Array) -> Array:
+    """Return what to sort eigenvalues by: ω of their shape, of the fast one of two real ones that of the slow one."""
+    omega = shape_frequencies(X, MX, KX)
+    real = (values.imag == 0.0) & (values.real < 0.0)
+    slow, fast = np.flatnonzero(real & (np.abs(values) < omega)), np.flatnonzero(real & (np.abs(values) >= omega))
+    if len(slow) and len(fast):
+        sizes = np.sqrt(np.abs(np.sum(X.conj() * MX, axis=0)))
+        alike = np.abs(X[:, fast].conj().T @ MX[:, slow]) / np.outer(sizes[fast], sizes[slow])
+        omega[fast] = omega[slow[np.argmax(alike, axis=1)]]
+    return omega
+
+
+def turn_equal(values: Array, vectors: tuple[Array, Array], matrices: tuple[Array, Array, Array]) -> None:
+    """Make eigenvalues that are one real one equal, in place; turn their vectors to shapes of their own frequencies.
+
+    With C = η K + M/η all slow eigenvalues are −1/η, and any combination of their shapes is one.
+
+    Args:
+        values: λ, those of conjugate pairs both.
+        vectors: x and y, columns.
+        matrices: M, C, K.
+    """
+    (x, y), (m, c, k) = vectors, matrices
+    real = np.flatnonzero((np.abs(values.imag) <= EQUAL * np.abs(values)) & (values.real < 0.0))
+    real = real[np.argsort(values.real[real])]
+    groups = np.split(real, 1 + np.flatnonzero(np.diff(values.real[real]) > EQUAL * np.abs(values.real[real][1:])))
+    for group in (g for g in groups if len(g) > 1):
+        X, Y = (_real_span(v[:, group]) for v in (x, y))
+        _, turn = sl.eig(X.T @ k @ X, X.T @ m @ X)
+        if not np.all(np.isfinite(turn)) or np.max(np.abs(turn.imag)) > 0.0:
+            continue
+        lam = float(np.mean(values.real[group]))
+        X = X @ turn.real
+        Y = Y @ np.linalg.pinv(Y.T @ (2 * lam * m + c) @ X).T
+        values[group] = lam
+        x[:, group], y[:, group] = X / np.linalg.norm(X, axis=0), Y / np.linalg.norm(Y, axis=0)
+
+
+def _real_span(v: Array) -> Array:
+    """Return as many orthonormal real columns as v has, that span its real and imaginary parts best."""
+    return np.asarray(np.linalg.svd(np.hstack([v.real, v.imag]), full_matrices=False)[0][:, : v.shape[1]])
+
+
+class RitzPairs:
+    """Ritz pairs of M, C and K (balanced PETSc matrices) in a growing real basis.
+
+    Args:
+        matrices: M, C, K.
+        start: first directions, columns of owned unknowns.
+        target: where K + σ C + σ² M is factorised, 0 or beside the zero eigenvalue of a free hub.
+
+    Attributes:
+        values, right, left, errors: λ, vectors of owned unknowns, and the larger backward error of both.
+    """
+
+    def __init__(self, matrices: tuple[Any, Any, Any], start: Array, target: float):
+        self.matrices, self.target = matrices, target
+        self.comm: MPI.Comm = matrices[2].comm.tompi4py()
+        self.norms = np.array([A.norm(PETSc.NormType.INFINITY) for A in matrices])
+        P = matrices[2].copy()
+        for A, factor in ((matrices[1], target), (matrices[0], target**2)):
+            if factor != 0.0:
+                P.axpy(factor, A)
+        self._solver = DirectSolver(P)
+        self._x, self._b = P.createVecs()
+        self.V = np.zeros((self._x.getLocalSize(), 0))
+        self._products = [self.V] * 3
+        self.add(start)
+
+    def _sum(self, local: Array) -> Array:
+        return np.asarray(self.comm.allreduce(local) if self.comm.size > 1 else local)
+
+    def _apply(self, A: Any, X: Array) -> Array:
+        out = np.empty_like(X)
+        for j in range(X.shape[1]):
+            self._x.array[:] = X[:, j]
+            A.mult(self._x, self._b)
+            out[:, j] = self._b.array
+        return out
+
+    def add(self, columns: Array) -> int:
+        """Put what is new in real columns into the orthonormal basis; return how many directions that were."""
+        W = columns / np.maximum(np.sqrt(self._sum(np.sum(columns**2, axis=0))), 1e-300)
+        for limit in (NEW, 0.5):  # twice, as once leaves round-off of what was taken away
+            W = W - self.V @ self._sum(self.V.T @ W)
+            sizes, turns = np.linalg.eigh(self._sum(W.T @ W))
+            keep = sizes > limit**2 if limit == NEW else sizes > limit
+            W = W @ (turns[:, keep] / np.sqrt(sizes[keep]))
+        self.V = np.hstack([self.V, W])
+        old = self._products
+        self._products = [np.hstack([P, self._apply(A, W)]) for P, A in zip(old, self.matrices, strict=True)]
+        return int(W.shape[1])
+
+    def solve(self, count: int) -> None:
+        """Set the pairs to those of the smoothest shapes, slowest without damping first, one of each conjugate pair."""
+        m, c, k = (self._sum(self.V.T @ P) for P in self._products)
+        values, x, y = quadratic(m, c, k, self.target)
+        turn_equal(values, (x, y), (m, c, k))
+        upper = (values.imag >= 0.0) & (np.abs(np.sum(x.conj() * (m @ x), axis=0)) > 0.0)
+        values, x, y = values[upper], x[:, upper], y[:, upper]
+        order = np.lexsort((np.abs(values), place(values, x, m @ x, k @ x)))[:count]
+        self.values, x, y = values[order], x[:, order], y[:, order]
+        MX, CX, KX = (P @ x for P in self._products)
+        self.right, self.left = self.V @ x, self.V @ y
+        self._residual = self.values**2 * MX + self.values * CX + KX
+        self._left_residual = self._transposed(self.left)
+        size = self.norms @ np.abs(np.array([self.values**2, self.values, np.ones_like(self.values)]))
+        both = [np.sqrt(self._sum(np.sum(np.abs(r) ** 2, axis=0))) for r in (self._residual, self._left_residual)]
+        self.errors = np.maximum(*both) / size
+
+    def _transposed(self, Y: Array) -> Array:
+        """Return (λ² M + λ C + K)^H y for all pairs."""
+        total = np.zeros_like(Y)
+        for A, power in zip(self.matrices, (2, 1, 0), strict=True):
+            for part, factor in ((Y.real, 1.0), (Y.imag, 1j)):
+                for j in range(Y.shape[1]):
+                    self._x.array[:] = part[:, j]
+                    A.multTranspose(self._x, self._b)
+                    total[:, j] += factor * np.conj(self.values[j]) ** power * self._b.array
+        return total
+
+    def grow(self) -> int:
+        """Add K⁻¹ times the residuals of pairs that are not done; return how many directions are new."""
+        open_pairs = self.errors > DONE
+        columns = []
+        for residual in (self._residual[:, open_pairs], self._left_residual[:, open_pairs]):
+            for r in np.hstack([residual.real, residual.imag]).T:
+                self._b.array[:] = r
+                self._solver.solve(self._b, self._x)
+                columns.append(self._x.array.copy())
+        sizes = np.sqrt(self._sum(np.array([c @ c for c in columns])))
+        new = [c / size for c, size in zip(columns, sizes, strict=True) if size > 0.0]
+        return self.add(np.array(new).T) if new else 0
+
+
+def damped_pairs(
+    matrices: tuple[Any, Any, Any], undamped: Array, count: int, target: float
+) -> tuple[Array, Array, Array, Array]:
+    """Return (λ, x, y, backward errors) of the shapes that vibrate slowest without damping.
+
+    Args:
+        matrices: M, C, K, balanced.
+        undamped: vectors of the pencil without damping, columns of owned unknowns.
+        count: number of pairs.
+        target: see `RitzPairs`.
+    """
+    start = np.hstack([undamped.real, undamped.imag])
+    ritz = RitzPairs(matrices, start, target)
+    for _ in range(ROUNDS):
+        ritz.solve(count)
+        if float(np.max(ritz.errors)) <= DONE or ritz.V.shape[1] > COLUMNS or ritz.grow() == 0:
+            break
+    ritz.solve(count)
+    return ritz.values, ritz.right, ritz.left, ritz.errors

@@ -1,0 +1,129 @@
+"""Modes of heavily damped structures: all of them are found, those that no longer vibrate as a slow and a fast one.
+
+Where the damping matrix is a combination of M and K, C = η K + a₀ M, each undamped frequency ω gives the roots of
+
+    λ² + (η ω² + a₀) λ + ω² = 0,
+
+which shares nothing with the search for them. In a spinning beam the stiffening by its force is not damped, so there
+the roots are those of the exported matrices by LAPACK.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import scipy.linalg as sl
+
+from rotfem import campbell, modes
+
+Array = npt.NDArray[Any]
+
+SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6e-4}
+
+
+def beam(viscosity: float, mass_rate: float, speed: float, count: int, **changes: Any) -> dict[str, Any]:
+    """Return a scene of a planar beam with Kelvin–Voigt and mass-proportional damping."""
+    damping = {"kelvin_voigt": viscosity, "rayleigh": [mass_rate, 0.0]}
+    return {
+        "structure": {"type": "planar_beam", "length": 10.0, "section": SECTION, "damping": damping},
+        "motion": {"type": "constant", "speed": speed},
+        "mesh": {"elements": 8},
+        "modes": {"count": count},
+        **changes,
+    }
+
+
+def roots(omega: Array, viscosity: float, mass_rate: float) -> Array:
+    """Return the roots of λ² + (η ω² + a₀) λ + ω² = 0 with non-negative imaginary part, by increasing ω, slow first."""
+    out: list[complex] = []
+    for w in omega:
+        half = 0.5 * (viscosity * w**2 + mass_rate)
+        if half < w:
+            out.append(complex(-half, np.sqrt(w**2 - half**2)))
+        else:  # their product is ω², which keeps the digits of the slow one
+            fast = -half - np.sqrt(half**2 - w**2)
+            out += [complex(w**2 / fast), complex(fast)]
+    return np.array(out)
+
+
+@pytest.mark.parametrize("viscosity", [1e-5, 1e-3, 5e-3, 2e-2, 0.1, 1.0])
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+def test_proportional_damping(viscosity: float, theory: str) -> None:
+    """At rest all first ten eigenvalues are those of the undamped frequencies, to ten times their error bounds.
+
+    The bounds are those of two computations, and near critical damping a root moves more than the frequency it is of.
+    """
+    model = {"model": {"theory": theory}}
+    undamped = modes(beam(0.0, 0.0, 0.0, 14, **model))
+    expected = roots(undamped.frequencies, viscosity, 1.0)[:10]
+    result = modes(beam(viscosity, 1.0, 0.0, 10, **model))
+    assert len(result.rows) == 10
+    tolerance = 10 * (result.column("error_bound") + 1e-9)
+    found = result.eigenvalues
+    distance = np.array([np.min(np.abs(expected - lam)) / abs(lam) for lam in found])
+    missed = np.array([np.min(np.abs(found - lam)) / abs(lam) for lam in expected])
+    assert np.all(distance < tolerance)
+    assert np.all(missed < np.max(tolerance))
+    assert result.stable
+
+
+def test_overdamped_modes_are_named() -> None:
+    """Each undamped mode is one row that vibrates, or a slow and a fast one with its number."""
+    result = modes(beam(0.02, 1.0, 0.0, 9))
+    over = ["lag 4, slow", "lag 4, fast", "lag 5, slow", "lag 5, fast", "lag 6, slow", "lag 6, fast"]
+    assert result.labels == ["lag 1", "lag 2", "lag 3", *over]
+    np.testing.assert_array_equal(result.frequencies[3:], 0.0)
+    np.testing.assert_allclose(result.damping[3:], 1.0)
+
+
+def test_plate_and_free_hub() -> None:
+    """The same roots of a plate at rest; a free hub keeps its rigid-body mode, and its others are damped so, too."""
+    plate = {"type": "plate", "length": 1.0, "width": 0.5, "thickness": 0.01, "E": 7e10, "nu": 0.3, "rho": 2700.0}
+    still = {"motion": {"type": "constant", "speed": 0.0}}
+    hub = {"motion": {"type": "torque", "hub_inertia": 50.0, "pulses": [[0.0, 1.0, 1.0]]}}
+    cases = [
+        ({"structure": plate, **still, "mesh": {"elements": [4, 4]}}, 5e-3, 0),
+        ({**beam(0.0, 0.0, 0.0, 6), **hub}, 0.02, 1),
+    ]
+    for scene, viscosity, rigid in cases:
+        structure = {key: value for key, value in scene["structure"].items() if key != "damping"}
+        bare, damping = scene | {"structure": structure}, {"kelvin_voigt": viscosity}
+        undamped = modes(bare | {"modes": {"count": 9 + rigid}})
+        expected = roots(undamped.frequencies[rigid:], viscosity, 0.0)[:6]
+        result = modes(bare | {"structure": structure | {"damping": damping}, "modes": {"count": 6 + rigid}})
+        assert result.labels[:rigid] == ["rigid body"] * rigid
+        np.testing.assert_allclose(result.eigenvalues[rigid:], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("viscosity", [5e-3, 0.1])
+def test_spinning(viscosity: float) -> None:
+    """In spin all rows are eigenvalues of the matrices by LAPACK, and none with a slower shape is left out."""
+    result = modes(beam(viscosity, 1.0, 6.0, 8, model={"theory": "reissner"}))
+    pencil, clamped = result.spinning.pencil, result.analysis.system.clamped
+    size = pencil.K.getSize()[0]
+    free = np.setdiff1d(np.arange(size), clamped)
+    M, C, K = (np.real(pencil.apply(A, np.eye(size)))[np.ix_(free, free)] for A in (pencil.M, pencil.C, pencil.K))
+    d, unit = 1 / np.sqrt(np.diag(K)), 100.0
+    M, C, K = (unit**p * A * np.outer(d, d) for p, A in ((2, M), (1, C), (0, K)))
+    one, zero = np.eye(len(free)), np.zeros_like(M)
+    values, vectors = sl.eig(np.block([[zero, one], [-K, -C]]), np.block([[one, zero], [zero, M]]))
+    x = vectors[: len(free)]
+    omega = unit * np.sqrt(np.abs(np.sum(x.conj() * (K @ x), axis=0) / np.sum(x.conj() * (M @ x), axis=0)))
+    found = result.eigenvalues
+    distance = [np.min(np.abs(unit * values - lam)) / abs(lam) for lam in found]
+    assert np.max(distance) < 1e-7  # LAPACK's own error, of 1e-16 times the largest |λ|
+    slow = (values.imag >= 0.0) & (omega < 60.0)  # two undamped frequencies are below
+    for lam in unit * values[slow]:
+        assert np.min(np.abs(found - lam)) < 1e-7 * abs(lam)
+
+
+def test_campbell() -> None:
+    """Branches of a heavily damped beam are followed over speed, and none is lost."""
+    result = campbell(beam(5e-3, 1.0, 6.0, 6), [0.0, 3.0, 6.0])
+    assert result.labels == [f"lag {n}" for n in range(1, 7)]
+    assert np.all(np.isfinite(result.frequencies))
+    single = modes(beam(5e-3, 1.0, 6.0, 6))
+    np.testing.assert_allclose(result.frequencies[-1], single.frequencies, rtol=1e-8)
