@@ -135,7 +135,7 @@ def test_ladder_is_one_of_powers_of_two() -> None:
     ("choice", "says"),
     [
         ({"theories": ["reisner"]}, 'did you mean "reissner"'),
-        ({"schemes": ["euler"]}, "allowed: generalised_alpha, newmark"),
+        ({"schemes": ["euler"]}, "allowed: .*generalised_alpha, newmark"),
         ({"elements": [0]}, "integers greater than 0"),
         ({"steps": [-0.1]}, "numbers greater than 0"),
         ({"steps": [21.0]}, "at most time.end = 20"),

@@ -70,7 +70,7 @@ CASES = [
         reference=RELEASED[u2],
         tolerance=0.02,  # of the time step about 1 %, of the chain and of the second and third mode the rest
         source="chain of rigid links",
-        nightly=(u2, slenderness) not in ((1.0, 1e4),),
+        nightly=(u2, slenderness) not in ((1.0, 1e4), (5.0, 1e5), (8.0, 1e3)),
     )
     for u2 in RELEASED
     for slenderness in (1e3, 1e4, 1e5)
