@@ -40,7 +40,7 @@ class Registry(Generic[E]):
     """
 
     def __init__(self, kind: str, *homes: str):
-        self.kind, self._homes = kind, homes
+        self.kind, self._homes, self._order = kind, homes, homes
         self._entries: dict[str, E] = {}
 
     def add(self, entry: E) -> None:
@@ -67,9 +67,13 @@ class Registry(Generic[E]):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All names, in order."""
+        """All names, in order: the package's own as their homes are listed, whichever was imported first."""
         self._load()
-        return tuple(self._entries)
+        return tuple(sorted(self._entries, key=self._rank))
+
+    def _rank(self, name: str) -> int:
+        home = self._entries[name].__module__
+        return self._order.index(home) if home in self._order else len(self._order)
 
     def __getitem__(self, name: str) -> E:
         self._load()
@@ -79,8 +83,7 @@ class Registry(Generic[E]):
         return name in self.names
 
     def __iter__(self) -> Iterator[E]:
-        self._load()
-        return iter(tuple(self._entries.values()))
+        return iter([self._entries[name] for name in self.names])
 
 
 # The registries themselves are here, on the ground, so that a scene knows the names of what lies above it.
