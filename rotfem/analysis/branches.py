@@ -7,7 +7,7 @@ a veering then shows itself as two branches that keep their order, a true crossi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -196,7 +196,9 @@ class Sweep:
                     def f(s: float, left: Node = left, b: int = b, k: int = k) -> float:
                         return self.between(left, s).value(b).imag - k * abs(s)
 
-                    speed = right.speed if gap[1] == 0.0 else brentq(f, left.speed, right.speed, xtol=1e-12, rtol=1e-8)
+                    speed = right.speed if gap[1] == 0.0 else root(f, (left.speed, right.speed), gap)
+                    if speed is None:
+                        continue
                     out.append(
                         {"branch": b + 1, "per_rev": k, "speed": float(speed), "frequency": k * abs(float(speed))}
                     )
@@ -246,9 +248,9 @@ class Sweep:
                 return 0.0  # K is singular: this is the speed
             return float((values[np.argmin(np.abs(values))] ** 2).real)
 
-        if square(left.speed) * square(right.speed) > 0.0:
-            return None
-        return float(brentq(square, left.speed, right.speed, xtol=1e-12, rtol=1e-10))
+        ends = (left.speed, right.speed)
+        at_ends = [square(speed) for speed in ends]
+        return None if not at_ends[0] * at_ends[1] <= 0.0 else root(square, ends, at_ends)
 
     def _bisect(self, left: Node, right: Node, before: str | None, after: str | None) -> float | None:
         """Return the lowest speed that is no longer of the kind before; None where growth ends with a jump."""
@@ -261,6 +263,25 @@ class Sweep:
                 high = middle.speed
         worst = max(low.pairs.values, key=lambda lam: lam.real)
         return None if after is None and worst.real > 1e-2 * abs(worst) else high
+
+
+def root(f: Callable[[float], float], ends: tuple[float, float], at_ends: Sequence[float]) -> float | None:
+    """Return a speed between two where f changes sign; None where f has no value on the way.
+
+    Args:
+        f: of the speed.
+        ends: the two speeds.
+        at_ends: f there, of different signs. Solved for anew, a value near zero may come out with the other sign.
+    """
+    known, lost = dict(zip(ends, at_ends, strict=True)), []
+
+    def value(speed: float) -> float:
+        found = known[speed] if speed in known else f(speed)
+        lost.extend([] if np.isfinite(found) else [speed])
+        return found if np.isfinite(found) else 0.0
+
+    speed = float(brentq(value, *ends, xtol=1e-12, rtol=1e-8))
+    return None if lost else speed
 
 
 def unstable(spinning: Spinning, bounded: bool = True) -> str | None:

@@ -200,10 +200,11 @@ def branch_labels(analysis: ModalAnalysis, first: Node, count: int) -> list[str]
     return [n if names.count(n) == 1 else f"{n}{'abcdefgh'[names[:i].count(n)]}" for i, n in enumerate(names)]
 
 
-def branch_summary(sweep: Sweep, b: int) -> dict[str, float]:
-    """Return the least confidence of a branch and its frequency at both ends (rad/s)."""
+def branch_summary(sweep: Sweep, b: int) -> dict[str, float | None]:
+    """Return the least confidence of a branch and its frequency at both ends (rad/s), None at one where it is lost."""
     confidence = min(float(n.confidence[b]) for n in sweep.nodes)
-    first, last = (float(sweep.nodes[i].value(b).imag) for i in (0, -1))
+    ends = [float(sweep.nodes[i].value(b).imag) for i in (0, -1)]
+    first, last = (value if np.isfinite(value) else None for value in ends)
     return {"confidence": confidence, "frequency_first": first, "frequency_last": last}
 
 

@@ -59,7 +59,7 @@ def campbell_report(summary: dict[str, Any], folder: Path) -> list[str]:
         f"{'branch':>6}  {'label':<16}{'first rad/s':>14}{'last rad/s':>14}{'confidence':>12}",
     ]
     for b in summary["branches"]:
-        first, last = (f"{b[k]:.6f}" if b[k] == b[k] else "lost" for k in ("frequency_first", "frequency_last"))
+        first, last = ("lost" if b[k] is None else f"{b[k]:.6f}" for k in ("frequency_first", "frequency_last"))
         lines.append(f"{b['branch']:>6}  {b['label']:<16}{first:>14}{last:>14}{b['confidence']:>12.3f}")
     for c in summary["critical_speeds"]:
         lines.append(f"critical speed {c['speed']:.6f} rad/s: {c['label']} meets {c['per_rev']}Ω")

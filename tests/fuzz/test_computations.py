@@ -1,0 +1,34 @@
+"""What is computed of a scene out of all proportion is finite, or the computation fails and says so."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import hypothesis.strategies as st
+
+import rotfem
+from tests.fuzz.mutants import misproportioned, mutants
+from tests.fuzz.seeds import COMPUTED
+from tests.fuzz.trying import outcome, sized
+
+SEEDS = list(COMPUTED.values())
+VERBS = {
+    "run": rotfem.run,
+    "modes": rotfem.modes,
+    "campbell": lambda tables: rotfem.campbell(tables, [0.0, 3.0, 6.0]),
+}
+
+
+@sized(st.tuples(st.sampled_from(list(VERBS)), misproportioned(SEEDS)), core=60, nightly=1000)
+def test_numbers_of_any_size(given: tuple[str, Any]) -> None:
+    verb, tables = given
+    outcome(lambda: VERBS[verb](tables))
+
+
+@sized(st.tuples(st.sampled_from(list(VERBS)), mutants(SEEDS, most=2)), core=30, nightly=400)
+def test_changes_of_any_kind(given: tuple[str, Any]) -> None:
+    verb, tables = given
+    elements = tables.get("mesh", {}).get("elements") if isinstance(tables.get("mesh"), dict) else None
+    if type(elements) is int and elements > 8:  # allowed, but not tried here
+        tables["mesh"]["elements"] = 8
+    outcome(lambda: VERBS[verb](tables))

@@ -1,0 +1,135 @@
+"""A scene is valid or an error names what is wrong with it, whatever it holds and however it is written."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import hypothesis.strategies as st
+import tomli_w
+
+from rotfem.errors import SceneError
+from rotfem.scene import Scene, load_scene
+from rotfem.scene.files import quick_rows, read_rows
+from tests.fuzz.mutants import mutants, numbers, texts, values
+from tests.fuzz.seeds import COMPUTED, SCENES
+from tests.fuzz.trying import VALIDATION, check_message, sized, within
+
+SEEDS = [*SCENES.values(), *COMPUTED.values()]
+FOLDER = str(next(iter(SCENES)).parent)
+#: Scenes as text, without those that name other files.
+TEXTS = [tomli_w.dumps(tables).encode() for tables in SEEDS]
+BYTES = [
+    b"\0",
+    b"\xff",
+    b"\xef\xbb\xbf",
+    b"\r\n",
+    b"\n",
+    b"[",
+    b"]",
+    b"=",
+    b'"',
+    b"#",
+    b"e999",
+    b"9" * 5000,
+    b"[[" * 2000,
+]
+BYTES += [b"\xed\xa0\x80", b"nan", b"inf", b"-", b".", b"'''", b"{a=" * 500, b"\x1b[2J", "Ω̈".encode()]
+
+
+def accepted(make: Any) -> Scene | None:
+    """Return the scene, None where it is refused as it should be."""
+    with within(VALIDATION):
+        try:
+            return make()
+        except SceneError as error:
+            check_message(error)
+            return None
+
+
+@sized(mutants(SEEDS), core=400, nightly=6000)
+def test_tables_of_any_kind(tables: Any) -> None:
+    scene = accepted(lambda: Scene.from_dict(tables, directory=FOLDER))
+    if scene is not None:
+        again = Scene.from_dict(scene.to_dict(), directory=FOLDER)
+        assert again.to_dict() == scene.to_dict()
+        scene.digest()
+        scene.effective_effects()
+
+
+@st.composite
+def written(draw: st.DrawFn) -> bytes:
+    """Return the text of a scene with some bytes put in, taken out, or the end missing."""
+    text = draw(st.sampled_from(TEXTS))
+    for _ in range(draw(st.integers(0, 3))):
+        here = draw(st.integers(0, len(text)))
+        gone = draw(st.sampled_from([0, 0, 1, 5, len(text)]))
+        text = text[:here] + draw(st.one_of(st.sampled_from(BYTES), st.binary(max_size=4))) + text[here + gone :]
+    return text
+
+
+@sized(written(), core=100, nightly=2500)
+def test_files_of_any_kind(text: bytes) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "beam.toml"
+        path.write_bytes(text)
+        accepted(lambda: load_scene(path))
+
+
+KEYS = [
+    "model.theory",
+    "time.step",
+    "time",
+    "structure.section.EA",
+    "motion.speed",
+    "limits.steps",
+    "mesh",
+    "a.b.c",
+    "",
+]
+overrides = st.one_of(
+    texts, st.builds("{}={}".format, st.one_of(st.sampled_from(KEYS), texts), st.one_of(values, texts, numbers))
+)
+
+
+@sized(st.tuples(st.sampled_from(list(SCENES)), st.lists(overrides, min_size=1, max_size=3)), core=100, nightly=1500)
+def test_overrides_of_any_kind(given: tuple[Path, list[str]]) -> None:
+    accepted(lambda: load_scene(*given))
+
+
+CELLS = [
+    "",
+    "0",
+    "1",
+    "2.5",
+    "-1e3",
+    "1e999",
+    "nan",
+    "inf",
+    "O",
+    "1_0",
+    "１",
+    "t",
+    "w # s",
+    "0x1p3",
+    "1d5",
+    " 3 ",
+    '"1"',
+    "+",
+]
+cells = st.one_of(st.sampled_from(CELLS), st.floats().map(repr), st.text(max_size=6))
+lines = st.lists(cells, min_size=1, max_size=4).map(",".join)
+
+
+@sized(st.lists(lines, max_size=6).map("\n".join), core=150, nightly=2500)
+def test_tables_in_files_of_any_kind(text: str) -> None:
+    """Also: what is read quickly is what is read cell by cell."""
+    text = text.replace("\r", "\n")
+    quick = quick_rows(text)
+    if quick is not None:
+        assert tuple(map(tuple, quick.tolist())) == tuple(read_rows(text, Path("speed.csv")).values())
+    beam = COMPUTED["adaptive"] | {"motion": {"type": "table", "table": "speed.csv"}}
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "speed.csv").write_bytes(text.encode("utf-8", "surrogatepass"))
+        accepted(lambda: Scene.from_dict(beam, directory=folder))

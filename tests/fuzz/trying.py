@@ -1,0 +1,105 @@
+"""What every mutant is held to: an answer in time, of finite numbers, or an error that says what is wrong."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, NoReturn
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+
+import rotfem
+from rotfem.errors import InputError
+
+#: Seconds that a validation and a computation of two elements may take, compilation included.
+VALIDATION, COMPUTATION = 5, 60
+
+
+class Endless(Exception):
+    """Not ended in time."""
+
+
+@contextmanager
+def within(seconds: int) -> Iterator[None]:
+    """Interrupt what takes longer, as soon as Python has a say."""
+
+    def late(signum: int, frame: Any) -> NoReturn:
+        raise Endless(f"not ended in {seconds} s")
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def check_message(error: InputError) -> None:
+    """See that an error of input says what is meant in lines of readable length, without the steering of a terminal."""
+    lines = str(error).split("\n")
+    assert error.allowed
+    assert all(line.isprintable() for line in lines)
+    assert len(str(error)) < 20_000
+
+
+def check_finite(value: Any, where: str = "result") -> None:
+    """See that all numbers in nested tables and arrays are finite."""
+    if isinstance(value, Mapping):
+        for key, entry in value.items():
+            check_finite(entry, f"{where}.{key}")
+    elif isinstance(value, list | tuple):
+        for i, entry in enumerate(value):
+            check_finite(entry, f"{where}[{i}]")
+    elif isinstance(value, np.ndarray | float | complex):
+        assert np.all(np.isfinite(value)), f"{where} is not finite"
+
+
+def outcome(compute: Callable[[], Any]) -> str:
+    """Return "done", "refused" or "failed"; anything else is raised."""
+    with within(COMPUTATION):
+        try:
+            result = compute()
+        except InputError as error:
+            check_message(error)
+            return "refused"
+        except rotfem.ComputationError as error:
+            assert error.what
+            return "failed"
+    assert result.status == "done"
+    for name in ("history", "shape", "rows"):
+        check_finite(getattr(result, name, None), name)
+    check_finite({key: value for key, value in result.summary.items() if key not in ("scene", "timings")}, "summary")
+    return "done"
+
+
+def sized(strategy: Any, core: int, nightly: int) -> Callable[[Callable[..., None]], Any]:
+    """Make two tests of a property: a short one, always of the same examples, and a nightly one."""
+
+    def decorate(check: Callable[..., None]) -> Any:
+        often = [(core, True, []), (nightly, False, [pytest.mark.nightly])]
+
+        @pytest.mark.parametrize("run", [pytest.param(o, id=n, marks=o[2]) for o, n in zip(often, ("core", "nightly"))])
+        def test(run: tuple[int, bool, Any]) -> None:
+            @settings(
+                max_examples=run[0],
+                derandomize=run[1],
+                database=None,
+                deadline=None,
+                suppress_health_check=list(HealthCheck),
+                phases=(Phase.generate, Phase.shrink),
+                report_multiple_bugs=True,
+            )
+            @given(strategy)
+            def examples(mutant: Any) -> None:
+                check(mutant)
+
+            examples()
+
+        test.__name__, test.__doc__ = check.__name__, check.__doc__
+        return test
+
+    return decorate
