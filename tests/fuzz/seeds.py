@@ -1,4 +1,4 @@
-"""Valid scenes from which mutants are made: all that the repository has, and small ones that are computed in no time."""
+"""Valid scenes from which mutants are made: those of the repository, and small ones that are computed in no time."""
 
 from __future__ import annotations
 

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.structures.meshes.checks import FLAT, Array, BadMesh, Cells, Integers, at
+from rotfem.structures.meshes.trial import mishap
 
 #: gmsh's number of a kind of cells ↦ corners of a cell, and the kind of its edges. (Of second-order quadrilaterals
 #: those with a node in the middle: dolfinx has no others.)
@@ -24,6 +25,9 @@ HEAD = re.compile(
     rb"\$MeshFormat(\r?\n)[ \t]*(?:2\.[12]|3|4|4\.[01])[ \t]+"
     rb"(?:0[ \t]+8[ \t]*\1|1[ \t]+8[ \t]*\1(?:\x01\0\0\0|\0\0\0\x01)(?:\1)?)\$EndMeshFormat\1"
 )
+
+#: What gmsh may need to read a file: seconds, one more for so many bytes of it, and bytes of memory.
+SECONDS, BYTES_PER_SECOND, MEMORY = 20.0, 5e5, 1e9
 
 #: Names of physical groups ↦ tag, by dimension.
 Groups = dict[int, dict[str, int]]
@@ -42,12 +46,14 @@ def read(gmsh: Any, path: Path, surfaces: Sequence[str]) -> Groups:
     Raises:
         BadMesh: the file is not the mesh of a plate.
     """
-    gmsh.initialize([], False, False, False)
-    gmsh.option.setNumber("General.Terminal", 0)
     if path.suffix != ".msh":
         raise BadMesh("must be a mesh file of gmsh, with the ending .msh")
     _check_head(path)
-    _merge(gmsh, path)
+    size = path.stat().st_size
+    # gmsh checks neither the counts in a file nor the numbers that it takes for indices.
+    if (how := mishap(lambda: _load(gmsh, path), SECONDS + size / BYTES_PER_SECOND, MEMORY + 200 * size)) is not None:
+        raise BadMesh(f"its numbers and counts cannot be right: gmsh {how} with it")
+    _load(gmsh, path)
     groups: Groups = {0: {}, 1: {}, 2: {}, 3: {}}
     for dimension, tag in gmsh.model.getPhysicalGroups():
         groups[dimension][gmsh.model.getPhysicalName(dimension, tag) or f"{tag}"] = tag
@@ -81,11 +87,19 @@ def _check_head(path: Path) -> None:
         head = file.read(512)
     if HEAD.match(head):
         return
-    lines = [line.decode("utf-8", "backslashreplace").strip("\r")[:60] for line in head.rstrip().split(b"\n")[:3]]
+    # A file that is none of ours may be a secret: nothing of it is shown.
+    begins = "begins otherwise" if not head.startswith(b"$MeshFormat") else "has another format"
     raise BadMesh(
-        f"is no mesh of gmsh: it begins with {' | '.join(lines)!r}; must be $MeshFormat, without anything before, then "
+        f"is no mesh of gmsh: it {begins if head else 'is empty'}; must be $MeshFormat, without anything before, then "
         "version (2.1, 2.2, 3, 4, 4.0 or 4.1), file type (0 text, 1 binary) and data size (8), then $EndMeshFormat"
     )
+
+
+def _load(gmsh: Any, path: Path) -> None:
+    """Start gmsh, and load the file."""
+    gmsh.initialize([], False, False, False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    _merge(gmsh, path)
 
 
 def _merge(gmsh: Any, path: Path) -> None:
