@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
-from petsc4py import PETSc
-from slepc4py import SLEPc
 
 from rotfem.analysis.arc_length import LoadPath, Tracer
 from rotfem.equations.compiled import compile_system
@@ -18,7 +16,7 @@ from rotfem.mechanics.loads import ConstantLoad, Loads
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.inertia import negative_eigenvalues, symmetric
-from rotfem.numerics.linear import DirectSolver, Increment, use_direct_solver
+from rotfem.numerics.linear import DirectSolver, Increment
 from rotfem.numerics.newton import REACH, Newton
 
 Array = npt.NDArray[np.float64]
@@ -271,35 +269,3 @@ def _led(system: System, displacement: float, q: Array, F: float, newton: Newton
     if not system.linear and system.model.inside_out():
         raise ComputationError("Newton met a state that is turned inside out (an axial strain below −1)")
     return q, F
-
-
-def critical_speed(system: Any) -> float | None:
-    """Return the lowest speed (rad/s) at which the stiffness of a linear theory is singular; None if there is none.
-
-    Of a nonlinear theory there is none: its stiffness is that of each equilibrium.
-
-    Raises:
-        ComputationError: the eigensolver did not converge.
-
-    K = K_1 + Omega² K_2: the least positive Omega² of K_1 x = −Omega² K_2 x.
-    """
-    if not system.linear:
-        return None
-    K_1, K_2 = system.stiffness_pieces()
-    if K_2.norm() == 0.0:
-        return None
-    eps = SLEPc.EPS().create(K_1.comm)
-    # K_1 is definite: nu = 1/Omega² is the largest eigenvalue of −K_2 x = nu K_1 x.
-    K_2.scale(-1.0)
-    eps.setOperators(K_2, K_1)
-    eps.setProblemType(SLEPc.EPS.ProblemType.GHEP)
-    eps.setWhichEigenpairs(SLEPc.EPS.Which.LARGEST_REAL)
-    eps.setDimensions(1, min(K_1.getSize()[0], 100))
-    eps.setTolerances(1e-12, 2000)
-    K_1.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-    use_direct_solver(eps.getST().getKSP(), K_1.getSize()[0], symmetric=True)
-    eps.solve()
-    if eps.getConverged() == 0:
-        raise ComputationError("the eigenproblem of the critical speed did not converge")
-    nu = eps.getEigenvalue(0).real
-    return float(1 / np.sqrt(nu)) if nu > 0 else None

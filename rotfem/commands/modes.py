@@ -7,6 +7,7 @@ C = ∂F/∂v, K = ∂F/∂q at (q̄, 0, 0).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -14,7 +15,8 @@ from typing import Any
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.equilibrium import check_steady, critical_speed
+from rotfem.analysis.critical_speed import critical_speed
+from rotfem.analysis.equilibrium import check_steady
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.stability import stability_of_pencil
@@ -22,7 +24,7 @@ from rotfem.commands.finite import check_rows
 from rotfem.commands.mode_tables import advice, mode_tables, scaled
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.summary import modal_summary
-from rotfem.errors import input_of
+from rotfem.errors import ComputationError, input_of
 from rotfem.listeners import Hint, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Problem as ProblemData
@@ -134,5 +136,6 @@ def hints_of(analysis: ModalAnalysis, scene: Scene, command: str, hint: Hint | N
     """Return hints about the computation ahead, up to a speed (rad/s), and hand them on."""
     theory, critical = analysis.problem.theory, None
     if hint is not None and theory.linear and not theory.prestress:
-        critical = critical_speed(analysis.system)
+        with suppress(ComputationError):  # a hint is worth no failure
+            critical = critical_speed(analysis.system)
     return advise(scene, command, hint, speed, critical)

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.equilibrium import critical_speed, static_tip_shape, steady_state
+from rotfem.analysis.critical_speed import critical_speed
+from rotfem.analysis.equilibrium import static_tip_shape, steady_state
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability, stability_of
 from rotfem.analysis.stepper import Stepper

@@ -21,7 +21,7 @@ from scipy.io import mmread
 from scipy.optimize import brentq, minimize_scalar, newton
 
 from rotfem import ComputationError, InputError, Scene, SceneError, modes
-from rotfem.analysis.equilibrium import critical_speed
+from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.mode_checks import linearisation_error
 from rotfem.analysis.state_space import state_space, write_matrices
