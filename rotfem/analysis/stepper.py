@@ -56,11 +56,13 @@ class Stepper:
 
     Attributes:
         substeps, rejected: steps that were halved because Newton failed, and adaptive ones that were taken back.
+        pace: length of the next adaptive step (s), and largest displacement so far (scaled); None before the first.
     """
 
     def __init__(self, system: Any, scheme: Scheme, newton: Newton):
         self.system, self.scheme, self.newton = system, scheme, newton
         self.substeps = self.rejected = 0
+        self.pace: tuple[float, float] | None = None
         self._held: Shifts | None = None
         #: Whether Newton's way is a long one, so that tangents that know where it came from are worth compiling.
         self._far = False

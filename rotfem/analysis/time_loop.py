@@ -59,21 +59,25 @@ class March:
 
     Attributes:
         stepper: what advances the system, with its counts.
+        reached: state that an earlier march has yielded, to go on from; its stepper's numbers must be this one's.
     """
 
     def __init__(self, system: Any, scheme: Scheme, steps: Steps, newton: Newton, q: Array | None = None):
         self.system, self.steps = system, steps
         self.stepper = Stepper(system, scheme, newton)
+        self.reached: State | None = None
         self._q = np.zeros_like(system.q.x.array) if q is None else q
 
     def __iter__(self) -> Iterator[State]:
-        """Yield the state at t = 0 and at the end of every step.
+        """Yield the state at t = 0, unless it goes on from a later one, and at the end of every step.
 
         Raises:
             ComputationError: a step failed, however short.
         """
-        state = self.stepper.start(0.0, *self.system.start(self._q))
-        yield state
+        state = self.reached
+        if state is None:
+            state = self.stepper.start(0.0, *self.system.start(self._q))
+            yield state
         steps = fixed_steps if self.steps.step is not None else adaptive_steps
         yield from steps(self.stepper, state, self.steps)
 
@@ -85,11 +89,12 @@ def fixed_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[State]
         ComputationError: a step failed, however short.
     """
     assert steps.step is not None
-    legs = iter(Itinerary(stepper.system.courses, *grid(steps)))
+    ahead, reached = Itinerary(stepper.system.courses, *grid(steps)), state.t
+    legs = ((number, leg) for number, leg in ahead if leg.end > reached)
     wanted = None if steps.parts is None else set(np.cumsum(steps.parts).tolist())
     after: Leg | None
-    number, after = next(legs)
-    if after.averaged:
+    number, after = next(legs, (0, None))
+    if after is not None and after.averaged and reached == 0.0:
         state = stepper.restart(state, View(1), View(window=(0.0, after.length)))
     while after is not None:
         now, leg = number, after
@@ -146,7 +151,7 @@ def adaptive_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[Sta
     assert steps.tolerance is not None
     longest = steps.max_step or steps.end / 20
     shortest = steps.min_step or 1e-9 * steps.end
-    h, largest = min(longest, 1e-4 * steps.end), FLOOR
+    h, largest = stepper.pace or (min(longest, 1e-4 * steps.end), FLOOR)
     close = 1e-12 * steps.end
     jumps = sorted({float(t) for c in stepper.system.courses for t in c.knots if 0.0 < t <= steps.end + close})
     while state.t < steps.end - close:
@@ -176,5 +181,5 @@ def adaptive_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[Sta
         elif not KEEP[0] <= factor <= KEEP[1]:
             new = stepper.scheme.resized(new, state, h * factor)
             h *= factor
-        state = new
+        state, stepper.pace = new, (h, largest)
         yield state

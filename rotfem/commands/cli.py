@@ -136,12 +136,25 @@ def command(advice: bool = True) -> Callable[[Callable[..., None]], Callable[...
 
 
 @command()
-def run(todo: Job) -> None:
+def run(
+    todo: Job,
+    checkpoint: Annotated[
+        str | None, typer.Option("--checkpoint", metavar="EVERY", help="write checkpoints: every 30s, or 500 steps")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="go on from the checkpoint in the result folder")] = False,
+) -> None:
     """Compute the steady state or the time history of SCENE."""
-    from rotfem.commands.keeper import Keeper
+    from rotfem.commands.keeper import Interval, Keeper
     from rotfem.commands.run import simulate
 
-    keeper = Keeper(todo.session.comm, todo.results)
+    every = None if checkpoint is None else Interval.of(checkpoint)
+    keeper = Keeper(todo.session.comm, todo.results, every, resume)
+    if resume and (summary := keeper.finished(todo.scene)):
+        todo.session.print_json(summary)
+        todo.session.say(
+            [f"{todo.results.path} holds the finished run already; a later time.end is what --resume can go on to"]
+        )
+        return
     try:
         with todo.progress() as progress:
             result = simulate(todo.scene, keeper, progress, todo.hint)

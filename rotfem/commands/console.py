@@ -134,13 +134,17 @@ class Session:
         """
         assert self._folder is not None
         problems = self._folder.write(result, plots, further)
-        if self.first and self.as_json:
-            sys.stdout.write(json_text(result.summary))
+        self.print_json(result.summary)
         for warning in result.summary["warnings"]:
             if self.first and not self.quiet:
                 print(f"warning: {warning}", file=sys.stderr)
         if problems:
             raise problems[0]
+
+    def print_json(self, summary: dict[str, Any]) -> None:
+        """Print a summary if --json asks for it."""
+        if self.first and self.as_json:
+            sys.stdout.write(json_text(summary))
 
     def say(self, lines: list[str]) -> None:
         """Print what was done."""

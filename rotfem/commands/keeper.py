@@ -1,48 +1,174 @@
-"""What of a run is on disk while it goes on: the rows of its history."""
+"""What of a run is on disk while it goes on: the rows of its history, and checkpoints."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
 from mpi4py import MPI
 
+from rotfem.analysis.schemes import State
 from rotfem.commands.interrupts import Interrupted, Interrupts
 from rotfem.commands.result_folder import ResultFolder
+from rotfem.errors import OutputError, SceneError
 from rotfem.results.live import LiveTable
-from rotfem.results.result_set import ResultSet
-from rotfem.results.run import Table
+from rotfem.results.result_set import ResultSet, read_summary
+from rotfem.scene import Scene
+
+if TYPE_CHECKING:
+    from rotfem.commands.checkpoint import Memory, Tree
+    from rotfem.commands.simulation import Simulation
+
+#: Bits of what ranks tell each other after a step.
+ASKED, DUE = 1, 2
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Time, or number of steps, from one checkpoint to the next.
+
+    Attributes:
+        seconds: of the clock on the wall; None where steps are counted.
+        steps: number of steps; None where time is.
+    """
+
+    seconds: float | None = None
+    steps: int | None = None
+
+    @classmethod
+    def of(cls, text: str | int) -> Interval:
+        """Return the interval of "30s" or "500".
+
+        Raises:
+            SceneError: it is none.
+        """
+        found = re.fullmatch(r"(\d+(?:\.\d+)?)(s?)", str(text))
+        if found is None or float(found[1]) == 0.0 or not (found[2] or found[1].isdigit()):
+            allowed = 'must be a time in seconds such as "30s", or a number of steps such as "500"'
+            raise SceneError("command line", "--checkpoint", text, allowed)
+        return cls(seconds=float(found[1])) if found[2] else cls(steps=int(found[1]))
 
 
 class Keeper:
-    """Keeps a run's rows on disk, and ends it between steps when it is asked to.
+    """Keeps a run's rows and checkpoints on disk, and ends it between steps when it is asked to.
 
     Args:
         comm: communicator of the run.
         folder: where its results go; None keeps nothing.
+        every: from one checkpoint to the next; None writes none.
+        resume: whether the run goes on from the checkpoint in the folder.
     """
 
-    def __init__(self, comm: MPI.Comm, folder: ResultFolder | None = None):
-        self.comm, self.folder = comm, folder
+    def __init__(
+        self,
+        comm: MPI.Comm,
+        folder: ResultFolder | None = None,
+        every: Interval | None = None,
+        resume: bool = False,
+    ):
+        self.comm, self.folder, self.every, self.resume = comm, folder, every, resume
         self._live: LiveTable | None = None
+        self._memory: Memory | None = None
+        self._tree: Tree | None = None
+        self._identity: Tree = {}
+        self._written = monotonic()
+        self._failed = False
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether there is a checkpoint to go on from."""
+        return self._tree is not None
+
+    def open(self, scene: Scene, terms: Mapping[str, Any], outputs: Mapping[str, Any]) -> None:
+        """Read the checkpoint that the run is to go on from, and see that it is one of this run.
+
+        Args:
+            scene: what is run.
+            terms: terms that a script adds.
+            outputs: outputs that it asks for.
+
+        Raises:
+            SceneError: there is none, or it is damaged, or of another run; or there is nothing to go on with.
+        """
+        if self.every is None and not self.resume:
+            return
+        option = "--resume" if self.resume else "--checkpoint"
+        if scene.time is None:
+            raise SceneError("command line", option, None, "needs a scene with [time]; a steady state has no steps")
+        if self.folder is None:
+            raise SceneError("command line", option, None, "needs a folder")
+        from rotfem.commands.checkpoint import check_end, check_identity, identity
+        from rotfem.results.checkpoint_file import NAME, read_checkpoint
+
+        self._identity, path, end = identity(scene, terms, outputs), self.folder.path / NAME, scene.time.end
+
+        def read(files: ResultSet) -> Tree:
+            tree = read_checkpoint(path)
+            check_identity(path, tree, self._identity)
+            check_end(path, tree, end)
+            return tree
+
+        if self.resume:
+            self._tree = self.folder.first_does(read)
+            self.every = self.every or Interval(**self._tree["every"])
+
+    def finished(self, scene: Scene) -> Tree | None:
+        """Return the summary in the folder if it is that of this run, done; None otherwise."""
+        if self.folder is None:
+            return None
+        from rotfem.commands.checkpoint import told
+
+        summary = self.folder.first_does(lambda files: read_summary(files.folder))
+        is_done = summary.get("command") == "run" and summary.get("status") == "done"
+        return summary if is_done and told(summary.get("scene")) == told(scene.digest()) else None
+
+    def choice(self) -> Any:
+        """Return how the model was chosen that the run goes on with; None where it was not, or does not."""
+        if self._tree is None or self._tree["choice"] is None:
+            return None
+        from rotfem.selection.model_choice import Choice
+
+        return Choice(**self._tree["choice"])
 
     def interrupts(self) -> Interrupts:
-        """Return the context in which a march is interrupted between steps, where ranks must agree on that."""
-        self._interrupts = Interrupts(self.comm, self._secure, self.comm.size > 1)
+        """Return the context in which a march is interrupted between steps, where that is needed."""
+        self._interrupts = Interrupts(self.comm, self._secure, self.comm.size > 1 or self.every is not None)
         return self._interrupts
 
-    def start(self, history: Table) -> None:
-        """Begin the set of the run with the rows there are.
+    def start(self, run: Simulation) -> State | None:
+        """Begin the set of a run; return the state that it goes on from, if it does.
 
         Raises:
             OutputError: the folder cannot be written.
+            SceneError: the checkpoint does not fit.
         """
         if self.folder is None:
-            return
+            return None
+        from rotfem.results.checkpoint_file import NAME
+
+        state, path = None, self.folder.path / NAME
+        if self.every is not None or self._tree is not None:
+            from rotfem.commands.checkpoint import Memory
+
+            self._memory = Memory(run)
+        if self._tree is not None and self._memory is not None:
+            state = self._memory.put_back(path, self._tree)
+            run.resumed.append({"time": state.t, "ranks": self.comm.size})
+        keep = (NAME,) if self._tree is not None else ()
+        self._tree = None  # a richer model would start afresh
 
         def begin(files: ResultSet) -> None:
-            self._live = files.grow("history.csv", history)
+            files.begin("running", keep)
+            self._live = files.grow("history.csv", run.record.history)
 
         self.folder.first_does(begin)
+        self._written = monotonic()
+        return state
 
-    def stepped(self) -> None:
+    def stepped(self, run: Simulation, state: State) -> None:
         """Take note of the end of a step.
 
         Raises:
@@ -50,8 +176,48 @@ class Keeper:
         """
         if self._live is not None:
             self._live.update()
-        if self._interrupts.active and self.comm.allreduce(self._interrupts.asked, op=MPI.LOR):
+        told = ASKED * self._interrupts.asked + DUE * self._is_due(run)
+        if self.comm.size > 1:
+            told = self.comm.allreduce(told, op=MPI.BOR)
+        if told or self._is_last(run, state):
+            self._save(run, state)
+        if told & ASKED and self._interrupts.active:
             raise Interrupted
+
+    def _is_due(self, run: Simulation) -> bool:
+        if self.every is None or run.steps == 0:
+            return False
+        if self.every.steps is not None:
+            return run.steps % self.every.steps == 0
+        return self.comm.rank == 0 and monotonic() - self._written >= (self.every.seconds or 0.0)
+
+    @staticmethod
+    def _left(run: Simulation, state: State) -> float:
+        """Return how many more steps there are at least; of adaptive ones whether there is one."""
+        time = run.scene.time
+        assert time is not None
+        return (time.end - state.t) / (time.step or 1e-9 * time.end)
+
+    def _is_last(self, run: Simulation, state: State) -> bool:
+        """Return whether this is the last state that a run with a later end would have met, too."""
+        time = run.scene.time
+        return time is not None and time.step is not None and 1 - 1e-6 <= self._left(run, state) < 2 - 1e-6
+
+    def _save(self, run: Simulation, state: State) -> None:
+        """Write a checkpoint, unless the last step is shorter than it would be in a run with a later end."""
+        if self._memory is None or self.every is None or self._left(run, state) < 1 - 1e-6:
+            return
+        from rotfem.results.checkpoint_file import NAME, write_checkpoint
+
+        tree = self._memory.taken(state, self._identity) | {"every": vars(self.every)}
+        if self.folder is not None and self.folder.set is not None:
+            try:
+                write_checkpoint(self.folder.path / NAME, tree)
+            except OutputError as error:
+                if not self._failed:
+                    run.warnings.append(f"a checkpoint could not be written at t = {state.t:.6g} s: {error.reason}")
+                self._failed = True
+        self._written = monotonic()
 
     def _secure(self) -> None:
         """Put on disk at once what can be."""

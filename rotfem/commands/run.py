@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady
-from rotfem.commands.keeper import Keeper
+from rotfem.commands.keeper import Interval, Keeper
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.result_folder import ResultFolder
 from rotfem.commands.simulation import Simulation
@@ -35,6 +35,8 @@ def run(
     terms: Mapping[str, Work] | None = None,
     outputs: Mapping[str, Functional] | None = None,
     folder: str | Path | None = None,
+    checkpoint: str | int | None = None,
+    resume: bool = False,
 ) -> RunResult:
     """Return the time history of a scene, or its steady state where the spin is constant and [time] absent.
 
@@ -46,18 +48,21 @@ def run(
         terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form (see `rotfem.Effect`).
         outputs: functionals to record, by name, mechanics ↦ UFL form; columns of the history.
         folder: where the results go, the history as it grows, all of them but figures at the end; None writes nothing.
+        checkpoint: how often checkpoints are written there: after "30s", or after 500 steps; never if None.
+        resume: go on from the checkpoint that is there.
 
     Raises:
-        SceneError: the scene is not valid or cannot be run.
+        SceneError: the scene is not valid or cannot be run, or a checkpoint that is none of this run.
         ComputationError: it failed; its attribute `result` holds what was computed until then.
         OutputError: the folder cannot be written.
     """
     scene = as_scene(scene)
+    every = None if checkpoint is None else Interval.of(checkpoint)
     if folder is None:
-        return simulate(scene, Keeper(comm), progress, hint, terms, outputs)
+        return simulate(scene, Keeper(comm, None, every, resume), progress, hint, terms, outputs)
     with closing(ResultFolder(comm, Path(folder), "run")) as results:
         try:
-            done = simulate(scene, Keeper(comm, results), progress, hint, terms, outputs)
+            done = simulate(scene, Keeper(comm, results, every, resume), progress, hint, terms, outputs)
         except (ComputationError, KeyboardInterrupt) as error:
             so_far = getattr(error, "result", None)
             if so_far is not None:
@@ -80,6 +85,7 @@ def simulate(
     """Return the result of a scene (see `run`), with what is kept of it on disk while it goes on."""
     comm = keeper.comm
     scene.check_run()
+    keeper.open(scene, terms or {}, outputs or {})
     problem = Problem.of(scene, terms=terms, outputs=outputs)
     with input_of(scene.file):
         if scene.time is None or scene.initial.state == "steady":
@@ -103,7 +109,7 @@ def run_chosen(
     Raises:
         ComputationError: the full model failed, or one of them with on_exceed = "stop" or "warn".
     """
-    choice = choose(case_of(scene).replace(problem=problem), (HISTORY, STEADY), comm=keeper.comm)
+    choice = keeper.choice() or choose(case_of(scene).replace(problem=problem), (HISTORY, STEADY), comm=keeper.comm)
     while True:
         try:
             simulation = Simulation(scene, choice.applied(problem), keeper.comm, choice, keeper)

@@ -70,7 +70,8 @@ class Simulation:
         self.record = Recorder(self.system)
         self.newton = Newton.of(scene.solver)
         self.stepper: Stepper | None = None
-        self.steps = 0
+        self.steps, self.elapsed = 0, 0.0
+        self.resumed: list[dict[str, Any]] = []
         self.critical = critical_speed(self.system)
         self.stability: Stability | None = None
         self._critical_since: float | None = None
@@ -114,11 +115,13 @@ class Simulation:
         time = self.scene.time
         assert time is not None
         newton = Newton.of(self.scene.solver)
-        march = March(self.system, scheme_of(time), Steps.of(time), newton, self._initial())
+        scheme, steps = scheme_of(time), Steps.of(time)
+        march = March(self.system, scheme, steps, newton, None if self.keeper.goes_on else self._initial())
         self.stepper = march.stepper
-        self.keeper.start(self.record.history)
+        march.reached = self.keeper.start(self)
         with self.keeper.interrupts():
-            for self.steps, state in enumerate(march):
+            first = 0 if march.reached is None else self.steps + 1
+            for self.steps, state in enumerate(march, first):
                 self._stepped(state, time, progress)
 
     def _stepped(self, state: State, time: Time, progress: Progress) -> None:
@@ -129,7 +132,7 @@ class Simulation:
         if self.steps % time.output_every == 0 or state.t >= time.end * (1 - 1e-9):
             self._keep(state)
             progress(state.t / time.end)
-        self.keeper.stepped()
+        self.keeper.stepped(self, state)
 
     def _initial(self) -> Array | None:
         """Return q at t = 0 in the turning frame; None where it is undeformed."""

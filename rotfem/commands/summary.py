@@ -76,7 +76,8 @@ def run_summary(run: Simulation, status: str, history: dict[str, npt.NDArray[np.
     system, stepper, choice = run.system, run.stepper, run.choice
     space, mesh = system.V.dofmap, system.structure.mesh
     parts = {"compile": run.compiled, **(system.seconds if stepper else {})}
-    before = {} if choice is None else {"choice": choice.seconds}
+    before = {} if choice is None or run.resumed else {"choice": choice.seconds}
+    before |= {"before": run.elapsed} if run.resumed else {}
     out = {
         **summary("run", run.scene, run.comm, choice),
         "status": status,
@@ -95,6 +96,8 @@ def run_summary(run: Simulation, status: str, history: dict[str, npt.NDArray[np.
         "warnings": run.warnings,
         "advice": run.advice,
     }
+    if run.resumed:
+        out["resumed"] = run.resumed
     if stepper is not None and stepper.rejected:
         out["rejected_steps"] = stepper.rejected
     if run.stability is not None:

@@ -24,9 +24,16 @@ class Solutions:
 
     Attributes:
         seconds: time spent on assembly and on solution.
+        factored: of the factor that is kept, time `t`, state `q`, `v`, `a`, `shifts` and `before` of its tangent.
+        factored_before: factorisations of the same computation before this object was made.
     """
 
     seconds: dict[str, float]
+    factored: dict[str, Any] | None = None
+    factored_before = 0
+    keeps_factor: bool
+    time: float
+    _state: tuple[Array, ...]
     _solver: DirectSolver | None
     _dx: Increment
 
@@ -45,6 +52,14 @@ class Solutions:
     def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
         """Return a new matrix c_k K + c_v C + c_m M at the state with `diagonal` at clamped unknowns."""
 
+    @abstractmethod
+    def set_state(self, q: Array, v: Array | None = None, a: Array | None = None) -> None:
+        """Write the state that the forms are evaluated at."""
+
+    @abstractmethod
+    def set_time(self, t: float) -> None:
+        """Write what the forms depend on at time t (s)."""
+
     def correction(self, shifts: tuple[float, float, float], before: Array | None = None) -> Array:
         """Return −(c_k K + c_v C + c_m M)⁻¹ F at the state, Newton's correction of q (a local array, reused).
 
@@ -55,6 +70,9 @@ class Solutions:
         started = perf_counter()
         b = self.residual()
         A, changed = self.tangent(*shifts, before)
+        if changed and self.keeps_factor:
+            q, v, a = (x.copy() for x in self._state)
+            self.factored = {"t": self.time, "q": q, "v": v, "a": a, "shifts": shifts, "before": before}
         assembled = perf_counter()
         dq = self._dx.solve(self.factor(A, changed), b)
         self.seconds["assemble"] += assembled - started
@@ -72,6 +90,13 @@ class Solutions:
         self.seconds["solve"] += perf_counter() - assembled
         return dq
 
+    def refactor(self, known: dict[str, Any] | None) -> None:
+        """Make the factor that is kept anew from what is known of it (see `factored`); nothing from None."""
+        if known is not None:
+            self.set_time(known["t"])
+            self.set_state(known["q"], known["v"], known["a"])
+            self.correction(known["shifts"], known["before"])
+
     def factor(self, A: Any, changed: bool = True) -> DirectSolver:
         """Return the solver of the system's tangent, with a new factor where it has changed."""
         if self._solver is None:
@@ -83,7 +108,7 @@ class Solutions:
     @property
     def factorisations(self) -> int:
         """Number of matrix factorisations so far."""
-        return self._solver.factorisations if self._solver else 0
+        return self.factored_before + (self._solver.factorisations if self._solver else 0)
 
     def acceleration(self, t: float) -> Array:
         """Return what is to be added to a so that F = 0 at the state, M δa = −F; `set_time` has been called for t.

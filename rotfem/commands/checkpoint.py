@@ -1,0 +1,203 @@
+"""What a run must know to go on as if it had never ended, taken out of its objects and put back into them.
+
+Numbers that the stepper and Newton's method have learnt are all their attributes that are plain values; unknowns are
+kept in the common order of nodes, so that any number of processes may go on. A kept factor is that of a tangent at a
+state, which is kept in its place.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from importlib import import_module
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotfem.analysis.schemes import State
+from rotfem.errors import SceneError
+from rotfem.scene import Scene
+from rotfem.structures.numbering import Numbering
+from rotfem.version import versions
+
+if TYPE_CHECKING:
+    from rotfem.commands.simulation import Simulation
+
+#: Positions of nodes that differ by this part of the structure's size are those of another mesh.
+MOVED = 1e-9
+
+#: What of a simulation changes while it runs, besides what its parts know themselves.
+CHANGING = ("steps", "warnings", "resumed", "_critical_since", "_exceeded")
+
+Tree = dict[str, Any]
+
+
+def identity(scene: Scene, terms: Mapping[str, Any], outputs: Mapping[str, Any]) -> Tree:
+    """Return all that a run depends on, but for its end: scene, content of a mesh file, names of what scripts added."""
+    mesh = scene.structure.mesh_file
+    content = None if mesh is None else hashlib.sha256(Path(mesh).read_bytes()).hexdigest()
+    tables = told(scene.digest())
+    tables.get("time", {}).pop("end", None)
+    return {"scene": tables, "mesh": content, "terms": sorted(terms), "outputs": sorted(outputs)}
+
+
+def told(scene: Any) -> Any:
+    """Return the tables of a scene as a file tells them, without those that nothing computed depends on."""
+    tables = json.loads(json.dumps(scene, default=str))
+    return {k: v for k, v in tables.items() if k not in ("name", "limits")} if isinstance(tables, dict) else tables
+
+
+def differences(there: Any, here: Any, key: str = "") -> list[str]:
+    """Return which keys of two identities differ, and how."""
+    if isinstance(there, dict) and isinstance(here, dict):
+        keys = list(dict.fromkeys([*there, *here]))
+        return [line for k in keys for line in differences(there.get(k), here.get(k), f"{key}.{k}" if key else k)]
+    if there == here:
+        return []
+    shown = [value if len(value) <= 40 else value[:39] + "…" for value in map(json.dumps, (there, here))]
+    return [f"{key.removeprefix('scene.')} is {shown[0]} there and {shown[1]} here"]
+
+
+def check_identity(path: Path, tree: Tree, mine: Tree) -> None:
+    """Refuse a checkpoint of another run.
+
+    Raises:
+        SceneError: it is of another scene, or of another version of the program; says what differs.
+    """
+    there, here = tree["versions"]["rotfem"], versions()["rotfem"]
+    if there != here:
+        why = f"was written by rotfem {there}, this is {here}; start the run anew, without --resume"
+        raise SceneError("command line", "--resume", path, why)
+    lines = differences(tree["identity"], mine)
+    if lines:
+        more = f", and {len(lines) - 4} more" if len(lines) > 4 else ""
+        raise SceneError("command line", "--resume", path, f"is of another run: {'; '.join(lines[:4])}{more}")
+
+
+def check_end(path: Path, tree: Tree, end: float) -> None:
+    """Refuse an end (s) that lies before the checkpoint.
+
+    Raises:
+        SceneError: it does.
+    """
+    if end < tree["t"]:
+        raise SceneError("command line", "--resume", path, f"is of t = {tree['t']:g} s, after time.end = {end:g} s")
+
+
+class Memory:
+    """What one run knows.
+
+    Args:
+        run: the run.
+    """
+
+    def __init__(self, run: Simulation):
+        self.run = run
+        self.numbering = Numbering(run.system.V)
+
+    def taken(self, state: State, mine: Tree) -> Tree:
+        """Return what the run knows at a state, on rank 0 in the common order of nodes.
+
+        Args:
+            state: the state at the end of the last step.
+            mine: identity of the run.
+        """
+        run, snapshots = self.run, self.run.record.snapshots
+        assert run.stepper is not None
+        return {
+            "identity": mine,
+            "versions": versions(),
+            "positions": self.numbering.positions,
+            "t": state.t,
+            "given": state.given,
+            "state": self._packed({k: v for k, v in vars(state).items() if k != "given"}),
+            "factored": self._packed(run.system.held.factored),
+            "stepper": plain(run.stepper),
+            "newton": plain(run.stepper.newton),
+            "run": {name: getattr(run, name) for name in CHANGING},
+            "elapsed": run.elapsed + perf_counter() - run.started,
+            "factorisations": run.system.factorisations,
+            "columns": list(run.record.history.columns),
+            "rows": np.array(run.record.history.rows()).reshape(len(run.record.history), -1),
+            "snapshots": None if snapshots is None else self._packed(vars(snapshots)),
+            "choice": None if run.choice is None else vars(run.choice),
+        }
+
+    def put_back(self, path: Path, tree: Tree) -> State:
+        """Make the run know what a checkpoint says; return the state to go on from.
+
+        Raises:
+            SceneError: the mesh is another one, or the program that wrote it was.
+        """
+        run, stepper = self.run, self.run.stepper
+        assert stepper is not None
+        self._check_mesh(path, tree["positions"])
+        if list(run.record.history.columns) != tree["columns"] or set(plain(stepper)) != set(tree["stepper"]):
+            raise SceneError("command line", "--resume", path, "was written by another rotfem; start the run anew")
+        state, system = State(**self._unpacked(tree["state"]), given=tree["given"]), run.system.held
+        system.refactor(self._unpacked(tree["factored"]))
+        run.system.set_time(state.t)
+        system.factored_before = tree["factorisations"] - system.factorisations
+        for target, values in ((stepper, tree["stepper"]), (stepper.newton, tree["newton"]), (run, tree["run"])):
+            vars(target).update(values)
+        for row in tree["rows"]:
+            run.record.history.append(row)
+        if run.record.snapshots is not None:
+            vars(run.record.snapshots).update(self._unpacked(tree["snapshots"]))
+        run.elapsed = tree["elapsed"]
+        return state
+
+    def _check_mesh(self, path: Path, there: Any) -> None:
+        here = self.numbering.comm.bcast(self.numbering.positions)
+        size = float(np.max(np.ptp(here, axis=0)))
+        if there.shape != here.shape or np.max(np.abs(there - here)) > MOVED * size:
+            raise SceneError("command line", "--resume", path, "is of another mesh")
+
+    def _packed(self, value: Any) -> Any:
+        """Return a tree with the arrays over the mesh in the common order; all processes come here together."""
+        if isinstance(value, np.ndarray) and value.ndim and (kind := self.numbering.kind(value)):
+            return {"kind": kind, "values": self.numbering.gather(value, kind)}
+        if isinstance(value, dict):
+            return {"kind": "dict", "values": {k: self._packed(v) for k, v in value.items()}}
+        if isinstance(value, list | tuple):
+            return type(value)(self._packed(v) for v in value)
+        if is_dataclass(value) and not isinstance(value, type):
+            values = {f.name: self._packed(getattr(value, f.name)) for f in fields(value)}
+            return {"kind": f"{type(value).__module__}:{type(value).__qualname__}", "values": values}
+        return value
+
+    def _unpacked(self, value: Any) -> Any:
+        if isinstance(value, list | tuple):
+            return type(value)(self._unpacked(v) for v in value)
+        if not isinstance(value, dict):
+            return value
+        kind, values = value["kind"], value["values"]
+        if kind == "dict":
+            return {k: self._unpacked(v) for k, v in values.items()}
+        if ":" in kind:
+            return record_of(kind)(**{k: self._unpacked(v) for k, v in values.items()})
+        return self.numbering.local(values, kind)
+
+
+def record_of(name: str) -> Any:
+    """Return a dataclass of the program by "module:name"; nothing else is made from a file."""
+    module, _, attribute = name.partition(":")
+    found = getattr(import_module(module), attribute) if module.startswith("rotfem.") else None
+    if not (isinstance(found, type) and is_dataclass(found)):
+        raise SceneError("command line", "--resume", name, "is no record of rotfem")
+    return found
+
+
+def plain(thing: Any) -> Tree:
+    """Return the attributes of an object that are numbers, texts, truth values, None, or tuples of such."""
+
+    def is_plain(value: Any) -> bool:
+        if isinstance(value, tuple):
+            return all(map(is_plain, value))
+        return value is None or isinstance(value, bool | int | float | str | np.generic)
+
+    return {name: value for name, value in vars(thing).items() if is_plain(value)}

@@ -1,0 +1,131 @@
+"""Any number of processes goes on from a checkpoint, and signals end all of them at the same step."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotfem.results.files import read_csv
+from tests.beams import SECTION
+from tests.launch import MPIRUN, environment, rotfem
+
+pytestmark = [pytest.mark.mpi, pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")]
+
+BEAM = f"""\
+[structure]
+type = "planar_beam"
+length = 10.0
+{SECTION}[motion]
+type = "torque"
+hub_inertia = 50.0
+pulses = [[0.0, 0.1, 30.0]]
+[mesh]
+elements = 6
+[time]
+end = 0.2
+step = 0.01
+"""
+PLATE = """\
+[structure]
+type = "plate"
+length = 1.0
+width = 0.5
+thickness = 0.02
+E = 7e10
+nu = 0.3
+rho = 2700.0
+[motion]
+type = "spin_up"
+speed = 60.0
+duration = 2.0
+[loads]
+distributed = [0.0, 0.0, 100.0]
+[mesh]
+elements = [4, 3]
+cell = "triangle"
+[time]
+end = 0.02
+step = 1e-3
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "first", "second"), [(BEAM, 1, 2), (PLATE, 2, 1), (PLATE, 2, 3)], ids=["beam", "plate", "plate, more"]
+)
+def test_another_number_of_processes_goes_on(tmp_path: Path, text: str, first: int, second: int) -> None:
+    """To 1e-9 of the largest value of a column: sums in another order, and Newton's last increments, are left."""
+    (tmp_path / "scene.toml").write_text(text)
+    end = float(text.split("end = ")[1].split("\n")[0])
+    command = ("run", "scene.toml", "--no-plots", "--no-advice")
+    assert rotfem(tmp_path, 1, *command, "-o", "whole").returncode == 0
+    half = rotfem(tmp_path, first, *command, "-o", "cut", "--checkpoint", "3", "--set", f"time.end={0.6 * end}")
+    assert half.returncode == 0, half.stderr
+    done = rotfem(tmp_path, second, *command, "-o", "cut", "--resume")
+    assert done.returncode == 0, done.stderr
+    (note,) = json.loads((tmp_path / "cut" / "summary.json").read_text())["resumed"]
+    assert note["ranks"] == second
+    assert 0.5 * end < note["time"] < 0.6 * end
+    for name in ("history.csv", "shape.csv"):
+        whole, cut = (read_csv(tmp_path / folder / name) for folder in ("whole", "cut"))
+        order, again = (
+            np.lexsort([np.round(d[c], 9) for c in ("x", "y", "t") if c in d]) for d in (whole, cut)
+        )  # nodes come in the order of the processes
+        for column, values in whole.items():
+            scale = float(np.max(np.abs(values)))
+            np.testing.assert_allclose(cut[column][again], values[order], rtol=0, atol=1e-9 * scale, err_msg=column)
+
+
+RANK = "$OMPI_COMM_WORLD_RANK"
+
+
+def started(folder: Path, shells: bool) -> subprocess.Popen[str]:
+    """Return a long run on two processes that has got to its first rows; shells keep the exit status of each."""
+    (folder / "beam.toml").write_text(BEAM.replace("end = 0.2", "end = 200.0"))
+    command = [sys.executable, "-m", "rotfem", "run", "beam.toml", "--no-plots", "--no-advice", "-o", "out"]
+    if shells:
+        command = ["sh", "-c", f"echo $$ > shell.{RANK}; {' '.join(command)}; echo $? > status.{RANK}"]
+    start = [str(MPIRUN), "-n", "2", "--oversubscribe", *command]
+    program = subprocess.Popen(start, cwd=folder, env=environment(), stderr=subprocess.PIPE, text=True)
+    for _ in range(1000):
+        rows = folder / "out" / "history.csv"
+        if rows.exists() and rows.read_text().count("\n") > 2:
+            return program
+        time.sleep(0.1)
+    program.kill()
+    pytest.fail("the run did not start")
+
+
+@pytest.mark.parametrize(("number", "whom"), [(signal.SIGINT, (0, 1)), (signal.SIGTERM, (1,))])
+def test_a_signal_to_one_process_or_all_ends_all_with_what_there_is(
+    tmp_path: Path, number: signal.Signals, whom: tuple[int, ...]
+) -> None:
+    program = started(tmp_path, shells=True)
+    shells = [int((tmp_path / f"shell.{rank}").read_text()) for rank in (0, 1)]
+    children = [int(subprocess.check_output(["ps", "-o", "pid=", "--ppid", str(pid)])) for pid in shells]
+    time.sleep(0.5)
+    for rank in whom:
+        os.kill(children[rank], number)
+    _, err = program.communicate(timeout=60)
+    assert [(tmp_path / f"status.{rank}").read_text() for rank in (0, 1)] == ["130\n", "130\n"]
+    assert err.count("rotfem: interrupted") == 1
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["status"] == "interrupted"
+    assert len(read_csv(tmp_path / "out" / "history.csv")["t"]) == summary["steps"] + 1
+
+
+def test_a_signal_to_mpirun_leaves_the_history(tmp_path: Path) -> None:
+    """It gives its processes a quarter of a second."""
+    program = started(tmp_path, shells=False)
+    time.sleep(0.5)
+    program.send_signal(signal.SIGINT)
+    program.communicate(timeout=60)
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["status"] == "interrupted"
+    assert len(read_csv(tmp_path / "out" / "history.csv")["t"]) > 1
