@@ -105,12 +105,22 @@ def test_the_history_is_that_of_an_unbroken_run(kind: str, tmp_path: Path, monke
 @pytest.mark.parametrize("every", [1, 3])
 def test_a_finished_run_goes_on_to_a_later_end(tmp_path: Path, end: float, every: int) -> None:
     """Also where the first end is in the middle of a step, or between two rows of the history."""
-    scene = scene_of({"time.output_every": every, "mesh.elements": 2})
+    still = {"motion": {"type": "constant", "speed": 2.0}, "initial": {"tip_displacement": 0.5}}
+    scene = scene_of({"time.output_every": every, "mesh.elements": 2, **still})
     rotfem.run(scene.replace({"time.end": end}), folder=tmp_path, checkpoint=1000)
     result, whole = rotfem.run(scene, folder=tmp_path, resume=True), rotfem.run(scene)
     assert result.summary["resumed"][0]["time"] > end - 0.021
     for name, values in whole.history.items():
         np.testing.assert_array_equal(result.history[name], values, err_msg=name)
+
+
+def test_where_steps_land_on_what_is_prescribed_a_later_end_keeps_the_rows_there_are(tmp_path: Path) -> None:
+    """Where a march lands is chosen by what is prescribed up to its end: later steps are those of the later end."""
+    first = rotfem.run(scene_of({"time.end": 0.2}), folder=tmp_path, checkpoint=1000)
+    result, whole = rotfem.run(scene_of({}), folder=tmp_path, resume=True), rotfem.run(scene_of({}))
+    np.testing.assert_array_equal(result.history["tip_u2"][:20], first.history["tip_u2"][:20])
+    scale = np.max(np.abs(whole.history["tip_u2"]))
+    np.testing.assert_allclose(result.history["tip_u2"], whole.history["tip_u2"], rtol=0, atol=1e-3 * scale)
 
 
 SIGNALLED = """
