@@ -7,19 +7,20 @@ a veering then shows itself as two branches that keep their order, a true crossi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq, linear_sum_assignment
+from scipy.optimize import linear_sum_assignment
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
 from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
 from rotfem.numerics.eigenproblem import SAME
+from rotfem.numerics.roots import root
 
 Array = npt.NDArray[Any]
 
@@ -37,6 +38,9 @@ TWIN = 1e-6
 
 #: Smallest refined step as a part of the speed range: a veering narrower than this passes as a crossing.
 FINEST = 1e-5
+
+#: Speeds that may be put between those asked for: so many in all, and for each of those. A veering takes 17.
+ADDED, ADDED_EACH = 1000, 40
 
 
 #: Modes computed beyond those asked for, so that a branch that falls in the order is still there.
@@ -135,7 +139,7 @@ class Sweep:
     def __init__(self, analysis: ModalAnalysis, count: int):
         self.analysis, self.count = analysis, count
         self.nodes: list[Node] = []
-        self.solves = 0
+        self.solves, self.most_solves, self.unresolved = 0, ADDED, False
         self.ambiguous: list[dict[str, float]] = []
 
     def solve(self, speed: float, start: Array | None, requested: bool) -> Node:
@@ -150,6 +154,7 @@ class Sweep:
         first.order, first.confidence = np.arange(total), np.ones(total)
         self.nodes = [first]
         self.finest = FINEST * max(speeds[-1] - speeds[0], 1e-300)
+        self.most_solves = ADDED + (1 + ADDED_EACH) * len(speeds)
         for i, speed in enumerate(speeds[1:], start=1):
             self._advance(self.solve(speed, self.nodes[-1].spinning.q, True))
             progress(i / (len(speeds) - 1))
@@ -160,7 +165,8 @@ class Sweep:
         confidence = assign(last, target)
         near = self._watched(last, target)
         if (confidence < SURE and near) or swapped(last, target):
-            if target.speed - last.speed > 2 * self.finest:
+            self.unresolved |= self.solves >= self.most_solves
+            if target.speed - last.speed > 2 * self.finest and not self.unresolved:
                 middle = 0.5 * (last.speed + target.speed)
                 self._advance(self.solve(middle, last.spinning.q, False))
                 self._advance(target)
@@ -263,25 +269,6 @@ class Sweep:
                 high = middle.speed
         worst = max(low.pairs.values, key=lambda lam: lam.real)
         return None if after is None and worst.real > 1e-2 * abs(worst) else high
-
-
-def root(f: Callable[[float], float], ends: tuple[float, float], at_ends: Sequence[float]) -> float | None:
-    """Return a speed between two where f changes sign; None where f has no value on the way.
-
-    Args:
-        f: of the speed.
-        ends: the two speeds.
-        at_ends: f there, of different signs. Solved for anew, a value near zero may come out with the other sign.
-    """
-    known, lost = dict(zip(ends, at_ends, strict=True)), []
-
-    def value(speed: float) -> float:
-        found = known[speed] if speed in known else f(speed)
-        lost.extend([] if np.isfinite(found) else [speed])
-        return found if np.isfinite(found) else 0.0
-
-    speed = float(brentq(value, *ends, xtol=1e-12, rtol=1e-8))
-    return None if lost else speed
 
 
 def unstable(spinning: Spinning, bounded: bool = True) -> str | None:

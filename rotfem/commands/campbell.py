@@ -181,7 +181,13 @@ def told(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends: li
     """
     last = sweep.nodes[-1]
     lost = [label for b, label in enumerate(labels) if last.order[b] < 0]
-    out = [f"{name} left the computed modes before the last speed; more modes.count keeps it" for name in lost]
+    out = []
+    if sweep.unresolved:
+        out.append(
+            f"the branches change too fast to be followed: {sweep.solves} speeds were solved, and no more were added "
+            "between those asked for"
+        )
+    out += [f"{name} left the computed modes before the last speed; more modes.count keeps it" for name in lost]
     out += [
         f"ambiguous: {labels[int(a['branch']) - 1]} at {a['speed']:.6g} rad/s, correlation {a['confidence']:.2f}"
         for a in sweep.ambiguous
