@@ -27,12 +27,11 @@ class Problem(NamedTuple):
     allowed: str
 
     def __str__(self) -> str:
+        allowed = "\n".join(map(printable, self.allowed.split("\n")))
         if not self.key:
-            return self.allowed
+            return allowed
         key = printable(self.key, _LONGEST_VALUE)
-        if self.value is None:
-            return f"{key}: {self.allowed}"
-        return f"{key} = {show(self.value)}: {self.allowed}"
+        return f"{key}: {allowed}" if self.value is None else f"{key} = {show(self.value)}: {allowed}"
 
 
 class InputError(ValueError):

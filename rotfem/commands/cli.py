@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -287,4 +288,6 @@ def listed(option: str, text: str | None, kind: Callable[[str], Any]) -> list[An
 
 def main() -> None:
     """Run the command line."""
-    app(prog_name="rotfem")
+    arguments = sys.argv[1:]
+    del sys.argv[1:]  # where dolfinx looks for options of its own, and fails on what is not UTF-8
+    app(arguments, prog_name="rotfem")

@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 
 from rotfem.commands.interrupts import Interrupted
 from rotfem.commands.result_folder import ResultFolder, Writer
-from rotfem.errors import ComputationError, InputError, OutputError, SceneError
+from rotfem.errors import ComputationError, InputError, OutputError, SceneError, printable
 from rotfem.results.files import json_text
 
 
@@ -149,7 +149,7 @@ class Session:
     def say(self, lines: list[str]) -> None:
         """Print what was done."""
         if self.first and not (self.quiet or self.as_json):
-            print("\n".join(lines))
+            print("\n".join(map(printable, lines)))
 
 
 class ProgressBar:

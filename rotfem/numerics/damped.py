@@ -185,7 +185,7 @@ class RitzPairs:
 
     def _transposed(self, Y: Array) -> Array:
         """Return (λ² M + λ C + K)^H y for all pairs."""
-        total = np.zeros_like(Y)
+        total = np.zeros(Y.shape, dtype=np.complex128)  # all of Y is real where all values are
         for A, power in zip(self.matrices, (2, 1, 0), strict=True):
             for part, factor in ((Y.real, 1.0), (Y.imag, 1j)):
                 for j in range(Y.shape[1]):

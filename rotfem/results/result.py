@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotfem.errors import printable
+
 if TYPE_CHECKING:
     import pandas
     import xarray
@@ -37,7 +39,7 @@ class Result(ABC):
     @property
     def title(self) -> str:
         """Heading of figures: name of the scene, theory where there is one, and status unless it is done."""
-        words = ": ".join(self.summary[key] for key in ("name", "theory") if key in self.summary)
+        words = printable(": ".join(self.summary[key] for key in ("name", "theory") if key in self.summary))
         return words if self.status == "done" else f"{words} ({self.status})"
 
     @abstractmethod

@@ -47,7 +47,7 @@ def parse_override(file: str, override: str) -> tuple[str, Any]:
     Raises:
         SceneError: it is not of the form `table.key=value`.
     """
-    key, equals, text = (part.strip() for part in override.partition("="))
+    key, equals, text = (part.strip() for part in encodable(override).partition("="))
     if not equals or not text or not _KEY.fullmatch(key):
         raise SceneError(file, allowed=f"override {show(override)} must have the form table.key=value")
     try:
@@ -85,12 +85,19 @@ def set_key(file: str, data: dict[str, Any], key: str, value: Any) -> dict[str, 
     return result
 
 
+def encodable(text: str) -> str:
+    """Return a text that UTF-8 can hold: what a command line gives in other bytes is shown as such."""
+    return text.encode("utf-8", "backslashreplace").decode()
+
+
 def to_builtin(value: Any) -> Any:
     """Return the value with NumPy arrays and numbers, at any depth, as lists and Python numbers."""
     if isinstance(value, Mapping):
-        return {str(key): to_builtin(entry) for key, entry in value.items()}
+        return {encodable(str(key)): to_builtin(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
         return [to_builtin(entry) for entry in value]
+    if isinstance(value, str):
+        return encodable(value)
     if isinstance(value, np.ndarray):
         return value.tolist()
     return value.item() if isinstance(value, np.generic) else value

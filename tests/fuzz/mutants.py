@@ -37,7 +37,7 @@ INTEGERS = [0, 1, -1, 2, 7, 2**31, 2**63, -(2**63), 10**30, 10**400]
 numbers = st.one_of(st.sampled_from(EXTREMES), st.sampled_from(INTEGERS), st.floats(), st.integers())
 texts = st.one_of(
     st.sampled_from(
-        ["", "0", "1e3", "auto", "reissner", "nan", "true", "../../etc/passwd", "/dev/zero", ".", "\0", "Ω"]
+        ["", "0", "1e3", "auto", "reissner", "nan", "true", "../../etc/passwd", "/dev/zero", ".", "\0", "Ω", "\udcfe"]
     ),
     st.text(max_size=12),
 )

@@ -26,6 +26,9 @@ HEAD = re.compile(
     rb"(?:0[ \t]+8[ \t]*\1|1[ \t]+8[ \t]*\1(?:\x01\0\0\0|\0\0\0\x01)(?:\1)?)\$EndMeshFormat\1"
 )
 
+#: Coordinates that a node may have at most, m.
+LARGEST = 1e100
+
 #: What gmsh may need to read a file: seconds, one more for so many bytes of it, and bytes of memory.
 SECONDS, BYTES_PER_SECOND, MEMORY = 20.0, 5e5, 1e9
 
@@ -190,8 +193,8 @@ def _edges(gmsh: Any, name: str, tag: int, kind: int, rows: Integers) -> Integer
 
 def _check_flat(x: Array) -> None:
     """Refuse nodes outside the plane x_3 = 0."""
-    if not np.all(np.isfinite(x)):
-        raise BadMesh("has nodes whose coordinates are not finite")
+    if not np.all(np.abs(x) < LARGEST):  # so that areas are numbers
+        raise BadMesh("has nodes whose coordinates are not finite, or of no size")
     away = np.max(np.abs(x[:, 2]))
     if away > FLAT * np.max(np.ptp(x, axis=0)):
         raise BadMesh(f"it leaves the plane x₃ = 0 (by {away:.3g} m); a plate lies in it")
