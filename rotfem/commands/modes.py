@@ -20,6 +20,7 @@ from rotfem.analysis.equilibrium import check_steady
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.stability import stability_of_pencil
+from rotfem.analysis.theory_error import TheoryCheck
 from rotfem.commands.finite import check_rows
 from rotfem.commands.mode_tables import advice, mode_tables, scaled
 from rotfem.commands.problem import Problem, case_of
@@ -88,13 +89,18 @@ def _modes(
         warnings = [line for line in warnings if line not in advice(analysis, speed)]
     warnings = [*analysis.notes, *warnings]
     stability = stability_of_pencil(spinning.pencil, spinning.clamped)
-    said = GROWS_AS_SAID * max(row["growth"] for row in found.rows if row["stability"] != "neutral")
-    if stability.stable is None or stability.held_by_spin or stability.growth > max(said, 0.0):
+    known = GROWS_AS_SAID * max(row["growth"] for row in found.rows if row["stability"] != "neutral")
+    if stability.stable is None or stability.held_by_spin or stability.growth > max(known, 0.0):
         warnings = [*warnings, stability.warning()]
+    pairs = spinning.pairs
+    off = TheoryCheck(analysis.system.held).of_modes(spinning.q, spinning.clamped, pairs.values, pairs.right)
+    if said := off.warning():
+        warnings = [*warnings, said]
     result = {
         **modal_summary("modes", analysis, scene, choice, started),
         "speed": speed,
         "stability": stability.summary(),
+        "theory_error": off.summary(),
         "modes": found.rows,
         "checks": self_checks(analysis, spinning),
         "warnings": warnings,

@@ -14,6 +14,7 @@ from rotfem.analysis.equilibrium import static_tip_shape, steady_state
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability, stability_of
 from rotfem.analysis.stepper import Stepper
+from rotfem.analysis.theory_error import Farthest, TheoryError
 from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
 from rotfem.commands.interrupts import Interrupted
 from rotfem.commands.keeper import Keeper
@@ -74,6 +75,8 @@ class Simulation:
         self.resumed: list[dict[str, Any]] = []
         self.critical = critical_speed(self.system)
         self.stability: Stability | None = None
+        self.farthest = Farthest(self.system)
+        self.theory_error: TheoryError | None = None
         self._critical_since: float | None = None
         self._exceeded = ""
 
@@ -159,6 +162,7 @@ class Simulation:
         if not self.system.linear:
             self.system.structure.check_range(state.q, state.t)
         self.record(state)
+        self.farthest(state.q, state.t)
         if self.choice is None or self._exceeded:
             return
         sizes = self.system.sizes(state.q)
@@ -207,6 +211,9 @@ class Simulation:
                 f"longer definite, since t = {self._critical_since:.4g} s"
             )
         self._warn_of_what_the_strains_lack(history)
+        self.theory_error = self.farthest.error()
+        if self.theory_error is not None and (said := self.theory_error.warning()):
+            self.warnings.append(said)
         summary = run_summary(self, status, history)
         if failure is not None:
             summary["failure"] = {"what": failure.what, "time": failure.time, "advice": failure.advice}

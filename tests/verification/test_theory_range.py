@@ -1,0 +1,128 @@
+"""The indicator of a theory's own error against the error itself, and silence where the error is small."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rotfem
+
+LENGTH, EI = 10.0, 1.4e4
+UNIT = EI / LENGTH**2  # N
+APPROXIMATE = ("linear", "consistent_linear", "von_karman_linear", "second_order", "von_karman")
+
+
+def beam(theory: str, loads: dict[str, Any], **tables: Any) -> dict[str, Any]:
+    section = {"EA": 2.8e7, "GA": 1.0e7, "EI": EI, "mass_per_length": 1.2, "rotary_inertia": 6e-4}
+    return {
+        "structure": {"type": "planar_beam", "length": LENGTH, "section": section},
+        "motion": {"type": "constant", "speed": 0.0},
+        "model": {"theory": theory},
+        "mesh": {"elements": 12},
+        "loads": loads,
+        **tables,
+    }
+
+
+def tip(result: Any) -> Any:
+    return np.array([result.history[f"tip_{name}"][-1] for name in ("u1", "u2")])
+
+
+def errors(scene: Any, theory: str, *arguments: Any) -> tuple[float, float, list[str]]:
+    """Return the true error of the tip's displacement, relative to the exact one, its estimate, and the warnings."""
+    found, exact = (rotfem.run(scene(name, *arguments)) for name in (theory, "reissner"))
+    true = float(np.linalg.norm(tip(found) - tip(exact)) / np.linalg.norm(tip(exact)))
+    said = [line for line in found.summary["warnings"] if "model.theory" in line]
+    return true, found.summary["theory_error"]["estimate"], said
+
+
+def force(theory: str, axial: float, side: float) -> dict[str, Any]:
+    return beam(theory, {"tip_force": [axial * UNIT, side * UNIT]})
+
+
+def moment(theory: str, degrees: float) -> dict[str, Any]:
+    return beam(theory, {"tip_moment": EI * np.radians(degrees) / LENGTH})
+
+
+def spinning(theory: str, speed: float, side: float) -> dict[str, Any]:
+    motion = {"type": "constant", "speed": speed}
+    return beam(theory, {"tip_force": [0.0, side * UNIT]}, motion=motion)
+
+
+CASES = [
+    *((force, (0.0, side)) for side in (0.05, 0.2, 1.0, 5.0, 1e3)),
+    *((force, (axial, side)) for axial, side in ((-1.0, 0.1), (-2.2, 0.02), (3.7, 0.01))),
+    *((moment, (degrees,)) for degrees in (5.0, 45.0, 90.0, 180.0)),
+    *((spinning, arguments) for arguments in ((0.5, 0.05), (3.0, 0.05), (6.0, 3.0))),
+]
+
+
+@pytest.mark.parametrize("theory", APPROXIMATE)
+@pytest.mark.parametrize(("scene", "arguments"), CASES)
+def test_never_below_a_third_of_the_error(scene: Any, arguments: tuple[float, ...], theory: str) -> None:
+    try:
+        true, estimate, said = errors(scene, theory, *arguments)
+    except rotfem.ComputationError:
+        assert theory == "von_karman"  # its column has a limit point, at which it stops
+        return
+    if true > 0.05:
+        assert estimate > true / 3
+    if true > 0.15:  # three times what is to be noticed
+        assert len(said) == 1
+    if true < 0.005:
+        assert not said
+
+
+def test_column_above_its_buckling_load_in_a_theory_that_does_not_see_it() -> None:
+    for load, noticed in ((-500.0, True), (-300.0, False)):
+        summary = rotfem.run(beam("linear", {"tip_force": [load, 0.0]})).summary
+        assert summary["stability"]["stable"]  # by its own stiffness
+        assert any("buckling load" in line for line in summary["warnings"]) is noticed
+
+
+def test_buckled_column_in_a_theory_without_terms_of_third_order() -> None:
+    # Its amplitude is off by 70 %, whatever the rotation.
+    result = rotfem.run(beam("second_order", {"tip_force": [-400.0, 0.01]}))
+    assert any("buckled" in line for line in result.summary["warnings"])
+
+
+@pytest.mark.parametrize("theory", APPROXIMATE[1:])
+def test_spin_up_is_in_the_range_of_all_theories_but_the_linear_one(theory: str) -> None:
+    motion = {"type": "spin_up", "speed": 6.0, "duration": 15.0}
+    summary = rotfem.run(beam(theory, {}, motion=motion, time={"end": 16.0, "step": 0.05})).summary
+    assert 0.0 < summary["theory_error"]["estimate"] < 0.05
+    assert not any("model.theory" in line for line in summary["warnings"])
+
+
+def test_history_that_leaves_the_range() -> None:
+    # A tip released from 0.4 L swings with rotations of 0.6 rad.
+    initial, time = {"tip_displacement": 4.0}, {"end": 0.2, "step": 0.02}
+    for theory, noticed in (("consistent_linear", True), ("reissner", False)):
+        summary = rotfem.run(beam(theory, {}, initial=initial, time=time)).summary
+        assert any("model.theory" in line for line in summary["warnings"]) is noticed
+
+
+def test_frequencies_without_stiffening() -> None:
+    motion = {"type": "constant", "speed": 3.0}
+    rows = {
+        theory: rotfem.modes(beam(theory, {}, motion=motion, modes={"count": 3})) for theory in ("linear", "reissner")
+    }
+    found, exact = (rows[theory].frequencies for theory in ("linear", "reissner"))
+    true = float(np.max(np.abs(found - exact) / exact))
+    assert rows["linear"].summary["theory_error"]["estimate"] > true / 3
+    assert any("model.theory" in line for line in rows["linear"].summary["warnings"])
+    assert not any("model.theory" in line for line in rows["reissner"].summary["warnings"])
+    still = rotfem.modes(beam("linear", {}, modes={"count": 3})).summary
+    assert still["theory_error"]["estimate"] == 0.0
+
+
+@pytest.mark.slow
+def test_linear_flap_of_a_spinning_plate() -> None:
+    plate = {"type": "plate", "length": 1.0, "width": 0.3, "thickness": 0.002, "E": 7e10, "nu": 0.3, "rho": 2700.0}
+    tables = {"motion": {"type": "constant", "speed": 100.0, "axis": [0.0, 1.0, 0.0]}, "mesh": {"elements": [6, 2]}}
+    scene = {"structure": plate, **tables, "modes": {"count": 1}}
+    found, exact = (rotfem.modes({**scene, "model": {"theory": name}}) for name in ("linear", "consistent_linear"))
+    assert any("out of its range" in line for line in found.summary["warnings"])
+    assert not any("model.theory" in line for line in exact.summary["warnings"])
