@@ -60,9 +60,10 @@ def test_modes_json_is_alone_on_stdout(folder: Path, rotfem: Rotfem) -> None:
     assert done.status == 0
     summary = json.loads(done.out)
     assert summary["modes"][0]["stability"] == "static instability"
-    hint, warning = done.err.splitlines()
+    hint, warning, beyond = done.err.splitlines()
     assert hint.startswith('hint: model.theory = "linear"')
     assert warning.startswith("warning: static instability")
+    assert beyond.startswith('warning: model.theory = "linear"')
     assert written(folder / "out") == {"modes.csv", "modes.json", "mode_shapes.csv", "summary.json"}
     quiet = rotfem("modes", "beam.toml", "-q", *options)
     assert quiet == (0, "", "")
