@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from rotfem.analysis.turning import recounted
 from rotfem.errors import ComputationError
 from rotfem.numerics.inertia import negative_eigenvalues, symmetric
 from rotfem.numerics.linear import DirectSolver, Increment
@@ -98,6 +99,7 @@ class Tracer:
         Args:
             past_limits: whether to go on where the load has a maximum.
         """
+        self.system.count_rotations_from(None)
         path, point, length = LoadPath(self.system.zeros()), self._point(self.system.zeros(), 0.0, None), FIRST
         for _ in range(MOST_STEPS):
             try:
@@ -126,7 +128,7 @@ class Tracer:
             if new.s < 0.0:
                 path.why = "the load would have to be reversed"
                 break
-            point, length = new, min(length * min(2.0, 4.0 / used), LONGEST)
+            point, length = self._counted(new), min(length * min(2.0, 4.0 / used), LONGEST)
             path.q, path.share = point.q, point.s
         else:
             path.why = f"{MOST_STEPS} steps were not enough"
@@ -153,8 +155,18 @@ class Tracer:
                 if self.system.model.inside_out():
                     raise ComputationError("the path met a state that is turned inside out")
                 self.system.structure.check_range(q)
+                self.system.check_reach(q)
                 return self._point(q, s, point), iteration
         raise ComputationError(f"a step along the path did not converge in {ITERATIONS} iterations")
+
+    def _counted(self, point: Point) -> Point:
+        """Return a point with rotations that are counted from its own shape, where they are large."""
+        turns = self.system.structure.turns
+        if turns is None or not turns.is_due(point.q):
+            return point
+        q, t_q = recounted(self.system, point.q, point.t_q)
+        size = np.sqrt(self._product(t_q, t_q) + point.t_s**2)
+        return Point(q, point.s, t_q / size, point.t_s / size, point.negative)
 
     def _set(self, q: Array, s: float) -> None:
         system = self.system

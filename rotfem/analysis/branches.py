@@ -142,7 +142,7 @@ class Sweep:
         self.solves, self.most_solves, self.unresolved = 0, ADDED, False
         self.ambiguous: list[dict[str, float]] = []
 
-    def solve(self, speed: float, start: Array | None, requested: bool) -> Node:
+    def solve(self, speed: float, start: Spinning | None, requested: bool) -> Node:
         """Return the modes at a speed, its equilibrium continued from start."""
         self.solves += 1
         return Node(self.analysis.at(speed, self.count + SPARE, start), requested)
@@ -156,7 +156,7 @@ class Sweep:
         self.finest = FINEST * max(speeds[-1] - speeds[0], 1e-300)
         self.most_solves = ADDED + (1 + ADDED_EACH) * len(speeds)
         for i, speed in enumerate(speeds[1:], start=1):
-            self._advance(self.solve(speed, self.nodes[-1].spinning.q, True))
+            self._advance(self.solve(speed, self.nodes[-1].spinning, True))
             progress(i / (len(speeds) - 1))
 
     def _advance(self, target: Node) -> None:
@@ -168,7 +168,7 @@ class Sweep:
             self.unresolved |= self.solves >= self.most_solves
             if target.speed - last.speed > 2 * self.finest and not self.unresolved:
                 middle = 0.5 * (last.speed + target.speed)
-                self._advance(self.solve(middle, last.spinning.q, False))
+                self._advance(self.solve(middle, last.spinning, False))
                 self._advance(target)
                 return
             weak = [b for b in range(self.count) if last.order[b] >= 0 and target.confidence[b] < AMBIGUOUS]
@@ -185,7 +185,7 @@ class Sweep:
 
     def between(self, left: Node, speed: float) -> Node:
         """Return the modes at a speed to the right of a node, joined with its branches."""
-        node = self.solve(speed, left.spinning.q, False)
+        node = self.solve(speed, left.spinning, False)
         assign(left, node)
         return node
 
@@ -249,7 +249,7 @@ class Sweep:
 
         def square(speed: float) -> float:
             try:
-                values = self.solve(speed, left.spinning.q, False).spinning.pairs.values
+                values = self.solve(speed, left.spinning, False).spinning.pairs.values
             except ComputationError:
                 return 0.0  # K is singular: this is the speed
             return float((values[np.argmin(np.abs(values))] ** 2).real)
@@ -262,7 +262,7 @@ class Sweep:
         """Return the lowest speed that is no longer of the kind before; None where growth ends with a jump."""
         low, high = left.spinning, right.speed
         while high - low.speed > 1e-9 * max(abs(high), abs(low.speed)):
-            middle = self.solve(0.5 * (low.speed + high), low.q, False).spinning
+            middle = self.solve(0.5 * (low.speed + high), low, False).spinning
             if unstable(middle, bounded=False) == before:
                 low = middle
             else:

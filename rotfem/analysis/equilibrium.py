@@ -9,6 +9,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.arc_length import LoadPath, Tracer
+from rotfem.analysis.load_steps import LESS, SMALLEST_SHARE, balance, counted, raised
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError, InputError
@@ -21,14 +22,8 @@ from rotfem.numerics.newton import REACH, Newton
 
 Array = npt.NDArray[np.float64]
 
-#: What helps where there is no equilibrium.
-LESS = "a lower speed or load, a stiffer section, or a theory that holds at large deflection"
-
 #: Distance, in the scales of the unknowns, at which two equilibria are one.
 SAME_STATE = 1e-6
-
-#: A continuation that must cut its steps below this share of the whole has met a limit point.
-SMALLEST_SHARE = 1e-3
 
 
 def steady_state(
@@ -60,53 +55,32 @@ def steady_state(
     system = system.held
     if start is not None:
         try:
-            return _balance(system, omega, 1.0, start, newton)
+            return counted(system, omega, 1.0, balance(system, omega, 1.0, start, newton), newton)
         except ComputationError:
             pass
     if system.linear:
-        return _balance(system, omega, 1.0, system.zeros(), newton)
+        return balance(system, omega, 1.0, system.zeros(), newton)
     if past_limits:
         return _followed(system, omega, newton, notes)
     try:
-        q = _raised(system, omega, newton)
+        q = raised(system, omega, newton)
     except ComputationError as error:
         path = _path(system, omega, newton, past_limits, notes)
         if path is None or path.share < 1.0:
             raise error if path is None or not path.limits else _at_limit(omega, path) from None
-        return np.asarray(path.q)
+        return counted(system, omega, 1.0, path.q, newton)
     if not _has_descent(system):
         return q
+    datum, found = system.datum, system.structure.total(q)
     path = _path(system, omega, newton, past_limits, notes)
     if path is not None and path.limits:
         raise _at_limit(omega, path)
     if path is None or path.share < 1.0:
-        system.set_state(q)
-        return q
-    if system.size(path.q - q) > SAME_STATE:
+        system.count_rotations_from(datum)
+        return balance(system, omega, 1.0, q, newton)
+    if system.size(system.structure.total(path.q) - found) > SAME_STATE:
         notes.append("Newton met another, unstable equilibrium first; this is the one that the growing load leads to")
-    return np.asarray(path.q)
-
-
-def _raised(system: System, omega: float, newton: Newton) -> Array:
-    """Return the equilibrium at full load, in one step or by halved ones."""
-    q, done, share = system.zeros(), 0.0, 1.0
-    while done < 1.0:
-        target = min(1.0, done + share)
-        try:
-            q = _balance(system, omega, target, q, newton)
-        except ComputationError as error:
-            share /= 2
-            if share < SMALLEST_SHARE:
-                raise ComputationError(
-                    f"no steady state at {omega:g} rad/s: the last equilibrium was at {done:.3g} of the load "
-                    f"({np.sqrt(done) * omega:.4g} rad/s); {error.what}",
-                    advice=LESS,
-                ) from None
-            continue
-        done = target
-        share *= 1.5
-    system.structure.check_range(q)
-    return q
+    return counted(system, omega, 1.0, path.q, newton)
 
 
 def _has_descent(system: Any) -> bool:
@@ -150,7 +124,7 @@ def _followed(system: System, omega: float, newton: Newton, notes: list[str]) ->
             f"{why}",
             advice=LESS,
         )
-    return path.q
+    return counted(system, omega, 1.0, path.q, newton)
 
 
 def _shares(shares: list[float]) -> str:
@@ -166,31 +140,6 @@ def _at_limit(omega: float, path: LoadPath) -> ComputationError:
         f"{share:.6g} of the load{speed}, where the structure snaps",
         advice=f'solver.continuation = "arc_length" to follow the path past it, or {LESS}',
     )
-
-
-def _balance(system: System, omega: float, share: float, guess: Array, newton: Newton) -> Array:
-    """Solve F(q, 0, 0) = 0 by Newton's method with loads, base acceleration and omega² multiplied by share."""
-    motion = system.motion.at_speed(np.sqrt(share) * omega)
-    system.set_time(0.0, motion, share)
-    q, dx = guess.copy(), Increment(system.V)
-
-    def increment() -> float:
-        system.set_state(q)
-        b = system.residual()
-        A, _ = system.tangent(1.0, 0.0, 0.0)
-        q[:] += dx.solve(DirectSolver(A), b)
-        system.set_state(q)
-        return float(system.size(dx.function.x.array))
-
-    if system.linear:
-        if not np.isfinite(increment()):
-            raise ComputationError("the stiffness is singular")
-        newton.iterations += 1
-    else:
-        newton.solve(increment, lambda: system.size(q))
-        if system.model.inside_out():
-            raise ComputationError("Newton met a state that is turned inside out (an axial strain below −1)")
-    return q
 
 
 def check_steady(problem: Problem) -> None:

@@ -43,6 +43,7 @@ class Spinning:
         pairs: eigenpairs, sorted by |λ|, one of each conjugate pair.
         clamped: M, C, K without the hub's unknown (the same pencil where the hub is not free).
         rigid: whether hub and structure can turn as a rigid body (λ = 0, not among the pairs).
+        datum: what the rotations of the equilibrium are counted from; None for the undeformed structure.
     """
 
     speed: float
@@ -51,6 +52,7 @@ class Spinning:
     pairs: Eigenpairs
     clamped: Pencil
     rigid: bool = False
+    datum: Any = None
 
 
 class ModalAnalysis:
@@ -102,13 +104,13 @@ class ModalAnalysis:
             why = f"must be at most {allowed}, the number of unknowns that are free on this mesh"
             raise InputError("modes.count", count, why)
 
-    def at(self, speed: float, count: int, start: Array | None = None, keep: bool = True) -> Spinning:
+    def at(self, speed: float, count: int, start: Spinning | None = None, keep: bool = True) -> Spinning:
         """Return equilibrium and eigenpairs at a speed (rad/s).
 
         Args:
             speed: Ω, rad/s.
             count: number of pairs, at least.
-            start: an equilibrium nearby, to continue from.
+            start: the structure at a speed nearby, whose equilibrium to continue from.
             keep: whether the pencil must outlast another call; large systems save memory without.
 
         Raises:
@@ -132,12 +134,13 @@ class ModalAnalysis:
             self.seconds[name] += span
         # A PETSc matrix must not outlive the mesh it was made on: their communicator goes with the mesh.
         clamped.owner = pencil.owner = self
-        finite = massed(clamped.M)
+        finite, datum = massed(clamped.M), self.system.datum
         if not self.free:
-            return Spinning(speed, q, pencil, pairs.select(np.arange(len(pairs.values))[:finite]), clamped)
+            chosen = pairs.select(np.arange(len(pairs.values))[:finite])
+            return Spinning(speed, q, pencil, chosen, clamped, datum=datum)
         flexible = np.flatnonzero(np.abs(pairs.values) > ZERO * np.median(np.abs(pairs.values)))
         rigid = len(flexible) < len(pairs.values)
-        return Spinning(speed, q, pencil, pairs.select(flexible[:finite]), clamped, rigid)
+        return Spinning(speed, q, pencil, pairs.select(flexible[:finite]), clamped, rigid, datum)
 
     def stiffness_sizes(self, K: Any) -> Array | None:
         """Return √ of what the entries of K are sums of, for each owned unknown; None where the diagonal says it.
@@ -163,14 +166,17 @@ class ModalAnalysis:
         if self.free:
             raise InputError("motion.type", "torque", f"{what} cannot be computed for a free hub yet")
 
-    def equilibrium(self, speed: float, start: Array | None = None) -> Array:
+    def equilibrium(self, speed: float, start: Spinning | None = None) -> Array:
         """Return the state the modes are about, left in the system's functions: steady, or undeformed."""
         s = self.system.held
         if self.about == "undeformed" or s.linear:
             s.set_time(0.0, s.motion.at_speed(speed))
             s.set_state(zero := s.zeros())
             return np.asarray(zero)
-        return steady_state(s, speed, self.newton, start, self.past_limits, self.notes)
+        if start is not None:
+            s.count_rotations_from(start.datum)
+        first = None if start is None else start.q
+        return steady_state(s, speed, self.newton, first, self.past_limits, self.notes)
 
     def report(self) -> dict[str, Any]:
         """Return what a summary says of how the modes were solved; nothing special here."""

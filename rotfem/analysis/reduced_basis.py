@@ -143,7 +143,7 @@ class ReducedAnalysis(ModalAnalysis):
             out[:, j] = y.array
         return out
 
-    def at(self, speed: float, count: int, start: Array | None = None, keep: bool = True) -> Spinning:
+    def at(self, speed: float, count: int, start: Spinning | None = None, keep: bool = True) -> Spinning:
         """Return the eigenpairs of the basis at a speed (see `ModalAnalysis.at`), with errors in the full system."""
         system = self.system
         zero = system.zeros()

@@ -35,6 +35,7 @@ class State:
         memory: what the scheme keeps of the steps before.
         given: work (J) and angular impulse (N·m·s) that a free hub and its structure were given since t = 0, and the
             moment (N·m) of the forces from outside now; None where the hub is not free.
+        datum: what the rotations in q are counted from; None for the undeformed structure.
     """
 
     t: float
@@ -43,6 +44,18 @@ class State:
     a: Array
     memory: Any = None
     given: Array | None = None
+    datum: Any = None
+
+    @classmethod
+    def at_rest(cls, system: Any, q: Array, v: Array | None = None) -> State:
+        """Return the state at t = 0 of a shape that rests in the frame, counted as a system counts its rotations.
+
+        Args:
+            system: whose forms see it.
+            q: unknowns.
+            v: their rates, where the frame does not turn with the structure.
+        """
+        return cls(0.0, q, np.zeros_like(q) if v is None else v, np.zeros_like(q), datum=system.datum)
 
     def changed(self, **changes: Any) -> State:
         """Return a copy with other values."""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rotfem.analysis.schemes import Array, Scheme, Shifts, Stage, State
+from rotfem.analysis.turning import keep_rotations_small
 from rotfem.errors import ComputationError
 from rotfem.mechanics.courses import View
 from rotfem.numerics.newton import REACH, Newton
@@ -74,7 +75,7 @@ class Stepper:
     def start(self, t: float, q: Array, v: Array) -> State:
         """Return the state at t (s) with the acceleration that the equations of motion give."""
         s = self.system
-        state = State(t, q.copy(), v.copy(), np.zeros_like(q))
+        state = State(t, q.copy(), v.copy(), np.zeros_like(q), datum=s.datum)
         with seen(s, View(1)):
             s.prescribe(t, state.q, state.v, state.a)
             s.set_time(t)
@@ -92,6 +93,7 @@ class Stepper:
             after: how the next one does.
         """
         s, t = self.system, state.t
+        s.count_rotations_from(state.datum)
         with seen(s, before):
             old = s.driven(t)
         with seen(s, after):
@@ -141,6 +143,8 @@ class Stepper:
             self._solve(stage, state)
             stages.append(stage)
         new = self.scheme.finish(state, h, stages)
+        new.datum = state.datum
+        self.system.check_reach(new.q, new.t)
         new.given = self.system.given(new, state)
         return new
 
@@ -171,11 +175,7 @@ class Stepper:
         except ComputationError:
             if self._share == 0.0:
                 raise
-            stage.q[:], self._share, self._far = (
-                state.q,
-                0.0,
-                True,
-            )  # from where the step starts, whatever was predicted
+            stage.q[:], self._share, self._far = state.q, 0.0, True  # from where the step starts
             stage.v[:], stage.a[:] = v + stage.c_v * stage.q, a + stage.c_a * stage.q
             iterations = self._root(stage, state)
         if self._share < WHOLE or iterations > MANY:
@@ -277,6 +277,8 @@ class Stepper:
         Raises:
             ComputationError: Newton failed at the smallest step too; says how small it was.
         """
+        if keep_rotations_small(self.system, self.scheme, state, h):
+            self._held = None
         try:
             return self.step(state, h, end)
         except ComputationError as error:

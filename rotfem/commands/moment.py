@@ -24,6 +24,7 @@ class Moment:
     @property
     def tip(self) -> dict[str, float]:
         """The unknowns at the tip, relative to the turning frame: u1, u2, … (m), alpha, … (rad)."""
+        self.system.count_rotations_from(self.state.datum)
         values = self.system.tip(self.state.q, self.t)
         return dict(zip(self.system.structure.components, map(float, values), strict=True))
 
@@ -59,6 +60,7 @@ class Moment:
 
     def _set(self) -> Any:
         """Write the state into the system."""
+        self.system.count_rotations_from(self.state.datum)
         self.system.set_time(self.t)
         self.system.set_state(self.state.q, self.state.v, self.state.a)
         return self.system

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Self, cast
 
-import numpy as np
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady, steady_state
@@ -124,7 +123,7 @@ class Problem(ProblemData):
         check_steady(still)
         system = still.system(moving=False, comm=comm)
         q = steady_state(system, speed, Newton())
-        return Moment(system, State(0.0, q, np.zeros_like(q), np.zeros_like(q)))
+        return Moment(system, State.at_rest(system, q))
 
     def modes(
         self,

@@ -105,7 +105,7 @@ class Simulation:
         q = steady_state(self.system, omega, self.newton, past_limits=past, notes=self.warnings)
         self.stability = stability_of(self.system, q, omega)
         q, v = self.system.start(q)
-        self._keep(State(0.0, q, v, np.zeros_like(q)))
+        self._keep(State.at_rest(self.system, q, v))
         if said := self.stability.warning():
             if self.critical is not None and abs(omega) > self.critical:
                 said += (

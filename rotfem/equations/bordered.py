@@ -124,7 +124,7 @@ class BorderedSystem:
     clamp = None
 
     def __init__(self, inner: System):
-        self.inner, self.row = inner, HubRow(inner)
+        self.inner, self._row = inner, (inner.compilations, HubRow(inner))
         self.angle = self.row.angle
         self.hub = self.row.hub
         self._dz = Increment(inner.V)
@@ -133,6 +133,15 @@ class BorderedSystem:
         if name == "inner":
             raise AttributeError(name)
         return getattr(self.inner, name)
+
+    @property
+    def row(self) -> HubRow:
+        """The hub's equation, made anew where the structure's were."""
+        if self._row[0] != self.inner.compilations:
+            coupled = self._row[1].coupled
+            self._row = self.inner.compilations, HubRow(self.inner)
+            self._row[1].coupled = coupled
+        return self._row[1]
 
     # --- state -------------------------------------------------------------------------------------------------------
 

@@ -60,10 +60,14 @@ class Model:
             self.structure.mesh, self.structure.planar, problem.frame == "inertial", problem.loads.gravity
         )
         self.switches: dict[str, fem.Constant] = {}
-        self.mechanics = self._mechanics()
         chosen = [Effect.registry[name] for name in self.effects]
         further = [Effect(name, term) for name, term in problem.terms.items()]
         self.acting = {effect.name: effect for effect in (INTERNAL, INERTIA, *chosen, *further, LOADS)}
+        self.compose()
+
+    def compose(self) -> None:
+        """Write the mechanics and the terms, or write them anew where the structure counts its rotations otherwise."""
+        self.mechanics: Mechanics = self._mechanics()
         self.terms = self.work(Variation(self.structure.k))
         self._stretch: Any = None
 

@@ -22,6 +22,7 @@ from rotfem.equations.solutions import Solutions
 from rotfem.mechanics.courses import Course, View
 from rotfem.mechanics.motion import IDENTITY, Motion
 from rotfem.numerics import compat, forms
+from rotfem.numerics.caching import forget
 from rotfem.numerics.linear import DirectSolver, Increment
 from rotfem.structures.turning_clamp import TurningClamp
 
@@ -50,6 +51,7 @@ class System(Solutions, ABC):
         view: how these are seen.
         seconds: time spent on assembly and solution of steps.
         assembled: time spent on assembly while compiling, s.
+        compilations: how often the forms were made; once, or twice where rotations have become very large.
     """
 
     linear = False
@@ -67,6 +69,7 @@ class System(Solutions, ABC):
         self._state = tuple(x.x.array for x in (self.q, self.v, self.a))
         self.scale = self.structure.scales()
         self.time = self.assembled = 0.0
+        self.compilations = 1
         self.seconds = {"assemble": 0.0, "solve": 0.0}
         self.bcs = [fem.dirichletbc(fem.Function(self.V), self.structure.clamped)]
         owned = self.V.dofmap.index_map.size_local
@@ -82,6 +85,33 @@ class System(Solutions, ABC):
         self.A = self._compile()
         #: Whether a factor is kept for the steps that follow, where factorising is dear.
         self.keeps_factor = self.A.getSize()[0] > KEPT_FROM[self.structure.mesh.topology.dim]
+
+    def count_rotations_from(self, datum: Any) -> None:
+        """Count rotations from a datum (see `rotfem.structures.datum`), None for the undeformed structure.
+
+        The first time all forms are made anew, with the datum in them; set_time must follow then.
+        """
+        turns = self.structure.turns
+        if turns is not None and turns.use(datum):
+            self.model.compose()
+            forget(self)
+            self._solver = None
+            self.A = self._compile()
+            self.compilations += 1
+
+    @property
+    def datum(self) -> Any:
+        """What rotations are counted from; None for the undeformed structure."""
+        return None if self.structure.turns is None else self.structure.turns.datum
+
+    def check_reach(self, q: Array, time: float | None = None) -> None:
+        """Refuse rotations in q (local dof array) that have come too far from what they are counted from.
+
+        Raises:
+            BeyondReach: they have.
+        """
+        if self.structure.turns is not None:
+            self.structure.turns.check(q, time)
 
     # --- what kinds of systems differ in, besides `Solutions` --------------------------------------------------------
 
@@ -208,12 +238,12 @@ class System(Solutions, ABC):
 
     def tip(self, q: Array, t: float) -> Array:
         """Return the values of the unknowns at the tip, relative to the turning frame, shape (components,)."""
-        tip = self.structure.tip_values(q)
+        tip = self.structure.tip_values(self.structure.total(q))
         return tip if self.clamp is None else self.clamp.relative(tip[None, :], self.structure.length, t)[0]
 
     def shape(self) -> dict[str, Array]:
         """Return the deflected structure at the state: position x (m), u1, u2 (m), alpha, … in the turning frame."""
-        coordinates, q = self.structure.nodes(self.q.x.array)
+        coordinates, q = self.structure.nodes(self.structure.total(self.q.x.array))
         if self.clamp is not None:
             q = self.clamp.relative(q, coordinates["x"], self.time)
         return {**coordinates, **{name: q[:, i] for i, name in enumerate(self.structure.components)}}

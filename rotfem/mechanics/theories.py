@@ -25,7 +25,8 @@ class Theory:
         name: what a scene calls it.
         rank: its place in the ladder, from the poorest on.
         strains: structure type ("planar_beam", "spatial_beam", "plate") ↦ strain measures. Of a planar beam and of a
-            plate a function of q; of a spatial beam one of (u', θ, θ', e); see `rotfem.mechanics.strains`.
+            plate a function of q; of a spatial beam one of (u', θ, θ', e); see `rotfem.mechanics.strains`. That of a
+            plate in an exact theory takes the director as a second argument, None for that of the angles in q.
         linear: whether the equations of motion are linear in q.
         exact: whether displacements and rotations may be of any size.
         prestress: for a linear theory, second-order strains by structure type, which meet the force of the spinning

@@ -18,21 +18,20 @@ from dolfinx import fem
 from mpi4py import MPI
 from scipy.spatial import Delaunay
 
-from rotfem.errors import ComputationError, InputError
+from rotfem.errors import InputError
 from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
 from rotfem.mechanics.loads import Load
 from rotfem.mechanics.mindlin import PlateGradients, director, triad
 from rotfem.mechanics.problem import Problem
+from rotfem.structures.datum import DirectorTurns
 from rotfem.structures.memory import check_memory
 from rotfem.structures.meshes.plate_mesh import PlateGrid, plate_grid
 from rotfem.structures.mode_names import plate_mode_name, turning
+from rotfem.structures.moderate_turns import check_directors
 from rotfem.structures.plate_loads import PointPlace, TipEdge, locate, point_measure
 from rotfem.structures.plate_section import constants, plane_stress, shear_moduli, thickness_field
 from rotfem.structures.structure import Array, Structure
 from rotfem.structures.tip_values import TipValues
-
-#: Largest |alpha_2|, rad: at π/2 the two angles of the director meet their pole.
-LARGEST_TILT = 1.5
 
 #: Part of the energy that reduced integration does not see and is put back; all of it would stiffen the plate.
 SEEN = 0.1
@@ -97,6 +96,7 @@ class Plate(Structure):
         self.tip = self.grid.along("tip") if self._has_tip else None
         self.tip_values = TipValues(self.V, self._tip_point(low, high))
         self._properties()
+        self.turns = DirectorTurns.of(self)
 
     # --- mesh -------------------------------------------------------------------------------------------------------
 
@@ -144,17 +144,22 @@ class Plate(Structure):
 
     def director(self, q: Any) -> Any:
         """Return t, to second order in linear theories, exact in the others."""
-        return director(PlateGradients(q).alpha, exact=not self.problem.theory.linear)
+        return self.triad(q)[2] if not self.problem.theory.linear else director(PlateGradients(q).alpha, exact=False)
+
+    def triad(self, q: Any) -> list[Any]:
+        """Return (t_1, t_2, t), exact: those of alpha, turned by R where they are counted from a datum."""
+        axes, R = triad(PlateGradients(q).alpha), None if self.turns is None else self.turns.rotation
+        return list(axes) if R is None else [ufl.dot(R, t) for t in axes]
 
     def turned(self, q: Any, v: Any) -> Any:
         """Return v_1 t_1 + v_2 t_2 + v_3 t."""
-        t = triad(PlateGradients(q).alpha)
+        t = self.triad(q)
         return sum(v[i] * t[i] for i in range(3))
 
     def stretch(self, strains: list[Strain]) -> Any:
         """Return (r,1 × r,2)·t."""
         p = PlateGradients(self.k.q)
-        return ufl.dot(ufl.cross(p.dr[:, 0], p.dr[:, 1]), triad(p.alpha)[2])
+        return ufl.dot(ufl.cross(p.dr[:, 0], p.dr[:, 1]), self.triad(self.k.q)[2])
 
     def strains(self, measures: Callable[..., tuple[Any, ...]]) -> list[Strain]:
         """Return membrane strain, shear and curvature of one theory's measures with this plate's stiffnesses.
@@ -163,7 +168,8 @@ class Plate(Structure):
         membrane is integrated fully in the linear theories, where it does not lock; in the others SEEN of its linear
         part is, and in all of them a part of the shear by u_3 that the bending stiffness bounds.
         """
-        membrane, shear, curvature = measures(self.k.q)
+        q, counted = self.k.q, self.turns is not None and self.turns.rotation is not None
+        membrane, shear, curvature = measures(q, self.director(q)) if counted else measures(q)
         linear, p = self.problem.theory.linear, PlateGradients(self.k.q)
         h, Q, kG = self.section["thickness"], plane_stress(self.section), shear_moduli(self.section)
         strains = [
@@ -279,19 +285,10 @@ class Plate(Structure):
         return turning(coordinates, values[:, 2])
 
     def check_range(self, q: Array, time: float | None = None) -> None:
-        """Refuse a state whose director has come to the pole of its angles.
+        """Refuse a state whose director has come to the pole of its angles, where these are not counted from a datum.
 
         Raises:
-            ComputationError: says where.
+            ComputationError: says how far it has come.
         """
-        owned = self.V.dofmap.index_map.size_local
-        tilt = np.abs(q[: self.size * owned].reshape(-1, self.size)[:, 4])
-        here = float(tilt.max(initial=0.0))
-        worst = self.comm.allreduce(here, op=MPI.MAX)
-        if worst > LARGEST_TILT:
-            raise ComputationError(
-                f"the plate has turned about direction 1 by {worst:.3g} rad (largest: {LARGEST_TILT}); the director's "
-                "angles are limited there, not about direction 2",
-                time,
-                "a smaller load, or the plate laid so that it bends about direction 2",
-            )
+        if self.turns is None:
+            check_directors(self, q, time)

@@ -136,6 +136,8 @@ class TipEdge:
         plate, q = self._plate, self._plate.k.q
         tilting, alpha = ufl.as_vector((m[0], m[1], 0)), PlateGradients(q).alpha
         density = self.spread(tilting if dead else plate.turned(q, tilting))
+        if plate.turns is not None and plate.turns.before is not None:
+            alpha = alpha + PlateGradients(plate.turns.before).alpha
         about = ufl.as_vector((alpha[1], -alpha[0], 0))
         couple = m[2] * self._couple()
         force = couple if dead else plate.turned(q, couple)

@@ -22,12 +22,12 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from rotfem.errors import ComputationError
 from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
 from rotfem.mechanics.loads import Load
 from rotfem.mechanics.problem import Problem
-from rotfem.mechanics.rotations import FULL_TURN
 from rotfem.structures.beam import Beam
+from rotfem.structures.datum import SectionTurns
+from rotfem.structures.moderate_turns import check_sections
 from rotfem.structures.spatial_section import SectionForms, euler_tensor
 from rotfem.structures.structure import Array
 from rotfem.structures.swept_axis import swept_axis
@@ -74,6 +74,7 @@ class SpatialBeam(Beam):
             parts = [self.scalar(f"hub_offset_{i}", x) for i, x in enumerate(s.hub_offset, start=1)]
             self._root = ufl.as_vector(parts)
         self._triad = self._undeformed_triad()
+        self.turns = SectionTurns.of(self)
 
     # --- the undeformed beam ------------------------------------------------------------------------------------
 
@@ -101,13 +102,20 @@ class SpatialBeam(Beam):
         c, s = ufl.cos(angle), ufl.sin(angle)
         return e_1, c * e_2 + s * e_3, c * e_3 - s * e_2
 
+    def _from_datum(self, v: Any) -> Any:
+        """Return R v, what a vector v of the undeformed section is where θ is counted from."""
+        R = None if self.turns is None else self.turns.rotation
+        return v if R is None else ufl.as_vector([sum(R[i, j] * v[j] for j in range(3)) for i in range(3)])
+
     def _along_triad(self, v: Any) -> Any:
-        """Return the components of v along t_i⁰."""
-        return ufl.as_vector([sum(t[i] * v[i] for i in range(3)) for t in self._triad])
+        """Return the components of v along R t_i⁰."""
+        triad = [self._from_datum(t) for t in self._triad]
+        return ufl.as_vector([sum(t[i] * v[i] for i in range(3)) for t in triad])
 
     def _from_triad(self, components: Any) -> Any:
-        """Return the vector with these components along t_i⁰."""
-        return ufl.as_vector([sum(c * t[i] for c, t in zip(components, self._triad, strict=True)) for i in range(3)])
+        """Return the vector with these components along R t_i⁰."""
+        pairs = list(zip(components, self._triad, strict=True))
+        return self._from_datum(ufl.as_vector([sum(c * t[i] for c, t in pairs) for i in range(3)]))
 
     def oriented(self, values: Array) -> Array:
         """Return components along the undeformed beam, without its pretwist, of nodal values (n, 6, …)."""
@@ -122,16 +130,24 @@ class SpatialBeam(Beam):
         return self._root + self._axis + ufl.as_vector([q[i] for i in (0, 1, 2)])
 
     def turned(self, q: Any, v: Any) -> Any:
-        """Return Λ(θ) v."""
-        return SectionTurn(rotation_part(q), self._turn.exact).rotate(v)
+        """Return Λ v = exp(θ) R v."""
+        return SectionTurn(rotation_part(q), self._turn.exact).rotate(self._from_datum(v))
 
     def strains(self, measures: Callable[..., tuple[Any, Any]]) -> list[Strain]:
-        """Return the strains (Γ, K) of one theory's measures with the section's stiffness."""
-        q = self.k.q
+        """Return the strains (Γ, K) of one theory's measures with the section's stiffness.
+
+        Counted from a datum they are those of a beam with the axis R e and the curvature of the datum beforehand.
+        """
+        q, e = self.k.q, self._triad[0]
         dq = q.dx(0)
         du = ufl.as_vector([dq[i] for i in (0, 1, 2)])
-        Gamma, K = measures(du, rotation_part(q), rotation_part(dq), self._triad[0])
-        return self._forms.strains(self._along_triad(Gamma), self._along_triad(K), self.dx_elastic)
+        if self.turns is None or self.turns.rotation is None:
+            Gamma, K = measures(du, rotation_part(q), rotation_part(dq), e)
+            return self._forms.strains(self._along_triad(Gamma), self._along_triad(K), self.dx_elastic)
+        turned = self._from_datum(e)
+        Gamma, K = measures(e + du - turned, rotation_part(q), rotation_part(dq), turned)
+        before = ufl.as_vector([sum(t[i] * self.turns.curvature[i] for i in range(3)) for t in self._triad])
+        return self._forms.strains(self._along_triad(Gamma), self._along_triad(K) + before, self.dx_elastic)
 
     def bodies(self, effects: Collection[str]) -> list[Body]:
         """Return mass-centre line, section directors, tip body and its directors, as the effects call for them."""
@@ -172,24 +188,17 @@ class SpatialBeam(Beam):
         moment, out = self.problem.loads.tip_moment, self.forces()
         if moment is not None and not moment.is_zero:
             m, dead = self.add_load("tip_moment", 3, partial(_moment, moment)), moment.kind == "dead"
-            M = m if dead else self._turn.rotate(m)
-            out.append(AppliedMoment("tip_moment", M, self._turn.theta, self.tip, dead, section=self._turn))
+            M, theta = m if dead else self.turned(self.k.q, m), self._turn.theta
+            if self.turns is not None and self.turns.before is not None:
+                theta = theta + rotation_part(self.turns.before)
+            out.append(AppliedMoment("tip_moment", M, theta, self.tip, dead, section=self._turn))
         return out
 
     def check_range(self, q: Array, time: float | None = None) -> None:
-        """Refuse a state in which some section has turned by more than a full turn.
+        """Refuse a state in which some section has turned by more than a turn, where that is not counted from a datum.
 
         Raises:
-            ComputationError: says where; rotation vectors stand for rotations one to one only up to there.
+            ComputationError: says where.
         """
-        coordinates, values = self.nodes(q)
-        X = coordinates["x"]
-        turns = np.linalg.norm(values[:, 3:], axis=1)
-        worst = int(np.argmax(turns))
-        if turns[worst] > FULL_TURN:
-            raise ComputationError(
-                f"the section at X = {X[worst]:.4g} m has turned by {turns[worst] / (2 * np.pi):.3g} turns relative to "
-                "the frame; a spatial beam's rotations are limited to one",
-                time,
-                'a smaller load, or structure.type = "planar_beam" where the motion is in a plane',
-            )
+        if self.turns is None:
+            check_sections(self, q, time)

@@ -17,6 +17,7 @@ from rotfem.errors import InputError, shown
 from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, Strain
 from rotfem.mechanics.loads import Load
 from rotfem.mechanics.problem import Problem
+from rotfem.structures.datum import Turns
 from rotfem.structures.tip_values import TipValues
 
 Array = npt.NDArray[np.float64]
@@ -75,6 +76,8 @@ class Structure:
         #: Single numbers that the forms contain, by name.
         self.scalars: dict[str, fem.Constant] = {}
         self.load_constants: dict[str, tuple[fem.Constant, Callable[[float], Array]]] = {}
+        #: What finite rotations are counted from; None where they have no limit, or the theory none of large size.
+        self.turns: Turns | None = None
 
     def discretise(self, mesh: Any, degree: int) -> None:
         """Make the space of blocked Lagrange functions of a degree, and the unknowns in it."""
@@ -216,6 +219,10 @@ class Structure:
     def oriented(self, values: Array) -> Array:
         """Return the components along the undeformed structure of nodal values (n, components, …), to name modes by."""
         return values
+
+    def total(self, q: Array) -> Array:
+        """Return q (local dof array) with rotations that are counted from the undeformed structure."""
+        return q if self.turns is None else self.turns.total(q)
 
     def check_range(self, q: Array, time: float | None = None) -> None:
         """Refuse a state (local dof array) outside the range of the unknowns; there is none here.

@@ -30,12 +30,16 @@ def spatial_beam(du: Any, theta: Any, dtheta: Any, e: Any) -> tuple[Any, Any]:
     return turn.rotate_back(e + du) - e, turn.material_rate(dtheta)
 
 
-def plate(q: Any) -> tuple[Any, Any, Any]:
+def plate(q: Any, t: Any = None) -> tuple[Any, Any, Any]:
     """Return membrane strain (1), transverse shear (1) and curvature (1/m) of q = (u_1, u_2, u_3, alpha_1, alpha_2).
 
     ½ (r,γ·r,β − δ_γβ), r,β·t and −½ (r,γ·t,β + r,β·t,γ) with the unit director t, shapes (2, 2), (2,), (2, 2): Simo &
     Fox 1989, the fully nonlinear plate of Simo & Vu-Quoc 1986.
+
+    Args:
+        q: unknowns.
+        t: the director, where it is not simply that of alpha.
     """
     p = PlateGradients(q)
-    dr, t = p.dr, director(p.alpha)
+    dr, t = p.dr, director(p.alpha) if t is None else t
     return (ufl.dot(dr.T, dr) - ufl.Identity(2)) / 2, ufl.dot(t, dr), -ufl.sym(ufl.dot(dr.T, ufl.grad(t)))

@@ -1,0 +1,96 @@
+"""Equilibria at a share of speed squared and loads, and the way to the full load in steps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.turning import reached, recounted
+from rotfem.equations.system import System
+from rotfem.errors import ComputationError
+from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.newton import Newton
+from rotfem.structures.datum import BeyondReach
+
+Array = npt.NDArray[np.float64]
+
+#: What helps where there is no equilibrium.
+LESS = "a lower speed or load, a stiffer section, or a theory that holds at large deflection"
+
+#: A continuation that must cut its steps below this share of the whole has met a limit point.
+SMALLEST_SHARE = 1e-3
+
+#: Part of their range from which rotations are counted afresh where the next step of the load leads out of it.
+NEAR = 0.3
+
+
+def raised(system: System, omega: float, newton: Newton) -> Array:
+    """Return the equilibrium at full load, in one step or by halved ones."""
+    datum: Any = None
+    system.count_rotations_from(datum)
+    q, done, share = system.zeros(), 0.0, 1.0
+    while done < 1.0:
+        target = min(1.0, done + share)
+        try:
+            q = counted(system, omega, target, balance(system, omega, target, q, newton), newton)
+        except BeyondReach as error:
+            failure, afresh = error.what, reached(system, q) > NEAR
+        except ComputationError as error:
+            failure, afresh = error.what, False
+        else:
+            done, share, datum = target, 1.5 * share, system.datum
+            continue
+        share /= 2
+        if share < SMALLEST_SHARE:
+            raise ComputationError(
+                f"no steady state at {omega:g} rad/s: the last equilibrium was at {done:.3g} of the load "
+                f"({np.sqrt(done) * omega:.4g} rad/s); {failure}",
+                advice=LESS,
+            )
+        system.count_rotations_from(datum)
+        if afresh:
+            q, _ = recounted(system, q)
+            datum = system.datum
+    system.structure.check_range(q)
+    return np.asarray(q)
+
+
+def counted(system: System, omega: float, share: float, q: Array, newton: Newton) -> Array:
+    """Return a balanced state, where its rotations are large counted from a shape near it and balanced again.
+
+    Raises:
+        BeyondReach: they have changed too much since the last equilibrium.
+        ComputationError: the state could not be balanced again.
+    """
+    system.check_reach(q)
+    turns = system.structure.turns
+    if turns is None or not turns.is_due(q):
+        return q
+    return balance(system, omega, share, recounted(system, q)[0], newton)
+
+
+def balance(system: System, omega: float, share: float, guess: Array, newton: Newton) -> Array:
+    """Solve F(q, 0, 0) = 0 by Newton's method with loads, base acceleration and omega² multiplied by share."""
+    motion = system.motion.at_speed(np.sqrt(share) * omega)
+    system.set_time(0.0, motion, share)
+    q, dx = guess.copy(), Increment(system.V)
+
+    def increment() -> float:
+        system.set_state(q)
+        b = system.residual()
+        A, _ = system.tangent(1.0, 0.0, 0.0)
+        q[:] += dx.solve(DirectSolver(A), b)
+        system.set_state(q)
+        return float(system.size(dx.function.x.array))
+
+    if system.linear:
+        if not np.isfinite(increment()):
+            raise ComputationError("the stiffness is singular")
+        newton.iterations += 1
+    else:
+        newton.solve(increment, lambda: system.size(q))
+        if system.model.inside_out():
+            raise ComputationError("Newton met a state that is turned inside out (an axial strain below −1)")
+    return q

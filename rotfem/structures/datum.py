@@ -1,0 +1,288 @@
+"""What rotations are counted from: the undeformed structure, or a shape it has had, so that they have no limit.
+
+A rotation vector stands for a rotation one to one up to a full turn, and the two angles of a plate's director have a
+pole. Neither is a limit of the structure. Before rotations come there they are counted afresh from the shape reached,
+the *datum*: with its orientation R(X) the section is turned by exp(θ) R, the director is R t(alpha), and θ or alpha
+start again at zero. Displacements do not change. R lies as polynomials in every cell, of a degree so much above that of
+the unknowns that the strains are the same before and after; at their nodes R is exact, so errors do not add up. It is
+known, exactly, at the nodes of the unknowns too. A beam also keeps the curvature of the datum, axial(Rᵀ R').
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from inspect import signature
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+import numpy.typing as npt
+from basix.ufl import element
+from dolfinx import fem
+from mpi4py import MPI
+
+from rotfem.errors import ComputationError
+from rotfem.mechanics import turned_arrays as turned
+
+if TYPE_CHECKING:
+    from rotfem.structures.structure import Structure
+
+Array = npt.NDArray[np.float64]
+
+
+class BeyondReach(ComputationError):
+    """Rotations have come farther from their datum than they may: what led there was too long a step."""
+
+
+@dataclass(frozen=True, eq=False)
+class Datum:
+    """The orientations that rotations are counted from; arrays of this process, which are not changed.
+
+    Attributes:
+        nodes: R at the nodes of the unknowns, shape (nodes, 3, 3).
+        total: what the rotations are there, counted from the undeformed structure, (nodes, 3 or 2), rad.
+        rotation: R at the nodes of its polynomials, cell by cell, shape (cells, points, 3, 3).
+        curvature: axial(Rᵀ R') there (1/m), (cells, points, 3); of a beam.
+    """
+
+    nodes: Array
+    total: Array
+    rotation: Array
+    curvature: Array
+
+
+class Turns(ABC):
+    """The rotations of a structure, and the datum they are counted from.
+
+    Args:
+        structure: it is discretised already.
+
+    Attributes:
+        datum: None as long as rotations are counted from the undeformed structure.
+        rotation, curvature: the functions that hold R and its curvature in the forms; None until there is a datum.
+        before: a function of the unknowns' space that holds the total rotations of the datum; None until there is one.
+    """
+
+    #: The unknowns that are rotations.
+    components: ClassVar[slice]
+    #: By how much the polynomials of R are of higher degree than the unknowns: over a cell of a beam that is bent by
+    #: 1.5 rad, or of a plate by 0.8 rad, they are then good to 1e-11.
+    finer: ClassVar[int]
+    #: Largest rotation (rad) that may be reached, and up to which a step may start.
+    limit: ClassVar[float]
+    enough: ClassVar[float]
+
+    def __init__(self, structure: Structure):
+        self._structure = structure
+        self.datum: Datum | None = None
+        self.rotation: Any = None
+        self.curvature: Any = None
+        self.before: Any = None
+
+    @classmethod
+    def of(cls, structure: Structure) -> Self | None:
+        """Return the rotations of a structure; None in a theory whose strains do not allow a datum."""
+        return cls(structure) if structure.problem.theory.exact else None
+
+    # --- what sections and directors differ in ---------------------------------------------------------------------
+
+    @abstractmethod
+    def _reach(self, rotations: Array) -> Array:
+        """Return how far rotations (n, …) have come, (n,) in rad, to be compared with the limit."""
+
+    @abstractmethod
+    def _orientation(self, rotations: Array, R: Array) -> Array:
+        """Return the orientation (…, 3, 3) that rotations (…, 3 or 2) counted from R stand for."""
+
+    @abstractmethod
+    def _from_rest(self, orientation: Array, guess: Array) -> Array:
+        """Return the rotations that an orientation is from the undeformed structure, of all those nearest a guess."""
+
+    @abstractmethod
+    def _rates(self, rotations: Array, v: Array, a: Array) -> tuple[Array, Array]:
+        """Return rates and second rates of rotations that are counted from the present shape."""
+
+    @abstractmethod
+    def _curvature(self, datum: Datum, rotations: Array, nodal: Array) -> Array:
+        """Return the curvature of the next datum at the points of the polynomials.
+
+        Args:
+            datum: the present one.
+            rotations: at the points, (cells, points, 3 or 2).
+            nodal: at the nodes of the unknowns, cell by cell, (cells, nodes of a cell, 3 or 2).
+        """
+
+    # --- range ------------------------------------------------------------------------------------------------------
+
+    def reached(self, q: Array, v: Array | None = None, h: float = 0.0) -> float:
+        """Return the part of the limit that the rotations of q (local dof array) take, over all processes.
+
+        With rates v (rad/s) it is, to be safe, what a step of twice the length h (s) would lead to.
+        """
+        reach = self._reach(self._of(q))
+        if v is not None:
+            reach = reach + 2 * abs(h) * self._reach(self._of(v))
+        here, comm = float(reach.max(initial=0.0)), self._structure.comm
+        return (here if comm.size == 1 else comm.allreduce(here, op=MPI.MAX)) / self.limit
+
+    def is_due(self, q: Array, v: Array | None = None, h: float = 0.0) -> bool:
+        """Return whether rotations should be counted afresh before what follows, a step of h (s) with rates v."""
+        now = self.reached(q)
+        return now * self.limit > self.enough or (v is not None and 2 * now > 1.0 and self.reached(q, v, h) > 1.0)
+
+    def check(self, q: Array, time: float | None = None) -> None:
+        """Refuse rotations that have come farther from their datum than they may.
+
+        Raises:
+            BeyondReach: they have.
+        """
+        if (part := self.reached(q)) > 1.0:
+            raise BeyondReach(f"rotations changed by {part * self.limit:.3g} rad at once", time)
+
+    # --- change of the datum ---------------------------------------------------------------------------------------
+
+    def use(self, datum: Datum | None) -> bool:
+        """Count rotations from a datum, None for the undeformed structure; return whether forms must be made anew."""
+        if datum is self.datum:
+            return False
+        first = self.rotation is None
+        if first:
+            self._make_functions()
+        self.datum = datum
+        shape = datum or self._undeformed
+        _write(self.rotation, shape.rotation)
+        _write(self.curvature, shape.curvature)
+        self._of(self.before.x.array)[:] = shape.total
+        return first
+
+    def reset(self, q: Array, v: Array, second: list[Array]) -> Datum:
+        """Return the shape of q as a datum, and make rotations, their rates and second rates those from there.
+
+        Args:
+            q: local dof array of the unknowns, overwritten.
+            v: of their rates, overwritten.
+            second: arrays of second rates, overwritten.
+        """
+        rotations, rates = self._of(q).copy(), self._of(v).copy()
+        for a in second:
+            self._of(v)[:], self._of(a)[:] = self._rates(rotations, rates, self._of(a))
+        self._of(q)[:] = 0.0
+        old, cells = self.datum or self._undeformed, self._structure.V.dofmap.list
+        nodes, nodal = self._orientation(rotations, old.nodes), rotations[cells]
+        at_points = np.einsum("pn,cni->cpi", self._tables[0], nodal)
+        total = self._from_rest(nodes, old.total + rotations)
+        curvature = self._curvature(old, at_points, nodal)
+        return Datum(nodes, total, self._orientation(at_points, old.rotation), curvature)
+
+    def total(self, q: Array) -> Array:
+        """Return q (local dof array) with its rotations counted from the undeformed structure."""
+        if self.datum is None:
+            return q
+        out, rotations = q.copy(), self._of(q)
+        orientation = self._orientation(rotations, self.datum.nodes)
+        self._of(out)[:] = self._from_rest(orientation, self.datum.total + rotations)
+        return out
+
+    # --- fields -----------------------------------------------------------------------------------------------------
+
+    def _of(self, values: Array) -> Array:
+        """Return the rotations of a local dof array of the structure's space, a view (nodes, 3 or 2)."""
+        nodes = self._structure.V.dofmap.index_map
+        size = self._structure.size
+        return values[: (nodes.size_local + nodes.num_ghosts) * size].reshape(-1, size)[:, self.components]
+
+    @cached_property
+    def _space(self) -> fem.FunctionSpace:
+        """Polynomials of R in every cell."""
+        mesh, degree = self._structure.mesh, self._structure.V.element.basix_element.degree + self.finer
+        return fem.functionspace(mesh, element("DG", mesh.basix_cell(), degree, shape=(3, 3)))
+
+    @cached_property
+    def _tables(self) -> Array:
+        """Values and derivatives of the unknowns' functions at the points, shape (1 + dim, points, nodes of a cell)."""
+        points = self._space.element.basix_element.points
+        return np.asarray(self._structure.V.element.basix_element.tabulate(1, points)[..., 0])
+
+    @cached_property
+    def _undeformed(self) -> Datum:
+        nodes = self._structure.V.dofmap.index_map
+        n = nodes.size_local + nodes.num_ghosts
+        cells, points = self._space.dofmap.list.shape
+        total = np.zeros((n, self.components.stop - self.components.start))
+        everywhere = np.broadcast_to(np.eye(3), (cells, points, 3, 3))
+        return Datum(np.broadcast_to(np.eye(3), (n, 3, 3)), total, everywhere, np.zeros((cells, points, 3)))
+
+    def _make_functions(self) -> None:
+        mesh, degree = self._structure.mesh, self._space.element.basix_element.degree
+        vectors = fem.functionspace(mesh, element("DG", mesh.basix_cell(), degree, shape=(3,)))
+        self.rotation = fem.Function(self._space, name="datum")
+        self.curvature = fem.Function(vectors, name="datum_curvature")
+        self.before = fem.Function(self._structure.V, name="before")
+
+
+def _write(function: Any, values: Array) -> None:
+    """Write values (cells, points, …) into a function of polynomials with these points."""
+    cells = function.function_space.dofmap.list
+    function.x.array.reshape(cells.size, -1)[cells] = values.reshape(*cells.shape, -1)
+
+
+class SectionTurns(Turns):
+    """The rotation vectors θ of a spatial beam's sections: Λ = exp(θ) R."""
+
+    components = slice(3, 6)
+    finer = 8
+    limit = 2 * np.pi * (1 + 1e-6)  # that a circle itself can be reached
+    enough = 1.75 * np.pi
+
+    def _reach(self, rotations: Array) -> Array:
+        return np.asarray(np.linalg.norm(rotations, axis=-1))
+
+    def _orientation(self, rotations: Array, R: Array) -> Array:
+        return turned.rotations(rotations) @ R
+
+    def _from_rest(self, orientation: Array, guess: Array) -> Array:
+        return turned.rotation_vectors(orientation, guess)
+
+    def _rates(self, rotations: Array, v: Array, a: Array) -> tuple[Array, Array]:
+        return turned.spins(rotations, v, a)
+
+    def _curvature(self, datum: Datum, rotations: Array, nodal: Array) -> Array:
+        """Return Rᵀ T(θ) θ' + axial(Rᵀ R')."""
+        geometry = self._structure.mesh.geometry
+        ends = geometry.x[geometry.dofmap, 0]
+        slopes = np.einsum("pn,cni->cpi", self._tables[1], nodal) / np.diff(ends)[:, :, None]
+        change = turned.material_curvature(rotations, slopes)
+        return np.asarray(np.einsum("cpji,cpj->cpi", datum.rotation, change) + datum.curvature)
+
+
+class DirectorTurns(Turns):
+    """The angles alpha of a plate's director: t = R t(alpha)."""
+
+    components = slice(3, 5)
+    finer = 6
+    limit = 1.5  # of alpha_2, whose pole is at π/2; alpha_1 may go round
+    enough = 1.1
+
+    @classmethod
+    def of(cls, structure: Structure) -> Self | None:
+        """Return the rotations of a plate; None in a theory whose strains are not those of a director t too."""
+        theory = structure.problem.theory
+        takes_director = len(signature(theory.measures(structure.type)).parameters) > 1
+        return cls(structure) if theory.exact and takes_director else None
+
+    def _reach(self, rotations: Array) -> Array:
+        return np.abs(rotations[..., 1])
+
+    def _orientation(self, rotations: Array, R: Array) -> Array:
+        return R @ turned.triads(rotations)
+
+    def _from_rest(self, orientation: Array, guess: Array) -> Array:
+        return turned.tilt_angles(orientation[..., 2], guess)
+
+    def _rates(self, rotations: Array, v: Array, a: Array) -> tuple[Array, Array]:
+        return turned.tilts(rotations, v, a)
+
+    def _curvature(self, datum: Datum, rotations: Array, nodal: Array) -> Array:
+        """Return zeros: what bends a plate are the derivatives of its director, which the polynomials of R have."""
+        return datum.curvature

@@ -1,0 +1,233 @@
+"""Rotations of any size: beams and plates rolled up by turns, motions beyond a turn, what a new datum leaves."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.integrate import quad
+from scipy.spatial.transform import Rotation
+
+import rotfem
+from rotfem import Scene
+from rotfem.analysis.schemes import State
+from rotfem.analysis.turning import keep_rotations_small, recounted
+from rotfem.commands.problem import Problem
+from tests.plate_mesh_files import write_msh
+
+Array = npt.NDArray[np.float64]
+
+U, THETA = ("tip_u1", "tip_u2", "tip_u3"), ("tip_theta1", "tip_theta2", "tip_theta3")
+AT_REST = {"type": "constant", "speed": 0.0}
+
+#: A beam that bends and twists alike, so that a moment m at its tip makes a helix or a circle of it, exactly.
+BEAM: dict[str, Any] = {
+    "structure": {
+        "type": "spatial_beam",
+        "length": 1.0,
+        "section": {"EA": 1e4, "GA2": 4e3, "GA3": 4e3, "GJ": 1.0, "EI2": 1.0, "EI3": 1.0, "mass_per_length": 1.0},
+    },
+    "motion": AT_REST,
+    "mesh": {"elements": 10, "degree": 3},
+}
+
+
+def final(result: Any, names: tuple[str, ...]) -> Array:
+    return np.array([result.history[name][-1] for name in names])
+
+
+def helix(m: Array) -> Array:
+    """Return the tip of a unit beam that is turned by Λ = exp(X m)."""
+    return np.array([quad(lambda X, i=i: Rotation.from_rotvec(X * m).as_matrix()[i, 0], 0, 1)[0] for i in range(3)])
+
+
+# --- rolled up ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["dead", "follower"])
+@pytest.mark.parametrize("moment", [(0, 0, 4 * np.pi), (4.0, -7.0, 9.0)], ids=["circle", "helix"])
+def test_beam_rolled_up_by_two_turns(kind: str, moment: tuple[float, float, float]) -> None:
+    """The moment turns about its own direction, so that θ at the tip is the moment itself (EI = GJ = L = 1)."""
+    m = np.array(moment)
+    result = rotfem.run(BEAM | {"loads": {"tip_moment": {"value": list(m), "kind": kind}}})
+    np.testing.assert_allclose(final(result, U), helix(m) - [1, 0, 0], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(final(result, THETA), m, rtol=0, atol=1e-10)
+    energy = m @ m / 2
+    assert result.history["strain"][-1] == pytest.approx(energy, rel=1e-8)
+    potential = -2 * energy if kind == "dead" else 0.0
+    assert result.history["jacobi"][-1] == pytest.approx(energy + potential, rel=1e-8)
+
+
+def strip(path: Path, direction: int, turns: float, thickness: float = 0.01) -> dict[str, Any]:
+    """Return a strip 10 × 1 with ν = 0 along a direction, and the moment at its end that rolls it up."""
+    n, EI = 32, 1e7 * thickness**3 / 12
+    along, across = np.meshgrid(np.linspace(0, 10, n + 1), [0.0, 1.0], indexing="ij")
+    points = np.column_stack([along.ravel(), across.ravel()] if direction == 1 else [across.ravel(), along.ravel()])
+    cells = [[2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1] for i in range(n)]
+    groups = {"clamped": [[0, 1]], "tip": [[2 * n, 2 * n + 1]], "plate": cells}
+    mesh = str(write_msh(path / "strip.msh", points, groups))
+    moment = turns * 2 * np.pi * EI / 10
+    return {
+        "structure": {"type": "plate", "mesh": mesh, "thickness": thickness, "E": 1e7, "nu": 0.0, "rho": 1.0},
+        "motion": AT_REST,
+        "loads": {"tip_moment": [0.0, -moment, 0.0] if direction == 1 else [moment, 0.0, 0.0]},
+    }
+
+
+def green(curvature: float, thickness: float) -> float:
+    """Return the curvature of the circle that a plate with Green's strains has for M/EI = curvature.
+
+    N = 0 and M = EI λ² κ with the stretch λ² = 1 − h² κ²/6 of the mid-surface.
+    """
+    kappa = curvature
+    for _ in range(50):
+        kappa = curvature / (1 - thickness**2 * kappa**2 / 6)
+    return kappa
+
+
+@pytest.mark.parametrize(("direction", "turns"), [(1, 2.0), pytest.param(2, 2.0, marks=pytest.mark.slow), (2, 0.4)])
+def test_plate_rolled_up(tmp_path: Path, direction: int, turns: float) -> None:
+    """A strip is rolled up to the circle of Green's strains to 1e-6 of its length, about direction 2 or about 1.
+
+    About direction 1 the director's angles have their pole at a quarter of a turn.
+    """
+    result = rotfem.run(strip(tmp_path, direction, turns))
+    kappa = green(turns * 2 * np.pi / 10, 0.01)
+    stretch = np.sqrt(1 - 0.01**2 * kappa**2 / 6)
+    expected = [stretch * np.sin(10 * kappa) / kappa - 10, stretch * (1 - np.cos(10 * kappa)) / kappa]
+    names = (f"tip_u{direction}", "tip_u3")
+    np.testing.assert_allclose(final(result, names), expected, rtol=0, atol=1e-5)
+    assert result.history[f"tip_alpha{direction}"][-1] == pytest.approx(10 * kappa, rel=1e-6)
+    assert abs(result.history[f"tip_alpha{3 - direction}"][-1]) < 1e-6
+
+
+# --- in motion ------------------------------------------------------------------------------------------------------
+
+
+def wound(kind: str) -> dict[str, Any]:
+    """Return a soft beam on a spinning hub that a moment winds up by two turns within a second."""
+    section: dict[str, Any] = {"EA": 1e4, "mass_per_length": 1.0}
+    if kind == "planar_beam":
+        section |= {"GA": 3e3, "EI": 1.0, "rotary_inertia": 1e-3}
+    else:
+        section |= {"GA2": 3e3, "GA3": 3e3, "GJ": 1.0, "EI2": 1.3, "EI3": 1.0}
+        section |= {"rotary_inertia2": 1e-3, "rotary_inertia3": 1e-3}
+    rows = [[0.0, 0.0], [1.0, 12.0]]
+    table = rows if kind == "planar_beam" else [[t, 0.0, 0.0, M] for t, M in rows]
+    return {
+        "structure": {"type": kind, "length": 1.0, "hub_radius": 0.1, "section": section},
+        "motion": {"type": "constant", "speed": 1.0},
+        "mesh": {"elements": 8},
+        "loads": {"tip_moment": {"table": table}},
+        "time": {"end": 1.0, "step": 4e-3},
+        "solver": {"increment_tolerance": 1e-12},
+    }
+
+
+@pytest.mark.slow
+def test_history_beyond_a_turn_is_the_planar_beams() -> None:
+    """The tip turns by 1.5 turns; the planar beam has no limit. What is left is round-off that the motion amplifies."""
+    planar, spatial = (rotfem.run(wound(kind)).history for kind in ("planar_beam", "spatial_beam"))
+    assert np.max(planar["tip_alpha"]) > 9.0
+    for one, other in {"tip_alpha": "tip_theta3", "tip_u1": "tip_u1", "tip_u2": "tip_u2", "jacobi": "jacobi"}.items():
+        np.testing.assert_allclose(spatial[other], planar[one], rtol=0, atol=1e-8 * np.max(np.abs(planar[one])))
+
+
+# --- what a change of the datum leaves as it is ----------------------------------------------------------------------
+
+
+def bent(kind: str, elements: int) -> tuple[Any, State]:
+    """Return a system and a smooth motion of it, in which rotations are due to be counted afresh."""
+    if kind == "plate":
+        plate = {"type": "plate", "length": 1.0, "width": 0.3, "thickness": 0.01, "E": 1e7, "nu": 0.3, "rho": 1e3}
+        tables: dict[str, Any] = {"structure": plate, "mesh": {"elements": [elements, 2]}}
+    else:
+        tables = copy.deepcopy(BEAM) | {"mesh": {"elements": elements}}
+    system = Problem.of(Scene.from_dict(tables | {"motion": AT_REST})).system()
+    x = system.V.tabulate_dof_coordinates()
+    size, rng = system.structure.size, np.random.default_rng(3)
+
+    def field(scale: float) -> Array:
+        parts = rng.standard_normal((3, size)) * np.where(np.arange(size) < 3, 0.1, scale)
+        return np.sum([x[:, :1] ** (k + 1) * (1 + 0.3 * x[:, 1:2]) * parts[k] for k in range(3)], axis=0).ravel()
+
+    q, v, a = field(1.0), field(1.0), field(1.0)
+    turns = system.structure.turns
+    q.reshape(-1, size)[:, turns.components] *= 0.95 / turns.reached(q)
+    return system, State(0.0, q, v, a, memory=a.copy())
+
+
+@pytest.mark.parametrize("kind", ["spatial_beam", "plate"])
+def test_energy_and_orientation_do_not_feel_a_new_datum(kind: str) -> None:
+    """To round-off: strains are kept at the points of integration, orientations and their rates at the nodes."""
+    system, state = bent(kind, 8)
+    scheme = rotfem.GeneralisedAlpha()
+
+    def read() -> tuple[float, Array]:
+        system.set_time(0.0)
+        system.set_state(state.q, state.v, state.a)
+        return system.energies()["strain"], system.tip(state.q, 0.0)
+
+    strain, tip = read()
+    assert keep_rotations_small(system, scheme, state, 0.0)
+    assert system.structure.turns.reached(state.q) == 0.0
+    changed, same = read()
+    assert changed == pytest.approx(strain, rel=1e-10)
+    np.testing.assert_allclose(same, tip, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(state.memory, state.a)
+
+
+def test_rates_go_over_to_a_new_datum() -> None:
+    """Rates and second rates from the datum are those of the same motion, by differences: Λ(t) R⁻¹ = exp(θ(t))."""
+    system, state = bent("spatial_beam", 2)
+    theta, v, a = (x.reshape(-1, 6)[:, 3:].copy() for x in (state.q, state.v, state.a))
+    keep_rotations_small(system, rotfem.GeneralisedAlpha(), state, 0.0)
+    h = 1e-3
+    R = Rotation.from_rotvec(theta)
+    before, after = ((Rotation.from_rotvec(theta + t * v + t * t / 2 * a) * R.inv()).as_rotvec() for t in (-h, h))
+    np.testing.assert_allclose(state.v.reshape(-1, 6)[:, 3:], (after - before) / (2 * h), rtol=0, atol=1e-5)
+    np.testing.assert_allclose(state.a.reshape(-1, 6)[:, 3:], (after + before) / h**2, rtol=0, atol=1e-4)
+
+
+def test_a_rigid_turn_strains_nothing() -> None:
+    """Counted from a shape that was turned rigidly, by any number of turns, the beam is free of strain to round-off."""
+    system, _ = bent("spatial_beam", 4)
+    x, turn = system.V.tabulate_dof_coordinates()[:, 0], np.array([1.3, -0.7, 1.9])
+    for count in range(1, 4):
+        total = Rotation.from_rotvec(count * turn)
+        q = np.zeros((len(x), 6))
+        q[:, :3] = np.outer(x, total.apply([1.0, 0.0, 0.0]) - [1.0, 0.0, 0.0])
+        q[:, 3:] = turn
+        q = q.ravel()
+        q, _ = recounted(system, q)
+        system.set_time(0.0)
+        system.set_state(q)
+        assert system.energies()["strain"] < 1e-20
+        tip = Rotation.from_rotvec(system.tip(q, 0.0)[3:])
+        np.testing.assert_allclose((tip * total.inv()).as_rotvec(), 0.0, rtol=0, atol=1e-13)
+
+
+def test_the_way_there_matters_less_with_every_mesh() -> None:
+    """A beam wound up in two planes and put straight keeps strains, which fall with the fourth power of the cells."""
+    left = []
+    for elements in (4, 8):
+        system, _ = bent("spatial_beam", elements)
+        x = system.V.tabulate_dof_coordinates()[:, 0]
+        paths = np.array([[2.0, -1.0, 1.5], [-1.0, 2.5, 0.5]])
+        turned = Rotation.from_rotvec(np.zeros((len(x), 3)))
+        q = np.zeros((len(x), 6))
+        for end in paths:  # along the first path, then the second, bent in different planes
+            q[:, 3:] = np.outer(np.sin(x), end)
+            turned = Rotation.from_rotvec(q[:, 3:]) * turned
+            q[:] = recounted(system, q.ravel())[0].reshape(-1, 6)
+        q[:, 3:] = turned.inv().as_rotvec()  # back to where no section is turned, at all nodes
+        system.set_time(0.0)
+        system.set_state(q.ravel())
+        assert np.max(np.abs(system.tip(q.ravel(), 0.0)[3:])) < 1e-12
+        left.append(np.sqrt(system.energies()["strain"]))
+    assert left[1] < left[0] / 2**3.8
+    assert left[1] < 1e-3
