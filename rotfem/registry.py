@@ -89,7 +89,9 @@ class Registry(Generic[E]):
 # The registries themselves are here, on the ground, so that a scene knows the names of what lies above it.
 theories: Registry[Theory] = Registry("theory", "rotfem.mechanics.theories")
 effects: Registry[Effect] = Registry("effect", "rotfem.mechanics.effects")
-schemes: Registry[Any] = Registry("scheme", "rotfem.analysis.alpha_family", "rotfem.analysis.esdirk")
+schemes: Registry[Any] = Registry(
+    "scheme", "rotfem.analysis.alpha_family", "rotfem.analysis.esdirk", "rotfem.analysis.energy_conserving"
+)
 shapes: Registry[Shape] = Registry("section shape", "rotfem.scene.section_shapes")
 outputs: Registry[Output] = Registry("output", "rotfem.mechanics.outputs")
 

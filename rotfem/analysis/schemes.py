@@ -62,6 +62,14 @@ class State:
         return replace(self, **changes)
 
 
+@dataclass(frozen=True)
+class Span:
+    """A whole step: where it starts, and when it ends (s)."""
+
+    start: State
+    end: float
+
+
 @dataclass
 class Stage:
     """An instant at which F = 0 is to be met: a prediction of q, v, a, and how v and a change with q.
@@ -70,6 +78,8 @@ class Stage:
         t: time, s.
         q, v, a: the prediction, then the solution; overwritten by `correct`.
         c_v, c_a: ∂v/∂q (1/s) and ∂a/∂q (1/s²).
+        over: the step that the stage is the middle of, where the balance of energy over it is to be kept; its end is
+            at 2q − q_n, 2v − v_n then.
     """
 
     t: float
@@ -78,6 +88,7 @@ class Stage:
     a: Array
     c_v: float
     c_a: float
+    over: Span | None = None
     shifts: Shifts = field(init=False)
 
     def __post_init__(self) -> None:

@@ -21,7 +21,7 @@ LONG = 5
 PATIENCE = 5
 
 #: Newton iterations after which a way is long.
-SOON = 4
+SOON = 6
 
 #: Newton iterations after which the prediction of the next step is questioned, and its share that is taken for all.
 MANY, WHOLE = 3, 0.9
@@ -138,7 +138,7 @@ class Stepper:
         for i in range(self.scheme.stages):
             stage = self.scheme.stage(i, state, h, end, stages)
             if self.system.clamp is not None:  # a prediction that turns with the hub is the better one
-                turned = self.system.clamp.turned(state.q, state.v, state.t, stage.t)
+                turned = turned_with_clamp(self.system.clamp, state, stage)
                 stage.correct(turned - stage.q)
             self._solve(stage, state)
             stages.append(stage)
@@ -200,7 +200,7 @@ class Stepper:
             raise ComputationError(
                 "Newton met a state that is turned inside out (an axial strain below −1)", time=stage.t
             )
-        if not s.model.closed:
+        if not s.model.closed or stage.over is not None:
             return
         new = s.energies()
         s.set_state(state.q, state.v, state.a)
@@ -221,9 +221,12 @@ class Stepper:
 
     def _iterate(self, stage: Stage, state: State, chord: bool = False) -> int:
         """Solve a stage by Newton's method, or with the factor of an earlier step throughout; return the iterations."""
-        s, before = self.system, state.q
+        span = None if self.system.linear else stage.over
+        s, before = self.system if span is None else self.system.balance, state.q
         followed = 0
         s.set_time(stage.t)
+        if span is not None:
+            s.begin(span.start, span.end)
         s.prescribe(stage.t, stage.q, stage.v, stage.a)
 
         def increment() -> float:
@@ -247,6 +250,8 @@ class Stepper:
             raise ComputationError(error.what, time=stage.t, advice=error.advice) from None
         self._held = stage.shifts if s.keeps_factor and not (chord and iterations > LONG) else None
         self._far = iterations > SOON
+        if span is not None:
+            s.finish(stage)
         return iterations
 
     def _solve_linear(self, increment: Any, stage: Stage, chord: bool) -> int:
@@ -299,6 +304,13 @@ class Stepper:
         error = self.scheme.local_error(new, old)
         assert error is not None
         return float(self.system.size(error))
+
+
+def turned_with_clamp(clamp: Any, state: State, stage: Stage) -> Array:
+    """Return q of a stage predicted by a turn with the clamp and the velocity relative to it."""
+    if stage.over is None:
+        return np.asarray(clamp.turned(state.q, state.v, state.t, stage.t))
+    return np.asarray((state.q + clamp.turned(state.q, state.v, state.t, stage.over.end)) / 2)
 
 
 def came_true(system: Any, move: Array, predicted: Array) -> float:

@@ -183,6 +183,11 @@ class BorderedSystem:
         self.row.coupled = "hub_coupling" in self.inner.model.effects and "hub_coupling" not in effects
         self.angle.start()
 
+    @cached_property
+    def balance(self) -> OverStep:
+        """The equations over a whole step."""
+        return OverStep(self)
+
     # --- solutions ---------------------------------------------------------------------------------------------------
 
     def correction(self, shifts: tuple[float, float, float], before: Array | None = None) -> Array:
@@ -274,6 +279,24 @@ class BorderedSystem:
         self.set_time(state.t)
         self.set_state(state.q, state.v, state.a)
         return self.row.outside()
+
+
+class OverStep(BorderedSystem):
+    """A bordered system of the equations over a whole step (see `EnergyBalance`)."""
+
+    inner: Any
+
+    def __init__(self, whole: BorderedSystem):
+        vars(self).update(vars(whole))
+        self.inner = whole.inner.balance
+
+    def begin(self, start: Any, end: float) -> None:
+        """Say where and when (s) a step starts and ends; the time of its middle is set."""
+        self.inner.begin(start.changed(q=start.q[:-1], v=start.v[:-1]), end)
+
+    def finish(self, stage: Any) -> None:
+        """Note that a step is solved."""
+        self.inner.finish(stage)
 
 
 def bordered(A: Any, row: Array, column: Array, corner: float) -> Any:

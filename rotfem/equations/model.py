@@ -130,6 +130,33 @@ class Model:
             out["potential"] = sum(potentials)
         return out
 
+    def energy(self) -> Any:
+        """Return the UFL form of the energy that the terms with one belong to (J): the Jacobi integral.
+
+        In a frame that does not rotate it is the energy of the structure, to which the motion of the clamp gives work.
+        """
+        parts = self.energies()
+        H = parts["T2"] + parts["strain"]
+        if "T0" in parts:
+            H -= parts["T0"]
+        if "potential" in parts:
+            H += parts["potential"]
+        astray = [load for load in self.mechanics.loads if load.dead and not load.conservative]
+        return H + sum(ufl.inner(load.force, load.x) * load.measure for load in astray) if astray else H
+
+    def terms_without_energy(self) -> list[Any]:
+        """Return the terms that no part of the `energy` belongs to, as damping and followers; UFL forms."""
+        stored = (INTERNAL.name, INERTIA.name)
+        out = [
+            term
+            for name, term in self.terms.items()
+            if name not in stored and not self.acting[name].kinetic and self.acting[name].potential is None
+        ]
+        others = [load for load in self.mechanics.loads if not (load.dead and load.conservative)]
+        if others:
+            out.append(work.loads(replace(self.mechanics, loads=others), Variation(self.structure.k)))
+        return out
+
     @cached_property
     def closed(self) -> bool:
         """Whether nothing gives energy to the structure, so that its Jacobi integral stays, or falls by damping."""

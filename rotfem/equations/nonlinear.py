@@ -12,6 +12,7 @@ from dolfinx import fem, la
 from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms import expand_derivatives
 
+from rotfem.equations.energy_balance import EnergyBalance
 from rotfem.equations.point_stresses import PointStresses
 from rotfem.equations.system import System
 from rotfem.numerics import compat, forms
@@ -38,6 +39,11 @@ class NonlinearSystem(System):
         F, du = self.model.residual, ufl.TrialFunction(self.V)
         parts = (ufl.derivative(F, x, du) for x in (self.q, self.v, self.a))
         return sum(c * form for c, form in zip(self._shifts, parts, strict=True))
+
+    @cached_property
+    def balance(self) -> EnergyBalance:
+        """The equations over a whole step, with the balance of energy kept, compiled."""
+        return EnergyBalance(self)
 
     @cached_property
     def _stresses(self) -> PointStresses:

@@ -138,6 +138,11 @@ class System(Solutions, ABC):
         for name, switch in self.model.switches.items():
             switch.value = 0.0 if name in effects else 1.0
 
+    @property
+    def balance(self) -> Any:
+        """The equations over a whole step, which keep the balance of energy; those of a linear theory are its own."""
+        return self
+
     # --- state -------------------------------------------------------------------------------------------------------
 
     @property

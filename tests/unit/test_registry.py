@@ -130,7 +130,7 @@ def test_the_classes_share_the_registries_of_the_ground() -> None:
     assert (Scheme.registry, Output.registry) == (registry.schemes, registry.outputs)
     assert ladder()[0] == "linear"
     assert set(ladder()) == set(registry.theories.names)
-    assert registry.schemes.names == ("generalised_alpha", "newmark", "esdirk4")
+    assert registry.schemes.names == ("generalised_alpha", "newmark", "esdirk4", "energy_conserving")
 
 
 @pytest.mark.parametrize("name", ["", "two words", "2nd", "a-b", "a.b", None])

@@ -72,6 +72,7 @@ SCHEMES = {
     "generalised_alpha, rho 0.8": {"scheme": "generalised_alpha", "spectral_radius": 0.8},
     "generalised_alpha, rho 0.0": {"scheme": "generalised_alpha", "spectral_radius": 0.0},
     "newmark": {"scheme": "newmark"},
+    "energy_conserving": {"scheme": "energy_conserving"},
 }
 
 
@@ -93,8 +94,9 @@ def test_order_in_time(unit_beam: Any, scheme: str, theory: str) -> None:
     np.testing.assert_allclose(orders[-1], 2.0, rtol=0, atol=0.1)
 
 
-def test_order_in_time_in_the_inertial_frame(unit_beam: Any) -> None:
-    change = changes_of_history(unit_beam, SCHEMES["generalised_alpha, rho 0.8"], "reissner", "inertial")
+@pytest.mark.parametrize("scheme", ["generalised_alpha, rho 0.8", "energy_conserving"])
+def test_order_in_time_in_the_inertial_frame(unit_beam: Any, scheme: str) -> None:
+    change = changes_of_history(unit_beam, SCHEMES[scheme], "reissner", "inertial")
     orders = np.log2(change[:-1] / change[1:])
     np.testing.assert_allclose(orders[-1], 2.0, rtol=0, atol=0.1)
 

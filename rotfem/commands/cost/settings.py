@@ -12,6 +12,7 @@ from rotfem.mechanics.theories import ladder as theory_ladder
 from rotfem.mechanics.theories import theories as all_theories
 from rotfem.scene import Scene
 from rotfem.scene.problems import did_you_mean
+from rotfem.scene.stepping import estimates_error
 
 Elements = int | tuple[int, int] | None
 
@@ -167,7 +168,8 @@ def _ways(
     others = [] if quick else [name for name in registry.schemes.names if name != time.scheme]
     schemes = chosen.get("schemes") or [time.scheme, *others]
     fixed = [(scheme, h, None, max(1, round(interval / h))) for scheme in schemes for h in steps]
-    return [*fixed, *((scheme, None, tolerance, 1) for scheme in schemes for tolerance in tolerances)]
+    adaptive = [scheme for scheme in schemes if estimates_error(registry.schemes[scheme])]
+    return [*fixed, *((scheme, None, tolerance, 1) for scheme in adaptive for tolerance in tolerances)]
 
 
 def default_theories(scene: Scene, quick: bool) -> list[str]:

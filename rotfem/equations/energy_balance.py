@@ -1,0 +1,222 @@
+"""The equations of motion over a whole step, with the balance of energy kept to the last digit.
+
+A step from (q_0, v_0) to (q_1, v_1) is met at its middle, q = (q_0 + q_1)/2, q_1 − q_0 = h v, v_1 − v_0 = h a, by
+
+    F̄(q, v, a; δq) + λ Δq·N δq = 0,    Δq = q_1 − q_0,
+
+where F̄ is F with the mean of the stresses at both ends, ½ C (Γ(q_0) + Γ(q_1)), in the place of those of the middle
+(Simo & Tarnow, Z. angew. Math. Phys. 43 (1992) 757): the middle of two turned configurations is shorter than both, and
+in a slender structure that would be a large force. Where strains are quadratic in q and the inertia is constant that
+alone keeps the energy. What is left, of third order in Δq, is put right by a discrete gradient (Gonzalez, J. Nonlinear
+Sci. 6 (1996) 449) of the whole residual: with H the energy that the conservative terms F^c of F̄ belong to,
+
+    λ |Δq|²_N = H(q_1, v_1) − H(q_0, v_0) − F̄^c·Δq,
+
+so H changes by the work of all other terms on Δq, and of the clamp, and by nothing else. N is the mass matrix of the
+undeformed structure. H is the Jacobi integral for the spin, loads and base acceleration of the middle of the step. On a
+free hub, whose speed is an unknown, there is no such integral, and λ = 0.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem, la
+from dolfinx.fem import petsc as fem_petsc
+from petsc4py import PETSc
+
+from rotfem.equations.solutions import Solutions
+from rotfem.mechanics.effects import INTERNAL
+from rotfem.numerics import compat, forms
+
+Array = npt.NDArray[np.float64]
+
+#: Part of the energy that a step must move to have its balance put right: in less the digits of H are lost.
+MOVED = 1e-10
+
+#: Part of the energy a step moves by which it may make up for what the steps before have left.
+MADE_UP = 1e-3
+
+
+class EnergyBalance(Solutions):
+    """The equations of a nonlinear system over a step; what it does not say itself is that of the system.
+
+    Args:
+        system: the equations of motion.
+    """
+
+    def __init__(self, system: Any):
+        self.system, self.model, self.comm = system, system.model, system.comm
+        self.seconds, self._dx, self._solver = system.seconds, system._dx, None
+        self._k = system.structure.k
+        self._start, self._end, self._before, self._ahead, self._move = (fem.Function(system.V) for _ in range(5))
+        self._shifts = [system.structure.constant(c) for c in (1.0, 0.0, 0.0)]
+        self._F, self._J = forms.form(self._residual), forms.form(self._tangent)
+        self.A = fem_petsc.create_matrix(self._J)
+        self._b = la.vector(system.V.dofmap.index_map, system.V.dofmap.index_map_bs)
+        self.b, self._inertia = compat.wrap(self._b), compat.create_vector(system.V)
+        self._moved = compat.wrap(self._move.x)
+        self._owned = slice(0, system.V.dofmap.index_map.size_local * system.V.dofmap.index_map_bs)
+        self._factor = 0.0
+        #: When the last step ended, the energy there, and what its balance lacks.
+        self._left = (-np.inf, 0.0, 0.0)
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "system":
+            raise AttributeError(name)
+        return getattr(self.system, name)
+
+    # --- forms -------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _others(self) -> Any:
+        """All terms but that of the stresses."""
+        return sum(term for name, term in self.model.terms.items() if name != INTERNAL.name)
+
+    def _at(self, strain: Any, q: Any) -> Any:
+        return ufl.replace(strain.value, {self._k.q: q})
+
+    @property
+    def _residual(self) -> Any:
+        F = self._others
+        for s in self.model.mechanics.strains:
+            mean = (self._at(s, self._start) + self._at(s, self._end)) / 2
+            F += ufl.inner(s.force(mean), self._k.variation(s.value)) * s.measure
+        return F
+
+    @property
+    def _tangent(self) -> Any:
+        """The derivative, with stresses that are linear in the last correction (see `PointStresses`)."""
+        k, du = self._k, ufl.TrialFunction(self.system.V)
+        J = sum(c * ufl.derivative(self._others, x, du) for c, x in zip(self._shifts, (k.q, k.v, k.a), strict=True))
+        for s in self.model.mechanics.strains:
+            change = ufl.derivative(self._at(s, self._end), self._end, du)  # twice the half of it: q_1 = 2q − q_0
+            before = self._at(s, self._before)
+            end = before + ufl.derivative(before, self._before, self._ahead)
+            mean, varied = (self._at(s, self._start) + end) / 2, k.variation(s.value)
+            J += ufl.inner(s.force(change), varied) * s.measure
+            J += ufl.inner(s.force(mean), ufl.derivative(varied, k.q, du)) * s.measure
+        return J
+
+    @cached_property
+    def _energy(self) -> Any:
+        return forms.form(self.model.energy())
+
+    @cached_property
+    def _work(self) -> Any:
+        """F of the terms that have no part in the energy, on Δq; None if there are none."""
+        terms = self.model.terms_without_energy()
+        return forms.form(ufl.replace(sum(terms), {self._k.dq: self._move})) if terms else None
+
+    @cached_property
+    def _N(self) -> Any:
+        self.system.set_state(self.system.zeros())
+        return self.system.matrix(0.0, 0.0, 1.0, 0.0)
+
+    # --- a step ------------------------------------------------------------------------------------------------------
+
+    def begin(self, start: Any, end: float) -> None:
+        """Say where and when (s) a step starts and ends; the time of its middle is set."""
+        self._q_0, self._v_0, self._t_0, self._t_1 = start.q, start.v, start.t, end
+        self._start.x.array[:] = start.q
+        if self.model.hub is not None:
+            return
+        t, energy, left = self._left
+        follows = t == start.t
+        self._due = left if follows else 0.0
+        _ = self._N
+        self._H_0 = energy if follows and self.model.closed else self._H(start.q, start.v)
+
+    def finish(self, stage: Any) -> None:
+        """Note the energy at the end of a step that is solved, and what is left of its balance."""
+        if self.model.hub is not None:
+            return
+        self.set_state(stage.q, stage.v, stage.a)
+        given = self._given()
+        H_1 = self._H(self._end.x.array, 2 * stage.v - self._v_0)
+        self._left = self._t_1, H_1, self._due + self._H_0 + given - H_1
+
+    def prescribe(self, t: float, q: Array, v: Array, a: Array) -> None:
+        """Write the motion of the clamp: at the end of the step it is where it should be."""
+        if self.system.clamp is None:
+            return
+        dofs, h = self.system.clamp.dofs, self._t_1 - self._t_0
+        start, end = self._q_0[dofs], self.system.clamp.at(self._t_1)[0]
+        q[dofs], v[dofs] = (start + end) / 2, (end - start) / h
+        a[dofs] = (v[dofs] - self._v_0[dofs]) * 2 / h
+
+    def set_state(self, q: Array, v: Array, a: Array) -> None:
+        """Write the middle of the step, and with it its end, into what the forms are evaluated at."""
+        self._state = q, v, a
+        self._end.x.array[:] = 2 * q - self._q_0
+        self._move.x.array[:] = 2 * (q - self._q_0)
+        self.system.set_state(q, v, a)
+
+    def _H(self, q: Array, v: Array) -> float:
+        self.system.set_state(q, v)
+        return float(self.system.total(self._energy))
+
+    def _given(self) -> float:
+        """Return the work of the clamp and of the terms without energy over the step to the state set, J."""
+        work = -self.system.total(self._work)
+        if self.system.clamp is not None:
+            work += self._product(self._assembled(), self._move.x.array, self.system.clamped)
+        return float(work)
+
+    def _assembled(self) -> Array:
+        self._b.array[:] = 0.0
+        fem.assemble_vector(self._b.array, self._F)
+        if self.comm.size > 1:
+            self._b.scatter_reverse(la.InsertMode.add)
+        b: Array = self._b.array
+        return b
+
+    def _product(self, x: Array, y: Array, chosen: Any = None) -> float:
+        chosen = self._owned if chosen is None else chosen
+        here = float(x[chosen] @ y[chosen])
+        return here if self.comm.size == 1 else float(self.comm.allreduce(here))
+
+    # --- solutions ---------------------------------------------------------------------------------------------------
+
+    def residual(self) -> Any:
+        """Return −(F̄ + λ N Δq) at the state set, zero at clamped unknowns."""
+        b = self._assembled()
+        if self.model.hub is None:
+            self._balance(b)
+        np.negative(b, out=b)
+        b[self.system.clamped] = 0.0
+        return self.b
+
+    def _balance(self, b: Array) -> None:
+        """Add λ N Δq to the assembled F̄."""
+        work = self._product(b, self._move.x.array) - self.system.total(self._work)
+        self._N.mult(self._moved, self._inertia)
+        size = self._product(self._inertia.array, self._move.x.array)
+        q, v, a = self._state
+        H_1 = self._H(self._end.x.array, 2 * v - self._v_0)
+        self.system.set_state(q, v, a)
+        moved = size / (self._t_1 - self._t_0) ** 2
+        due = np.clip(self._due, -MADE_UP * moved, MADE_UP * moved)
+        enough = moved > MOVED * max(abs(self._H_0), abs(H_1))
+        self._factor = (H_1 - self._H_0 - due - work) / size if enough else 0.0
+        b[self._owned] += self._factor * self._inertia.array
+
+    def tangent(self, c_k: float, c_v: float, c_m: float, before: Array | None = None) -> tuple[Any, bool]:
+        """Return (the tangent of the residual but for the change of λ, True); clamped rows are identity rows."""
+        for constant, value in zip(self._shifts, (c_k, c_v, c_m), strict=True):
+            constant.value = value
+        self._before.x.array[:] = self._end.x.array if before is None else 2 * before - self._q_0
+        self._ahead.x.array[:] = self._end.x.array - self._before.x.array
+        self.A.zeroEntries()
+        fem_petsc.assemble_matrix(self.A, self._J, self.system.bcs)
+        self.A.assemble()
+        self.A.axpy(self._factor, self._N, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        return self.A, True
+
+    def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
+        """Return c_k K + c_v C + c_m M of the system."""
+        return self.system.matrix(c_k, c_v, c_m, diagonal)
