@@ -80,6 +80,7 @@ class Stage:
         c_v, c_a: ∂v/∂q (1/s) and ∂a/∂q (1/s²).
         over: the step that the stage is the middle of, where the balance of energy over it is to be kept; its end is
             at 2q − q_n, 2v − v_n then.
+        memory: what the balance leaves to the next step.
     """
 
     t: float
@@ -89,6 +90,7 @@ class Stage:
     c_v: float
     c_a: float
     over: Span | None = None
+    memory: Any = None
     shifts: Shifts = field(init=False)
 
     def __post_init__(self) -> None:

@@ -175,7 +175,8 @@ class Stepper:
         except ComputationError:
             if self._share == 0.0:
                 raise
-            stage.q[:], self._share, self._far = state.q, 0.0, True  # from where the step starts
+            stage.q[:] = state.q  # from where the step starts, whatever was predicted
+            self._share, self._far = 0.0, True
             stage.v[:], stage.a[:] = v + stage.c_v * stage.q, a + stage.c_a * stage.q
             iterations = self._root(stage, state)
         if self._share < WHOLE or iterations > MANY:
@@ -197,9 +198,7 @@ class Stepper:
         s = self.system
         s.set_state(stage.q, stage.v, stage.a)
         if s.model.inside_out():
-            raise ComputationError(
-                "Newton met a state that is turned inside out (an axial strain below −1)", time=stage.t
-            )
+            raise ComputationError("Newton met a state turned inside out (an axial strain below −1)", time=stage.t)
         if not s.model.closed or stage.over is not None:
             return
         new = s.energies()
@@ -251,7 +250,7 @@ class Stepper:
         self._held = stage.shifts if s.keeps_factor and not (chord and iterations > LONG) else None
         self._far = iterations > SOON
         if span is not None:
-            s.finish(stage)
+            stage.memory = s.finish(stage)
         return iterations
 
     def _solve_linear(self, increment: Any, stage: Stage, chord: bool) -> int:

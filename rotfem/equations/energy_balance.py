@@ -49,6 +49,8 @@ class EnergyBalance(Solutions):
         system: the equations of motion.
     """
 
+    keeps_factor = False
+
     def __init__(self, system: Any):
         self.system, self.model, self.comm = system, system.model, system.comm
         self.seconds, self._dx, self._solver = system.seconds, system._dx, None
@@ -61,9 +63,7 @@ class EnergyBalance(Solutions):
         self.b, self._inertia = compat.wrap(self._b), compat.create_vector(system.V)
         self._moved = compat.wrap(self._move.x)
         self._owned = slice(0, system.V.dofmap.index_map.size_local * system.V.dofmap.index_map_bs)
-        self._factor = 0.0
-        #: When the last step ended, the energy there, and what its balance lacks.
-        self._left = (-np.inf, 0.0, 0.0)
+        self._factor = self._due = 0.0
 
     def __getattr__(self, name: str) -> Any:
         if name == "system":
@@ -125,20 +125,18 @@ class EnergyBalance(Solutions):
         self._start.x.array[:] = start.q
         if self.model.hub is not None:
             return
-        t, energy, left = self._left
-        follows = t == start.t
-        self._due = left if follows else 0.0
         _ = self._N
-        self._H_0 = energy if follows and self.model.closed else self._H(start.q, start.v)
+        energy, self._due = start.memory or (None, 0.0)
+        self._H_0 = self._H(start.q, start.v) if energy is None or not self.model.closed else energy
 
-    def finish(self, stage: Any) -> None:
-        """Note the energy at the end of a step that is solved, and what is left of its balance."""
+    def finish(self, stage: Any) -> tuple[float, float] | None:
+        """Return the energy at the end of a step that is solved, and what its balance lacks, for the next one (J)."""
         if self.model.hub is not None:
-            return
+            return None
         self.set_state(stage.q, stage.v, stage.a)
         given = self._given()
         H_1 = self._H(self._end.x.array, 2 * stage.v - self._v_0)
-        self._left = self._t_1, H_1, self._due + self._H_0 + given - H_1
+        return H_1, self._due + self._H_0 + given - H_1
 
     def prescribe(self, t: float, q: Array, v: Array, a: Array) -> None:
         """Write the motion of the clamp: at the end of the step it is where it should be."""
@@ -149,8 +147,14 @@ class EnergyBalance(Solutions):
         q[dofs], v[dofs] = (start + end) / 2, (end - start) / h
         a[dofs] = (v[dofs] - self._v_0[dofs]) * 2 / h
 
-    def set_state(self, q: Array, v: Array, a: Array) -> None:
+    def set_time(self, t: float, motion: Any = None, load_factor: float = 1.0) -> None:
+        """Write the frame and load constants of time t (see `System.set_time`)."""
+        self.system.set_time(t, motion, load_factor)
+
+    def set_state(self, q: Array, v: Array | None = None, a: Array | None = None) -> None:
         """Write the middle of the step, and with it its end, into what the forms are evaluated at."""
+        assert v is not None
+        assert a is not None
         self._state = q, v, a
         self._end.x.array[:] = 2 * q - self._q_0
         self._move.x.array[:] = 2 * (q - self._q_0)
