@@ -265,33 +265,35 @@ class Farthest:
 
     Args:
         system: equations of motion.
+
+    Attributes:
+        seen: largest rotation (rad), time (s) and state (local dof array).
     """
 
     def __init__(self, system: Any):
         self.system, self.check = system, TheoryCheck(system.held)
         self._turned = np.array([not name.startswith("u") for name in system.structure.components])
-        self._size, self._t = -1.0, 0.0
-        self._q: Array = np.empty(0)
+        self.seen: tuple[float, float, Array] = (-1.0, 0.0, system.zeros())
 
     def __call__(self, q: Array, t: float) -> None:
         """Look at a state (local dof array) of time t (s)."""
         if not self.check.known:
             return
         size = float(np.max(self.system.sizes(q)[self._turned], initial=0.0))
-        if size > MORE * self._size:
-            self._size, self._t, self._q = size, t, np.array(q)
+        if size > MORE * self.seen[0]:
+            self.seen = (size, t, np.array(q))
 
     def error(self) -> TheoryError | None:
         """Return the error of the theory there; None where that fails. State and time of the system stay."""
-        system = self.system.held
+        system, (size, t, q) = self.system.held, self.seen
         if not self.check.known:
-            return self.check.of_state(self._q)
-        if self._size < 0.0:
+            return self.check.of_state(q)
+        if size < 0.0:
             return None
         state, time = [x.x.array.copy() for x in (system.q, system.v, system.a)], system.time
-        system.set_time(self._t)
+        system.set_time(t)
         try:
-            return self.check.of_state(self._q[: len(state[0])])
+            return self.check.of_state(q[: len(state[0])])
         except ComputationError:
             return None
         finally:

@@ -119,6 +119,7 @@ class Memory:
             "stepper": plain(run.stepper),
             "newton": plain(run.stepper.newton),
             "run": {name: getattr(run, name) for name in CHANGING},
+            "seen": self._packed({"farthest": run.farthest.seen, "stability": run.stability}),
             "elapsed": run.elapsed + perf_counter() - run.started,
             "factorisations": run.system.factorisations,
             "columns": list(run.record.history.columns),
@@ -144,6 +145,8 @@ class Memory:
         system.factored_before = tree["factorisations"] - system.factorisations
         for target, values in ((stepper, tree["stepper"]), (stepper.newton, tree["newton"]), (run, tree["run"])):
             vars(target).update(values)
+        seen = self._unpacked(tree["seen"])
+        run.farthest.seen, run.stability = seen["farthest"], seen["stability"]
         for row in tree["rows"]:
             run.record.history.append(row)
         if run.record.snapshots is not None:
