@@ -127,7 +127,7 @@ class TheoryCheck:
 
         Args:
             q: equilibrium of a nonlinear theory; a linear one has another, which is found here.
-            pencil: M, C and K of the structure, its hub held.
+            pencil: M, C and K, with the unknown of a free hub if there is one.
             values: λ of the modes.
             right: their vectors, one column each.
         """
@@ -136,9 +136,11 @@ class TheoryCheck:
         out = self.of_state(q)
         if not (self.known and self.unstiffened):
             return out
-        X = right[: pencil.M.getLocalSize()[0]]
         G = self._stress_stiffness(q)
-        sums = np.array([np.real(X.conj() * pencil.apply(A, X)).sum(axis=0) for A in (G, pencil.M)])
+        X = right[: G.getLocalSize()[0]]
+        clamped = Pencil(G, G, G)
+        products = ((X, clamped.apply(G, X)), (right, pencil.apply(pencil.M, right)))
+        sums = np.array([np.real(x.conj() * Ax).sum(axis=0) for x, Ax in products])
         stress, mass = pencil.comm.allreduce(sums) if pencil.comm.size > 1 else sums
         squares = np.real(-(values**2))  # ω², negative for a divergence
         own, stressed = (np.sqrt(np.maximum(square, 0.0)) for square in (squares, squares + stress / mass))

@@ -93,7 +93,7 @@ def _modes(
     if stability.stable is None or stability.held_by_spin or stability.growth > max(known, 0.0):
         warnings = [*warnings, stability.warning()]
     pairs = spinning.pairs
-    off = TheoryCheck(analysis.system.held).of_modes(spinning.q, spinning.clamped, pairs.values, pairs.right)
+    off = TheoryCheck(analysis.system.held).of_modes(spinning.q, spinning.pencil, pairs.values, pairs.right)
     if said := off.warning():
         warnings = [*warnings, said]
     result = {
