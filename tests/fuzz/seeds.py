@@ -50,6 +50,9 @@ COMPUTED: dict[str, Tables] = {
     | {"model": {"theory": "reissner", "frame": "inertial"}, "structure": _BEAM | {"damping": {"kelvin_voigt": 1e-4}}},
 }
 
+#: What mutants are made of, by the name that a failing test shows.
+SEEDS: dict[str, list[Tables]] = {"all": [*SCENES.values(), *COMPUTED.values()], "small": list(COMPUTED.values())}
+
 
 def copied(tables: Tables) -> Tables:
     """Return a copy that may be changed."""

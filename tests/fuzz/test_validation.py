@@ -13,13 +13,12 @@ from rotfem.errors import SceneError
 from rotfem.scene import Scene, load_scene
 from rotfem.scene.files import quick_rows, read_rows
 from tests.fuzz.mutants import mutants, numbers, texts, values
-from tests.fuzz.seeds import COMPUTED, SCENES
+from tests.fuzz.seeds import COMPUTED, SCENES, SEEDS
 from tests.fuzz.trying import VALIDATION, check_message, sized, within
 
-SEEDS = [*SCENES.values(), *COMPUTED.values()]
 FOLDER = str(next(iter(SCENES)).parent)
 #: Scenes as text, without those that name other files.
-TEXTS = [tomli_w.dumps(tables).encode() for tables in SEEDS]
+TEXTS = [tomli_w.dumps(tables).encode() for tables in SEEDS["all"]]
 BYTES = [
     b"\0",
     b"\xff",
@@ -48,7 +47,7 @@ def accepted(make: Any) -> Scene | None:
             return None
 
 
-@sized(mutants(SEEDS), core=400, nightly=6000)
+@sized(mutants("all"), core=400, nightly=6000)
 def test_tables_of_any_kind(tables: Any) -> None:
     scene = accepted(lambda: Scene.from_dict(tables, directory=FOLDER))
     if scene is not None:
