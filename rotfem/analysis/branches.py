@@ -134,12 +134,13 @@ class Sweep:
     Args:
         analysis: compiled scene.
         count: number of branches.
+        most: speeds that may be solved; those asked for are in any case.
     """
 
-    def __init__(self, analysis: ModalAnalysis, count: int):
+    def __init__(self, analysis: ModalAnalysis, count: int, most: float = np.inf):
         self.analysis, self.count = analysis, count
         self.nodes: list[Node] = []
-        self.solves, self.most_solves, self.unresolved = 0, ADDED, False
+        self.solves, self.most_solves, self.unresolved = 0, most, False
         self.ambiguous: list[dict[str, float]] = []
 
     def solve(self, speed: float, start: Spinning | None, requested: bool) -> Node:
@@ -154,7 +155,7 @@ class Sweep:
         first.order, first.confidence = np.arange(total), np.ones(total)
         self.nodes = [first]
         self.finest = FINEST * max(speeds[-1] - speeds[0], 1e-300)
-        self.most_solves = ADDED + (1 + ADDED_EACH) * len(speeds)
+        self.most_solves = min(self.most_solves, ADDED + (1 + ADDED_EACH) * len(speeds))
         for i, speed in enumerate(speeds[1:], start=1):
             self._advance(self.solve(speed, self.nodes[-1].spinning, True))
             progress(i / (len(speeds) - 1))

@@ -135,7 +135,7 @@ class Diagram:
     def result(self, orders: int | None, progress: Progress, started: float) -> CampbellResult:
         """Return the branches over speed, with what the diagram says."""
         analysis, count, values = self.analysis, self.scene.modes.count, self.values
-        sweep = Sweep(analysis, count)
+        sweep = Sweep(analysis, count, self.scene.limits.speeds)
         sweep.run(values, progress)
         sweep.count = count = min(count, len(sweep.nodes[0].order))
         found = [node.value(b).imag for node in sweep.nodes for b in range(count)]

@@ -92,7 +92,7 @@ def ended(arguments: list[str]) -> tuple[int, str, str]:
     return int(end.value.code or 0), out.getvalue(), err.getvalue()
 
 
-@sized(commands(), core=30, nightly=400)
+@sized(commands(), core=25, nightly=400)
 def test_commands_of_any_kind(given: tuple[list[str], Any]) -> None:
     arguments, tables = given
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):

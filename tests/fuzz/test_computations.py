@@ -17,13 +17,13 @@ VERBS = {
 }
 
 
-@sized(st.tuples(st.sampled_from(list(VERBS)), misproportioned("small")), core=60, nightly=1000)
+@sized(st.tuples(st.sampled_from(list(VERBS)), misproportioned("small")), core=25, nightly=1000)
 def test_numbers_of_any_size(given: tuple[str, Any]) -> None:
     verb, tables = given
     outcome(lambda: VERBS[verb](tables))
 
 
-@sized(st.tuples(st.sampled_from(list(VERBS)), mutants("small", most=2)), core=30, nightly=400)
+@sized(st.tuples(st.sampled_from(list(VERBS)), mutants("small", most=2)), core=15, nightly=400)
 def test_changes_of_any_kind(given: tuple[str, Any]) -> None:
     verb, tables = given
     elements = tables.get("mesh", {}).get("elements") if isinstance(tables.get("mesh"), dict) else None
