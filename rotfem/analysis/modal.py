@@ -15,6 +15,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import steady_state
+from rotfem.analysis.kept_digits import KeptDigits
 from rotfem.analysis.mode_labels import with_overdamped
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import InputError
@@ -88,6 +89,7 @@ class ModalAnalysis:
         self.free = self.system.hub is not None
         self.newton = newton or Newton()
         self._unit: float | None = None
+        self._kept = KeptDigits(self.system)
         self.past_limits, self.notes = False, list[str]()
         assembled = self.system.assembled
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
@@ -127,6 +129,8 @@ class ModalAnalysis:
         pencil.sizes = self.stiffness_sizes(pencil.K)
         pairs = pencil.solve(count, clamped.scale() if self.free else 0.0)
         self._unit = pencil.unit
+        if not self.free:
+            pairs = self._kept.better(pencil, pairs, count)
         t3 = perf_counter()
         factored = pencil.factored
         spans = {"equilibrium": t1 - t0, "assemble": t2 - t1, "factor": factored, "eigen": t3 - t2 - factored}

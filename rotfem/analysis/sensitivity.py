@@ -211,7 +211,7 @@ class Sensitivity:
         if system.linear:
             return system.material
         system.set_state(self.base_state)
-        from rotfem.numerics.eigenproblem import transposed
+        from rotfem.numerics.linear import transposed
 
         return transposed(system.matrix(1.0, 0.0, 0.0, 1.0))
 

@@ -172,6 +172,19 @@ class AffineSystem(System):
         out.array[self.clamped] = 0.0
         return out
 
+    @property
+    def prestressed(self) -> bool:
+        """Whether there is geometric stiffness at the time set."""
+        weights = self._coefficients if self._coefficients is not None else np.zeros(len(self.pieces))
+        return any(PRESTRESS in p.of and value != 0.0 for p, value in zip(self.pieces, weights, strict=True))
+
+    def add_other_stiffness(self, A: Any) -> None:
+        """Add to a matrix the stiffness at the time set that is not that of the strains: of effects and prestress."""
+        assert self._coefficients is not None
+        for p, value in zip(self.pieces, self._coefficients, strict=True):
+            if p.kind == "K" and value != 0.0 and ("internal" not in p.of or PRESTRESS in p.of):
+                A.axpy(value, p.operator)
+
     def stiffness_pieces(self) -> tuple[Any, Any]:
         """Return (K_1, K_2) of K = K_1 + Omega² K_2 without base acceleration and loads; clamped rows 1 and 0."""
         axis = self._decomposed.axis

@@ -41,7 +41,7 @@ def unknown_scale(M: Any, K: Any, unit: float) -> Any:
 
 
 @contextmanager
-def balanced(M: Any, C: Any, K: Any, unit: float = 1.0) -> Iterator[Array]:
+def balanced(M: Any, C: Any, K: Any, unit: float = 1.0, scale: Any = None) -> Iterator[Array]:
     """Change M, C and K to u² D M D, u D C D and D K D and back again; yields the owned part of D.
 
     Args:
@@ -49,8 +49,9 @@ def balanced(M: Any, C: Any, K: Any, unit: float = 1.0) -> Iterator[Array]:
         C: gyroscopic and damping matrix.
         K: stiffness matrix.
         unit: u, a power of two, 1/s.
+        scale: D, a PETSc vector of powers of two; that of the diagonal if None.
     """
-    d = unknown_scale(M, K, unit)
+    d = unknown_scale(M, K, unit) if scale is None else scale
     inverse = d.duplicate()
     inverse.array[:] = 1.0 / d.array
     for A, factor in ((M, unit**2), (C, unit), (K, 1.0)):

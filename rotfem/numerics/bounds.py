@@ -48,17 +48,20 @@ class RoundOff:
     Args:
         pencil: M, C and K.
         sizes: √ of the stiffness that entries are sums of, one for each owned unknown; by default √|K_ii|.
+        factors: part of K whose entries are no sums, but rounded relative to themselves, a PETSc matrix; None without.
     """
 
-    def __init__(self, pencil: Pencil, sizes: Array | None = None):
-        self.pencil = pencil
+    def __init__(self, pencil: Pencil, sizes: Array | None = None, factors: Any = None):
+        self.pencil, self.factors = pencil, factors
         self.sizes = np.sqrt(np.abs(pencil.K.getDiagonal().array)) if sizes is None else sizes
 
     def stiffness(self, Y: Array, X: Array) -> Array:
         """Return a bound of |y^H δK x| for the columns of Y and X (owned unknowns), over all ranks, shape (m,)."""
         squares = (self.sizes[:, None] * np.abs(X)) ** 2
-        rows = np.sqrt(self._along_rows(squares))
-        return ROUNDED * self._sum((self.sizes[:, None] * np.abs(Y) * rows).sum(axis=0))
+        rows = self.sizes[:, None] * np.sqrt(self._along_rows(squares))
+        if self.factors is not None:
+            rows += np.real(self.pencil.apply(self.factors, np.abs(X).astype(complex)))
+        return ROUNDED * self._sum((np.abs(Y) * rows).sum(axis=0))
 
     def _along_rows(self, values: Array) -> Array:
         """Return for every row the sum of values (n, m) over the columns that K has entries in."""

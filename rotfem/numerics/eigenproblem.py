@@ -19,7 +19,7 @@ from rotfem.numerics.balance import balanced, least_frequency, power_of_two
 from rotfem.numerics.bounds import RoundOff
 from rotfem.numerics.damped import MORE, damped_pairs, heavily_damped
 from rotfem.numerics.left_vectors import matched, mirror_error, mirrored
-from rotfem.numerics.linear import SMALL, use_direct_solver
+from rotfem.numerics.linear import SMALL, transposed, use_direct_solver
 
 Array = npt.NDArray[Any]
 
@@ -37,11 +37,6 @@ ZERO = 1e-3
 
 #: Relative distance at which two eigenvalues count as equal, or a real part as zero.
 SAME = 1e-6
-
-
-def transposed(A: Any) -> Any:
-    """Return Aᵀ as a new matrix (without an argument PETSc would transpose A itself)."""
-    return A.transpose(PETSc.Mat())
 
 
 @dataclass
@@ -86,8 +81,12 @@ class Pencil:
         self._smallest = 1.0
         #: Unit of λ in the eigensolver, 1/s, a power of two: numbers of order one keep all digits. None: not known yet.
         self.unit: float | None = None
-        #: Sizes of what the entries of K are sums of (see `rotfem.numerics.bounds.RoundOff`).
+        #: What the entries of K are sums of, and entries that are none (see `rotfem.numerics.bounds.RoundOff`).
         self.sizes: Array | None = None
+        self.factors: Any = None
+        #: Scale of the unknowns, powers of two (None: that of the diagonal), and whether a factor needs pivots.
+        self.unknowns: Any = None
+        self.pivots = False
         #: Time of factorisations, s.
         self.factored = 0.0
         self.spectrum_error: float | None = None
@@ -117,7 +116,9 @@ class Pencil:
         Of large matrices they are estimates from a few random signs r: the mean of ‖A r‖² is the norm's square.
         """
         out = {}
-        with balanced(self.M, self.C, self.K):  # else the unit of length would say which entries count
+        with balanced(
+            self.M, self.C, self.K, scale=self.unknowns
+        ):  # else the unit of length would say which entries count
             for name, A, sign in (("M", self.M, -1.0), ("C", self.C, 1.0), ("K", self.K, -1.0)):
                 size = A.norm()
                 out[name] = self._distance_from_transpose(A, sign) / size if size > 0 else 0.0
@@ -159,8 +160,7 @@ class Pencil:
         """
         try:
             return self._solve(count, target)
-        except ComputationError:
-            # K is singular or nearly so (a critical speed, a rigid-body mode): aim beside zero.
+        except ComputationError:  # K is singular or nearly so (a critical speed, a rigid-body mode): aim beside zero
             return self._solve(count, 0.1 * self._smallest)
 
     def _solve(self, count: int, target: float) -> Eigenpairs:
@@ -187,9 +187,8 @@ class Pencil:
         pairs = self._checked(values, (right, left), errors, small)
         values = pairs.values
         # Of ± pairs of real eigenvalues of a conservative pencil, the growing one tells all.
-        upper = np.flatnonzero(
-            (values.imag > 0.0) | ((values.imag == 0.0) & ((values.real >= 0.0) | (not self.conservative)))
-        )
+        telling = (values.real >= 0.0) | (not self.conservative)
+        upper = np.flatnonzero((values.imag > 0.0) | ((values.imag == 0.0) & telling))
         order = upper[np.argsort(np.abs(values[upper]), kind="stable")]
         return pairs.select(order)
 
@@ -226,13 +225,13 @@ class Pencil:
                 f"an eigenpair has the backward error {worst:.1e}, above {BACKWARD_TOLERANCE:.0e}",
                 advice="fewer modes.count or another mesh",
             )
-        values, bounds = RoundOff(self, self.sizes).corrected(values, left, right)
+        values, bounds = RoundOff(self, self.sizes, self.factors).corrected(values, left, right)
         return Eigenpairs(values, right, left, errors, bounds)
 
     def _right(self, M: Any, C: Any, K: Any, count: int, target: float) -> tuple[Array, Array, Array]:
         """Return (λ, x, backward error) of the pairs nearest to the target, both signs of the imaginary part."""
         unit = self.unit or 1.0
-        with balanced(M, C, K, unit) as d:
+        with balanced(M, C, K, unit, self.unknowns) as d:
             values, right, errors = self._nearest(M, C, K, count, target / unit)
         return (self.unit or 1.0) * values, d[:, None] * right, errors
 
@@ -245,7 +244,7 @@ class Pencil:
         st = pep.getST()
         if symmetric:
             K.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        use_direct_solver(st.getKSP(), n, symmetric)
+        use_direct_solver(st.getKSP(), n, symmetric, self.pivots)
         started, scaled = perf_counter(), 1.0
         try:
             pep.setUp()

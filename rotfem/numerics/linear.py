@@ -26,16 +26,26 @@ def combine(target: Any, matrices: list[Any], weights: Array) -> None:
             target.axpy(weight, A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
 
 
-def use_direct_solver(ksp: Any, size: int, symmetric: bool = False) -> None:
+def transposed(A: Any) -> Any:
+    """Return Aᵀ as a new matrix (without an argument PETSc would transpose A itself)."""
+    return A.transpose(PETSc.Mat())
+
+
+def use_direct_solver(ksp: Any, size: int, symmetric: bool = False, pivots: bool = False) -> None:
     """Make a KSP apply one factorisation: PETSc's own LU up to SMALL unknowns, MUMPS above.
 
     Args:
         ksp: PETSc KSP.
         size: number of unknowns.
         symmetric: whether the matrix is (it may be indefinite); MUMPS then needs half the memory.
+        pivots: whether rows must change places, as where zeros are on the diagonal: PETSc's own LU does not.
     """
     ksp.setType(PETSc.KSP.Type.PREONLY)
     pc = ksp.getPC()
+    if pivots:
+        pc.setType(PETSc.PC.Type.LU)
+        pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+        return
     if ksp.comm.size > 1 and size <= SMALL:
         # Every process factors the whole small matrix: far quicker than sharing it out.
         pc.setType(PETSc.PC.Type.REDUNDANT)

@@ -35,6 +35,7 @@ class Beam(Structure):
     """
 
     prestressing: ClassVar[tuple[str, ...]] = ("axial",)
+    stiff: ClassVar[tuple[str, ...]] = ("axial", "shear", "shear_2", "shear_3", "section")
     #: Family ↦ the components whose kinetic energy counts, and the one whose nodes are counted.
     families: ClassVar[dict[str, tuple[tuple[int, ...], int]]]
 

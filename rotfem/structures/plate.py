@@ -64,6 +64,7 @@ class Plate(Structure):
     type = "plate"
     components = ("u1", "u2", "u3", "alpha1", "alpha2")
     prestressing: ClassVar = ("membrane",)
+    stiff: ClassVar = ("shear",)
     unstiffened: ClassVar = ("in-plane",)
     #: Conjugates of the tip's components: inputs of the state-space model.
     tip_inputs = ("tip_force_1", "tip_force_2", "tip_force_3", "tip_moment_alpha1", "tip_moment_alpha2")

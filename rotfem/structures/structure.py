@@ -53,6 +53,8 @@ class Structure:
     dimension: ClassVar[int] = 3
     #: Strains whose force makes geometric stiffness in the prestressed linear theories.
     prestressing: ClassVar[tuple[str, ...]]
+    #: Strains whose stiffness may outweigh that of the others by so much that round-off of it spoils them.
+    stiff: ClassVar[tuple[str, ...]] = ()
 
     #: Mode families that the force of the spinning structure stiffens in the exact theory only.
     unstiffened: ClassVar[tuple[str, ...]] = ()

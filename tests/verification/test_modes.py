@@ -28,6 +28,7 @@ from rotfem.analysis.state_space import state_space, write_matrices
 from rotfem.commands.campbell import campbell
 from rotfem.commands.problem import Problem
 from rotfem.numerics import eigenproblem as pencil
+from rotfem.numerics.linear import transposed
 from rotfem.results import ModesResult
 from rotfem.results.plots import plot
 
@@ -376,9 +377,9 @@ def test_left_vectors(unit_beam: Any, theory: str, conservative: bool) -> None:
     result = modes(unit_beam(changes | {"model.theory": theory}))
     p, pairs = result.spinning.pencil, result.spinning.pairs
     assert p.conservative is conservative
-    transposed = [pencil.transposed(A) for A in (p.M, p.C, p.K)]
+    transposes = [transposed(A) for A in (p.M, p.C, p.K)]
     for j, lam in enumerate(pairs.values):
-        for operators, x, z in (((p.M, p.C, p.K), pairs.right, lam), (transposed, pairs.left, lam.conjugate())):
+        for operators, x, z in (((p.M, p.C, p.K), pairs.right, lam), (transposes, pairs.left, lam.conjugate())):
             terms = [c * p.apply(A, x[:, j]) for c, A in zip((z**2, z, 1.0), operators, strict=True)]
             assert np.linalg.norm(sum(terms)) < 1e-9 * np.linalg.norm(terms[0])
     gram = p.gram(pairs.left, pairs.values, pairs.right, pairs.values)

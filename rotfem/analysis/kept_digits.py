@@ -1,0 +1,120 @@
+"""Modes once more, with the stiff strains as unknowns, where round-off of the stiffness has spoilt them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.equations.resultants import Resultants, Saddle
+from rotfem.errors import ComputationError
+from rotfem.numerics.balance import power_of_two
+from rotfem.numerics.bounds import ROUNDED, relative
+from rotfem.numerics.eigenproblem import Eigenpairs, Pencil
+
+Array = npt.NDArray[Any]
+
+#: Error bound from which digits are lost, so that the modes are computed once more.
+LOST = 1e-5
+
+
+class KeptDigits:
+    """Modes of a system from its saddle form; compiled when it is first needed.
+
+    Args:
+        system: equations of motion of the structure, hub held.
+    """
+
+    def __init__(self, system: Any):
+        self.system = system
+        self._resultants: Resultants | None = None
+
+    def better(self, pencil: Pencil, pairs: Eigenpairs, count: int) -> Eigenpairs:
+        """Return the pairs, or those of the saddle form where digits are lost and it keeps more of them.
+
+        Args:
+            pencil: M, C and K at the state that is set.
+            pairs: its eigenpairs.
+            count: number of pairs wanted.
+        """
+        worst = float(np.max(pairs.bounds[:count], initial=0.0))
+        if worst <= LOST or not Resultants.possible(self.system):
+            return pairs
+        if self._resultants is None:
+            self._resultants = Resultants(self.system)
+        saddle = self._resultants.at_state(pencil.M, pencil.C)
+        kept = saddle_pencil(saddle, pencil.unit or 1.0)
+        try:
+            found = kept.solve(count)
+        except ComputationError:
+            return pairs
+        n = pairs.right.shape[0]
+        right, left, bounds = found.right[:n], found.left[:n], found.bounds
+        if saddle.stressed is not None:
+            of_stress = ROUNDED * np.abs(_product(pencil, left, pencil.apply(saddle.stressed, right)))
+            MX, CX = (pencil.apply(A, right) for A in (pencil.M, pencil.C))
+            slope = np.abs(_product(pencil, left, 2 * found.values * MX + CX) * found.values)
+            bounds = bounds + relative(of_stress / np.maximum(slope, np.finfo(float).tiny))
+        if len(bounds) < min(count, len(pairs.bounds)) or _digits(bounds[:count]) <= _digits(pairs.bounds[:count]):
+            return pairs
+        pencil.spectrum_error = kept.spectrum_error
+        return Eigenpairs(found.values, right, left, found.errors, bounds)
+
+
+def _product(pencil: Pencil, Y: Array, X: Array) -> Array:
+    """Return y^H x of all columns, over all ranks."""
+    local = np.sum(Y.conj() * X, axis=0)
+    return np.asarray(pencil.comm.allreduce(local) if pencil.comm.size > 1 else local)
+
+
+def _digits(bounds: Array) -> float:
+    """Return how many digits relative bounds leave, in the mean."""
+    return -float(np.mean(np.log10(np.maximum(bounds, np.finfo(float).eps)))) if len(bounds) else 0.0
+
+
+def saddle_pencil(saddle: Saddle, unit: float) -> Pencil:
+    """Return the pencil of a saddle form, its unknowns scaled so that neither stiff nor soft strains are lost.
+
+    Unknowns are scaled by what soft strains, or where there are none the inertia at a frequency of the size wanted,
+    make of them; the equation of each strain by its largest entry.
+
+    Args:
+        saddle: the matrices.
+        unit: size of the frequencies, 1/s.
+    """
+    pencil = Pencil(saddle.M, saddle.C, saddle.K)
+    n = saddle.rest.getLocalSize()[0]
+    d, mass = saddle.K.createVecRight(), saddle.M.getDiagonal().array[:n]
+    rest = np.abs(saddle.rest.getDiagonal().array)
+    size = np.maximum(rest, unit**2 * np.abs(mass))
+    d.array[:] = 1.0
+    d.array[:n] = power_of_two(1.0 / np.sqrt(np.where(size > 0.0, size, 1.0)))
+    rows = saddle.factors.copy()
+    rows.diagonalScale(None, _first(d, n))
+    strains = _largest_in_rows(rows)[n:]
+    d.array[n:] = power_of_two(1.0 / np.where(strains > 0.0, strains, 1.0))
+    pencil.unknowns, pencil.pivots, pencil.unit = d, True, unit
+    factors = saddle.factors.copy()
+    indptr, indices, data = factors.getValuesCSR()
+    factors.setValuesCSR(indptr, indices, np.abs(data))
+    factors.assemble()
+    pencil.factors = factors
+    pencil.sizes = np.zeros(d.getLocalSize())
+    pencil.sizes[:n] = np.sqrt(rest)
+    return pencil
+
+
+def _largest_in_rows(A: Any) -> Array:
+    """Return the size of the largest entry of every owned row."""
+    indptr, _, data = A.getValuesCSR()
+    out = np.zeros(len(indptr) - 1)
+    np.maximum.at(out, np.repeat(np.arange(len(out)), np.diff(indptr)), np.abs(data))
+    return out
+
+
+def _first(d: Any, n: int) -> Any:
+    """Return a copy of a vector that is zero but for its first n owned entries."""
+    out = d.copy()
+    out.array[n:] = 0.0
+    return out
