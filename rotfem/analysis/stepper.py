@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rotfem.analysis.roots import came_true, check_root, turned_with_clamp
 from rotfem.analysis.schemes import Array, Scheme, Shifts, Stage, State
 from rotfem.analysis.turning import keep_rotations_small
 from rotfem.errors import ComputationError
@@ -25,9 +26,6 @@ SOON = 6
 
 #: Newton iterations after which the prediction of the next step is questioned, and its share that is taken for all.
 MANY, WHOLE = 3, 0.9
-
-#: Part of the kinetic and strain energy by which a root that Newton strayed to may exceed the energy there was.
-MORE_ENERGY = 0.03
 
 #: A linear step is refined with an old factor up to this relative error, as long as that shrinks at this rate, or to
 #: where it stays at round-off.
@@ -163,7 +161,7 @@ class Stepper:
                     self._failed = 0
                     return
             self._pause = max(self._pause - 1, 0)
-        if self.system.linear:
+        if self.system.solved_at_once:
             self._iterate(stage, state)
             return
         move = stage.q - state.q
@@ -186,29 +184,8 @@ class Stepper:
         """Solve a stage of a nonlinear system, see that it is the motion's and return the iterations."""
         iterations = self._iterate(stage, state)
         if self.newton.strayed:
-            self._check_root(stage, state)
+            check_root(self.system, stage, state)
         return iterations
-
-    def _check_root(self, stage: Stage, state: State) -> None:
-        """Refuse a root of a stage that is not the motion's.
-
-        Raises:
-            ComputationError: it is turned inside out, or has energy that nothing has given it.
-        """
-        s = self.system
-        s.set_state(stage.q, stage.v, stage.a)
-        if s.model.inside_out():
-            raise ComputationError("Newton met a state turned inside out (an axial strain below −1)", time=stage.t)
-        if not s.model.closed or stage.over is not None:
-            return
-        new = s.energies()
-        s.set_state(state.q, state.v, state.a)
-        old = s.energies()
-        grown, there = new["jacobi"] - old["jacobi"], max(e["kinetic"] + e["strain"] for e in (old, new))
-        if grown > MORE_ENERGY * there:
-            raise ComputationError(
-                f"Newton met a state with {grown:.2g} J more than there were, of {there:.2g} J", time=stage.t
-            )
 
     def _new_factor_pays(self, t: float) -> bool:
         """Return whether the matrix stays as it is from now on, while the factor is that of another."""
@@ -235,9 +212,9 @@ class Stepper:
             dq = s.chord() if chord else s.correction(stage.shifts, before if self._far else None)
             followed += 1
             size = float(s.increment_size(dq))
-            if not s.linear:
+            if not s.solved_at_once:
                 before = stage.q.copy()
-            stage.correct(dq if s.linear or size <= REACH else dq * (REACH / size))
+            stage.correct(dq if s.solved_at_once or size <= REACH else dq * (REACH / size))
             return size
 
         try:
@@ -286,13 +263,13 @@ class Stepper:
         try:
             return self.step(state, h, end)
         except ComputationError as error:
-            if self.system.linear:
+            if self.system.solved_at_once:
                 raise
             if halvings == 0:
                 raise ComputationError(
                     f"{error.what} (the step was cut down to {h:.3g} s)",
                     time=error.time,
-                    advice="a smaller time.step, or a look at the load and speed at this time",
+                    advice='a smaller time.step, time.scheme = "energy_conserving", or a look at load and speed then',
                 ) from None
             self.substeps += 1
             middle = self.advance(state, h / 2, None, halvings - 1)
@@ -303,20 +280,3 @@ class Stepper:
         error = self.scheme.local_error(new, old)
         assert error is not None
         return float(self.system.size(error))
-
-
-def turned_with_clamp(clamp: Any, state: State, stage: Stage) -> Array:
-    """Return q of a stage predicted by a turn with the clamp and the velocity relative to it."""
-    if stage.over is None:
-        return np.asarray(clamp.turned(state.q, state.v, state.t, stage.t))
-    return np.asarray((state.q + clamp.turned(state.q, state.v, state.t, stage.over.end)) / 2)
-
-
-def came_true(system: Any, move: Array, predicted: Array) -> float:
-    """Return the share of a predicted move that makes it closest to the one that came, between 0 and 1.
-
-    Where the motion is smooth it is 1. Where vibrations are faster than the steps resolve a prediction of constant
-    acceleration is worse than none: they are elsewhere after every step, and h²q̈ is much larger than they are.
-    """
-    length = system.product(predicted, predicted)
-    return float(np.clip(system.product(move, predicted) / length, 0.0, 1.0)) if length > 0.0 else 1.0

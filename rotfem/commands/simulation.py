@@ -16,6 +16,7 @@ from rotfem.analysis.stability import Stability, stability_of
 from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.theory_error import Farthest, TheoryError
 from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
+from rotfem.commands import energy_growth
 from rotfem.commands.interrupts import Interrupted
 from rotfem.commands.keeper import Keeper
 from rotfem.commands.problem import scheme_of
@@ -89,11 +90,13 @@ class Simulation:
         try:
             self._steady() if self.scene.time is None else self._march(progress or (lambda share: None))
         except (ComputationError, KeyboardInterrupt) as error:
-            failure = error if isinstance(error, ComputationError) else None
+            failure = self._failure(error) if isinstance(error, ComputationError) else None
             if self.comm.size > 1 and failure is None and not isinstance(error, Interrupted):
                 raise  # the others may be anywhere
             status = "interrupted" if failure is None else "failed"
-            vars(error)["result"] = self.result(status, failure)
+            vars(failure or error)["result"] = self.result(status, failure)
+            if failure is not None and failure is not error:
+                raise failure from error
             raise
         return self.result("done")
 
@@ -205,6 +208,8 @@ class Simulation:
         """Return everything computed so far with a summary of how it went."""
         history = self.record.history.arrays()
         self._warn_of_steps()
+        if failure is None and self.stepper is not None and (said := energy_growth.said(self.system, history)):
+            self.warnings.append(said)
         if status == "done" and self._critical_since is not None:
             self.warnings.append(
                 f"the speed is above {self.critical:.6g} rad/s, where the {self.problem.theory.name} stiffness is no "
@@ -218,6 +223,12 @@ class Simulation:
         if failure is not None:
             summary["failure"] = {"what": failure.what, "time": failure.time, "advice": failure.advice}
         return self.record.result(summary, history)
+
+    def _failure(self, error: ComputationError) -> ComputationError:
+        """Return a failure, with what was wrong before it as its cause if something was."""
+        if self.stepper is None:
+            return error
+        return energy_growth.with_cause(error, self.system, self.record.history.arrays())
 
     def _warn_of_steps(self) -> None:
         if self.stepper is not None and self.stepper.substeps:

@@ -128,6 +128,7 @@ class BorderedSystem:
         self.angle = self.row.angle
         self.hub = self.row.hub
         self._dz = Increment(inner.V)
+        self._whole: OverStep | None = None
 
     def __getattr__(self, name: str) -> Any:
         if name == "inner":
@@ -183,10 +184,12 @@ class BorderedSystem:
         self.row.coupled = "hub_coupling" in self.inner.model.effects and "hub_coupling" not in effects
         self.angle.start()
 
-    @cached_property
+    @property
     def balance(self) -> OverStep:
-        """The equations over a whole step."""
-        return OverStep(self)
+        """The equations over a whole step, made anew where the structure's were."""
+        if self._whole is None or self._whole.inner is not self.inner.balance:
+            self._whole = OverStep(self)
+        return self._whole
 
     # --- solutions ---------------------------------------------------------------------------------------------------
 
@@ -287,6 +290,7 @@ class OverStep(BorderedSystem):
     inner: Any
 
     def __init__(self, whole: BorderedSystem):
+        _ = whole.row  # of the forms that are now
         vars(self).update(vars(whole))
         self.inner = whole.inner.balance
 

@@ -1,0 +1,79 @@
+"""Energy and momentum that a history has from nowhere: what steps that are too long do before anything else is seen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.errors import ComputationError
+
+Array = npt.NDArray[np.float64]
+
+#: Growth of the Jacobi integral, relative to the energy that goes to and fro, that is said.
+GROWN = 0.02
+
+#: Part of the energies that round-off may make of them.
+ROUND_OFF = 1e-9
+
+#: Angular momentum from nowhere, relative to the largest that there was or was given, that is said.
+TURNED = 0.01
+
+#: Rows from which on a growth can be told from a fluctuation.
+FEWEST = 20
+
+
+def growth(history: dict[str, Array]) -> float:
+    """Return by how much the Jacobi integral grew, relative to the energy exchanged; 0 where that is nothing.
+
+    Schemes let it fluctuate with the motion by h²; so the largest of the last tenth of the rows is compared with the
+    largest of the first tenth. What is exchanged is the range of the strain energy or of the kinetic one.
+
+    Args:
+        history: columns by name; a row that is not finite and all after it are left out.
+    """
+    energies = np.array([history[name] for name in ("jacobi", "kinetic", "strain")])
+    fine = np.isfinite(energies).all(axis=0)
+    n = len(fine) if fine.all() else int(np.argmin(fine))
+    if n < FEWEST:
+        return 0.0
+    (jacobi, kinetic, strain), part = energies[:, :n], n // 10
+    exchanged = float(max(np.ptp(kinetic), np.ptp(strain)))
+    grown = float(np.max(jacobi[-part:]) - np.max(jacobi[:part]))
+    return grown / exchanged if exchanged > ROUND_OFF * np.max(np.abs(energies[1:, :n])) and grown > 0.0 else 0.0
+
+
+def said(system: Any, history: dict[str, Array]) -> str:
+    """Return what a run says of energy that came from nowhere; nothing where something gives it, or none came."""
+    if system.hub is not None:
+        return _said_of_momentum(history)
+    share = growth(history) if system.model.closed else 0.0
+    if share < GROWN:
+        return ""
+    return (
+        f"the energy has grown by {share:.2g} of what is exchanged though nothing gives any: the steps are unstable "
+        'or too long for this motion; give a smaller time.step, time.scheme = "energy_conserving", or numerical damping'
+    )
+
+
+def _said_of_momentum(history: dict[str, Array]) -> str:
+    momentum, impulse = history["angular_momentum"], history["impulse"]
+    largest = max(np.max(np.abs(momentum), initial=0.0), np.max(np.abs(impulse), initial=0.0))
+    off = float(np.ptp(momentum - impulse)) if len(momentum) else 0.0
+    if not off > TURNED * largest:
+        return ""
+    return (
+        f"the angular momentum of hub and structure is {off / largest:.2g} of itself off the impulse they were given: "
+        "the steps do not resolve how the hub moves, as where it has little inertia of its own; "
+        'give a smaller time.step or time.scheme = "energy_conserving"'
+    )
+
+
+def with_cause(error: ComputationError, system: Any, history: dict[str, Array]) -> ComputationError:
+    """Return a failure of a history, with the energy that it had gained before as its cause."""
+    cause = said(system, history)
+    if not cause or type(error) is not ComputationError:
+        return error
+    why, _, advice = cause.partition("; ")
+    return ComputationError(f"{error.what}; before that {why}", time=error.time, advice=advice.removeprefix("give "))

@@ -1,0 +1,94 @@
+"""Energy from nowhere is said, and is the cause of what it leads to; fluctuations and what is given are not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rotfem import ComputationError, run
+from rotfem.commands.energy_growth import growth
+from tests.beams import STRUCTURE
+
+T = np.linspace(0.0, 100.0, 1001)
+SHAPE = {"kinetic": 1e3 + np.cos(T), "strain": 1.0 - np.cos(T)}
+
+
+@pytest.mark.parametrize(
+    ("jacobi", "grown"),
+    [
+        (-1e3 + 0.1 * np.sin(T), 0.0),  # a scheme's fluctuation
+        (-1e3 - 0.01 * T, 0.0),  # damping
+        (-1e3 + 0.01 * T, 0.45),  # from 0.1 at the end of the first tenth to 1.0, of an exchange of 2
+        (np.where(T > 99.5, np.inf, -1e3 + 0.01 * T), 0.45),
+        (np.full_like(T, np.nan), 0.0),
+    ],
+)
+def test_growth_is_of_what_is_exchanged(jacobi: Any, grown: float) -> None:
+    assert growth({**SHAPE, "jacobi": jacobi}) == pytest.approx(grown, abs=5e-3)
+
+
+def test_what_does_not_move_does_not_grow() -> None:
+    """Round-off of a steady state is no exchange."""
+    noise = 1e-10 * np.random.default_rng(1).standard_normal((3, 1001))
+    assert growth(dict(zip(("jacobi", "kinetic", "strain"), 1e3 + noise, strict=True))) == 0.0
+
+
+def released(**time: Any) -> dict[str, Any]:
+    """Return the beam let go from 0.2 L at 3 rad/s."""
+    return {
+        "structure": STRUCTURE,
+        "motion": {"type": "constant", "speed": 3.0},
+        "mesh": {"elements": 3, "degree": 3},
+        "initial": {"tip_displacement": 2.0},
+        "time": {"end": 11.0, "step": 0.02, **time},
+    }
+
+
+def test_a_scheme_that_feeds_vibrations_is_found_out() -> None:
+    """Without numerical damping steps of 0.02 s are unstable: in 11 s they gain as much as was exchanged, or fail."""
+    try:
+        said = " ".join(run(released(scheme="generalised_alpha", spectral_radius=1.0)).summary["warnings"])
+    except ComputationError as error:
+        said = str(error)
+    assert "the energy has grown by" in said
+    assert 'time.scheme = "energy_conserving"' in said
+
+
+@pytest.mark.parametrize("time", [{"scheme": "energy_conserving"}, {"scheme": "generalised_alpha"}])
+def test_others_are_not(time: dict[str, Any]) -> None:
+    assert not any("energy" in warning for warning in run(released(**time)).summary["warnings"])
+
+
+def test_nothing_is_said_where_energy_is_given() -> None:
+    """A follower force makes the beam spin faster and faster."""
+    tables = {k: v for k, v in released(end=2.0).items() if k != "initial"}
+    tables["loads"] = {"tip_force": {"value": [0.0, 20.0], "kind": "follower"}}
+    result = run(tables)
+    assert growth(result.history) > 0.02
+    assert not any("energy" in warning for warning in result.summary["warnings"])
+
+
+def test_momentum_from_nowhere_is_said() -> None:
+    """A hub of next to no inertia is thrown about by a torque's jump in a way that long steps do not resolve."""
+    tables = {k: v for k, v in released().items() if k != "initial"}
+    tables["motion"] = {"type": "torque", "hub_inertia": 1e-2, "pulses": [[0.0, 0.5, 20.0]]}
+    tables["model"] = {"theory": "consistent_linear"}
+    for scheme, said in (("newmark", True), ("energy_conserving", False)):
+        warnings = run(tables | {"time": {"end": 1.0, "step": 0.01, "scheme": scheme}}).summary["warnings"]
+        assert any("off the impulse" in warning for warning in warnings) == said
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+def test_a_hub_without_inertia_has_that_of_the_structure(theory: str) -> None:
+    """What the hub's own inertia is no longer matters below that of the beam's first element."""
+    tables = {k: v for k, v in released().items() if k != "initial"}
+    ends = []
+    for inertia in (1e-5, 1e-12):
+        motion = {"type": "torque", "hub_inertia": inertia, "pulses": [[0.0, 0.5, 20.0]]}
+        time = {"end": 1.0, "step": 0.01, "scheme": "energy_conserving"}
+        history = run(tables | {"motion": motion, "model": {"theory": theory}, "time": time}).history
+        ends.append([history["psi"][-1], history["angular_momentum"][-1]])
+    assert ends[0] == pytest.approx(ends[1], rel=1e-3)
+    assert ends[1][1] == pytest.approx(10.0, rel=2e-3)  # 20 N·m for 0.5 s
