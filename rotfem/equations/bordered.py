@@ -10,104 +10,20 @@ solved by block elimination, one factorisation for both right-hand sides.
 
 from __future__ import annotations
 
-from functools import cached_property
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import ufl
 from petsc4py import PETSc
 
-from rotfem.equations.nonlinear import assembled, by_spin
+from rotfem.equations.hub_row import HubRow
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
-from rotfem.mechanics import work
 from rotfem.mechanics.motion import Motion
-from rotfem.numerics import compat, forms
 from rotfem.numerics.linear import Increment
 
 Array = npt.NDArray[np.float64]
-
-
-class HubRow:
-    """The hub's equation at the state that is written into a system, and its derivatives.
-
-    Args:
-        system: equations of motion of the structure.
-    """
-
-    def __init__(self, system: System):
-        self.system, self.model = system, system.model
-        assert system.model.hub is not None
-        self.angle, self.hub = system.model.hub, system.model.hub.hub
-        self.coupled = "hub_coupling" in self.model.effects
-        moments = self.model.work(self.model.turn)
-        self._moment = forms.form(sum(moments.values()))
-        outside = [term for name, term in moments.items() if not self.model.acting[name].momentum]
-        self._outside = forms.form(sum(outside)) if outside else None
-        self._work = sum(moments.values())
-        self._vector = compat.create_vector(system.V)
-
-    @cached_property
-    def _momentum(self) -> Any:
-        return forms.form(work.momentum(self.model.mechanics, self.model.turn))
-
-    @cached_property
-    def _by_spin(self) -> list[Any]:
-        return [by_spin(self.model, self._work, name) for name in ("w", "dw")]
-
-    @cached_property
-    def _row(self) -> tuple[list[Any], Any]:
-        k = self.system.structure.k
-        shifts = [self.system.structure.constant(0.0) for _ in range(3)]
-        parts = (ufl.derivative(self._work, x, k.dq) for x in (k.q, k.v, k.a))
-        return shifts, forms.form(sum(c * part for c, part in zip(shifts, parts, strict=True)))
-
-    def _value(self, form: Any) -> float:
-        """Evaluate a functional; of an uncoupled hub with the structure undeformed and at rest in the frame."""
-        system = self.system
-        if self.coupled:
-            return system.total(form)
-        state = [x.x.array.copy() for x in (system.q, system.v, system.a)]
-        system.set_state(np.zeros_like(state[0]))
-        value = system.total(form)
-        system.set_state(*state)
-        return value
-
-    def residual(self, t: float) -> float:
-        """Return I_R psi'' + c psi' + (work in the turn) − M(t), N·m."""
-        _, speed, rate = self.angle.values
-        own = self.hub.inertia * rate + self.hub.damping * speed
-        return float(own + self._value(self._moment) - self.hub.torque.at(t))
-
-    def diagonal(self, c_v: float, c_m: float) -> float:
-        """Return ∂(residual)/∂psi: c_v ∂/∂psi' + c_m ∂/∂psi''."""
-        by_speed = self._value(self._by_spin[0]) + self.hub.damping
-        by_rate = self._value(self._by_spin[1]) + self.hub.inertia
-        return c_v * by_speed + c_m * by_rate
-
-    def row(self, shifts: tuple[float, float, float]) -> Any:
-        """Return ∂(residual)/∂q as a PETSc vector (reused); zero if uncoupled."""
-        if not self.coupled:
-            self._vector.zeroEntries()
-            return self._vector
-        constants, form = self._row
-        for constant, value in zip(constants, shifts, strict=True):
-            constant.value = value
-        return assembled(form, self.system.V, self.system.clamped, self._vector)
-
-    def outside(self) -> float:
-        """Return the moment of all forces that are no change of momentum, with torque and brake left out (N·m)."""
-        return -self._value(self._outside) if self._outside is not None else 0.0
-
-    def angular_momentum(self) -> float:
-        """Return the angular momentum of hub and structure about the axis, kg·m²/s (rigid structure if uncoupled)."""
-        return self.hub.inertia * float(self.angle.values[1]) + self._value(self._momentum)
-
-    def kinetic(self) -> float:
-        """Return ½ I_R psi'², J."""
-        return 0.5 * self.hub.inertia * float(self.angle.values[1]) ** 2
 
 
 class BorderedSystem:
