@@ -28,7 +28,7 @@ from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 
 from rotfem.equations.pieces import set_diagonal
-from rotfem.errors import ComputationError
+from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.theories import richest, theories
 from rotfem.numerics import forms
 from rotfem.numerics.eigenproblem import Pencil
@@ -36,9 +36,6 @@ from rotfem.numerics.inertia import negative_eigenvalues
 from rotfem.numerics.linear import DirectSolver, Increment
 
 Array = npt.NDArray[np.float64]
-
-#: By how much a rotation must exceed the largest one so far to be looked at in its place.
-MORE = 1.02
 
 #: What the error of nonlinear strains is multiplied by for that of the lines that forces act on.
 LINES = 2.0
@@ -84,10 +81,11 @@ class TheoryCheck:
 
     Args:
         system: equations of motion, the hub held.
+        motion: of the frame; that of the system if None.
     """
 
-    def __init__(self, system: Any):
-        self.system, self.structure = system, system.structure
+    def __init__(self, system: Any, motion: Motion | None = None):
+        self.system, self.structure, self.motion = system, system.structure, motion or system.motion
         self.theory = system.model.theory
         self._forms: tuple[Any, Any] | None = None
 
@@ -122,26 +120,26 @@ class TheoryCheck:
             out = max(out, self._without_stress(q), key=lambda error: error.estimate)
         return out
 
-    def of_modes(self, q: Array, pencil: Pencil, values: Any, right: Any) -> TheoryError:
-        """Return the error of frequencies about an equilibrium; the speed that is set is that of it.
+    def of_modes(self, q: Array, values: Any, modes: Any, massed: Any) -> TheoryError:
+        """Return the error of frequencies about an equilibrium.
 
         Args:
             q: equilibrium of a nonlinear theory; a linear one has another, which is found here.
-            pencil: M, C and K, with the unknown of a free hub if there is one.
             values: λ of the modes.
-            right: their vectors, one column each.
+            modes: x, one column each, of the locally owned unknowns (that of a free hub may follow them).
+            massed: M x.
         """
+        self.system.set_time(0.0, self.motion)
         if self.known and self.theory.linear:
             q = self._under_load()
         out = self.of_state(q)
         if not (self.known and self.unstiffened):
             return out
         G = self._stress_stiffness(q)
-        X = right[: G.getLocalSize()[0]]
-        clamped = Pencil(G, G, G)
-        products = ((X, clamped.apply(G, X)), (right, pencil.apply(pencil.M, right)))
+        X = modes[: G.getLocalSize()[0]]
+        products = ((X, Pencil(G, G, G).apply(G, X)), (modes, massed))
         sums = np.array([np.real(x.conj() * Ax).sum(axis=0) for x, Ax in products])
-        stress, mass = pencil.comm.allreduce(sums) if pencil.comm.size > 1 else sums
+        stress, mass = self.system.comm.allreduce(sums) if self.system.comm.size > 1 else sums
         squares = np.real(-(values**2))  # ω², negative for a divergence
         own, stressed = (np.sqrt(np.maximum(square, 0.0)) for square in (squares, squares + stress / mass))
         errors = np.abs(stressed - own) / np.maximum(np.abs(values), 1e-300)
@@ -174,7 +172,7 @@ class TheoryCheck:
         system.set_time(t, system.motion.at_speed(0.0), 0.0)
         system.set_state(np.zeros_like(q))
         K = system.matrix(1.0, 0.0, 0.0, 1.0)
-        system.set_time(t)
+        system.set_time(t, self.motion)
         system.set_state(q)
         force, sizes = K.createVecs()[0], []
         moves = np.array([name.startswith("u") for name in self.structure.components])
@@ -260,44 +258,3 @@ class TheoryCheck:
 def stiffened() -> Any:
     """Return the poorest linear theory that has the stiffening by stress."""
     return next(theory for theory in theories() if theory.linear and theory.prestress)
-
-
-class Farthest:
-    """Remembers the state of a motion with the largest rotation, where a theory is farthest from the exact one.
-
-    Args:
-        system: equations of motion.
-
-    Attributes:
-        seen: largest rotation (rad), time (s) and state (local dof array).
-    """
-
-    def __init__(self, system: Any):
-        self.system, self.check = system, TheoryCheck(system.held)
-        self._turned = np.array([not name.startswith("u") for name in system.structure.components])
-        self.seen: tuple[float, float, Array] = (-1.0, 0.0, system.zeros())
-
-    def __call__(self, q: Array, t: float) -> None:
-        """Look at a state (local dof array) of time t (s)."""
-        if not self.check.known:
-            return
-        size = float(np.max(self.system.sizes(q)[self._turned], initial=0.0))
-        if size > MORE * self.seen[0]:
-            self.seen = (size, t, np.array(q))
-
-    def error(self) -> TheoryError | None:
-        """Return the error of the theory there; None where that fails. State and time of the system stay."""
-        system, (size, t, q) = self.system.held, self.seen
-        if not self.check.known:
-            return self.check.of_state(q)
-        if size < 0.0:
-            return None
-        state, time = [x.x.array.copy() for x in (system.q, system.v, system.a)], system.time
-        system.set_time(t)
-        try:
-            return self.check.of_state(q[: len(state[0])])
-        except ComputationError:
-            return None
-        finally:
-            system.set_time(time)
-            system.set_state(*state)

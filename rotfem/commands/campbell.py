@@ -18,7 +18,7 @@ from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
 from rotfem.commands.finite import check_rows
 from rotfem.commands.mode_tables import advice, instabilities, mode_rows, unreliable, unstiffened
-from rotfem.commands.modes import analysis_of, hints_of
+from rotfem.commands.modes import analysis_of, hints_of, theory_error
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import SceneError, input_of
@@ -152,6 +152,8 @@ class Diagram:
         ends = mode_rows(analysis, sweep.nodes[-1].spinning)[:count]
         warnings = [] if self.choice is not None else advice(analysis, fastest)
         warnings += [*unstiffened(analysis, fastest, ends), *told(sweep, labels, onsets, ends)]
+        off = theory_error(analysis, sweep.nodes[-1].spinning)
+        warnings += [off.warning()] if off.warning() else []
         summary = {
             **modal_summary("campbell", analysis, self.scene, self.choice, started),
             "branches": [{"branch": b + 1, "label": labels[b], **branch_summary(sweep, b)} for b in range(count)],
@@ -161,6 +163,7 @@ class Diagram:
             "ambiguous": sweep.ambiguous,
             "speeds": len(values),
             "speeds_solved": sweep.solves,
+            "theory_error": off.summary(),
             "checks": self_checks(analysis, sweep.nodes[-1].spinning),
             **analysis.report(),
             "lowest_frequency": lowest,

@@ -17,10 +17,10 @@ from mpi4py import MPI
 
 from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.equilibrium import check_steady
-from rotfem.analysis.modal import ModalAnalysis
+from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.stability import stability_of_pencil
-from rotfem.analysis.theory_error import TheoryCheck
+from rotfem.analysis.theory_error import TheoryCheck, TheoryError
 from rotfem.commands.finite import check_rows
 from rotfem.commands.mode_tables import advice, mode_tables, scaled
 from rotfem.commands.problem import Problem, case_of
@@ -92,8 +92,7 @@ def _modes(
     known = GROWS_AS_SAID * max(row["growth"] for row in found.rows if row["stability"] != "neutral")
     if stability.stable is None or stability.held_by_spin or stability.growth > max(known, 0.0):
         warnings = [*warnings, stability.warning()]
-    pairs = spinning.pairs
-    off = TheoryCheck(analysis.system.held).of_modes(spinning.q, spinning.pencil, pairs.values, pairs.right)
+    off = theory_error(analysis, spinning)
     if said := off.warning():
         warnings = [*warnings, said]
     result = {
@@ -123,6 +122,13 @@ def _modes(
 
         done.sensitivities = derivatives(analysis, spinning)
     return done
+
+
+def theory_error(analysis: ModalAnalysis, spinning: Spinning) -> TheoryError:
+    """Return how far the theory is off at one speed."""
+    system = analysis.system.held
+    check = TheoryCheck(system, system.motion.at_speed(spinning.speed))
+    return check.of_modes(spinning.q, spinning.pairs.values, analysis.right(spinning), analysis.mass_times(spinning))
 
 
 def analysis_of(scene: Scene, problem: ProblemData, comm: MPI.Comm) -> ModalAnalysis:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from rotfem.analysis.schemes import Array, State
+from rotfem.analysis.stability import Stability, stability_of
 
 
 class Moment:
@@ -41,6 +42,10 @@ class Moment:
     def energies(self) -> dict[str, float]:
         """Return kinetic and strain energy and the Jacobi integral, J."""
         return dict(self._set().energies())
+
+    def stability(self) -> Stability:
+        """Return what becomes of small disturbances of an equilibrium (see `rotfem.analysis.stability`)."""
+        return stability_of(self.system, self.state.q, self.speed)
 
     def hub(self) -> dict[str, float]:
         """Return what the history has of a free hub: `torque`, `hub_kinetic`, …; empty where none is free.

@@ -11,10 +11,11 @@ from mpi4py import MPI
 
 from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.equilibrium import static_tip_shape, steady_state
+from rotfem.analysis.farthest_state import Farthest
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability, stability_of
 from rotfem.analysis.stepper import Stepper
-from rotfem.analysis.theory_error import Farthest, TheoryError
+from rotfem.analysis.theory_error import TheoryError
 from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
 from rotfem.commands import energy_growth
 from rotfem.commands.interrupts import Interrupted
