@@ -7,6 +7,7 @@ C = ∂F/∂v, K = ∂F/∂q at (q̄, 0, 0).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from time import perf_counter
 from typing import Any
 
@@ -16,6 +17,7 @@ from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.kept_digits import KeptDigits
+from rotfem.analysis.mesh_estimate import MeshEstimate
 from rotfem.analysis.mode_labels import with_overdamped
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import InputError
@@ -210,6 +212,20 @@ class ModalAnalysis:
         families = self.structure.families
         shares = {name: energy[list(components)].sum(axis=0) / total for name, (components, _) in families.items()}
         return {**shares, "hub": energy[-1] / total} if self.free else shares
+
+    def mesh_errors(self, spinning: Spinning) -> list[float]:
+        """Return for every mode how far the mesh can put its frequency off, relative (see `mesh_estimate`)."""
+        shares, names = self.shares(spinning), self.structure.components
+        turns = [c for c, name in enumerate(names) if not name.startswith("u")]
+        moves = [c for c, name in enumerate(names) if name.startswith("u")]
+        families = [name for name in shares if name != "hub"]
+        leading = np.argmax([shares[name] for name in families], axis=0)
+        bends = [bool(set(turns) & set(self.structure.families[families[i]][0])) for i in leading]
+        return self._mesh_estimate.of_shapes(self.right(spinning), [turns if bend else moves for bend in bends])
+
+    @cached_property
+    def _mesh_estimate(self) -> MeshEstimate:
+        return MeshEstimate(self.system.V)
 
     def names(self, spinning: Spinning) -> list[str]:
         """Return "kind n" for every mode, as its structure counts them; mixed ones name both families."""

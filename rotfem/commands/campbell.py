@@ -17,7 +17,7 @@ from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
 from rotfem.commands.finite import check_rows
-from rotfem.commands.mode_tables import advice, instabilities, mode_rows, unreliable, unstiffened
+from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows, unstiffened
 from rotfem.commands.modes import analysis_of, hints_of, theory_error
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.summary import modal_summary
@@ -200,7 +200,7 @@ def told(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends: li
         + ("on" if onset["until"] is None else f"to {onset['until']:.8g} rad/s")
         for onset in onsets
     ]
-    return out + [f"at {last.speed:g} rad/s, {text}" for text in (*instabilities(ends), *unreliable(ends))]
+    return out + [f"at {last.speed:g} rad/s, {text}" for text in (*instabilities(ends), *doubtful(ends))]
 
 
 def branch_labels(analysis: ModalAnalysis, first: Node, count: int) -> list[str]:
@@ -225,7 +225,10 @@ def node_rows(analysis: ModalAnalysis, node: Node, labels: list[str]) -> list[di
         if node.order[b] < 0:
             continue
         row = columns[node.order[b]]
-        kept = {k: row[k] for k in ("frequency", "frequency_hz", "damping", "growth", "residual", "error_bound")}
+        kept = {
+            k: row[k]
+            for k in ("frequency", "frequency_hz", "damping", "growth", "residual", "error_bound", "mesh_error")
+        }
         shares = {k: v for k, v in row.items() if k.startswith("share_") or k == "turning"}
         rows.append(
             {

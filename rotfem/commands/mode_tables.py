@@ -19,6 +19,10 @@ Array = npt.NDArray[Any]
 RELIABLE = 1e-4
 
 
+#: Relative error that the mesh may cause in a frequency before it is said.
+RESOLVED = 0.02
+
+
 @dataclass(frozen=True)
 class ModeTables:
     """What is said of the modes at one speed.
@@ -52,7 +56,7 @@ def mode_tables(analysis: ModalAnalysis, speed: float, count: int, *, keep: bool
     rigid = int(spinning.rigid)
     spinning.pairs = spinning.pairs.select(np.arange(min(count - rigid, len(spinning.pairs.values))))
     rows = mode_rows(analysis, spinning)
-    warnings = [*advice(analysis, speed), *unstiffened(analysis, speed, rows), *instabilities(rows), *unreliable(rows)]
+    warnings = [*advice(analysis, speed), *unstiffened(analysis, speed, rows), *instabilities(rows), *doubtful(rows)]
     rows = [{**row, "mode": row["mode"] + rigid} for row in rows]
     shapes = {f"mode {row['mode']}: {row['label']}": scaled_shape(analysis, spinning, i) for i, row in enumerate(rows)}
     return ModeTables(spinning, [rigid_row(rows), *rows] if rigid else rows, shapes, warnings)
@@ -61,7 +65,7 @@ def mode_tables(analysis: ModalAnalysis, speed: float, count: int, *, keep: bool
 def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any]]:
     """Return one row a mode: frequency (rad/s, Hz), damping ratio, growth (1/s), label, shares, errors."""
     shares, names, turning = analysis.shares(spinning), analysis.names(spinning), analysis.turning(spinning)
-    rows, pairs = [], spinning.pairs
+    rows, pairs, mesh = [], spinning.pairs, analysis.mesh_errors(spinning)
     for i, (lam, error, bound) in enumerate(zip(pairs.values, pairs.errors, pairs.bounds, strict=True)):
         size = abs(lam)
         rows.append(
@@ -77,6 +81,7 @@ def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any
                 **({"turning": turning[i]} if turning else {}),
                 "residual": float(error),
                 "error_bound": float(bound),
+                "mesh_error": mesh[i],
             }
         )
     return rows
@@ -95,6 +100,20 @@ def instabilities(rows: list[dict[str, Any]]) -> list[str]:
         for row in rows
         if row["stability"].endswith("instability")
     ]
+
+
+def doubtful(rows: list[dict[str, Any]]) -> list[str]:
+    """Return warnings of frequencies that round-off or the mesh may have put off."""
+    return [*unreliable(rows), *coarse(rows)]
+
+
+def coarse(rows: list[dict[str, Any]]) -> list[str]:
+    """Return a warning if the mesh may have put frequencies off by more than RESOLVED of them."""
+    found = {row["label"]: row["mesh_error"] for row in rows if row["mesh_error"] > RESOLVED}
+    if not found:
+        return []
+    listed = ", ".join(f"{label} by about {100 * error:.2g} %" for label, error in found.items())
+    return [f"coarse: the mesh may have put off {listed} (mesh_error); more mesh.elements, or a higher mesh.degree"]
 
 
 def unreliable(rows: list[dict[str, Any]]) -> list[str]:

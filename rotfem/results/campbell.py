@@ -63,7 +63,7 @@ class CampbellResult(Result):
     Attributes:
         summary: scene, branches, critical speeds, instabilities, self-checks, warnings, timings; JSON-able.
         rows: one dictionary a speed and branch: `speed` (rad/s), `branch`, `label`, `mode` (its name at this speed),
-            `frequency` (rad/s), `frequency_hz`, `damping`, `growth` (1/s), `residual`, `error_bound`,
+            `frequency` (rad/s), `frequency_hz`, `damping`, `growth` (1/s), `residual`, `error_bound`, `mesh_error`,
             `share_…`, `confidence` (squared correlation with the speed before), `refined` (1 where the speed was not
             asked for); of a disk `turning` (1 for a wave that travels with the spin, −1 against it, 0 for a standing
             one).

@@ -31,6 +31,7 @@ COLUMNS = {
     "damping": ("damping ratio", "1"),
     "growth": ("growth", "1/s"),
     "residual": ("backward error", "1"),
+    "mesh_error": ("relative error that the mesh may cause", "1"),
     "error_bound": ("relative error that round-off may cause", "1"),
     "confidence": ("squared correlation with the speed before", "1"),
     "turning": ("wave with the spin (1) or against it (−1)", "1"),

@@ -31,7 +31,8 @@ class ModesResult(Result):
         summary: scene, speed, modes, self-checks, warnings, timings; JSON-able.
         rows: one dictionary a mode: `mode`, `label`, `frequency` (rad/s), `frequency_hz`, `damping` (ratio), `growth`
             (1/s), `stability`, `share_…` (of the kinetic energy), `residual` (backward error),
-            `error_bound` (how far round-off can have moved the eigenvalue, relative to its size).
+            `error_bound` (how far round-off can have moved the eigenvalue, relative to its size),
+            `mesh_error` (how far the mesh can have put the frequency off, relative, as its shape tells).
         shapes: title ↦ columns along the structure: `x` (m), of a plate `y`, each component and its imaginary part,
             largest entry 1.
         sensitivities: one dictionary a mode and parameter: `mode`, `parameter`, `value`, `dfrequency` (rad/s per unit),
