@@ -140,6 +140,7 @@ class Memory:
         if list(run.record.history.columns) != tree["columns"] or set(plain(stepper)) != set(tree["stepper"]):
             raise SceneError("command line", "--resume", path, "was written by another rotfem; start the run anew")
         state, system = State(**self._unpacked(tree["state"]), given=tree["given"]), run.system.held
+        system.count_rotations_from(state.datum)
         system.refactor(self._unpacked(tree["factored"]))
         run.system.set_time(state.t)
         system.factored_before = tree["factorisations"] - system.factorisations
