@@ -1,37 +1,23 @@
-"""Forms compiled so that a kill in the middle, or two programs at once, do no harm.
-
-FFCx marks a form in its cache as taken before it compiles it, and waits ten seconds for a form that is taken. What was
-killed in between is taken for ever; what takes longer than that, as the forms of spatial beams do, fails in a second
-program that wants it at the same time. Here who compiles holds a lock on the form, which ends with the process: what is
-taken but not locked was left behind, and is made anew.
-"""
+"""Forms compiled so that a kill in the middle, two programs at once, or a damaged cache do no harm."""
 
 from __future__ import annotations
 
-import fcntl
-import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from hashlib import sha1
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import basix
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
-from dolfinx import jit as dolfinx_jit
 from ufl.algorithms import expand_derivatives
 from ufl.algorithms.map_integrands import map_integrand_dags
 from ufl.constantvalue import Zero
 from ufl.corealg.multifunction import MultiFunction
 
-#: What FFCx says when it has waited in vain, with the file that is in the way; what dolfinx says on the other ranks.
-IN_VAIN, ELSEWHERE = re.compile(r"remove (.*\.c)\)"), "Compilation failed on root node"
+from rotfem.numerics import form_cache
 
-#: Seconds to wait for a form that is taken, though the lock on it is ours.
-PATIENCE = 1
-
+#: What dolfinx says on the other ranks when rank 0 could not compile a form.
+ELSEWHERE = "Compilation failed on root node"
 
 #: Flags of the C compiler for what is assembled often, and for what is assembled a few times on a few cells.
 OFTEN, SELDOM = ["-O2", "-g0", "-w"], ["-O0", "-g0", "-w"]
@@ -93,40 +79,41 @@ def integral_count(f: Any) -> int:
     return 0 if expanded.empty() else len(expanded.integrals())
 
 
-def _compiled(compile_it: Callable[[dict[str, int]], Any], comm: Any, name: str) -> Any:
-    with _locked(comm, name) as options:
-        try:
-            return compile_it(options)
-        except (TimeoutError, RuntimeError) as error:
-            left_behind = IN_VAIN.search(str(error))
-            # dolfinx lets all ranks fail together, so that all come here.
-            if left_behind is None and ELSEWHERE not in str(error):
-                raise
-            if not comm.bcast(left_behind is not None, root=0):
-                raise
-            if comm.rank == 0 and left_behind is not None:
-                Path(left_behind[1]).unlink(missing_ok=True)
-            comm.Barrier()
-            return compile_it(options)
-
-
-@contextmanager
-def _locked(comm: Any, name: str) -> Iterator[dict[str, int]]:
-    """Let one program at a time compile what has this name, on its rank 0, for which dolfinx lets the others wait."""
+def _compiled(compile_it: Callable[[dict[str, Any]], Any], comm: Any, name: str) -> Any:
+    """Return what is compiled, on its rank 0 first; if that fails, from a mended cache, or from a temporary one."""
     if comm.rank != 0:
-        yield {}
-        return
-    try:
-        cache = Path(dolfinx_jit.get_options()["cache_dir"])
-        cache.mkdir(parents=True, exist_ok=True)
-        file = (cache / "rotfem.lock").open("w")
-    except OSError:  # dolfinx will say it better
-        yield {}
-        return
-    with file:
-        try:  # a byte of the file for each name; closing it ends the lock, and so does the end of the process
-            fcntl.lockf(file, fcntl.LOCK_EX, 1, int(sha1(name.encode()).hexdigest()[:7], 16))
-            options = {"timeout": PATIENCE}
-        except OSError:  # a file system without locks
-            options = {}
-        yield options
+        return _followed(compile_it, comm)
+    watch = form_cache.Watch()
+    with form_cache.locked(name) as options:
+        try:
+            with watch:
+                return compile_it(options)
+        except Exception as error:
+            failure = error
+        if comm.bcast(watch.mend(failure)):
+            try:
+                with watch:
+                    return compile_it(options)
+            except Exception as error:
+                failure = error
+        if comm.bcast(form_cache.has_room()):
+            raise failure
+        return compile_it(options | {"cache_dir": comm.bcast(form_cache.temporary())})
+
+
+def _followed(compile_it: Callable[[dict[str, Any]], Any], comm: Any) -> Any:
+    """Return what rank 0 compiles, by the same tries: dolfinx lets all ranks fail when that one does."""
+    failure: Exception | None = None
+    for _ in ("at once", "mended"):
+        try:
+            return compile_it({})
+        except RuntimeError as error:
+            if ELSEWHERE not in str(error):
+                raise
+            if failure is not None or not comm.bcast(None):
+                failure = error
+                break
+            failure = error
+    if comm.bcast(None) and failure is not None:
+        raise failure
+    return compile_it({"cache_dir": comm.bcast(None)})

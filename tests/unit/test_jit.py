@@ -13,6 +13,7 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 from rotfem.numerics import forms
+from tests.launch import environment
 
 COMPILE = """
 import sys, time
@@ -21,6 +22,7 @@ import dolfinx.jit, ffcx.codegeneration.jit as ffcx_jit, ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
 from rotfem.numerics import forms
+from tests.launch import environment
 
 cache = Path(sys.argv[1])
 dolfinx.jit.DOLFINX_DEFAULT_JIT_OPTIONS["cache_dir"] = (cache, "")
@@ -75,3 +77,60 @@ def test_two_programs_want_one_form(tmp_path: Path) -> None:
     out = [program.communicate(timeout=120)[0] for program in both]
     assert [float(text) for text in out] == pytest.approx([1.0, 1.0], rel=1e-14)
     assert (tmp_path / "compiled.txt").read_text() == "once\n"
+
+
+def library(cache: Path) -> Path:
+    (path,) = cache.glob("libffcx_forms_*.so")
+    return path
+
+
+SOUND = """
+import sys
+from pathlib import Path
+import dolfinx.jit
+from tests.unit.test_jit import forms, mass, fem
+dolfinx.jit.DOLFINX_DEFAULT_JIT_OPTIONS["cache_dir"] = (Path(sys.argv[1]), "")
+print(fem.assemble_matrix(forms.form(mass())).to_dense().sum())
+"""
+
+
+def in_a_process(cache: Path) -> subprocess.CompletedProcess[str]:
+    """Assemble the form in a process of its own: a damaged library ends it."""
+    command = [sys.executable, "-c", SOUND, str(cache)]
+    return subprocess.run(command, env=environment(), capture_output=True, text=True, check=False, timeout=120)
+
+
+@pytest.mark.parametrize("damage", ["half", "nothing", "one bit", "no library", "no note", "all"])
+def test_a_damaged_cache_is_made_anew(cache: Path, damage: str) -> None:
+    assert float(in_a_process(cache).stdout) == pytest.approx(1.0, rel=1e-14)
+    path = library(cache)
+    whole = path.read_bytes()
+    if damage == "half":
+        path.write_bytes(whole[: len(whole) // 2])
+    elif damage == "nothing":
+        path.write_bytes(b"")
+    elif damage == "one bit":
+        path.write_bytes(whole[:-1] + bytes([whole[-1] ^ 1]))
+    elif damage == "no library":
+        path.unlink()
+    elif damage == "no note":  # as another program leaves it, cut short at the head
+        next(cache.glob("*.c.cached")).write_text("")
+        path.write_bytes(whole[:30])
+    else:
+        for file in cache.glob("libffcx*"):
+            file.write_bytes(b"\x7fELFspoilt")
+    done = in_a_process(cache)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) == pytest.approx(1.0, rel=1e-14)
+    assert done.stderr == ""
+    assert library(cache).stat().st_size == len(whole), "for ever"
+
+
+def test_a_cache_that_cannot_be_written_is_replaced_by_a_temporary_one(tmp_path: Path) -> None:
+    """A file in its place refuses everybody, root too."""
+    (tmp_path / "cache").write_text("")
+    done = in_a_process(tmp_path / "cache")
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) == pytest.approx(1.0, rel=1e-14)
+    assert done.stderr.count("cannot be written") == 1
+    assert "Traceback" not in done.stderr

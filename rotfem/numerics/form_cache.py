@@ -1,0 +1,161 @@
+"""The cache of compiled forms: what is damaged in it is made anew, what it cannot take is kept in a temporary one.
+
+FFCx marks a form in its cache as taken before it compiles it, and waits ten seconds for a form that is taken. What was
+killed in between is taken for ever; what takes longer than that, as the forms of spatial beams do, fails in a second
+program that wants it at the same time. Here who compiles holds a lock on the form, which ends with the process: what is
+taken but not locked was left behind. Nor does FFCx look at what it loads: a library that was cut short ends the process
+without a word. So the sum of each is noted beside it.
+"""
+
+from __future__ import annotations
+
+import atexit
+import fcntl
+import logging
+import re
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from hashlib import sha1, sha256
+from pathlib import Path
+from typing import Any
+
+import ffcx.codegeneration.jit as ffcx_jit
+from dolfinx import jit as dolfinx_jit
+
+#: What FFCx says when it has waited in vain, with the file that is in the way.
+IN_VAIN = re.compile(r"remove (.*\.c)\)")
+
+#: The line in FFCx's note on a form with the sum of its library.
+SUM = re.compile(r"^rotfem sha256 ([0-9a-f]{64})$", re.MULTILINE)
+
+#: Seconds to wait for a form that is taken, though the lock on it is ours.
+PATIENCE = 1
+
+#: Bytes that a cache must have room for to be of use.
+ROOM = 1 << 20
+
+_temporary: Path | None = None
+
+
+def folder() -> Path:
+    """Return where dolfinx keeps compiled forms."""
+    return Path(dolfinx_jit.get_options()["cache_dir"])
+
+
+@contextmanager
+def locked(name: str) -> Iterator[dict[str, Any]]:
+    """Let one program at a time compile what has this name; give the options of the compiler that follow from it."""
+    try:
+        cache = folder()
+        cache.mkdir(parents=True, exist_ok=True)
+        file = (cache / "rotfem.lock").open("w")
+    except OSError:  # nothing can be written there: compiling it will fail, and go elsewhere
+        yield {}
+        return
+    with file:
+        try:  # a byte of the file for each name; closing it ends the lock, and so does the end of the process
+            fcntl.lockf(file, fcntl.LOCK_EX, 1, int(sha1(name.encode()).hexdigest()[:7], 16))
+            options = {"timeout": PATIENCE}
+        except OSError:  # a file system without locks
+            options = {}
+        yield options
+
+
+class Watch:
+    """Stands in the place of FFCx's search in its cache, checks what is found, and notes the sum of what is new.
+
+    Attributes:
+        module: name of the form searched for last.
+        cache: the folder it was searched in.
+        new: whether it was not there.
+    """
+
+    def __init__(self) -> None:
+        self._real = ffcx_jit.get_cached_module
+        self.module, self.cache, self.new = "", Path(), True
+
+    def __enter__(self) -> Watch:
+        ffcx_jit.get_cached_module = self
+        return self
+
+    def __exit__(self, kind: Any, error: Any, trace: Any) -> None:
+        ffcx_jit.get_cached_module = self._real
+        if error is None and self.new and self.module:
+            self._seal()
+
+    def __call__(self, module_name: str, object_names: Any, cache_dir: Any, timeout: int) -> Any:
+        """Return what FFCx would find, after what is damaged was removed."""
+        self.module, self.cache, self.new = module_name, Path(cache_dir), True
+        if not self._is_sound():
+            self.discard()
+        found = self._real(module_name, object_names, cache_dir, timeout)
+        self.new = found[0] is None
+        return found
+
+    @property
+    def _note(self) -> Path:
+        return self.cache / f"{self.module}.c.cached"
+
+    def _libraries(self) -> list[Path]:
+        return list(self.cache.glob(f"{self.module}*.so"))
+
+    def _seal(self) -> None:
+        try:
+            (library,) = self._libraries()
+            with self._note.open("a", encoding="utf-8") as note:
+                note.write(f"\nrotfem sha256 {sha256(library.read_bytes()).hexdigest()}\n")
+        except (OSError, ValueError):  # one that is not sealed is trusted, as FFCx does
+            return
+
+    def _is_sound(self) -> bool:
+        try:
+            text = self._note.read_text(encoding="utf-8", errors="replace")
+        except OSError:
+            return True  # it is not there, or not ready
+        libraries, known = self._libraries(), SUM.search(text)
+        if len(libraries) != 1:
+            return False
+        return known is None or sha256(libraries[0].read_bytes()).hexdigest() == known[1]
+
+    def discard(self) -> bool:
+        """Remove the form from the cache; return whether that could be done."""
+        try:
+            for path in self.cache.glob(f"{self.module}.*"):
+                path.unlink(missing_ok=True)
+        except OSError:
+            return False
+        return True
+
+    def mend(self, error: Exception) -> bool:
+        """Remove what made a form of the cache fail; return whether to try again is worth it."""
+        left_behind = IN_VAIN.search(str(error))
+        if left_behind is not None:
+            Path(left_behind[1]).unlink(missing_ok=True)
+            return True
+        is_there = self._note.exists() and isinstance(error, ImportError | AttributeError | OSError | RuntimeError)
+        return is_there and self.discard()
+
+
+def has_room() -> bool:
+    """Return whether the cache can take another form."""
+    try:
+        with tempfile.TemporaryFile(dir=folder()) as file:
+            file.write(bytes(ROOM))
+        return True
+    except OSError:
+        return False
+
+
+def temporary() -> Path:
+    """Return a cache that goes with this process, and say once that it is used."""
+    global _temporary
+    if _temporary is None:
+        _temporary = Path(tempfile.mkdtemp(prefix="rotfem-forms-"))
+        atexit.register(shutil.rmtree, _temporary, ignore_errors=True)
+        logging.getLogger("rotfem").warning(
+            "rotfem: the cache of compiled forms %s cannot be written: what is not in it is compiled in every start",
+            folder(),
+        )
+    return _temporary
