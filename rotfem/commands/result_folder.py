@@ -118,7 +118,7 @@ class ResultFolder:
         problem = next((p for p in self.comm.allgather(problem) if p is not None), None)
         self.first_does(lambda files: files.close_stage(new, problem is None))
         if problem is not None:
-            raise problem
+            raise OutputError(self.path / Path(str(problem.path)).name, problem.reason)
 
 
 def _plot(result: Result, folder: Path) -> None:

@@ -127,8 +127,14 @@ class ResultSet:
         try:
             yield new
             whole = True
+        except OutputError as error:
+            raise self.outside(error) from None
         finally:
             self.close_stage(new, whole)
+
+    def outside(self, error: OutputError) -> OutputError:
+        """Return an error with a file of a hidden folder as one with the name that it would have had."""
+        return OutputError(self.folder / Path(str(error.path)).name, error.reason)
 
     def open_stage(self) -> Path:
         """Return a new hidden folder.

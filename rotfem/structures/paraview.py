@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import tempfile
 from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
@@ -16,6 +18,9 @@ from dolfinx import fem, io
 from rotfem.errors import OutputError
 
 Array = npt.NDArray[Any]
+
+#: Bytes that are written at a time.
+BLOCK = 4096
 
 #: Most snapshots of a history that are kept.
 MOST = 200
@@ -42,6 +47,38 @@ def writer(V: fem.FunctionSpace, name: str, states: Iterable[tuple[float, Array]
     return partial(write, V, name, list(states))
 
 
+def size_of_one(W: fem.FunctionSpace, fields: int) -> int:
+    """Return about how many bytes one snapshot of some fields takes, not less: its mesh is written with it.
+
+    Args:
+        W: space of a field.
+        fields: number of fields.
+    """
+    cells, nodes = W.mesh.topology.index_map(W.mesh.topology.dim), W.dofmap.index_map
+    points, cell_count = nodes.size_local + nodes.num_ghosts, cells.size_local + cells.num_ghosts
+    here = 8 * (points * (3 * fields + 5) + cell_count * (2 + W.dofmap.dof_layout.num_dofs))
+    blocks = 2 + here // BLOCK  # a whole number for each process, and what describes them
+    return int(W.mesh.comm.allreduce(blocks)) * BLOCK
+
+
+def reserve(comm: Any, path: Path, size: int) -> None:
+    """See that a file of this size (bytes) can be written, as ADIOS2 ends the program where it cannot.
+
+    Raises:
+        OutputError: on every rank; the disk is full, or a quota or a limit of the size of files is in the way.
+    """
+    problem = None
+    if comm.rank == 0:
+        try:
+            with tempfile.TemporaryFile(dir=path.parent) as file:
+                os.posix_fallocate(file.fileno(), 0, size)
+        except OSError as error:
+            problem = OutputError(path, error.strerror or str(error))
+    problem = comm.bcast(problem)
+    if problem is not None:
+        raise problem
+
+
 def write(V: fem.FunctionSpace, name: str, states: list[tuple[float, Array]], folder: Path) -> list[Path]:
     """Write the displacements of local dof arrays as name.bp (VTX), or name.xdmf without ADIOS2; return the path.
 
@@ -63,6 +100,7 @@ def write(V: fem.FunctionSpace, name: str, states: list[tuple[float, Array]], fo
     out = [fem.Function(W, name=n) for n in names]
     whole = fem.Function(full)
     path = folder / f"{name}.{'bp' if vtx else 'xdmf'}"
+    reserve(mesh.comm, path, len(states) * size_of_one(W, len(parts)))
     try:
         if vtx:
             if mesh.comm.rank == 0 and path.exists():

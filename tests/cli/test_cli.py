@@ -218,10 +218,19 @@ def test_a_failed_computation_keeps_what_it_had(rotfem: Run, here: Path) -> None
     assert all(np.all(np.isfinite(column)) for column in history.values())
 
 
-def test_json_of_a_failed_computation(rotfem: Run) -> None:
+def test_json_of_a_failed_computation(rotfem: Run, here: Path) -> None:
+    """What is printed is the summary on disk, with what failed, when, and what to try."""
     done = rotfem("run", "beam.toml", "--json", "--no-plots", *DIVERGING)
     assert done.returncode == 3
-    assert json.loads(done.stdout)["status"] == "failed"
+    summary = json.loads(done.stdout)
+    assert summary == json.loads((here / "results/beam/summary.json").read_text())
+    assert summary["status"] == "failed"
+    assert "linear solution diverged" in summary["failure"]["what"]
+    assert 8.5 < summary["failure"]["time"] < 9.5
+    assert "consistent_linear" in summary["failure"]["advice"]
+    history = read_csv(here / "results/beam/history.csv")
+    assert history["t"][-1] == pytest.approx(summary["failure"]["time"] - 0.02)
+    assert summary["figures"]["tip_u2_last"] == history["tip_u2"][-1]
 
 
 def test_debug_shows_the_traceback(rotfem: Run) -> None:
