@@ -230,7 +230,7 @@ def test_json_of_a_failed_computation(rotfem: Run, here: Path) -> None:
     assert "consistent_linear" in summary["failure"]["advice"]
     history = read_csv(here / "results/beam/history.csv")
     assert history["t"][-1] == pytest.approx(summary["failure"]["time"] - 0.02)
-    assert summary["figures"]["tip_u2_last"] == history["tip_u2"][-1]
+    assert summary["figures"]["tip_u2_final"] == history["tip_u2"][-1]
 
 
 def test_debug_shows_the_traceback(rotfem: Run) -> None:
