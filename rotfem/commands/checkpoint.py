@@ -142,6 +142,7 @@ class Memory:
         state, system = State(**self._unpacked(tree["state"]), given=tree["given"]), run.system.held
         system.count_rotations_from(state.datum)
         system.refactor(self._unpacked(tree["factored"]))
+        system.count_rotations_from(state.datum)
         run.system.set_time(state.t)
         system.factored_before = tree["factorisations"] - system.factorisations
         for target, values in ((stepper, tree["stepper"]), (stepper.newton, tree["newton"]), (run, tree["run"])):

@@ -24,7 +24,7 @@ class Solutions:
 
     Attributes:
         seconds: time spent on assembly and on solution.
-        factored: of the factor that is kept, time `t`, state `q`, `v`, `a`, `shifts` and `before` of its tangent.
+        factored: of the factor that is kept, time `t`, state `q`, `v`, `a`, `shifts`, `before` and `datum` of its tangent.
         factored_before: factorisations of the same computation before this object was made.
     """
 
@@ -60,6 +60,15 @@ class Solutions:
     def set_time(self, t: float) -> None:
         """Write what the forms depend on at time t (s)."""
 
+    @abstractmethod
+    def count_rotations_from(self, datum: Any) -> None:
+        """Count rotations from a datum; None for the undeformed structure."""
+
+    @property
+    @abstractmethod
+    def datum(self) -> Any:
+        """What rotations are counted from."""
+
     def correction(self, shifts: tuple[float, float, float], before: Array | None = None) -> Array:
         """Return −(c_k K + c_v C + c_m M)⁻¹ F at the state, Newton's correction of q (a local array, reused).
 
@@ -72,7 +81,8 @@ class Solutions:
         A, changed = self.tangent(*shifts, before)
         if changed and self.keeps_factor:
             q, v, a = (x.copy() for x in self._state)
-            self.factored = {"t": self.time, "q": q, "v": v, "a": a, "shifts": shifts, "before": before}
+            known = {"t": self.time, "q": q, "v": v, "a": a, "shifts": shifts, "before": before}
+            self.factored = {**known, "datum": self.datum}
         assembled = perf_counter()
         dq = self._dx.solve(self.factor(A, changed), b)
         self.seconds["assemble"] += assembled - started
@@ -93,6 +103,7 @@ class Solutions:
     def refactor(self, known: dict[str, Any] | None) -> None:
         """Make the factor that is kept anew from what is known of it (see `factored`); nothing from None."""
         if known is not None:
+            self.count_rotations_from(known["datum"])
             self.set_time(known["t"])
             self.set_state(known["q"], known["v"], known["a"])
             self.correction(known["shifts"], known["before"])
