@@ -24,7 +24,8 @@ class Solutions:
 
     Attributes:
         seconds: time spent on assembly and on solution.
-        factored: of the factor that is kept, time `t`, state `q`, `v`, `a`, `shifts`, `before` and `datum` of its tangent.
+        factored: of the factor that is kept, time `t`, state `q`, `v`, `a`, and `shifts`, `before`, `datum` of its
+            tangent.
         factored_before: factorisations of the same computation before this object was made.
     """
 
@@ -60,14 +61,13 @@ class Solutions:
     def set_time(self, t: float) -> None:
         """Write what the forms depend on at time t (s)."""
 
-    @abstractmethod
-    def count_rotations_from(self, datum: Any) -> None:
-        """Count rotations from a datum; None for the undeformed structure."""
+    def count_rotations_from(self, datum: Any) -> None:  # noqa: B027
+        """Count rotations from a datum, where there can be another one than the undeformed structure, None."""
 
     @property
-    @abstractmethod
     def datum(self) -> Any:
-        """What rotations are counted from."""
+        """What rotations are counted from; None for the undeformed structure."""
+        return None
 
     def correction(self, shifts: tuple[float, float, float], before: Array | None = None) -> Array:
         """Return −(c_k K + c_v C + c_m M)⁻¹ F at the state, Newton's correction of q (a local array, reused).
