@@ -35,7 +35,7 @@ FIRST, LONGEST, SHORTEST = 0.05, 0.25, 1e-6
 STRAIGHT = 0.9
 
 #: Steps before the path is given up, and iterations of a step.
-MOST_STEPS, ITERATIONS = 2000, 8
+MOST_STEPS, ITERATIONS = 500, 8
 
 #: Relative accuracy of the load at a limit point.
 LOCATED = 1e-8

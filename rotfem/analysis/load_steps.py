@@ -71,8 +71,19 @@ def counted(system: System, omega: float, share: float, q: Array, newton: Newton
     return balance(system, omega, share, recounted(system, q)[0], newton)
 
 
-def balance(system: System, omega: float, share: float, guess: Array, newton: Newton) -> Array:
-    """Solve F(q, 0, 0) = 0 by Newton's method with loads, base acceleration and omega² multiplied by share."""
+def balance(
+    system: System, omega: float, share: float, guess: Array, newton: Newton, *, looked_at: bool = True
+) -> Array:
+    """Solve F(q, 0, 0) = 0 by Newton's method with loads, base acceleration and omega² multiplied by share.
+
+    Args:
+        system: equations of motion, the hub held.
+        omega: speed, rad/s.
+        share: factor of the loads.
+        guess: where to start, a local dof array.
+        newton: iteration control.
+        looked_at: whether a state that is turned inside out is refused.
+    """
     motion = system.motion.at_speed(np.sqrt(share) * omega)
     system.set_time(0.0, motion, share)
     q, dx = guess.copy(), Increment(system.V)
@@ -91,6 +102,6 @@ def balance(system: System, omega: float, share: float, guess: Array, newton: Ne
         newton.iterations += 1
     else:
         newton.solve(increment, lambda: system.size(q))
-        if system.model.inside_out():
+        if looked_at and system.model.inside_out():
             raise ComputationError("Newton met a state that is turned inside out (an axial strain below −1)")
     return q

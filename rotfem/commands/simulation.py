@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from rotfem.analysis.constant_conditions import stability_ahead
 from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.equilibrium import static_tip_shape, steady_state
 from rotfem.analysis.farthest_state import Farthest
@@ -144,6 +145,10 @@ class Simulation:
     def _initial(self) -> Array | None:
         """Return q at t = 0 in the turning frame; None where it is undeformed."""
         initial = self.scene.initial
+        if initial.state != "steady":
+            self.stability = stability_ahead(self.system, Newton.of(self.scene.solver))
+            if self.stability is not None and (said := self.stability.warning()):
+                self.warnings.append(f"what constant conditions hold in balance: {said}")
         if initial.tip_displacement is not None:
             return static_tip_shape(self.problem, initial.tip_displacement, Newton.of(self.scene.solver), self.comm)
         if initial.state != "steady":

@@ -148,3 +148,14 @@ def test_history_from_an_unstable_equilibrium() -> None:
         summary = rotfem.run(beam((load, 0.0), **tables)).summary
         assert summary["stability"]["stable"] is stable
         assert any("starts from an equilibrium" in line for line in summary["warnings"]) is not stable
+
+
+@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
+def test_history_that_never_leaves_an_unstable_equilibrium(theory: str) -> None:
+    # A straight column under an axial load only shortens, above Euler's load as below.
+    tables = {"model": {"theory": theory}, "time": {"end": 0.05, "step": 0.01}}
+    for load, stable in ((-500.0, False), (-300.0, True)):
+        result = rotfem.run(beam((load, 0.0), **tables))
+        assert np.all(np.abs(result.tip["u2"]) < 1e-9)
+        assert result.summary["stability"]["stable"] is stable
+        assert any("unstable equilibrium" in line for line in result.summary["warnings"]) is not stable

@@ -1,0 +1,42 @@
+"""What a history under constant conditions moves about: an equilibrium, which may be unstable though nothing leaves it.
+
+A symmetric structure under symmetric loads never leaves an unstable equilibrium by itself: its history looks calm.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rotfem.analysis.equilibrium import check_steady
+from rotfem.analysis.load_steps import balance
+from rotfem.analysis.stability import Stability, stability_of
+from rotfem.errors import ComputationError, InputError
+from rotfem.mechanics.problem import Problem
+from rotfem.numerics.newton import Newton
+
+
+def are_constant(problem: Problem) -> bool:
+    """Return whether speed, base acceleration and loads are constant in a frame that turns with the hub."""
+    motion, loads = problem.motion, problem.loads
+    applied = (load for load in (loads.tip_force, loads.tip_moment, loads.distributed) if load is not None)
+    turning = problem.frame == "rotating" and motion.hub is None
+    return turning and motion.constant and all(load.constant for load in applied)
+
+
+def stability_ahead(system: Any, newton: Newton) -> Stability | None:
+    """Return the stability of the equilibrium of constant conditions; None where there is none that is found at once.
+
+    Args:
+        system: equations of motion; state and time are left at the equilibrium.
+        newton: iteration control.
+    """
+    problem = system.model.problem
+    if not are_constant(problem):
+        return None
+    speed = problem.motion.speed(0.0)
+    try:
+        check_steady(problem)
+        q = balance(system, speed, 1.0, system.zeros(), newton, looked_at=False)
+        return stability_of(system, q, speed)
+    except (ComputationError, InputError):
+        return None
