@@ -61,7 +61,7 @@ class Solutions:
     def set_time(self, t: float) -> None:
         """Write what the forms depend on at time t (s)."""
 
-    def count_rotations_from(self, datum: Any) -> None:  # noqa: B027
+    def count_rotations_from(self, datum: Any) -> None:
         """Count rotations from a datum, where there can be another one than the undeformed structure, None."""
 
     @property
