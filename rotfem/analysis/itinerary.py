@@ -91,6 +91,23 @@ class Itinerary:
                 yield i, Leg(stop, length, lands, averaged, drifts, stop == stops[-1][0])
                 begin = stop
 
+    def landings(self) -> tuple[Array, Array]:
+        """Return the times that are landed on, and rows (begin, end) of the legs that are averaged (s)."""
+        landed, averaged = [], []
+        for i, stops in sorted(self._special.items()):
+            begin = self._special[i - 1][-1][0] if i - 1 in self._special else float(self.times[i - 1])
+            for stop, lands, dense in stops:
+                landed += [stop] if lands else []
+                averaged += [(begin, stop)] if dense else []
+                begin = stop
+        return np.array(landed), np.array(averaged).reshape(-1, 2)
+
+    def bent(self, begin: float, end: float) -> float:
+        """Return how far a course is off a straight line over a stretch (s), as a part of its largest value."""
+        ends = np.array([begin, end])
+        own = ((course, points[(points > begin) & (points < end)]) for course, points in self._courses)
+        return max((float(self._deviation(course, mine, ends).max()) for course, mine in own if len(mine)), default=0.0)
+
     # --- the plan ----------------------------------------------------------------------------------------------------
 
     def _points(self, points: Array) -> Array:
@@ -160,18 +177,10 @@ class Itinerary:
             self._special[i] = legs
             for stop in stops:
                 passed = inside[(inside > begin + self.close) & (inside < stop - self.close)]
-                averaged = len(passed) > 0 and (
-                    off[i] > KINKED if len(stops) == 1 else self._kinked(begin, stop, passed)
-                )
+                averaged = len(passed) > 0 and ((off[i] if len(stops) == 1 else self.bent(begin, stop)) > KINKED)
                 stretch = np.searchsorted(edges, 0.5 * (begin + stop)) % 2 == 1
                 legs.append((stop, stop in landed, bool(averaged or stretch)))
                 begin = stop
-
-    def _kinked(self, begin: float, end: float, passed: Array) -> bool:
-        """Return whether a leg is no straight line to some course that has points in it."""
-        ends = np.array([begin, end])
-        own = ((course, points[(points > begin) & (points < end)]) for course, points in self._courses)
-        return any(len(mine) and self._deviation(course, mine, ends).max() > KINKED for course, mine in own)
 
     def _deviation(self, course: Course, points: Array, times: Array) -> Array:
         """Return how far a course is off the straight line over the step at each point, parts of its largest value."""

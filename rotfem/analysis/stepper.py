@@ -274,9 +274,3 @@ class Stepper:
             self.substeps += 1
             middle = self.advance(state, h / 2, None, halvings - 1)
             return self.advance(middle, h / 2, state.t + h if end is None else end, halvings - 1)
-
-    def local_error(self, new: State, old: State) -> float:
-        """Return the scheme's estimate of the local error of a step, in units of the unknowns' scale."""
-        error = self.scheme.local_error(new, old)
-        assert error is not None
-        return float(self.system.size(error))

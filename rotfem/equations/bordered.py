@@ -165,6 +165,10 @@ class BorderedSystem:
         """Return the product of the structure's unknowns (see `System.product`)."""
         return self.inner.product(x[:-1], y[:-1])
 
+    def deflection(self, q: Array, t: float) -> float:
+        """Return the largest of the structure's unknowns in units of their scale, over all ranks."""
+        return self.size(q)
+
     def increment_size(self, dq: Array) -> float:
         """Return the size of a correction by which Newton is judged, the angle's among them."""
         return max(self.inner.size(dq[:-1]), abs(float(dq[-1])))

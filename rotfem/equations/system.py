@@ -230,6 +230,13 @@ class System(Solutions, ABC):
         here = float((x[owned] / self.scale[owned]) @ (y[owned] / self.scale[owned]))
         return here if self.comm.size == 1 else self.comm.allreduce(here)
 
+    def deflection(self, q: Array, t: float) -> float:
+        """Return the largest unknown relative to the turning frame in units of `scale`, over all ranks."""
+        if self.clamp is None:
+            return self.size(q)
+        x = self.V.tabulate_dof_coordinates()[:, 0]
+        return self.size(self.clamp.relative(q.reshape(len(x), -1), x, t).ravel())
+
     def increment_size(self, dq: Array) -> float:
         """Return the size of a correction by which Newton is judged."""
         return self.size(dq)

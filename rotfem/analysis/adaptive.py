@@ -1,0 +1,175 @@
+"""Adaptive steps: as long as a tolerance allows, and never over anything that is prescribed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.alpha_family import GeneralisedAlpha
+from rotfem.analysis.error_measure import ErrorMeasure
+from rotfem.analysis.fixed_steps import Steps, fixed_steps
+from rotfem.analysis.itinerary import LEAST, Itinerary
+from rotfem.analysis.schemes import State
+from rotfem.analysis.stepper import Stepper, seen
+from rotfem.errors import ComputationError
+from rotfem.mechanics.courses import SAME, View
+
+Array = npt.NDArray[Any]
+
+#: Safety factor, bounds of a change, changes not worth a new factorisation, smallest relative scale.
+SAFETY, SHRINK, GROW, KEEP, FLOOR = 0.9, 0.2, 2.0, (0.9, 1.25), 1e-6
+
+#: Local errors are estimates: the tolerance is divided by this.
+MARGIN = 1.5
+
+#: Steps by which the scale of a motion is found, how alike their results must be, and errors that are noise, in units
+#: of Newton's tolerance.
+SCOUTED, ALIKE, NOISE = (50, 100), 0.6, 10.0
+
+#: The first step, the longest and the shortest, and the stretch within which knots may be too dense to be met, as parts
+#: of the end.
+FIRST, LONGEST, SHORTEST, CELL = 1e-4, 1 / 20, 1e-9, 1 / 2000
+
+#: Most a course may be off a straight line over a step, as a part of its largest value.
+BENT = 0.1
+
+#: Steps, with those taken back, after which a march is given up.
+MOST_STEPS = 500_000
+
+
+class Scout(Stepper):
+    """Steps so long that a jump of the acceleration would make them overshoot; it is spread over the next one."""
+
+    def restart(self, state: State, before: View, after: View) -> State:
+        """Return the state as it is."""
+        return state
+
+
+class AdaptiveSteps:
+    """States whose local errors add up to a tolerance, relative to the largest displacement so far.
+
+    Args:
+        stepper: what advances the system.
+        state: at t = 0.
+        steps: `Steps` with a tolerance.
+    """
+
+    def __init__(self, stepper: Stepper, state: State, steps: Any):
+        self.stepper, self.state, self.steps, self.end = stepper, state, steps, float(steps.end)
+        self.tolerance = float(steps.tolerance)
+        self.longest = steps.max_step or LONGEST * self.end
+        self.shortest = steps.min_step or SHORTEST * self.end
+        self.measure = ErrorMeasure(stepper.system, self.end)
+        cells = np.append(np.arange(round(1 / CELL)) * (CELL * self.end), self.end)
+        self.cells = Itinerary(stepper.system.courses, cells, CELL * self.end)
+        self.landings, self.dense = self.cells.landings()
+        self.least = NOISE * stepper.newton.tolerance
+        self.wanted = min(self.longest, FIRST * self.end)
+        if stepper.pace is not None:
+            self.wanted, self.largest = stepper.pace
+            return
+        self.largest = stepper.system.deflection(state.q, state.t)
+        if self.largest < FLOOR:
+            coarse, fine = (self._scouted(n) for n in SCOUTED)
+            self.largest = max(FLOOR, 0.5 * min(coarse, fine) if ALIKE * max(coarse, fine) < min(coarse, fine) else 0.0)
+
+    def __iter__(self) -> Iterator[State]:
+        """Yield the state at the end of every step.
+
+        Raises:
+            ComputationError: a step failed, or would have to be shorter than allowed, or there are too many.
+        """
+        state, wanted, stepper = self.state, self.wanted, self.stepper
+        for _ in range(MOST_STEPS):
+            if state.t >= self.end:
+                return
+            stop, h = self._next(state.t, wanted)
+            averaged, lands = self._averaged(state.t, stop), stop in self.landings
+            start = stepper.restart(state, View(), View(window=(0.0, h))) if averaged else state
+            finish = View(-1 if lands else 0, (h, 0.0) if averaged else None)
+            drifts = h <= LEAST * (1 + 1e-6) * min(self.cells.step, wanted)
+            new, ratio = self._drifted(start, h, stop, finish) if drifts else self._tried(start, h, stop, finish)
+            factor = float(np.clip(SAFETY * max(ratio, 1e-12) ** (-1 / stepper.scheme.order), SHRINK, GROW))
+            if ratio > 1.0:
+                stepper.rejected += 1
+                wanted = self._shorter(state.t, h * min(factor, SAFETY))
+                continue
+            if h >= wanted or factor < 1.0:
+                wanted = min(self.longest, h if KEEP[0] <= factor <= KEEP[1] else h * factor)
+            following = self._next(new.t, wanted)[1] if new.t < self.end else h
+            if not drifts and following != h:
+                new = stepper.scheme.resized(new, start, following)
+            if lands or averaged:
+                new = stepper.restart(new, finish, View(1 if lands else 0))
+            state, stepper.pace = new, (wanted, self.largest)
+            yield state
+        raise ComputationError(
+            f"{MOST_STEPS} steps have not reached the end",
+            time=state.t,
+            advice="a looser time.tolerance, fixed steps (time.step), or an earlier time.end",
+        )
+
+    def _scouted(self, number: int) -> float:
+        """Return the largest displacement (scaled) in so many steps, which see all that is prescribed; 0 if they fail.
+
+        Where a motion starts from nothing, errors that are small beside what it becomes would be large beside what it
+        is. The scale counts if steps of two lengths agree on it, half of it to be on the safe side.
+        """
+        system, size = self.stepper.system, 0.0
+        scout = Scout(system, GeneralisedAlpha(0.0), self.stepper.newton)
+        try:
+            for state in fixed_steps(scout, scout.scheme.start(self.state), Steps(self.end, self.end / number)):
+                size = max(size, system.deflection(state.q, state.t))
+                self.stepper.rejected += 1
+        except ComputationError:
+            return 0.0
+        return size if np.isfinite(size) else 0.0
+
+    def _tried(self, start: State, h: float, stop: float, finish: View) -> tuple[State, float]:
+        """Return the state at the end of a step, and its error as a part of what is allowed."""
+        stepper, system = self.stepper, self.stepper.system
+        with seen(system, finish):
+            new = stepper.advance(start, h, stop)
+        local = stepper.scheme.local_error(new, start)
+        assert local is not None
+        self.largest = max(self.largest, system.deflection(new.q, new.t))
+        return new, MARGIN * self.measure(local, h) / max(self.tolerance * self.largest, self.least)
+
+    def _drifted(self, start: State, h: float, stop: float, finish: View) -> tuple[State, float]:
+        """Return the state after a step between two knots that is too short to be solved for, and no error."""
+        new = self.stepper.drift(start, h, stop)
+        return (new if finish.window is None else self.stepper.struck(new, h)), 0.0
+
+    def _next(self, t: float, wanted: float) -> tuple[float, float]:
+        """Return end and length of a step from t that is about as long as wanted and steps over nothing."""
+        i = int(np.searchsorted(self.landings, t * (1 + SAME), side="right"))
+        stop = float(self.landings[i]) if i < len(self.landings) else self.end
+        left, h = stop - t, min(wanted, self.longest)
+        while h > self.cells.step and self.cells.bent(t, t + min(h, left)) > BENT:
+            h /= 2
+        if h >= left * (1 - 1e-9):
+            return stop, left
+        h = left / 2 if h > 0.6 * left else h
+        return t + h, h
+
+    def _averaged(self, begin: float, end: float) -> bool:
+        """Return whether a step meets what is denser than it can follow."""
+        i = np.searchsorted(self.dense[:, 1], begin * (1 + SAME), side="right")
+        return bool(i < len(self.dense) and self.dense[i, 0] < end * (1 - SAME))
+
+    def _shorter(self, t: float, h: float) -> float:
+        """Return the length (s) of a step to be tried again.
+
+        Raises:
+            ComputationError: it is shorter than allowed.
+        """
+        if h >= self.shortest:
+            return h
+        raise ComputationError(
+            f"the step fell below {self.shortest:.3g} s without meeting the tolerance",
+            time=t,
+            advice="a looser time.tolerance, a smaller time.min_step, or some damping",
+        )

@@ -1,0 +1,99 @@
+"""Fixed steps, gone in legs where knots of what is prescribed lie in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rotfem.analysis.itinerary import Itinerary, Leg
+from rotfem.analysis.schemes import Array, State
+from rotfem.analysis.stepper import Stepper, seen
+from rotfem.mechanics.courses import View
+
+
+@dataclass(frozen=True)
+class Steps:
+    """When a history ends, and how it is stepped: by a fixed step or to a tolerance.
+
+    Attributes:
+        end: last time, s.
+        step: fixed step, s; None for adaptive ones.
+        tolerance: error of all adaptive steps together, relative to the largest displacement; None for fixed ones.
+        max_step, min_step: bounds of an adaptive step, s; None for those of the program.
+        parts: in how many equal steps each fixed step is gone; in one, if None.
+    """
+
+    end: float
+    step: float | None = None
+    tolerance: float | None = None
+    max_step: float | None = None
+    min_step: float | None = None
+    parts: Sequence[int] | None = None
+
+    @classmethod
+    def of(cls, time: Any) -> Steps:
+        """Return the steps of anything with these attributes but the parts, as a scene's [time] table."""
+        return cls(time.end, time.step, time.tolerance, time.max_step, time.min_step)
+
+
+def fixed_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[State]:
+    """Yield the states at step, 2 step, … and end (s); the last distance may be shorter.
+
+    Raises:
+        ComputationError: a step failed, however short.
+    """
+    assert steps.step is not None
+    ahead, reached = Itinerary(stepper.system.courses, *grid(steps)), state.t
+    legs = ((number, leg) for number, leg in ahead if leg.end > reached)
+    wanted = None if steps.parts is None else set(np.cumsum(steps.parts).tolist())
+    after: Leg | None
+    number, after = next(legs, (0, None))
+    if after is not None and after.averaged and reached == 0.0:
+        state = stepper.restart(state, View(1), View(window=(0.0, after.length)))
+    while after is not None:
+        now, leg = number, after
+        number, after = next(legs, (0, None))
+        state = travel(stepper, state, leg, after)
+        if leg.whole and (wanted is None or now in wanted):
+            yield state
+
+
+def grid(steps: Steps) -> tuple[Array, float]:
+    """Return the ends of fixed steps, the first at 0, and their length (s)."""
+    assert steps.step is not None
+    n = int(np.ceil(steps.end / steps.step - 1e-9))
+    times = np.append(np.arange(n) * steps.step, steps.end)
+    if steps.parts is None:
+        return times, steps.step
+    cut = [np.linspace(a, b, m, endpoint=False) for a, b, m in zip(times, times[1:], steps.parts, strict=False)]
+    return np.append(np.concatenate(cut), steps.end), steps.step
+
+
+def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State:
+    """Return the state at the end of a leg, as the one after it starts from it.
+
+    Raises:
+        ComputationError: the step failed, however short.
+    """
+    old: State | None = None
+    if leg.drifts:
+        state = stepper.drift(state, leg.length, leg.end)
+        if leg.averaged:
+            state = stepper.struck(state, leg.length)
+    else:
+        joined = after is not None and leg.joins(after)
+        window = (leg.length, after.length if after is not None and joined else 0.0) if leg.averaged else None
+        with seen(stepper.system, View(-1 if leg.lands else 0, window)):
+            old, state = state, stepper.advance(state, leg.length, leg.end)
+    if after is None:
+        return state
+    if old is not None and not after.drifts and after.length != leg.length:
+        state = stepper.scheme.resized(state, old, after.length)
+    if leg.lands or ((leg.averaged or after.averaged) and not leg.joins(after)):
+        before = View(-1 if leg.lands else 0, (leg.length, 0.0) if leg.averaged else None)
+        ahead = View(1 if leg.lands else 0, (0.0, after.length) if after.averaged else None)
+        state = stepper.restart(state, before, ahead)
+    return state
