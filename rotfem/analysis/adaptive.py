@@ -23,11 +23,11 @@ Array = npt.NDArray[Any]
 SAFETY, SHRINK, GROW, KEEP, FLOOR = 0.9, 0.2, 2.0, (0.9, 1.25), 1e-6
 
 #: Local errors are estimates: the tolerance is divided by this.
-MARGIN = 1.5
+MARGIN = 2.5
 
 #: Steps by which the scale of a motion is found, how alike their results must be, and errors that are noise, in units
 #: of Newton's tolerance.
-SCOUTED, ALIKE, NOISE = (50, 100), 0.6, 10.0
+SCOUTED, ALIKE, NOISE = (30, 60), 0.6, 10.0
 
 #: The first step, the longest and the shortest, and the stretch within which knots may be too dense to be met, as parts
 #: of the end.
@@ -41,11 +41,11 @@ MOST_STEPS = 500_000
 
 
 class Scout(Stepper):
-    """Steps so long that a jump of the acceleration would make them overshoot; it is spread over the next one."""
+    """Steps so long that the acceleration after a knot, or before it, would make the next one overshoot."""
 
     def restart(self, state: State, before: View, after: View) -> State:
-        """Return the state as it is."""
-        return state
+        """Return the state without an acceleration."""
+        return self.scheme.start(state.changed(a=np.zeros_like(state.a)))
 
 
 class AdaptiveSteps:

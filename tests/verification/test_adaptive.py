@@ -1,0 +1,81 @@
+"""Adaptive steps: the error asked for, on motions of every kind, in about as many steps as fixed ones take."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import rotfem
+from rotfem import run
+from tests.beams import STRUCTURE
+
+Array = npt.NDArray[np.float64]
+
+STILL = {"type": "constant", "speed": 0.0}
+LATE = [[0.0, 0.0, 0.0], [61.0, 0.0, 0.0], [61.001, 0.0, 5.0], [62.0, 0.0, 5.0], [62.001, 0.0, 0.0]]
+STOP = {"type": "table", "table": [[0.0, 0.2], [1.0033, 0.2], [1.0043, 0.0]], "interpolation": "linear"}
+
+#: Tables of a motion of Kane's beam, and its end (s).
+MOTIONS: dict[str, tuple[dict[str, Any], float]] = {
+    "spin-up": ({"motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0}}, 20.0),
+    "torque pulse": ({"motion": {"type": "torque", "hub_inertia": 100.0, "pulses": [[0.5, 1.5, 100.0]]}}, 4.0),
+    "tip release": ({"motion": STILL, "initial": {"tip_displacement": 1.0}}, 5.0),
+    "late pulse": ({"motion": STILL, "loads": {"tip_force": {"table": LATE}}}, 63.0),
+    "sudden stop": ({"motion": STOP}, 3.0),
+}
+
+
+def moved(name: str, **time: float) -> Any:
+    tables, end = MOTIONS[name]
+    return run({"structure": STRUCTURE, "mesh": {"elements": 4}, "time": {"end": end, **time}} | tables)
+
+
+def error(result: Any, exact: Any) -> float:
+    """Return the largest error of u2 at the rows of a result as a part of the largest u2."""
+    at = np.interp(result.history["t"], exact.history["t"], exact.history["tip_u2"])
+    return float(np.abs(result.history["tip_u2"] - at).max() / np.abs(at).max())
+
+
+def check(name: str, tolerance: float, reference: int) -> None:
+    """The error is that asked for, within a factor of two, in at most three times the steps of a fixed step as good.
+
+    Fixed steps of second order are as good with √(their error / error) times as many.
+    """
+    exact = moved(name, step=MOTIONS[name][1] / reference)
+    adaptive = moved(name, tolerance=tolerance)
+    reached = error(adaptive, exact)
+    assert reached < 2 * tolerance
+    taken = adaptive.summary["steps"] + adaptive.summary.get("rejected_steps", 0)
+    fixed = taken // 3
+    assert error(moved(name, step=MOTIONS[name][1] / fixed), exact) > reached
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "tolerance"), [("spin-up", 1e-3), ("sudden stop", 1e-2)])
+def test_error_and_steps(name: str, tolerance: float) -> None:
+    check(name, tolerance, 10_000)
+
+
+def test_a_late_pulse_is_met() -> None:
+    """One second of load after a minute of rest: 0.2337 m, as fixed steps of 2.5 ms find."""
+    late = moved("late pulse", tolerance=3e-2).history["tip_u2"]
+    assert np.abs(late).max() == pytest.approx(0.2337, rel=2e-2)
+
+
+@pytest.mark.nightly
+@pytest.mark.slow
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
+@pytest.mark.parametrize("name", list(MOTIONS))
+def test_error_and_steps_of_every_motion(name: str, tolerance: float) -> None:
+    check(name, tolerance, 40_000)
+
+
+def test_work_without_end_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """More steps than a march may take: an error that says what to do, with the history until then."""
+    monkeypatch.setattr("rotfem.analysis.adaptive.MOST_STEPS", 50)
+    with pytest.raises(rotfem.ComputationError, match="50 steps have not reached the end") as caught:
+        moved("tip release", tolerance=1e-4)
+    assert len(caught.value.result.history["t"]) > 10  # type: ignore[attr-defined]
