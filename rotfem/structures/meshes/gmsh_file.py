@@ -55,7 +55,7 @@ def read(gmsh: Any, path: Path, surfaces: Sequence[str]) -> Groups:
     size = path.stat().st_size
     # gmsh checks neither the counts in a file nor the numbers that it takes for indices.
     if (how := mishap(lambda: _load(gmsh, path), SECONDS + size / BYTES_PER_SECOND, MEMORY + 200 * size)) is not None:
-        raise BadMesh(f"its numbers and counts cannot be right: gmsh {how} with it")
+        raise BadMesh(how)
     _load(gmsh, path)
     groups: Groups = {0: {}, 1: {}, 2: {}, 3: {}}
     for dimension, tag in gmsh.model.getPhysicalGroups():

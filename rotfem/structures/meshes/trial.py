@@ -1,4 +1,4 @@
-"""Something tried in a process of its own first, that may crash, never end or want all memory."""
+"""What gmsh is to do, tried in a process of its own first: it may crash, never end or want all memory."""
 
 from __future__ import annotations
 
@@ -11,9 +11,12 @@ from collections.abc import Callable
 #: Signals that libraries catch to print where they were.
 _CAUGHT = (signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGALRM, signal.SIGTERM)
 
+#: What the process says at the end of its work.
+DONE = b"\0done"
+
 
 def mishap(work: Callable[[], object], seconds: float, memory: float) -> str | None:
-    """Return how a process ends badly that does the work; None where it comes to an end, if only by an exception.
+    """Return how a process ends badly that does the work, or what an exception in it says; None where it comes through.
 
     Args:
         work: what is tried; nothing of it is left in this process.
@@ -21,20 +24,27 @@ def mishap(work: Callable[[], object], seconds: float, memory: float) -> str | N
         memory: bytes that it may need beyond what this process has.
     """
     with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
+        told, tell = os.pipe()
         child = os.fork()  # beside threads of libraries: of locks that they hold, the end of the time is the end
     if child == 0:
         try:
             _behave(seconds, memory)
             work()
-        except MemoryError:
-            os._exit(1)
-        except BaseException:  # which this process will meet again, and tell
+        except BaseException as error:
+            os.write(tell, str(error).encode("utf-8", "replace")[:2000])  # less than a pipe holds
+        else:
+            os.write(tell, DONE)
+        finally:
             os._exit(0)
-        os._exit(0)
+    os.close(tell)
+    with os.fdopen(told, "rb") as pipe:
+        said = pipe.read()
     _, code = os.waitpid(child, 0)
     if os.WIFSIGNALED(code) and os.WTERMSIG(code) == signal.SIGALRM:
-        return f"does not come to an end in {seconds:.0f} s"
-    return None if code == 0 else "crashes"
+        return f"gmsh does not come to an end with it in {seconds:.0f} s"
+    if code or not said:
+        return "its numbers and counts cannot be right: gmsh crashes with it"
+    return None if said == DONE else said.decode("utf-8", "replace")
 
 
 def _behave(seconds: float, memory: float) -> None:
