@@ -68,7 +68,7 @@ class Itinerary:
 
     def __init__(self, courses: Sequence[Course], times: Array, step: float):
         self.times, self.step, self.close = times, step, CLOSE * step
-        self._courses = [(c, p) for c in courses if len(p := self._points(np.append(c.knots, c.marks)))]
+        self._courses = [(c, p) for c in courses if len(p := self._points(np.concatenate([c.knots, c.marks, c.looks])))]
         self._sizes: dict[str, float] = {}
         self._special: dict[int, list[Stop]] = {}
         if self._courses:
@@ -125,7 +125,7 @@ class Itinerary:
         n = len(self.times) - 1
         sharp = self._points(np.concatenate([c.knots for c, _ in self._courses]))
         soft = self._points(np.concatenate([c.marks for c, _ in self._courses]))
-        points = np.union1d(sharp, soft)
+        points = np.unique(np.concatenate([own for _, own in self._courses]))
         off, weight = np.zeros(n + 1), np.zeros(len(points))
         for course, own in self._courses:
             each = self._deviation(course, own, self.times)
@@ -134,7 +134,7 @@ class Itinerary:
         chosen = sharp if len(sharp) <= n else sharp[off[self._step_of(sharp)] > KINKED]
         chosen = np.union1d(chosen, soft[off[self._step_of(soft)] > CURVED])
         landings, edges = self._spaced(self._foremost(chosen, weight[np.searchsorted(points, chosen)]))
-        self._lay(landings, edges, points, off)
+        self._lay(landings, edges, points, np.isin(points, sharp), off)
 
     def _foremost(self, points: Array, weight: Array) -> Array:
         """Return points without those that do not stand out where a step has more than MOST."""
@@ -163,21 +163,23 @@ class Itinerary:
             edges += [max(first, edges[-1] if edges else 0.0), min(last, float(self.times[-1]))]
         return np.array(single), np.array(edges)
 
-    def _lay(self, landings: Array, edges: Array, points: Array, off: Array) -> None:
+    def _lay(self, landings: Array, edges: Array, points: Array, sharp: Array, off: Array) -> None:
         """Write the legs of all steps that have points or edges of legs in them."""
         inner = np.union1d(landings, edges)
         of_point, of_inner = self._step_of(points), self._step_of(inner)
         for i in np.union1d(of_point, of_inner):
             begin, end = float(self.times[i - 1]), float(self.times[i])
             inside = points[slice(*np.searchsorted(of_point, [i, i + 1]))]
+            kinks = sharp[slice(*np.searchsorted(of_point, [i, i + 1]))]
             landed = as_list(inner[slice(*np.searchsorted(of_inner, [i, i + 1]))])
             last = min((t for t in landed if abs(t - end) <= self.close), default=end)
             stops = [*(t for t in landed if begin + self.close < t < end - self.close), last]
             legs: list[Stop] = []
             self._special[i] = legs
             for stop in stops:
-                passed = inside[(inside > begin + self.close) & (inside < stop - self.close)]
-                averaged = len(passed) > 0 and ((off[i] if len(stops) == 1 else self.bent(begin, stop)) > KINKED)
+                passes = (inside > begin + self.close) & (inside < stop - self.close)
+                allowed = KINKED if np.any(passes & kinks) else CURVED
+                averaged = np.any(passes) and (off[i] if len(stops) == 1 else self.bent(begin, stop)) > allowed
                 stretch = np.searchsorted(edges, 0.5 * (begin + stop)) % 2 == 1
                 legs.append((stop, stop in landed, bool(averaged or stretch)))
                 begin = stop

@@ -12,7 +12,7 @@ Hats add up to one, so the impulse Σ ½ (l + r) f̄ that a scheme of second ord
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -58,6 +58,7 @@ class Course:
         knots: times (s) between which it is smooth, increasing.
         marks: further times (s) between which it is nearly straight, where it is known to be fast.
         many: the same of an array of times, shape (n, components); made of `at` if None.
+        looks: times (s) at which it is looked at to see whether a step resolves it, but not landed on.
         known: whether all knots are known; otherwise it is a function that has to be looked at.
     """
 
@@ -67,6 +68,7 @@ class Course:
     marks: Array
     many: Callable[[Array], Array] | None = None
     known: bool = True
+    looks: Array = field(default_factory=lambda: np.empty(0))
 
     def values(self, t: Array) -> Array:
         """Return the values at times (n,), shape (n, components)."""
@@ -154,7 +156,9 @@ def _watched_motion(motion: Motion, see: Callable[[Course], Callable[[float], An
         known = motion.smooth or motion.breakpoints is not None
         for name, f in (("speed", motion.speed), ("rate", motion.rate)):
             many = _columns(f) if motion.arrays else None
-            changes[name] = see(Course(f"motion.{name}", f, _times(motion.sharp), _times(motion.knots), many, known))
+            course = Course(f"motion.{name}", f, _times(motion.sharp), _times(motion.knots), many, known)
+            course.looks = 0.5 * (course.marks[1:] + course.marks[:-1])
+            changes[name] = see(course)
     return replace(motion, **changes)
 
 

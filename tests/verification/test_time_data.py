@@ -87,6 +87,12 @@ def test_stop_within_a_step(start: float) -> None:
     np.testing.assert_allclose(tops[1:], tops[0], rtol=2e-3)
 
 
+def test_smooth_stop_within_a_step() -> None:
+    """The same stop in 1 ms through a monotone cubic, whose rate is zero at both of its knots: the same swing."""
+    rows = speeds((0.0, 0.2), (1.0033, 0.2), (1.0043, 0.0), (3.0, 0.0)) | {"interpolation": "pchip"}
+    assert np.abs(krb(rows, 0.01, 2.2).history["tip_u2"]).max() == pytest.approx(0.6086, rel=1e-2)
+
+
 def hub(pulses: list[list[float]], step: float, end: float = 2.0) -> Any:
     """Return the run of a hub that turns as if the beam were rigid."""
     return krb(HUB | {"hub_inertia": 10.0, "coupled": False, "pulses": pulses}, step, end)
