@@ -12,6 +12,9 @@ from rotfem.errors import ComputationError
 #: Part of the kinetic and strain energy by which a root that Newton strayed to may exceed the energy there was.
 MORE_ENERGY = 0.03
 
+#: Energy above that of the start, relative to what is exchanged, from which steps that add to it are made in parts.
+FED = 0.003
+
 
 def check_root(system: Any, stage: Stage, state: State) -> None:
     """Refuse a root of a stage that is not the motion's.
@@ -36,6 +39,37 @@ def check_root(system: Any, stage: Stage, state: State) -> None:
     if grown > MORE_ENERGY * there:
         what = f"Newton met a state with {grown:.2g} J more than there were, of {there:.2g} J"
         raise ComputationError(what, time=stage.t)
+
+
+def fed(system: Any, new: State, state: State, known: tuple[float, ...] | None) -> tuple[tuple[float, ...], bool]:
+    """Return what is known of the energies, and whether a step raised an energy that is above what there can be.
+
+    Nothing gives the motion energy. A scheme that does not resolve it may, a little in each step, which Newton's method
+    does not notice until the motion is lost; shorter steps give less, and take some back.
+
+    Args:
+        system: nonlinear, and closed.
+        new: end of the step.
+        state: its start.
+        known: Jacobi integral at the start, least and largest kinetic and strain energy since (J); None at first.
+    """
+
+    def energies(at: State) -> dict[str, float]:
+        system.set_time(at.t)
+        system.set_state(at.q, at.v, at.a)
+        return dict(system.energies())
+
+    first = None if known is not None else energies(state)
+    if first is not None:
+        known = (first["jacobi"], *2 * (first["kinetic"],), *2 * (first["strain"],))
+    assert known is not None
+    now = energies(new)
+    datum, low_t, high_t, low_w, high_w = known
+    low_t, high_t = min(low_t, now["kinetic"]), max(high_t, now["kinetic"])
+    low_w, high_w = min(low_w, now["strain"]), max(high_w, now["strain"])
+    too_much = now["jacobi"] - datum > FED * max(high_t - low_t, high_w - low_w)
+    feeds = too_much and now["jacobi"] > (first or energies(state))["jacobi"]
+    return (datum, low_t, high_t, low_w, high_w), feeds
 
 
 def turned_with_clamp(clamp: Any, state: State, stage: Stage) -> Array:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rotfem.analysis.roots import came_true, check_root, turned_with_clamp
+from rotfem.analysis.roots import came_true, check_root, fed, turned_with_clamp
 from rotfem.analysis.schemes import Array, Scheme, Shifts, Stage, State
 from rotfem.analysis.turning import keep_rotations_small
 from rotfem.errors import ComputationError
@@ -21,8 +21,8 @@ LONG = 5
 #: After an old factor has failed k times in a row, none is tried for 2^k steps; k grows to this.
 PATIENCE = 5
 
-#: Newton iterations after which a way is long.
-SOON = 6
+#: Newton iterations after which a way is long; halvings left with which a step is taken though it feeds the motion.
+SOON, STUBBORN = 6, 3
 
 #: Newton iterations after which the prediction of the next step is questioned, and its share that is taken for all.
 MANY, WHOLE = 3, 0.9
@@ -54,7 +54,7 @@ class Stepper:
         newton: iteration control, shared by all steps so that it learns the quadratic constant.
 
     Attributes:
-        substeps, rejected: steps that were halved because Newton failed, and adaptive ones that were taken back.
+        substeps, rejected: steps that were halved (Newton failed, or energy rose), and adaptive ones taken back.
         pace: length of the next adaptive step (s), and largest displacement so far (scaled); None before the first.
     """
 
@@ -65,6 +65,10 @@ class Stepper:
         self._held: Shifts | None = None
         #: Whether Newton's way is a long one, so that tangents that know where it came from are worth compiling.
         self._far = False
+        #: Whether a step was hard to solve, and whether the scheme keeps the balance of energy by itself.
+        self._hard = self._balanced = False
+        #: Energy at the first step that was hard, and ranges of the energies that were seen since (see `fed`).
+        self._exchange: tuple[float, ...] | None = None
         #: Share of the last predicted move that came true.
         self._share = 1.0
         #: How often in a row an old factor has failed, and for how many steps none is tried for that.
@@ -132,6 +136,7 @@ class Stepper:
             ComputationError: Newton failed; the given state is untouched.
         """
         end = state.t + h if end is None else end
+        self._hard = False
         stages: list[Stage] = []
         for i in range(self.scheme.stages):
             stage = self.scheme.stage(i, state, h, end, stages)
@@ -177,6 +182,8 @@ class Stepper:
             self._share, self._far = 0.0, True
             stage.v[:], stage.a[:] = v + stage.c_v * stage.q, a + stage.c_a * stage.q
             iterations = self._root(stage, state)
+        self._hard |= self.newton.strayed or iterations > MANY
+        self._balanced = stage.over is not None
         if self._share < WHOLE or iterations > MANY:
             self._share = came_true(self.system, stage.q - state.q, move)
 
@@ -253,7 +260,7 @@ class Stepper:
         raise ComputationError("the old factor is too far from the matrix")
 
     def advance(self, state: State, h: float, end: float | None = None, halvings: int = 5) -> State:
-        """Return the state at state.t + h (see `step`), in halved steps where Newton does not manage the whole one.
+        """Return the state at state.t + h (see `step`), in halved steps where the whole one fails or feeds the motion.
 
         Raises:
             ComputationError: Newton failed at the smallest step too; says how small it was.
@@ -261,7 +268,9 @@ class Stepper:
         if keep_rotations_small(self.system, self.scheme, state, h):
             self._held = None
         try:
-            return self.step(state, h, end)
+            new = self.step(state, h, end)
+            if halvings <= STUBBORN or not self._feeds(new, state):
+                return new
         except ComputationError as error:
             if self.system.solved_at_once:
                 raise
@@ -271,6 +280,13 @@ class Stepper:
                     time=error.time,
                     advice='a smaller time.step, time.scheme = "energy_conserving", or a look at load and speed then',
                 ) from None
-            self.substeps += 1
-            middle = self.advance(state, h / 2, None, halvings - 1)
-            return self.advance(middle, h / 2, state.t + h if end is None else end, halvings - 1)
+        self.substeps += 1
+        middle = self.advance(state, h / 2, None, halvings - 1)
+        return self.advance(middle, h / 2, state.t + h if end is None else end, halvings - 1)
+
+    def _feeds(self, new: State, state: State) -> bool:
+        """Return whether a step that was hard to solve raises an energy that is too large already (see `fed`)."""
+        if not self._hard or self._balanced or self.system.linear or not self.system.model.closed:
+            return False
+        self._exchange, feeds = fed(self.system, new, state, self._exchange)
+        return feeds

@@ -238,7 +238,7 @@ class Simulation:
 
     def _warn_of_steps(self) -> None:
         if self.stepper is not None and self.stepper.substeps:
-            self.warnings.append(f"{self.stepper.substeps} steps were halved because Newton did not converge")
+            self.warnings.append(f"{self.stepper.substeps} steps were halved where Newton failed or energy rose")
         if self.iteration.roundoff > 0:
             self.warnings.append(f"Newton stopped at round-off, increments {self.iteration.roundoff:.1e} (relative)")
 

@@ -1,4 +1,4 @@
-"""Long runs, motions that unstable steps feed, stiff damping, and hubs of next to no inertia: balances as references."""
+"""Motions that unstable steps feed, stiff damping, hubs of next to no inertia: balances as references."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def driven(theory: str, inertia: float, **time: Any) -> dict[str, Any]:
 
 
 def gained(result: Any) -> float:
-    """Return by how much the Jacobi integral ends above its start, relative to the largest strain energy; 0 if below."""
+    """Return by how much the Jacobi integral ends above its start, relative to the largest strain energy."""
     energy = result.history["jacobi"]
     return float(max(energy[-1] - energy[0], 0.0) / np.max(result.history["strain"]))
 
