@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,9 @@ NOTICED = 0.05
 
 #: Relative error up to which the largest rotation alone says it, and what forces amplify is not asked.
 PLAIN = 0.002
+
+#: The same of strains of first order, whose error is mostly a foreshortening.
+PLAIN_LINEAR = 0.04
 
 #: Relative error up to which nothing is compiled to look closer.
 NEAR = 0.02
@@ -89,7 +93,7 @@ class TheoryCheck:
         self.theory = system.model.theory
         self._forms: tuple[Any, Any] | None = None
 
-    @property
+    @cached_property
     def known(self) -> bool:
         """Whether there is anything to estimate, and strains to do it by."""
         kind = self.structure.type
@@ -107,7 +111,7 @@ class TheoryCheck:
         displacement, rotation = self._sizes(q)
         plain = rotation / 2 if self.theory.linear else LINES * rotation**2 / 4
         out = self._as(plain, f"the largest rotation is {rotation:.2g}")
-        if plain > PLAIN and displacement > 0.0:
+        if plain > (PLAIN_LINEAR if self.theory.linear else PLAIN) and displacement > 0.0:
             amplified = self._amplification(q)
             if not np.isfinite(amplified):
                 return self._as(1.0, "buckled: terms that it has not to order decide how far")
