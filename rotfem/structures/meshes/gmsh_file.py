@@ -26,6 +26,9 @@ HEAD = re.compile(
     rb"(?:0[ \t]+8[ \t]*\1|1[ \t]+8[ \t]*\1(?:\x01\0\0\0|\0\0\0\x01)(?:\1)?)\$EndMeshFormat\1"
 )
 
+#: Largest number of a node.
+MOST = 10**8
+
 #: Coordinates that a node may have at most, m.
 LARGEST = 1e100
 
@@ -67,6 +70,8 @@ def read(gmsh: Any, path: Path, surfaces: Sequence[str]) -> Groups:
         raise BadMesh("it holds cells of dimension 3; a plate is a mesh of triangles or quadrilaterals in a plane")
     _check_names(groups, surfaces)
     x = x.reshape(-1, 3)
+    if numbers.max() > MOST:
+        raise BadMesh(f"has a node of the number {numbers.max()}; numbers can be up to {MOST}")
     rows = np.full(int(numbers.max()) + 1, -1, dtype=np.int64)  # of x, by the number of a node in the file
     rows[numbers.astype(np.int64)] = np.arange(len(numbers))
     kind, found, nodes = _cells(gmsh, {name: groups[2][name] for name in surfaces}, rows)
