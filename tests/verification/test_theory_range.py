@@ -65,7 +65,7 @@ def test_never_below_a_third_of_the_error(scene: Any, arguments: tuple[float, ..
     try:
         true, estimate, said = errors(scene, theory, *arguments)
     except rotfem.ComputationError:
-        assert theory == "von_karman"  # its column has a limit point, at which it stops
+        assert theory in ("second_order", "von_karman")  # no equilibrium far out of their range, and said to be none
         return
     if true > 0.05:
         assert estimate > true / 3
