@@ -158,7 +158,8 @@ class Itinerary:
             points, np.concatenate([[0.0], *others])
         )
         close = np.diff(points) < SHORT * self.step
-        return points[~(own & (np.append(close, False) | np.append(False, close)))]
+        apart: Array = points[~(own & (np.append(close, False) | np.append(False, close)))]
+        return apart
 
     def _spaced(self, points: Array) -> tuple[Array, Array]:
         """Return landings, none closer than LEAST, and the ends of legs that stand for points that are."""
