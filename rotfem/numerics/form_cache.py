@@ -18,6 +18,7 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from hashlib import sha1, sha256
+from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import Any
 
@@ -99,7 +100,8 @@ class Watch:
         return self.cache / f"{self.module}.c.cached"
 
     def _libraries(self) -> list[Path]:
-        return list(self.cache.glob(f"{self.module}*.so"))
+        # By their names: a cache holds thousands of files, and listing them takes longer than all checks.
+        return [path for end in EXTENSION_SUFFIXES if (path := self.cache / f"{self.module}{end}").exists()]
 
     def _seal(self) -> None:
         try:
