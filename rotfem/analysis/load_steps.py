@@ -11,10 +11,13 @@ from rotfem.analysis.turning import reached, recounted
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.numerics.linear import DirectSolver, Increment
-from rotfem.numerics.newton import Newton
+from rotfem.numerics.newton import REACH, Newton
 from rotfem.structures.datum import BeyondReach
 
 Array = npt.NDArray[np.float64]
+
+#: Newton iterations after which the stresses of the last correction are worth compiling a tangent with.
+SOON = 4
 
 #: What helps where there is no equilibrium.
 LESS = "a lower speed or load, a stiffer section, or a theory that holds at large deflection"
@@ -87,14 +90,18 @@ def balance(
     motion = system.motion.at_speed(np.sqrt(share) * omega)
     system.set_time(0.0, motion, share)
     q, dx = guess.copy(), Increment(system.V)
+    before, followed = q.copy(), 0
 
     def increment() -> float:
+        nonlocal before, followed
         system.set_state(q)
         b = system.residual()
-        A, _ = system.tangent(1.0, 0.0, 0.0)
-        q[:] += dx.solve(DirectSolver(A), b)
+        A, _ = system.tangent(1.0, 0.0, 0.0, before if followed >= SOON else None)
+        dq = dx.solve(DirectSolver(A), b)
+        size, before, followed = float(system.size(dq)), q.copy(), followed + 1
+        q[:] += dq if system.linear or not size > REACH else dq * (REACH / size)
         system.set_state(q)
-        return float(system.size(dx.function.x.array))
+        return size
 
     if system.linear:
         if not np.isfinite(increment()):
