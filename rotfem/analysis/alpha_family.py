@@ -20,6 +20,9 @@ from typing import Any, ClassVar
 from rotfem.analysis.schemes import Array, Scheme, Stage, State
 from rotfem.registry import register
 
+#: Growth of the step up to which the memory is moved along.
+FAR = 10.0
+
 
 class AlphaFamily(Scheme):
     """What generalised-α and Newmark share; second-order accurate when γ = ½ + α_f − α_m."""
@@ -71,8 +74,11 @@ class AlphaFamily(Scheme):
         """Return the state with the auxiliary acceleration moved to where the next step takes it.
 
         It stands for q̈ at t + h (α_m − α_f), so it moves when h does; without this a change of step would cost an
-        order.
+        order. From a short step to one more than FAR times as long that would be an extrapolation, of vibrations that the
+        long one does not resolve too, and their multiple would go on with it: there the memory starts afresh, with q̈.
         """
+        if h > FAR * (new.t - old.t):
+            return self.start(new)
         last, (alpha_m, alpha_f, _, _) = new.t - old.t, self.coefficients
         lag = (alpha_m - alpha_f) * (h - last)
         return new.changed(memory=new.memory + lag / last * (new.memory - old.memory))
