@@ -21,7 +21,7 @@ from rotfem.analysis.schemes import Array, Scheme, Stage, State
 from rotfem.registry import register
 
 #: Growth of the step up to which the memory is moved along.
-FAR = 10.0
+FAR = 6.0
 
 
 class AlphaFamily(Scheme):
@@ -77,10 +77,10 @@ class AlphaFamily(Scheme):
         order. From a short step to one more than FAR times as long that would be an extrapolation, of vibrations that the
         long one does not resolve too, and their multiple would go on with it: there the memory starts afresh, with q̈.
         """
-        if h > FAR * (new.t - old.t):
-            return self.start(new)
         last, (alpha_m, alpha_f, _, _) = new.t - old.t, self.coefficients
         lag = (alpha_m - alpha_f) * (h - last)
+        if h > FAR * last:
+            return self.start(new)
         return new.changed(memory=new.memory + lag / last * (new.memory - old.memory))
 
 

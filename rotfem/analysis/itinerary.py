@@ -24,9 +24,6 @@ Stop = tuple[float, bool, bool]
 #: Part of a step that is one instant, and shortest leg that is stepped: below it, round-off of q spoils a.
 CLOSE, LEAST = 1e-9, 1e-3
 
-#: Part of a step that is too short for legs of their own: what happens within it is averaged over the step.
-SHORT = 0.25
-
 #: Knots in a step from which only those are landed on that matter this many times as much as the others.
 MOST, OUTSTANDING = 4, 10.0
 
@@ -150,21 +147,9 @@ class Itinerary:
             keep[first] = weight[first] > OUTSTANDING * np.median(weight[own])
         return points[keep]
 
-    def _apart(self, points: Array) -> Array:
-        """Return points without those of a load much shorter than a step, whose blow its modes would not resolve."""
-        loads = [c.knots for c, _ in self._courses if c.name.startswith("loads")]
-        others = [c.knots for c, _ in self._courses if not c.name.startswith("loads")]
-        own = np.isin(points, np.concatenate([np.empty(0), *loads])) & ~np.isin(
-            points, np.concatenate([[0.0], *others])
-        )
-        close = np.diff(points) < SHORT * self.step
-        apart: Array = points[~(own & (np.append(close, False) | np.append(False, close)))]
-        return apart
-
     def _spaced(self, points: Array) -> tuple[Array, Array]:
         """Return landings, none closer than LEAST, and the ends of legs that stand for points that are."""
         least = LEAST * self.step
-        points = self._apart(points)
         single: list[float] = []
         edges: list[float] = []
         for group in np.split(points, np.flatnonzero(np.diff(points) > least) + 1):
