@@ -133,6 +133,8 @@ class ModalAnalysis:
         self._unit = pencil.unit
         if not self.free:
             pairs = self._kept.better(pencil, pairs, count)
+        for vectors in (pairs.right, pairs.left):
+            vectors[self.system.held.clamped] = 0.0  # round-off of the scaled problem is none in the units of the scene
         t3 = perf_counter()
         factored = pencil.factored
         spans = {"equilibrium": t1 - t0, "assemble": t2 - t1, "factor": factored, "eigen": t3 - t2 - factored}

@@ -515,7 +515,7 @@ def test_a_trial_takes_no_more_steps_than_the_scene() -> None:
     assert samples.levels[-1] == 2
     assert trial.outputs("reissner").failed == {}
     assert all(np.maximum(samples.parts, finer).sum() <= 800 for finer in samples.levels)
-    assert trial.finer == 2
+    assert trial.finer <= 2
     choice = choose(case_of(asked.replace({"model.tolerance": 1e-1})), (HISTORY,))
     assert choice.full
     assert "would take longer" in choice.remark
