@@ -11,7 +11,8 @@ clamp, at b, every r becomes r − b, and what b did goes into the acceleration 
     a_o' = a_o + ẇ×b + w×(w×b),
 
 so that centrifugal and Euler force of one description are base acceleration in the other. The motion of the boom
-relative to the satellite is the same, exactly, whatever its theory, mesh or step. The number is the largest difference
+relative to the satellite is the same, whatever its theory, mesh or step, but for the kinks of the thrust: steps land on
+those of a table, and not on those of the function that is a_o' here. The number is the largest difference
 between the two, of any displacement of the tip, over the largest displacement. It sees every effect that depends on
 where the origin is, at the boom as well as at the tip mass, whose centre is off the axis; Coriolis forces, which do
 not, are the same in both.

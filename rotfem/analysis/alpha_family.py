@@ -20,8 +20,8 @@ from typing import Any, ClassVar
 from rotfem.analysis.schemes import Array, Scheme, Stage, State
 from rotfem.registry import register
 
-#: Growth of the step up to which the memory is moved along.
-FAR = 6.0
+#: Growth of the step, and distance in steps, from which on the memory is not moved along.
+LONGER, FAR = 6.0, 0.25
 
 
 class AlphaFamily(Scheme):
@@ -74,12 +74,12 @@ class AlphaFamily(Scheme):
         """Return the state with the auxiliary acceleration moved to where the next step takes it.
 
         It stands for q̈ at t + h (α_m − α_f), so it moves when h does; without this a change of step would cost an
-        order. From a short step to one more than FAR times as long that would be an extrapolation, of vibrations that the
-        long one does not resolve too, and their multiple would go on with it: there the memory starts afresh, with q̈.
+        order. From a short step to a much longer one it would be an extrapolation, of vibrations too that the long one
+        does not resolve, and their multiple would go on with it: there the memory starts afresh, with q̈.
         """
         last, (alpha_m, alpha_f, _, _) = new.t - old.t, self.coefficients
         lag = (alpha_m - alpha_f) * (h - last)
-        if h > FAR * last:
+        if h > LONGER * last and abs(lag) > FAR * last:
             return self.start(new)
         return new.changed(memory=new.memory + lag / last * (new.memory - old.memory))
 

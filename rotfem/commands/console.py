@@ -11,12 +11,16 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from time import sleep
 from typing import Any, NoReturn
 
 from rotfem.commands.interrupts import Interrupted
 from rotfem.commands.result_folder import ResultFolder, Writer
 from rotfem.errors import ComputationError, InputError, OutputError, SceneError, printable
 from rotfem.results.files import json_text
+
+#: Seconds that mpirun is given to pass on what was printed.
+PASSED_ON = 0.2
 
 
 class Session:
@@ -49,6 +53,9 @@ class Session:
             self._folder.close()
         if error is not None:
             self._tidy()
+        if self.comm.size > 1 and self.first:  # mpirun may drop what it has not passed on when processes end
+            sys.stdout.flush()
+            sleep(PASSED_ON)
         if error is None or (self.debug and not isinstance(error, SystemExit)):
             return
         if isinstance(error, InputError | OutputError):

@@ -37,6 +37,7 @@ end = 1.0
 step = 0.01
 """
 SMALL = ("--theories", "reissner", "--steps", "0.04,0.02", "--elements", "2,4", "--degrees", "2", "--repeat", "1")
+SMALL += ("--schemes", "generalised_alpha,newmark")
 
 
 def test_cost_writes_table_figure_and_tuned_scene(rotfem: Rotfem, folder: Path) -> None:

@@ -48,7 +48,9 @@ NUMBERS = [
     ("rotating_plate", -0.573834759, 1e-5),
     # rad/s: Legendre–Ritz of Kirchhoff's plate; Mindlin's with this mesh is 4.4e-4 below it
     ("disk_campbell", 213.464695, 0.12),
-    ("satellite_boom", 0.0, 1e-12),  # the origin of the frame is a matter of words; rounding gives 1e-14
+    # The origin of the frame is a matter of words; the kinks of the table of one description are landed on, those of
+    # the function in the other are not, which is a matter of the step's error.
+    ("satellite_boom", 0.0, 1e-6),
 ]
 
 

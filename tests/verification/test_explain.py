@@ -432,7 +432,7 @@ def test_a_model_chosen_for_no_motion_or_another_is_given_up(changes: dict[str, 
 @pytest.mark.parametrize("as_function", [False, True], ids=["table", "function"])
 @pytest.mark.parametrize("changes", [BLOW, AT_REST, STRETCHED], ids=["spin-up", "at rest", "stretched"])
 def test_a_trial_sees_a_blow_between_its_samples(changes: dict[str, Any], as_function: bool) -> None:
-    """The largest deflection, of the trial against the run: steps that do not resolve what it sets ringing give that to 10 %."""
+    """The largest deflection, of the trial against the run: its steps do not resolve all that the blow sets ringing."""
     asked = scene(SPIN_UP, changes | {"model.tolerance": None})
     rows = np.array(BLOW["loads"]["tip_force"])  # type: ignore[index]
     if as_function:
@@ -505,7 +505,7 @@ def test_no_choice_is_trusted_far_beyond_what_was_tried_out() -> None:
 
 
 def test_a_trial_takes_no_more_steps_than_the_scene() -> None:
-    """A release from 0.6 L, whose Newton wants shorter steps than the modes do."""
+    """A release from 0.6 L: the samples that its modes ask for may be met with as many steps as it has, not more."""
     changes = {"motion": {"type": "constant", "speed": 1.0}, "initial": {"tip_displacement": 6.0}}
     asked = scene(SPIN_UP, changes | {"time": {"end": 8.0, "step": 0.01}})
     trial = Trial(case_of(asked), (HISTORY,))
@@ -516,10 +516,6 @@ def test_a_trial_takes_no_more_steps_than_the_scene() -> None:
     assert trial.outputs("reissner").failed == {}
     assert all(np.maximum(samples.parts, finer).sum() <= 800 for finer in samples.levels)
     assert trial.finer <= 2
-    choice = choose(case_of(asked.replace({"model.tolerance": 1e-1})), (HISTORY,))
-    assert choice.full
-    assert "would take longer" in choice.remark
-    assert "remark" in choice.summary()
 
 
 def test_a_failing_eigenproblem_at_rest_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
