@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.looks import look_at
 from rotfem.mechanics.courses import SAME, Course
 
 Array = npt.NDArray[Any]
@@ -68,6 +69,8 @@ class Itinerary:
 
     def __init__(self, courses: Sequence[Course], times: Array, step: float):
         self.times, self.step, self.close = times, step, CLOSE * step
+        for course in courses:
+            look_at(course, times)
         self._courses = [(c, p) for c in courses if len(p := self._points(np.concatenate([c.knots, c.marks, c.looks])))]
         self._sizes: dict[str, float] = {}
         self._special: dict[int, list[Stop]] = {}

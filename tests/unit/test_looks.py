@@ -1,0 +1,57 @@
+"""Functions of time are looked at before a march: their jumps are found, and what a step would pass over is marked."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rotfem import SceneError, run
+from rotfem.analysis.looks import look_at
+from rotfem.mechanics.courses import Course
+from tests.beams import STRUCTURE
+
+TIMES = np.linspace(0.0, 2.0, 201)
+
+
+def looked(f: Any, name: str = "loads.tip_force") -> Course:
+    course = Course(name, f, np.empty(0), np.empty(0), known=False)
+    look_at(course, TIMES)
+    return course
+
+
+@pytest.mark.parametrize("at", [0.5033, 1.0 / 3.0, 1.25])
+def test_a_jump_is_found_to_round_off(at: float) -> None:
+    """Halving sixty times leaves two neighbouring numbers, one on each side."""
+    course = looked(lambda t: 3.0 if t >= at else -1.0)
+    assert len(course.knots) == 1
+    assert course.knots[0] == pytest.approx(at, rel=4e-16)
+
+
+def test_what_is_smooth_has_no_knots_and_what_is_slow_no_marks() -> None:
+    assert len(looked(lambda t: np.sin(7 * t)).knots) == len(looked(lambda t: np.sin(7 * t)).marks) == 0
+    bump = looked(lambda t: np.exp(-(((t - 0.505) / 1e-3) ** 2)))
+    assert len(bump.knots) == 0
+    assert np.all((bump.marks > 0.48) & (bump.marks < 0.53))
+    assert len(bump.marks) >= 64
+
+
+def beam(**tables: Any) -> Any:
+    still = {"motion": {"type": "constant", "speed": 0.0}}
+    return run({"structure": STRUCTURE, "mesh": {"elements": 4}, "time": {"end": 1.0, "step": 0.01}, **still, **tables})
+
+
+def test_a_blow_of_a_function_is_that_of_its_table() -> None:
+    """2 ms between two steps; the table's flanks of 0.1 ns are all the two differ in."""
+    rows = [[0, 0, 0], [0.5033, 0, 0], [0.5033000001, 0, 200.0], [0.5053, 0, 200.0], [0.5053000001, 0, 0], [9, 0, 0]]
+    table = beam(loads={"tip_force": rows})
+    function = beam(loads={"tip_force": lambda t: [0.0, 200.0 if 0.5033 < t < 0.5053 else 0.0]})
+    u2 = table.history["tip_u2"]
+    assert np.abs(u2).max() > 0.01
+    np.testing.assert_allclose(function.history["tip_u2"], u2, rtol=0, atol=1e-3 * np.abs(u2).max())
+
+
+def test_a_speed_that_jumps_is_refused() -> None:
+    with pytest.raises(SceneError, match=r"motion\.speed: jumps at t = 0\.5033 s"):
+        beam(motion={"type": "callable", "speed": lambda t: 1.0 if t > 0.5033 else 0.0})
