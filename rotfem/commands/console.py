@@ -53,9 +53,7 @@ class Session:
             self._folder.close()
         if error is not None:
             self._tidy()
-        if self.comm.size > 1 and self.first:  # mpirun may drop what it has not passed on when processes end
-            sys.stdout.flush()
-            sleep(PASSED_ON)
+        self._pass_on()
         if error is None or (self.debug and not isinstance(error, SystemExit)):
             return
         if isinstance(error, InputError | OutputError):
@@ -74,6 +72,12 @@ class Session:
 
             traceback.print_exception(kind, error, trace)
             self.comm.Abort(1)
+
+    def _pass_on(self) -> None:
+        """Wait until mpirun has passed on what was printed: what comes with the next, on stderr, goes astray with it."""
+        if self.comm.size > 1 and self.first:
+            sys.stdout.flush()
+            sleep(PASSED_ON)
 
     def _end(self, message: str, status: int) -> NoReturn:
         if self.first:
@@ -152,6 +156,7 @@ class Session:
         """Print a summary if --json asks for it."""
         if self.first and self.as_json:
             sys.stdout.write(json_text(summary))
+            self._pass_on()
 
     def say(self, lines: list[str]) -> None:
         """Print what was done."""
