@@ -74,7 +74,7 @@ class Session:
             self.comm.Abort(1)
 
     def _pass_on(self) -> None:
-        """Wait until mpirun has passed on what was printed: what comes with the next, on stderr, goes astray with it."""
+        """Wait until mpirun has passed on what was printed: what follows on stderr would go astray with it."""
         if self.comm.size > 1 and self.first:
             sys.stdout.flush()
             sleep(PASSED_ON)
