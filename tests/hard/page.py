@@ -27,7 +27,7 @@ from tests.hard.case import CLASSES, MEANINGS, Case, attempt  # noqa: E402
 from tests.hard.catalogue import catalogue  # noqa: E402
 
 #: The program as it was before these cases were tried.
-BEFORE = "1.0 as of commit 277dc66"
+BEFORE = "the code at commit 277dc66"
 
 
 def tried(case: Case) -> dict[str, Any]:
