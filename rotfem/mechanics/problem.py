@@ -64,6 +64,7 @@ class Problem:
     def __post_init__(self) -> None:
         for name in ("terms", "outputs"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+        object.__setattr__(self, "mesh", self.mesh.suited(self.structure))
         if not self.theory.holds_for(self.structure.type):
             kinds = ", ".join(self.theory.strains)
             why = f"has no strains for a {self.structure.type}; it has them for {kinds}"

@@ -208,6 +208,7 @@ class Scene(SceneModel):
 
     @model_validator(mode="after")
     def _check_combinations(self) -> Self:
+        vars(self)["mesh"] = self.mesh.suited(self.structure)
         if self.structure.is_planar:
             check_planar(self.motion, self.loads)
         check_loads(self.structure, self.loads)

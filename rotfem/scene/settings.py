@@ -101,6 +101,10 @@ class BeamMesh(SceneModel):
         """Why the elements lock; None, as those of beams are not refused."""
         return None
 
+    def suited(self, structure: Any) -> Self:
+        """Return the mesh: the defaults of beams suit all lengths."""
+        return self
+
     def at_most(self, nodes: int) -> Self:
         """Return the mesh, with no more elements than so many nodes along the beam need."""
         return self.model_copy(update={"elements": min(self.elements, math.ceil(nodes / self.degree))})
@@ -110,7 +114,8 @@ class PlateMesh(SceneModel):
     """The [mesh] table of a plate.
 
     Attributes:
-        elements: (nx, ny) of a rectangle; without meaning if the structure has a mesh file.
+        elements: (nx, ny) of a rectangle; if not given, 64 cells by its aspect ratio (see `suited`). Without meaning if
+            the structure has a mesh file.
         degree: polynomial degree, 1 to 6; if not given, 2 on quadrilaterals and 3 on triangles (see `degree_on`).
         cell: cell shape of a rectangle; without meaning if the structure has a mesh file.
         integration: quadrature of the membrane and shear terms; "reduced" avoids locking.
@@ -125,6 +130,19 @@ class PlateMesh(SceneModel):
     def locking(self) -> str | None:
         """Why the elements of a rectangle lock; None if they do not."""
         return self.locking_on(self.cell)
+
+    def suited(self, structure: Any) -> Self:
+        """Return the mesh with the counts that suit a rectangle, where none are given.
+
+        Args:
+            structure: a plate; its `length` and `width` (m) are None of one with a mesh file.
+        """
+        if "elements" in self.model_fields_set or structure.mesh_file is not None:
+            return self
+        out = self.model_copy()
+        # Not by `update`, which would count them as given: for another structure they are chosen anew.
+        vars(out)["elements"] = counts_for(structure.length / structure.width)
+        return out
 
     @model_validator(mode="before")
     @classmethod
@@ -145,6 +163,20 @@ class PlateMesh(SceneModel):
     def locking_on(self, cell: str) -> str | None:
         """Return why the elements lock on cells of a shape; None if they do not (see `locking`)."""
         return locking(cell, self.degree_on(cell), self.integration)
+
+
+def counts_for(aspect: float) -> tuple[int, int]:
+    """Return (nx, ny), 64 cells of a rectangle: (8, 8) up to 2:1, (16, 4) up to 32:1, (32, 2) beyond, or swapped.
+
+    A strip bends with ever shorter waves along it before anything happens across it, where its cells stay narrower.
+
+    Args:
+        aspect: length over width.
+    """
+    ratio = max(aspect, 1 / aspect)
+    doublings = 0 if ratio <= 2.0 else 1 if ratio <= 32.0 else 2
+    many, few = 8 * 2**doublings, 8 // 2**doublings
+    return (many, few) if aspect >= 1.0 else (few, many)
 
 
 class Modes(SceneModel):

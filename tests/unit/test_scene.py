@@ -14,6 +14,7 @@ import pytest
 import tomli_w
 from pydantic import ValidationError
 
+import rotfem
 from rotfem.errors import ComputationError, Problem, SceneError
 from rotfem.scene import (
     EFFECTS,
@@ -578,3 +579,26 @@ def test_computation_error_joins_what_when_and_advice() -> None:
     assert str(ComputationError("no convergence")) == "no convergence"
     error = pickle.loads(pickle.dumps(ComputationError("x", 1.0, "y")))
     assert (error.what, error.time, error.advice) == ("x", 1.0, "y")
+
+
+@pytest.mark.parametrize(
+    ("length", "width", "elements"),
+    [(1.0, 1.0, (8, 8)), (2.0, 1.0, (8, 8)), (10.0, 1.0, (16, 4)), (1.0, 20.0, (4, 16)), (1000.0, 1.0, (32, 2))],
+)
+def test_cells_by_the_aspect_ratio_of_a_plate(length: float, width: float, elements: tuple[int, int]) -> None:
+    """64 cells, more of them along the longer side; those that are given stay, in a variant of another shape too."""
+    s = scene("plate", structure__length=length, structure__width=width)
+    assert s.mesh.elements == elements
+    assert s.replace({"structure.length": width}).mesh.elements == (8, 8)
+    given = scene("plate", structure__length=length, structure__width=width, mesh__elements=[3, 5])
+    assert given.mesh.elements == (3, 5)
+    assert given.replace({"structure.length": 7 * width}).mesh.elements == (3, 5)
+
+
+def test_cells_of_a_plate_in_a_script() -> None:
+    """A problem chooses them too, and anew for another structure."""
+    plate = PlateStructure(length=1000.0, width=1.0, thickness=0.01, E=7e10, nu=0.3, rho=2700.0)
+    problem = rotfem.Problem(structure=plate, motion=rotfem.Motion.constant_speed(0.0), mesh=PlateMesh())
+    assert problem.mesh.elements == (32, 2)
+    square = problem.replace(structure=plate.model_copy(update={"length": 1.0}))
+    assert square.mesh.elements == (8, 8)

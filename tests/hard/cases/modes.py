@@ -105,6 +105,10 @@ def cells() -> list[Case]:
         truth = (beta / length) ** 2
         scene = strip(length, (along, 2))
         out.append(Case(CELLS, f"strip {length:g}:1", scene, lambda r: first(r, 2), truth, 2e-3, source, "modes"))
+    bare = {key: value for key, value in strip(1000.0, (8, 8)).items() if key != "mesh"}
+    truth = (beta / 1000.0) ** 2
+    name, source = "strip 1000:1 without a word on cells", "a strip without Poisson's ratio is a beam"
+    out.append(Case(CELLS, name, bare, lambda r: first(r, 2), truth, 2e-3, source, "modes"))
     few = beam(1e-2, 2) | {"modes": {"count": 5}}
     out.append(Case(CELLS, "five modes on two elements", few, command="modes", expected="warned", words="coarse|mesh"))
     wide = strip(1.0, (2, 40)) | {"modes": {"count": 6}}
