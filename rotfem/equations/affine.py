@@ -210,7 +210,7 @@ class AffineSystem(System):
     def _rest_energy(self) -> float:
         """Return T0 of the undeformed structure at the present speed, J: the constant of the Jacobi integral."""
         spin = self.model.frame.constants.get("w")
-        if spin is None or "T0" not in self._energies:
+        if spin is None or "T0" not in self._energies.names:
             return 0.0
         return self._rest_inertia * float(np.dot(spin.value, spin.value))
 
@@ -220,6 +220,6 @@ class AffineSystem(System):
         state, w = self.q.x.array.copy(), spin.value.copy()
         self.q.x.array[:] = 0.0
         spin.value[...] = self.motion.axis[-spin.value.size :]
-        inertia = self.total(self._energies["T0"])
+        inertia = self._energies()["T0"]
         self.q.x.array[:], spin.value[...] = state, w
         return inertia

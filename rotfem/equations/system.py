@@ -17,6 +17,7 @@ import numpy.typing as npt
 from dolfinx import fem, la
 from mpi4py import MPI
 
+from rotfem.equations.functionals import Functionals
 from rotfem.equations.model import Model
 from rotfem.equations.solutions import Solutions
 from rotfem.mechanics.courses import Course, View
@@ -261,8 +262,8 @@ class System(Solutions, ABC):
         return {**coordinates, **{name: q[:, i] for i, name in enumerate(self.structure.components)}}
 
     @cached_property
-    def _energies(self) -> dict[str, Any]:
-        return {name: forms.form(form) for name, form in self.model.energies().items()}
+    def _energies(self) -> Functionals:
+        return Functionals(self.model.energies(), self.structure.mesh)
 
     @cached_property
     def _outputs(self) -> dict[str, Any]:
@@ -289,7 +290,7 @@ class System(Solutions, ABC):
         V is the potential of dead loads, gravity and base acceleration; the integral is constant while these and the
         spin are constant in the frame and nothing dissipates.
         """
-        e = {name: self.total(form) for name, form in self._energies.items()}
+        e = self._energies()
         kinetic = e["T2"] + e.get("T1", 0.0) + e.get("T0", 0.0)
         if "momentum" in e:
             spin = self.motion.speed(self.time) * float(self.motion.axis[2])

@@ -74,9 +74,13 @@ def quadrature_points(domain: Any, number: int) -> Any:
 
 
 def integral_count(f: Any) -> int:
-    """Return the number of integrals of a UFL form after differentiation."""
-    expanded = expand_derivatives(f)
-    return 0 if expanded.empty() else len(expanded.integrals())
+    """Return the number of integrals of a UFL form after differentiation, which is done once for any form."""
+
+    def count() -> int:
+        expanded = expand_derivatives(f)
+        return 0 if expanded.empty() else len(expanded.integrals())
+
+    return form_cache.noted(f.signature(), count)
 
 
 def _compiled(compile_it: Callable[[dict[str, Any]], Any], comm: Any, name: str) -> Any:

@@ -64,6 +64,16 @@ def test_form_left_behind_is_made_anew(cache: Path) -> None:
     assert source.with_suffix(".c.cached").exists()
 
 
+def test_integrals_are_counted_once(cache: Path) -> None:
+    """The second time nothing is differentiated; a note that is no number is counted anew."""
+    assert forms.integral_count(mass()) == 1
+    (note,) = (cache / "rotfem-counts").iterdir()
+    note.write_text("2")
+    assert forms.integral_count(mass()) == 2
+    note.write_text("two")
+    assert forms.integral_count(mass()) == 1
+
+
 def test_errors_of_the_compiler_are_errors(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(dolfinx.jit.DOLFINX_DEFAULT_JIT_OPTIONS, "cffi_libraries", (["no_such_library"], ""))
     with pytest.raises(Exception, match=r"[Ll]inkError|failed"):
