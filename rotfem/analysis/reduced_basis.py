@@ -16,6 +16,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
+from rotfem.analysis.projection import orthonormal, summed, times
 from rotfem.numerics.bounds import RoundOff, relative
 from rotfem.numerics.damped import quadratic
 from rotfem.numerics.eigenproblem import Eigenpairs, Pencil
@@ -27,10 +28,6 @@ LARGE, MANY = 8000, 3
 
 #: Accepted relative difference of a frequency from that of the full system; most full solutions in the search for it.
 AGREEMENT, MOST = 1e-6, 9
-
-#: Directions whose kinetic energy is below this part of the largest are dropped: the others hold them to round-off. A
-#: larger part would drop what makes the small differences between modes at two speeds.
-DEPENDENT = 1e-13
 
 
 def worth_while(analysis: ModalAnalysis, speeds: Sequence[float]) -> bool:
@@ -113,35 +110,21 @@ class ReducedAnalysis(ModalAnalysis):
     def _project(self) -> None:
         """Make the columns M-orthonormal and project every piece."""
         system = self.system
-        V = np.array([c / max(np.sqrt(self._sum(c @ c)), 1e-300) for c in self._columns]).T
         self._index = [i for i, p in enumerate(system.pieces) if p.kind in "MCK"]
         pieces = [system.pieces[i] for i in self._index]
-        for _ in range(2):  # once more, as what is left of nearly equal columns is orthogonal only roughly
-            mass = sum(self._times(p.operator, V) for p in pieces if p.kind == "M")
-            gram = self._sum(V.T @ mass)
-            sizes, turns = np.linalg.eigh(0.5 * (gram + gram.T))
-            keep = sizes > DEPENDENT * sizes[-1]
-            V = V @ (turns[:, keep] / np.sqrt(sizes[keep]))
-        self.V = V
-        self.mass = sum(self._times(p.operator, V) for p in pieces if p.kind == "M")
-        products = [self._times(p.operator, self.V) for p in pieces]
-        self._pieces = [(p, self._sum(self.V.T @ PV)) for p, PV in zip(pieces, products, strict=True)]
-        self._grams = np.array([[self._sum(A.T @ B) for B in products] for A in products])
-        self._metric = self._sum(self.V.T @ self.V)
+        masses = [p.operator for p in pieces if p.kind == "M"]
+
+        def massed(X: Array) -> Any:
+            return sum(times(M, X) for M in masses)
+
+        self.V = orthonormal(self.comm, np.array(self._columns).T, massed)
+        self.mass = massed(self.V)
+        products = [times(p.operator, self.V) for p in pieces]
+        self._pieces = [(p, summed(self.comm, self.V.T @ PV)) for p, PV in zip(pieces, products, strict=True)]
+        self._grams = np.array([[summed(self.comm, A.T @ B) for B in products] for A in products])
+        self._metric = summed(self.comm, self.V.T @ self.V)
         self._norms = [float(p.operator.norm()) for p in pieces]
         self._round_off = RoundOff(Pencil(*system.mass_damping_stiffness(keep=False)))
-
-    def _sum(self, local: Any) -> Any:
-        return self.comm.allreduce(local, op=MPI.SUM) if self.comm.size > 1 else local
-
-    def _times(self, A: Any, X: Array) -> Array:
-        x, y = A.createVecs()
-        out = np.empty_like(X)
-        for j in range(X.shape[1]):
-            x.array[:] = X[:, j]
-            A.mult(x, y)
-            out[:, j] = y.array
-        return out
 
     def at(self, speed: float, count: int, start: Spinning | None = None, keep: bool = True) -> Spinning:
         """Return the eigenpairs of the basis at a speed (see `ModalAnalysis.at`), with errors in the full system."""
@@ -166,7 +149,7 @@ class ReducedAnalysis(ModalAnalysis):
 
     def mass_times(self, spinning: Spinning) -> Array:
         """Return M times the eigenvectors."""
-        return self.mass @ spinning.pairs.right
+        return np.asarray(self.mass @ spinning.pairs.right)
 
     def _backward_errors(self, pairs: Eigenpairs, c: Array) -> Array:
         """Return the normwise backward errors of the lifted eigenpairs in the full system, shape (m,).

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -49,11 +50,21 @@ class Recorder:
         row += [energy[name] for name in ("kinetic", "strain", "jacobi")]
         row += hub_values(system, state).values()
         row += system.outputs().values()
-        check_finite(zip(self.history.columns, row, strict=True), t)
+        self.add(row, state)
+
+    def add(self, row: Sequence[float], state: State | None) -> None:
+        """Add a row, and keep the state that it is of if there is one.
+
+        Raises:
+            ComputationError: a number of it is not finite.
+        """
+        check_finite(zip(self.history.columns, row, strict=True), row[0])
         self.history.append(row)
+        if state is None:
+            return
         self._last = state
         if self.snapshots is not None:
-            self.snapshots.add(t, state.q)
+            self.snapshots.add(state.t, state.q)
 
     def result(self, summary: dict[str, Any], history: dict[str, Array]) -> RunResult:
         """Return a result with the last shape and the fields kept."""

@@ -13,6 +13,7 @@ from rotfem.analysis.constant_conditions import stability_ahead
 from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.equilibrium import static_tip_shape, steady_state
 from rotfem.analysis.farthest_state import Farthest
+from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability, stability_of
 from rotfem.analysis.stepper import Stepper
@@ -23,6 +24,7 @@ from rotfem.commands.interrupts import Interrupted
 from rotfem.commands.keeper import Keeper
 from rotfem.commands.problem import scheme_of
 from rotfem.commands.recorder import Recorder
+from rotfem.commands.reduced_history import by_reduced_model
 from rotfem.commands.summary import run_summary
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError
@@ -74,6 +76,7 @@ class Simulation:
         self.record = Recorder(self.system)
         self.newton = Newton.of(scene.solver)
         self.stepper: Stepper | None = None
+        self.reduced: Response | None = None
         self.steps, self.elapsed = 0, 0.0
         self.resumed: list[dict[str, Any]] = []
         self.critical = critical_speed(self.system)
@@ -123,14 +126,21 @@ class Simulation:
         time = self.scene.time
         assert time is not None
         newton = Newton.of(self.scene.solver)
-        scheme, steps = scheme_of(time), Steps.of(time)
-        march = March(self.system, scheme, steps, newton, None if self.keeper.goes_on else self._initial())
+        scheme, steps, start = scheme_of(time), Steps.of(time), None if self.keeper.goes_on else self._initial()
+        if self.scene.model.reduced and by_reduced_model(self, start, progress):
+            return
+        march = March(self.system, scheme, steps, newton, start)
         self.stepper = march.stepper
         march.reached = self.keeper.start(self)
         with self.keeper.interrupts():
             first = 0 if march.reached is None else self.steps + 1
             for self.steps, state in enumerate(march, first):
                 self._stepped(state, time, progress)
+
+    def look(self, state: State) -> None:
+        """See that a state of a linear theory that no step has led to is in the range of the theory."""
+        self._check(state)
+        self.farthest(state.q, state.t)
 
     def _stepped(self, state: State, time: Time, progress: Progress) -> None:
         """Look at a state of the march, and keep what is to be kept of it."""

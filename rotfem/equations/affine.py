@@ -5,7 +5,7 @@ The pieces are assembled once (see `rotfem.equations.pieces`); a new speed costs
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -87,7 +87,7 @@ class AffineSystem(System):
     def set_time(self, t: float, motion: Motion | None = None, load_factor: float = 1.0) -> None:
         """Set the constants of time t (s) and form M, C, K and f there if their coefficients have changed."""
         super().set_time(t, motion, load_factor)
-        c = self._products([constant.value.ravel() for constant in self._all_constants])
+        c = self._products(np.concatenate([ONE, *(constant.value.ravel() for constant in self._all_constants)]))
         old = self._coefficients
         self._coefficients = c
         self.settled = True
@@ -107,12 +107,16 @@ class AffineSystem(System):
     def coefficients(self, motion: Motion) -> Array:
         """Return the factor of every piece at the start of another motion, shape (n,); nothing is set."""
         values = {**self.model.frame.values(motion, 0.0), **self.load_values(0.0, motion)}
-        return self._products([np.ravel(values[name]) for name in self._constants])
+        return self._products(np.concatenate([ONE, *(np.ravel(values[name]) for name in self._constants)]))
 
-    def _products(self, values: list[Array]) -> Array:
-        """Return the product that multiplies each piece, from the values of all constants in their order."""
-        flat = np.concatenate([ONE, *values])
-        return np.asarray(self._weights * flat[self._factors[:, 0]] * flat[self._factors[:, 1]])
+    def factors(self, values: Mapping[str, Array]) -> Array:
+        """Return the factor of every piece at many times, shape (n, pieces), from the values (n, size) of constants."""
+        given = [values[name] for name in self._constants]
+        return self._products(np.hstack([np.ones((len(given[0]), 1)), *given]).T)
+
+    def _products(self, values: Array) -> Array:
+        """Return the product that multiplies each piece, from 1 and the values of all constants in their order."""
+        return np.asarray((values[self._factors[:, 0]] * values[self._factors[:, 1]]).T * self._weights)
 
     def residual(self) -> Any:
         """Return −(M a + C v + K q + f), zero at clamped unknowns."""
@@ -212,10 +216,11 @@ class AffineSystem(System):
         spin = self.model.frame.constants.get("w")
         if spin is None or "T0" not in self._energies.names:
             return 0.0
-        return self._rest_inertia * float(np.dot(spin.value, spin.value))
+        return self.rest_inertia * float(np.dot(spin.value, spin.value))
 
     @cached_property
-    def _rest_inertia(self) -> float:
+    def rest_inertia(self) -> float:
+        """T0 of the undeformed structure at unit speed, kg·m²: half its moment of inertia about the axis."""
         spin = self.model.frame.constants["w"]
         state, w = self.q.x.array.copy(), spin.value.copy()
         self.q.x.array[:] = 0.0

@@ -62,6 +62,9 @@ def check_theory(structure: AnyStructure, model: Model) -> None:
         able = ", ".join(show(other.name) for other in registry.theories if other.holds_for(kind))
         has = ", ".join(theory.strains) or "no structure"
         raise problem("model.theory", theory.name, f"has strains for {has}, none for a {kind}; allowed there: {able}")
+    if model.reduced and not theory.linear:
+        able = ", ".join(show(other.name) for other in registry.theories if other.linear and other.holds_for(kind))
+        raise problem("model.reduced", model.reduced, f'needs a linear model.theory, not "{theory.name}": {able}')
 
 
 def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:

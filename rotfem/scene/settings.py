@@ -33,6 +33,14 @@ def _as_plate_elements(value: Any) -> tuple[int, int]:
     return entries[0], entries[1]
 
 
+def _as_reduced(value: Any) -> bool | float:
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, int | float) and 0.0 < value < 1.0:
+        return float(value)
+    raise problem("", value, "must be true, false, or an accuracy between 0 and 1")
+
+
 Degree = Annotated[int, PlainValidator(Bounds(ge=1, le=6).integer)]
 Integration = Literal["reduced", "full"]
 
@@ -46,6 +54,7 @@ class Model(SceneModel):
         frame: frame to which displacements refer.
         tolerance: relative model error up to which effects are left out and the theory may be poorer, or None.
         on_exceed: what a run does that leaves the range its model was chosen for.
+        reduced: whether a history is that of a reduced model, of a linear theory; a number is its accuracy.
     """
 
     theory: Annotated[str, PlainValidator(_as_theory)] = "reissner"
@@ -53,6 +62,7 @@ class Model(SceneModel):
     frame: Literal["rotating", "inertial"] = "rotating"
     tolerance: Positive | None = None
     on_exceed: Literal["upgrade", "stop", "warn"] = "upgrade"
+    reduced: Annotated[bool | float, PlainValidator(_as_reduced)] = False
 
     @model_validator(mode="after")
     def _check_choice(self) -> Self:
@@ -62,6 +72,8 @@ class Model(SceneModel):
         if self.tolerance is not None and self.frame == "inertial":
             reason = 'needs frame = "rotating": only there can effects be left out one by one'
             raise problem("tolerance", self.tolerance, reason)
+        if self.tolerance is not None and self.reduced:
+            raise problem("reduced", self.reduced, "cannot be combined with tolerance, which chooses the model")
         return self
 
 

@@ -1,0 +1,50 @@
+"""Matrices of a system times the columns of a basis, and bases that are orthonormal; columns hold owned unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+Array = npt.NDArray[Any]
+
+#: Directions whose energy is below this part of the largest are dropped: the others hold them to round-off. A larger
+#: part would drop what makes the small differences between modes at two speeds.
+DEPENDENT = 1e-13
+
+
+def summed(comm: MPI.Comm, local: Any) -> Any:
+    """Return the sum over all ranks of an array of each."""
+    return comm.allreduce(local, op=MPI.SUM) if comm.size > 1 else local
+
+
+def times(A: Any, X: Array) -> Array:
+    """Return A X of a PETSc matrix and columns (n, m)."""
+    x, y = A.createVecs()
+    out = np.empty_like(X)
+    for j in range(X.shape[1]):
+        x.array[:] = X[:, j]
+        A.mult(x, y)
+        out[:, j] = y.array
+    return out
+
+
+def orthonormal(comm: MPI.Comm, columns: Array, product: Callable[[Array], Array]) -> Array:
+    """Return an orthonormal basis of what columns (n, m) span, shape (n, k) with k ≤ m.
+
+    Args:
+        comm: communicator that the rows are distributed over.
+        columns: of any lengths.
+        product: X ↦ B X of the inner product x·B y.
+    """
+    sizes = np.sqrt(np.maximum(summed(comm, np.einsum("ij,ij->j", columns, columns)), 1e-300))
+    V: Array = columns / sizes
+    for _ in range(2):  # once more, as what is left of nearly equal columns is orthogonal only roughly
+        gram = summed(comm, V.T @ product(V))
+        energies, turns = np.linalg.eigh(0.5 * (gram + gram.T))
+        keep = energies > DEPENDENT * energies[-1]
+        V = np.asarray(V @ (turns[:, keep] / np.sqrt(energies[keep])))
+    return V

@@ -1,0 +1,139 @@
+"""A linear theory between the columns of a basis: V (n, m) with q = V η, and every piece as a small matrix."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.projection import orthonormal, summed, times
+from rotfem.numerics.linear import DirectSolver, Increment, combine
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+#: Part of its energy that a shape must have beside those of the basis, to be told from round-off.
+BESIDE = 1e-20
+
+
+class ReducedModel:
+    """Pieces of a linear theory in a basis that is orthonormal in strain energy, V·K₀V = 1, and can grow.
+
+    Args:
+        system: equations of a linear theory, the hub held.
+        active: numbers of the pieces that are ever there.
+
+    Attributes:
+        V: basis, local dof arrays with their ghosts, shape (n, m).
+        kinds: "M", "C", "K", "f" ↦ numbers of the active pieces of that kind.
+        small: "M", "C", "K" ↦ projected pieces (p, m, m), "f" ↦ (p, m).
+    """
+
+    def __init__(self, system: Any, active: Index):
+        self.system, self.comm = system, system.comm
+        space = system.V.dofmap
+        self.owned = slice(0, space.index_map.size_local * space.index_map_bs)
+        pieces = [(int(i), system.pieces[int(i)]) for i in active]
+        self.kinds = {kind: [i for i, p in pieces if p.kind == kind] for kind in "MCKf"}
+        self.V: Array = np.empty((len(system.zeros()), 0))
+        owned = self.V[self.owned]
+        self._products = {i: owned for kind in "MCK" for i in self.kinds[kind]}
+        loads = [system.pieces[i].operator.array for i in self.kinds["f"]]
+        self._loads = np.array(loads).reshape(len(loads), -1)[:, self.owned]
+        self.small: dict[str, Array] = {kind: np.empty((len(self.kinds[kind]), 0, 0)) for kind in "MCK"}
+        self.small["f"] = np.empty((len(self.kinds["f"]), 0))
+        self._increment = Increment(system.V)
+        self._right = system.A.createVecs()[1]
+
+    @property
+    def size(self) -> int:
+        """Number of columns."""
+        return self.V.shape[1]
+
+    def energy_product(self, X: Array) -> Array:
+        """Return K₀ X of owned rows: forces of the strains."""
+        return times(self.system.material, X)
+
+    def energies(self, X: Array) -> Array:
+        """Return twice the strain energy of each column (owned rows)."""
+        return np.asarray(summed(self.comm, np.einsum("ij,ij->j", X, self.energy_product(X))))
+
+    def grow(self, columns: Array, most: int | None = None, least: float = 0.0) -> int:
+        """Add to the basis what columns span beside it, those with the largest energy first; return how many.
+
+        Args:
+            columns: local dof arrays, shape (n, k).
+            most: number of shapes that are added; all if None.
+            least: twice the strain energy that a shape has to have beside the basis.
+        """
+        X, V = columns[self.owned], self.V[self.owned]
+        whole = self.energies(X)
+        for _ in range(2):
+            X = X - V @ summed(self.comm, self.energy_product(V).T @ X)
+        gram = summed(self.comm, X.T @ self.energy_product(X))
+        energies, turns = np.linalg.eigh(0.5 * (gram + gram.T))
+        keep = np.flatnonzero(energies > max(least, BESIDE * float(whole.max(initial=0.0))))[::-1][:most]
+        if not len(keep):
+            return 0
+        X = X @ (turns[:, keep] / np.sqrt(energies[keep]))
+        new = orthonormal(self.comm, X - V @ summed(self.comm, self.energy_product(V).T @ X), self.energy_product)
+        self._append(new)
+        return new.shape[1]
+
+    def _append(self, new: Array) -> None:
+        whole = np.zeros((len(self.V), new.shape[1]))
+        for column, x in zip(whole.T, new.T, strict=True):
+            function = self._increment.function.x
+            function.array[self.owned] = x
+            function.scatter_forward()
+            column[:] = function.array
+        self.V = np.hstack([self.V, whole])
+        V = self.V[self.owned]
+        for i, old in self._products.items():
+            self._products[i] = np.hstack([old, times(self.system.pieces[i].operator, new)])
+        m = self.size
+        for kind in "MCK":
+            projected = [summed(self.comm, V.T @ self._products[i]) for i in self.kinds[kind]]
+            self.small[kind] = np.array(projected).reshape(-1, m, m)
+        self.small["f"] = np.asarray(summed(self.comm, self._loads @ V))
+
+    def operators(self, c: Array) -> tuple[Array, Array, Array, Array]:
+        """Return M, C, K (n, m, m) and f (n, m) from the factors of all pieces (n, pieces)."""
+        m = self.size
+        M, C, K = ((c[:, self.kinds[k]] @ self.small[k].reshape(-1, m * m)).reshape(-1, m, m) for k in "MCK")
+        return M, C, K, c[:, self.kinds["f"]] @ self.small["f"]
+
+    def accelerations(self, c: Array, q: Array, v: Array) -> Array:
+        """Return the accelerations (n, m) that keep the reduced equations at coordinates and rates (n, m)."""
+        M, C, K, f = self.operators(c)
+        force = f + np.einsum("nij,nj->ni", C, v) + np.einsum("nij,nj->ni", K, q)
+        return -np.linalg.solve(M, force[:, :, None])[:, :, 0]
+
+    def residual(self, c: Array, q: Array, v: Array, a: Array) -> Array:
+        """Return M a + C v + K q + f of the full system at one instant, owned rows, from the factors (pieces,)."""
+        return self.load(c) + sum(self.forces(kind, c) @ x for kind, x in (("M", a), ("C", v), ("K", q)))
+
+    def forces(self, kind: str, c: Array) -> Array:
+        """Return M V, C V or K V of the full system from the factors of all pieces (pieces,), owned rows (n, m)."""
+        zero = np.zeros_like(self.V[self.owned])
+        return np.asarray(sum((c[i] * self._products[i] for i in self.kinds[kind]), zero))
+
+    def stiffness(self, c: Array) -> DirectSolver:
+        """Return a solver with the stiffness of the full system, from the factors of all pieces (pieces,)."""
+        A = self.system.A.duplicate()
+        combine(A, [self.system.pieces[i].operator for i in self.kinds["K"]], c[self.kinds["K"]])
+        return DirectSolver(A)
+
+    def solve(self, solver: DirectSolver, right: Array) -> Array:
+        """Return the solution (a new local dof array) with a right-hand side of owned rows."""
+        self._right.array[:] = right
+        return self._increment.solve(solver, self._right).copy()
+
+    def load(self, c: Array) -> Array:
+        """Return f of the full system, owned rows."""
+        return np.asarray(c[self.kinds["f"]] @ self._loads)
+
+    def coordinates(self, shape: Array) -> Array:
+        """Return the coordinates (m,) of a shape (local dof array) in the span of the basis."""
+        return np.asarray(summed(self.comm, self.energy_product(self.V[self.owned]).T @ shape[self.owned]))

@@ -1,0 +1,269 @@
+"""The history of a linear theory by a reduced model whose basis grows until nothing that it lacks is seen any more.
+
+What the basis V lacks is seen in the residual r = M V η̈ + C V η̇ + K V η + f of the full system, which the reduced
+equations make orthogonal to V. K⁻¹ r is the static answer to it: an estimate of the error of V η where what is lacking
+is stiff, and the shapes that lack. So the basis starts from the static answers to what drives the system, and grows by
+the answers to residuals at some instants, those of most energy first. The change of the history with the last shapes is
+an estimate that sees what is not stiff, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter, process_time
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.reduced.drive import Drive
+from rotfem.analysis.reduced.model import ReducedModel
+from rotfem.analysis.reduced.solution import Trajectory, Solution
+
+Array = npt.NDArray[np.float64]
+
+#: Rounds in which a basis may grow, shapes that one adds, and most columns.
+ROUNDS, ADDED, MOST = 12, 6, 60
+
+#: Instants at which the full system's residual is looked at, and rows of which these are chosen.
+INSTANTS, CHOSEN_OF = 24, 600
+
+#: Independent loads, relative to the largest, and most of them.
+INDEPENDENT, LOADS = 1e-9, 8
+
+#: Accuracy that is asked for if none is.
+ACCURACY = 1e-5
+
+#: Halvings of the steps of a collocation, by what one divides its error at least, and most steps.
+HALVINGS, ORDER, MOST_STEPS = 6, 8.0, 200_000
+
+
+@dataclass(frozen=True)
+class Response:
+    """A history in the coordinates of a basis.
+
+    Attributes:
+        model: the basis and its small matrices.
+        drive: what is prescribed.
+        times: of the rows, s.
+        q, v: coordinates and rates at them, (n, m).
+        projection_error, time_error: estimates, relative to the largest displacement of the tip.
+        met: whether both are within what was asked for.
+        steps: of the last solution in time.
+        exact: whether that is exact for its forces.
+        rounds: solutions until the basis was large enough.
+        seconds: of processor and clock, what all of it took, compilation apart.
+    """
+
+    model: ReducedModel
+    drive: Drive
+    times: Array
+    q: Array
+    v: Array
+    projection_error: float
+    time_error: float
+    met: bool
+    steps: int
+    exact: bool
+    rounds: int
+    seconds: dict[str, float]
+
+    @property
+    def tips(self) -> Array:
+        """The unknowns at the tip in all rows, (n, components)."""
+        return self.q @ tips_of(self.model).T
+
+    def accelerations(self) -> Array:
+        """Return the accelerations of the coordinates in all rows, (n, m)."""
+        return self.model.accelerations(self.factors(), self.q, self.v)
+
+    def factors(self) -> Array:
+        """Return the factors of all pieces in all rows, just after what jumps there, (n, pieces)."""
+        return self.drive.factors(after(self.times))
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a summary says of it."""
+        return {
+            "vectors": self.model.size,
+            "rounds": self.rounds,
+            "method": "exact exponential" if self.exact else "collocation",
+            "steps": self.steps,
+            "projection_error": self.projection_error,
+            "time_error": self.time_error,
+            "seconds": self.seconds,
+        }
+
+
+def reduced_response(system: Any, times: Array, start: Array | None = None, accuracy: float = ACCURACY) -> Response:
+    """Return the history of a linear theory at prescribed speed by a reduced model.
+
+    Args:
+        system: compiled equations of a linear theory.
+        times: times of the rows, the first 0, s.
+        start: shape at t = 0, at rest in the turning frame, local dof array; undeformed if None.
+        accuracy: error of basis and time, relative to the largest displacement of the tip, each.
+
+    Raises:
+        ComputationError: the stiffness is singular, or the history not finite.
+    """
+    began = process_time(), perf_counter()
+    drive = Drive(system, times)
+    active = np.flatnonzero(np.abs(drive.factors(np.append(drive.looks(), times[:1]))).max(axis=0) > 0.0)
+    growth = Growth(ReducedModel(system, active), drive, Solution(drive, times, active), start)
+    path, projection = growth.grow(accuracy)
+    path, error = growth.refine(path, accuracy)
+    seconds = {"cpu": process_time() - began[0], "wall": perf_counter() - began[1]}
+    met = projection <= accuracy and error <= accuracy
+    return Response(
+        growth.model,
+        drive,
+        times,
+        path.q,
+        path.v,
+        projection,
+        error,
+        met,
+        path.steps,
+        path.exact,
+        growth.rounds,
+        seconds,
+    )
+
+
+class Growth:
+    """A basis that grows with what the full system's residual says it lacks.
+
+    Args:
+        model: the reduced model, its basis empty.
+        drive: what is prescribed.
+        solution: of the history.
+        start: shape at t = 0, local dof array; None where undeformed.
+    """
+
+    def __init__(self, model: ReducedModel, drive: Drive, solution: Solution, start: Array | None):
+        self.model, self.drive, self.solution, self.start = model, drive, solution, start
+        self.rounds = 0
+        looks = drive.looks()
+        speeds = np.abs(drive.speed(looks))
+        ends = [int(speeds.argmax()), int(speeds.argmin())][: 1 if solution.constant else 2]
+        self._factors = drive.factors(looks)
+        self._speeds = speeds[ends]
+        self._solvers = [model.stiffness(self._factors[i]) for i in ends]
+        self._begin()
+
+    def _begin(self) -> None:
+        """Take the static answers to what drives the system at the extreme speeds, their inertia's, and the start."""
+        model = self.model
+        columns: list[Array] = [] if self.start is None or not np.any(self.start) else [self.start]
+        for load in self._loads():
+            columns += [model.solve(solver, load) for solver in self._solvers]
+        if columns:
+            model.grow(np.array(columns).T)
+        for kind in "MC":
+            strongest = int(np.argmax(np.abs(self._factors[:, model.kinds[kind]]).sum(axis=1)))
+            forces = model.forces(kind, self._factors[strongest])
+            if forces.size:
+                model.grow(np.array([model.solve(self._solvers[0], f) for f in forces.T]).T)
+
+    def _loads(self) -> Array:
+        """Return the independent loads of the history, owned rows, (k, n)."""
+        model, numbers = self.model, self.model.kinds["f"]
+        if not numbers:
+            return np.empty((0, 0))
+        norms = np.array([float(model.system.pieces[i].operator.norm()) for i in numbers])
+        _, sizes, parts = np.linalg.svd(self._factors[:, numbers] * norms, full_matrices=False)
+        parts = parts[sizes > INDEPENDENT * max(sizes[0], 1e-300)][:LOADS]
+        c = np.zeros((len(parts), self._factors.shape[1]))
+        c[:, numbers] = parts / norms
+        return np.array([model.load(row) for row in c])
+
+    # --- rounds ------------------------------------------------------------------------------------------------------
+
+    def grow(self, accuracy: float) -> tuple[Trajectory, float]:
+        """Return the history in a basis large enough, and the estimate of what it lacks.
+
+        Raises:
+            ComputationError: the stiffness is singular, or the history not finite.
+        """
+        model, lacking, error = self.model, np.inf, np.inf
+        before: Array | None = None
+        if model.size == 0:
+            nothing = np.zeros((len(self.solution.times), 0))
+            return Trajectory(nothing, nothing, 0, True), 0.0
+        while True:
+            self.rounds += 1
+            path = self.solve()
+            tips: Array = path.q @ tips_of(model).T
+            size = largest(model, tips)
+            if size == 0.0:
+                return path, 0.0
+            answers = self._answers(path)
+            last, lacking = lacking, largest(model, np.array([model.system.tip(x, 0.0) for x in answers])) / size
+            if before is not None:
+                change = largest(model, tips - before) / size
+                error = max(lacking, change * min(1.0, lacking / max(last, 1e-300)))
+                if error <= accuracy or self.rounds == ROUNDS:
+                    return path, error
+            before = tips
+            energy = float(np.max(np.einsum("ij,ij->i", path.q, path.q)))
+            least = (0.01 * accuracy) ** 2 * energy
+            if model.size >= MOST or model.grow(answers.T, ADDED, least) == 0:
+                return path, lacking if not np.isfinite(error) else error
+
+    def solve(self) -> Trajectory:
+        """Return the history in the basis that is there."""
+        model = self.model
+        nothing: Array = np.zeros(model.size)
+        q = nothing if self.start is None else model.coordinates(self.start)
+        return self.solution.solve(model, q, nothing)
+
+    def _answers(self, path: Trajectory) -> Array:
+        """Return the static answers to the residual at instants of the history, local dof arrays (k, n)."""
+        model, times = self.model, self.solution.times
+        rows = np.unique(np.linspace(0, len(times) - 1, CHOSEN_OF).astype(int))
+        t = after(times[rows])
+        c, q, v = self.drive.factors(t), path.q[rows], path.v[rows]
+        a = model.accelerations(c, q, v)
+        strength = np.linalg.norm(a, axis=1)
+        windows = np.array_split(np.arange(len(rows)), min(INSTANTS, len(rows)))
+        chosen = [int(w[np.argmax(strength[w])]) for w in windows]
+        speeds = np.abs(self.drive.speed(t[chosen]))
+        out = []
+        for i, speed in zip(chosen, speeds, strict=True):
+            solver = self._solvers[int(np.argmin(np.abs(self._speeds - speed)))]
+            out.append(-model.solve(solver, model.residual(c[i], q[i], v[i], a[i])))
+        return np.array(out)
+
+    def refine(self, path: Trajectory, accuracy: float) -> tuple[Trajectory, float]:
+        """Return the history with steps short enough, and the estimate of their error."""
+        if path.exact:
+            return path, self.solution.off
+        rows, error = tips_of(self.model).T, np.inf
+        for _ in range(HALVINGS):
+            if 2 * path.steps > MOST_STEPS:
+                break
+            self.solution.parts *= 2
+            finer = self.solve()
+            size = largest(self.model, finer.q @ rows)
+            error = largest(self.model, (finer.q - path.q) @ rows) / (ORDER * size) if size > 0.0 else 0.0
+            path = finer
+            if error <= accuracy:
+                break
+        return path, error
+
+
+def tips_of(model: ReducedModel) -> Array:
+    """Return the unknowns at the tip of every column of the basis, (components, m)."""
+    columns = [model.system.structure.tip_values(column.copy()) for column in model.V.T]
+    return np.array(columns).reshape(model.size, -1).T
+
+
+def largest(model: ReducedModel, tips: Array) -> float:
+    """Return the largest length of displacement vectors of the tip (n, components), m."""
+    moves = [name.startswith("u") for name in model.system.structure.components]
+    return float(np.linalg.norm(tips[:, moves], axis=1).max(initial=0.0))
+
+
+def after(times: Array) -> Array:
+    """Return times just after those given, where they have what follows a jump."""
+    return np.asarray(times * (1 + 1e-12))

@@ -1,0 +1,127 @@
+"""How a reduced model is solved in time: exactly where its matrices are constant, by batched collocation elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.reduced.collocation import collocate
+from rotfem.analysis.reduced.drive import Drive
+from rotfem.analysis.reduced.model import ReducedModel
+from rotfem.analysis.reduced.propagator import Propagator, cubics
+from rotfem.errors import ComputationError
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+#: Relative change of a factor that is none.
+SAME = 1e-12
+
+#: Length of a first step times the lowest frequency, and fewest steps in a history.
+LONG, FEWEST = 1.0, 32
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Coordinates and rates (n, m) at the times of a history.
+
+    Attributes:
+        q, v: coordinates and rates.
+        steps: number of steps or intervals.
+        exact: whether the solution is exact but for the cubics that stand for what drives it.
+    """
+
+    q: Array
+    v: Array
+    steps: int
+    exact: bool
+
+
+class Solution:
+    """Solves reduced models of one history, which differ in their bases.
+
+    Args:
+        drive: what is prescribed.
+        times: times at which the history is wanted, the first its start, s.
+        active: numbers of the pieces that are ever there.
+
+    Attributes:
+        parts: in how many parts each of the first steps is cut.
+        constant: whether the matrices are constant.
+        off: relative error of the cubics that stand for the forces, of an exact solution.
+    """
+
+    def __init__(self, drive: Drive, times: Array, active: Index):
+        self.drive, self.times, self.active = drive, times, active
+        self.parts = 1
+        self.off = 0.0
+        looks = drive.factors(drive.looks())
+        kinds = np.array([p.kind for p in drive.system.pieces])
+        matrices = looks[:, kinds != "f"]
+        self.constant = bool(np.all(np.ptp(matrices, axis=0) <= SAME * np.abs(matrices).max(axis=0, initial=0.0)))
+        self._looks = looks
+        self._loads = np.flatnonzero(kinds == "f")
+        self._steps: Array | None = None
+
+    def solve(self, model: ReducedModel, q: Array, v: Array) -> Trajectory:
+        """Return the history of a model from coordinates and rates (m,).
+
+        Raises:
+            ComputationError: it is not finite.
+        """
+        path = self._exact(model, q, v) if self.constant else None
+        path = path or self._collocated(model, q, v)
+        if not np.all(np.isfinite(path.q)):
+            raise ComputationError("the solution of the reduced model is not finite")
+        return path
+
+    @cached_property
+    def _cubics(self) -> tuple[Array, Array]:
+        grid = np.union1d(self.drive.knots, self.times)
+        grid, coefficients, self.off = cubics(lambda t: self.drive.factors(t)[:, self._loads], self.drive.within, grid)
+        return grid, coefficients
+
+    def _exact(self, model: ReducedModel, q: Array, v: Array) -> Trajectory | None:
+        """Return the exact solution; None where modal coordinates lose too many digits."""
+        M, C, K, _ = model.operators(self._looks[:1])
+        try:
+            propagator = Propagator(M[0], C[0], K[0])
+        except ComputationError:
+            return None
+        grid, coefficients = self._cubics
+        wanted = np.searchsorted(self._loads, model.kinds["f"])
+        x, rates = propagator.solve(grid, coefficients[:, :, wanted] @ model.small["f"], q, v)
+        at = np.searchsorted(grid, self.times)
+        return Trajectory(x[at], rates[at], len(grid) - 1, True)
+
+    def _collocated(self, model: ReducedModel, q: Array, v: Array) -> Trajectory:
+        if self._steps is None:
+            self._steps = self._first_steps(model)
+        ends = cut(self._steps, np.full(len(self._steps) - 1, self.parts))
+
+        def operators(t: Array) -> tuple[Array, Array, Array, Array]:
+            return model.operators(self.drive.factors(t))
+
+        steps = collocate(operators, self.drive.within, ends, q, v)
+        return Trajectory(*steps.at(self.times), len(ends) - 1, False)
+
+    def _first_steps(self, model: ReducedModel) -> Array:
+        """Return the ends of steps that land on all knots and resolve the lowest vibration."""
+        middle = self._looks[len(self._looks) // 2][None, :]
+        M, _, K, _ = model.operators(middle)
+        squares = np.abs(np.linalg.eigvals(np.linalg.solve(M[0], K[0])))
+        knots = self.drive.knots
+        longest = min(LONG / np.sqrt(squares.min()), (knots[-1] - knots[0]) / FEWEST)
+        return cut(knots, np.ceil(np.diff(knots) / longest * (1 - 1e-9)).astype(int))
+
+
+def cut(times: Array, parts: Index) -> Array:
+    """Return times with each interval cut in so many equal parts, shape (sum of parts + 1,)."""
+    begin = np.repeat(times[:-1], parts)
+    lengths = np.repeat(np.diff(times) / parts, parts)
+    first = np.cumsum(parts) - parts
+    number = np.arange(len(begin)) - np.repeat(first, parts)
+    return np.append(begin + number * lengths, times[-1])

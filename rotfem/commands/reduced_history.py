@@ -1,0 +1,119 @@
+"""The history of a run by a reduced model, in the place of a march: the same rows, fields and checks."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.fixed_steps import Steps, grid
+from rotfem.analysis.reduced.energies import ReducedEnergies
+from rotfem.analysis.reduced.response import ACCURACY, Response, reduced_response
+from rotfem.analysis.schemes import State
+from rotfem.listeners import Progress
+from rotfem.structures.paraview import MOST
+
+if TYPE_CHECKING:
+    from rotfem.commands.simulation import Simulation
+
+Array = npt.NDArray[np.float64]
+
+#: Rows of a history whose steps are adaptive.
+ROWS = 1000
+
+
+def by_reduced_model(run: Simulation, start: Array | None, progress: Progress) -> bool:
+    """Record the history of a reduced model; return whether one serves, which is said where it does not.
+
+    Args:
+        run: what is computed; its rows are added, and its warnings.
+        start: shape at t = 0, local dof array; undeformed if None.
+        progress: called with 1 at the end.
+
+    Raises:
+        ComputationError: it failed.
+    """
+    asked = run.scene.model.reduced
+    accuracy = ACCURACY if asked is True else float(asked)
+    if run.system.hub is not None:
+        run.warnings.append("there are no reduced models of a free hub; the full system was used")
+        return False
+    run.keeper.start(run)
+    with run.keeper.interrupts():
+        response = reduced_response(run.system, times_of(run.scene.time), start, accuracy)
+        if response.projection_error > accuracy:
+            run.warnings.append(
+                f"the reduced model of {response.model.size} vectors is off by {response.projection_error:.2g}, more "
+                f"than model.reduced allows ({accuracy:.2g}); the full system was used"
+            )
+            return False
+        run.reduced, run.steps = response, response.steps
+        Rows(run, response).record()
+    if response.time_error > accuracy:
+        run.warnings.append(
+            f"the steps of the reduced model leave an error of {response.time_error:.2g}, more than model.reduced "
+            f"allows ({accuracy:.2g})"
+        )
+    progress(1.0)
+    return True
+
+
+def times_of(time: Any) -> Array:
+    """Return the times of the rows that a [time] table asks for, s."""
+    steps = Steps.of(time)
+    if steps.step is None:
+        steps = Steps(steps.end, steps.end / ROWS)
+    ends, _ = grid(steps)
+    return np.append(ends[: -1 : time.output_every], ends[-1])
+
+
+class Rows:
+    """Rows and fields of a run, from a response.
+
+    Args:
+        run: what is computed.
+        response: its history.
+    """
+
+    def __init__(self, run: Simulation, response: Response):
+        self.run, self.response, self.system = run, response, run.system
+
+    def record(self) -> None:
+        """Add all rows to the run's history, and look at states of it as a march does."""
+        response, system = self.response, self.system
+        kept = set(range(0, len(response.times), stride(len(response.times)))) | {len(response.times) - 1}
+        motion, tips, energies = system.motion, response.tips, self._energies()
+        a = response.accelerations()
+        for i, t in enumerate(map(float, response.times)):
+            state = self._state(i, a) if i in kept or system.model.problem.outputs else None
+            row = [t, motion.angle(t), motion.speed(t), *tips[i], *(energy[i] for energy in energies)]
+            if state is not None:
+                self.run.look(state)
+                row += self._outputs(state)
+            self.run.record.add(row, state if i in kept else None)
+
+    def _energies(self) -> list[Array]:
+        response = self.response
+        c = response.factors()
+        energies = ReducedEnergies(response.model)(c, response.drive.speed(response.times), response.q, response.v)
+        return [energies[name] for name in ("kinetic", "strain", "jacobi")]
+
+    def _state(self, i: int, a: Array) -> State:
+        response, V = self.response, self.response.model.V
+        return State(float(response.times[i]), V @ response.q[i], V @ response.v[i], V @ a[i])
+
+    def _outputs(self, state: State) -> list[float]:
+        if not self.system.model.problem.outputs:
+            return []
+        self.system.set_time(state.t)
+        self.system.set_state(state.q, state.v, state.a)
+        return list(self.system.outputs().values())
+
+
+def stride(rows: int) -> int:
+    """Return from which row to which a snapshot is kept, so that there are at most MOST."""
+    every = 1
+    while (rows - 1) // every + 1 > MOST:
+        every *= 2
+    return every
