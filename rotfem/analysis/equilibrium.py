@@ -204,6 +204,8 @@ def _led(system: System, displacement: float, q: Array, F: float, newton: Newton
         loaded.axpy(-1.0, residual)
         solver = DirectSolver(system.tangent(1.0, 0.0, 0.0, before)[0])
         dq, per_force = under_residual.solve(solver, residual), under_load.solve(solver, loaded)
+        if tip(per_force)[1] == 0.0:
+            raise ComputationError("a force at the tip does not move it by anything above round-off")
         dF = (displacement - tip(q)[1] - tip(dq)[1]) / tip(per_force)[1]
         correction = dq + dF * per_force
         size = float(system.size(correction))

@@ -46,9 +46,9 @@ def estimates(scene: Scene, speed: float, count: int) -> list[Estimate]:
     for family, (EI, across) in bending.items():
         for n in range(1, count + 1):
             beta = CANTILEVER[n - 1] if n <= len(CANTILEVER) else (n - 0.5) * np.pi
-            at_rest = beta**4 * EI / (mass * L**4)
+            at_rest = (beta / L) * (beta / L) * float(np.sqrt(EI / mass))  # no power of L, which may be no number
             spin = (n * (2 * n - 1) * (1 + 1.5 * hub / L) - 0.8 + across) * speed**2
-            out.append(Estimate(family, n - 0.5, float(np.sqrt(at_rest + spin))))
+            out.append(Estimate(family, n - 0.5, float(np.sqrt(at_rest * at_rest + spin))))
     return sorted(out, key=lambda mode: mode.frequency)[:count]
 
 

@@ -273,6 +273,12 @@ def test_estimates_are_close_to_the_modes() -> None:
     np.testing.assert_allclose(found, computed, rtol=0.05)
 
 
+def test_estimates_of_the_tiniest_beam_are_numbers() -> None:
+    """A fourth power of its length is none any more."""
+    tiny = Scene.from_dict(BEAM).replace({"structure.length": 1e-90, "structure.hub_radius": 0.0})
+    assert all(mode.frequency > 0.0 for mode in estimates(tiny, 6.0, 4))
+
+
 def test_record_lines_are_json(tmp_path: Path) -> None:
     path = tmp_path / "cost.jsonl"
     Record(path, "x").put(Setting("reissner", (2, 3), 2), Measurement(status="failed", reason="no"))

@@ -85,6 +85,13 @@ def test_a_shape_that_is_not_found_says_how_far_the_tip_came() -> None:
         static_tip_shape(Problem.of(beam(1e3, 0.5)), 5.0, Newton(max_iterations=1))
 
 
+def test_a_section_that_no_number_holds_fails_with_a_message() -> None:
+    """GA/EI is beyond round-off by twenty orders: the shape is not found, and that is said."""
+    stiff = beam(1e3, 0.05).replace({"structure.section.GA": 1e37, "mesh.elements": 2, "mesh.degree": 2})
+    with pytest.raises(ComputationError, match="no static shape"):
+        static_tip_shape(Problem.of(stiff), 0.5, Newton())
+
+
 @pytest.mark.parametrize("theory", ["reissner", "second_order", "von_karman"])
 @pytest.mark.parametrize("displacement", [0.05, 0.3])
 def test_slenderness_is_no_matter(theory: str, displacement: float) -> None:
