@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.fixed_steps import Steps, grid
 from rotfem.analysis.reduced.energies import ReducedEnergies
+from rotfem.analysis.reduced.manifold import recover
 from rotfem.analysis.reduced.response import ACCURACY, Response, reduced_response
 from rotfem.analysis.schemes import State
 from rotfem.listeners import Progress
@@ -48,7 +49,9 @@ def by_reduced_model(run: Simulation, start: Array | None, progress: Progress) -
                 f"than model.reduced allows ({accuracy:.2g}); the full system was used"
             )
             return False
-        run.reduced, run.steps = response, response.steps
+        run.reduced, run.steps = response, response.trajectory.steps
+        if run.scene.model.foreshortening:
+            run.foreshortened = recover(response)
         Rows(run, response).record()
     if response.time_error > accuracy:
         run.warnings.append(
@@ -78,25 +81,34 @@ class Rows:
 
     def __init__(self, run: Simulation, response: Response):
         self.run, self.response, self.system = run, response, run.system
+        self.foreshortened = run.foreshortened
 
     def record(self) -> None:
         """Add all rows to the run's history, and look at states of it as a march does."""
         response, system = self.response, self.system
         kept = set(range(0, len(response.times), stride(len(response.times)))) | {len(response.times) - 1}
-        motion, tips, energies = system.motion, response.tips, self._energies()
-        a = response.accelerations()
+        motion, energies, a = system.motion, self._energies(), response.accelerations()
+        tips = response.tips if self.foreshortened is None else self.foreshortened.tips
         for i, t in enumerate(map(float, response.times)):
             state = self._state(i, a) if i in kept or system.model.problem.outputs else None
             row = [t, motion.angle(t), motion.speed(t), *tips[i], *(energy[i] for energy in energies)]
             if state is not None:
                 self.run.look(state)
                 row += self._outputs(state)
-            self.run.record.add(row, state if i in kept else None)
+            self.run.record.add(row, self._shown(state, i) if i in kept else None)
+
+    def _shown(self, state: State | None, i: int) -> State | None:
+        """Return a state as fields show it: with its foreshortening if that is given back."""
+        if state is None or self.foreshortened is None:
+            return state
+        return state.changed(q=self.foreshortened.manifold.shape(self.response.q[i]))
 
     def _energies(self) -> list[Array]:
         response = self.response
         c = response.factors()
-        energies = ReducedEnergies(response.model)(c, response.drive.speed(response.times), response.q, response.v)
+        energies = ReducedEnergies(response.model)(
+            c, response.solution.drive.speed(response.times), response.q, response.v
+        )
         return [energies[name] for name in ("kinetic", "strain", "jacobi")]
 
     def _state(self, i: int, a: Array) -> State:

@@ -13,6 +13,7 @@ from rotfem.analysis.constant_conditions import stability_ahead
 from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.equilibrium import static_tip_shape, steady_state
 from rotfem.analysis.farthest_state import Farthest
+from rotfem.analysis.reduced.manifold import Foreshortened
 from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability, stability_of
@@ -77,6 +78,7 @@ class Simulation:
         self.newton = Newton.of(scene.solver)
         self.stepper: Stepper | None = None
         self.reduced: Response | None = None
+        self.foreshortened: Foreshortened | None = None
         self.steps, self.elapsed = 0, 0.0
         self.resumed: list[dict[str, Any]] = []
         self.critical = critical_speed(self.system)
@@ -232,7 +234,7 @@ class Simulation:
                 f"longer definite, since t = {self._critical_since:.4g} s"
             )
         self._warn_of_what_the_strains_lack(history)
-        self.theory_error = self.farthest.error()
+        self.theory_error = self.farthest.error() if self.foreshortened is None else self.foreshortened.theory_error()
         if self.theory_error is not None and (said := self.theory_error.warning()):
             self.warnings.append(said)
         summary = run_summary(self, status, history)

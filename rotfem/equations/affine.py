@@ -15,6 +15,7 @@ import numpy.typing as npt
 from rotfem.equations.pieces import PRESTRESS, Pieces, set_diagonal
 from rotfem.equations.system import System
 from rotfem.mechanics.motion import Motion
+from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
 from rotfem.numerics.linear import combine
 
@@ -69,9 +70,9 @@ class AffineSystem(System):
         """Stiffness of the strains alone, clamped rows 1."""
         return self._decomposed.material
 
-    def geometric(self, u: Any, w: Any, base: Any) -> Any:
-        """Return ∫ N⁰ D²Γ₁[u, w] with N⁰ of the displacement `base`, a UFL form; 0 without a prestressed theory."""
-        return self._decomposed.geometric(u, w, base)
+    def geometric(self, u: Any, w: Any, base: Any, theory: Theory | None = None) -> Any:
+        """Return ∫ N⁰ D²Γ₁[u, w], a UFL form (see `Pieces.geometric`)."""
+        return self._decomposed.geometric(u, w, base, theory)
 
     def _factor_indices(self) -> npt.NDArray[np.int64]:
         """Return for every piece the two places of its factors in (1, all constants one after the other)."""

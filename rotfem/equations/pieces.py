@@ -22,6 +22,7 @@ from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms.analysis import extract_constants
 
 from rotfem.equations.model import Model
+from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
 from rotfem.numerics.linear import DirectSolver
 
@@ -213,9 +214,16 @@ class Pieces:
         """The displacement of the linear structure that carries N⁰."""
         return fem.Function(self.V)
 
-    def geometric(self, u: Any, w: Any, base: Any) -> Any:
-        """Return ∫ N⁰ D²Γ₁[u, w] with N⁰ of the displacement `base`, a UFL form; 0 without a prestressed theory."""
-        s, theory = self.structure, self.model.theory
+    def geometric(self, u: Any, w: Any, base: Any, theory: Theory | None = None) -> Any:
+        """Return ∫ N⁰ D²Γ₁[u, w] with N⁰ of the displacement `base`, a UFL form; 0 without a prestressed theory.
+
+        Args:
+            u: a displacement, or an argument of the form.
+            w: another.
+            base: what N⁰ is of, likewise.
+            theory: whose second-order strains Γ₁ are taken; those of the model if None.
+        """
+        s, theory = self.structure, theory or self.model.theory
         if not theory.prestress:
             return 0
         out: Any = 0

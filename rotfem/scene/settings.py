@@ -55,6 +55,7 @@ class Model(SceneModel):
         tolerance: relative model error up to which effects are left out and the theory may be poorer, or None.
         on_exceed: what a run does that leaves the range its model was chosen for.
         reduced: whether a history is that of a reduced model, of a linear theory; a number is its accuracy.
+        foreshortening: whether a reduced model gives back the foreshortening that linear strains lack.
     """
 
     theory: Annotated[str, PlainValidator(_as_theory)] = "reissner"
@@ -63,6 +64,7 @@ class Model(SceneModel):
     tolerance: Positive | None = None
     on_exceed: Literal["upgrade", "stop", "warn"] = "upgrade"
     reduced: Annotated[bool | float, PlainValidator(_as_reduced)] = False
+    foreshortening: bool = False
 
     @model_validator(mode="after")
     def _check_choice(self) -> Self:
@@ -74,6 +76,10 @@ class Model(SceneModel):
             raise problem("tolerance", self.tolerance, reason)
         if self.tolerance is not None and self.reduced:
             raise problem("reduced", self.reduced, "cannot be combined with tolerance, which chooses the model")
+        if self.foreshortening and not self.reduced:
+            raise problem(
+                "foreshortening", True, "needs reduced = true: it is given back to the shapes of a reduced model"
+            )
         return self
 
 

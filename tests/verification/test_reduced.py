@@ -155,3 +155,47 @@ def test_the_basis_is_checked(spin_up: MakeScene, monkeypatch: pytest.MonkeyPatc
     assert "reduced" not in result.summary
     assert any("the full system was used" in warning for warning in result.summary["warnings"])
     assert np.array_equal(result.history["tip_u2"], run(scene.replace({"model.reduced": None})).history["tip_u2"])
+
+
+def test_foreshortening_brings_the_spin_up_near_reissner(spin_up: MakeScene) -> None:
+    """From 3.3e-2 to 1.1e-3 of the largest displacement, and the estimate of what is left is not less than that."""
+    time = {"end": 20.0, "step": 0.01, "output_every": 10}
+    changes: dict[str, Any] = {"model.theory": "consistent_linear", "model.reduced": True, "model.foreshortening": True}
+    exact, scene = run(spin_up(time=time)), spin_up(changes, time=time)
+    given, linear = run(scene), run(scene.replace({"model.foreshortening": None}))
+
+    def off(result: Any) -> float:
+        u = [np.stack([x.history["tip_u1"], x.history["tip_u2"]]) for x in (result, exact)]
+        return float(np.linalg.norm(u[0] - u[1], axis=0).max() / np.linalg.norm(u[1], axis=0).max())
+
+    assert off(linear) == pytest.approx(3.3e-2, rel=0.02)
+    assert off(given) < 1.2e-3
+    assert off(given) < given.summary["theory_error"]["estimate"] < 3.5 * off(given)
+    assert given.shape["u1"][-1] == given.history["tip_u1"][-1]
+    with pytest.raises(SceneError, match="model.foreshortening = true: needs reduced = true"):
+        scene.replace({"model.reduced": None})
+
+
+def test_effects_are_as_large_as_the_full_models_say(spin_up: MakeScene) -> None:
+    """Each left out of reissner, against the reduced model of the linear theory."""
+    from rotfem.analysis.reduced.effect_sizes import effect_sizes
+    from rotfem.analysis.reduced.response import reduced_response
+    from rotfem.commands.problem import Problem
+
+    scene = spin_up({"mesh.elements": 6})
+    problem = Problem.of(scene)
+    times = np.linspace(0.0, 20.0, 501)
+    linear = problem.replace(theory="consistent_linear")
+    sizes = effect_sizes(reduced_response(linear.system(), times))
+
+    def tips(effects: tuple[str, ...]) -> Array:
+        moments = problem.replace(effects=effects).march(end=20.0, step=0.02)
+        return np.array([[moment.tip["u1"], moment.tip["u2"]] for moment in moments])
+
+    names = problem.effective_effects()
+    assert set(sizes) == set(names) == {"coriolis", "centrifugal", "euler", "rotary_inertia"}
+    whole = tips(names)
+    for name, size in sizes.items():
+        change = tips(tuple(n for n in names if n != name)) - whole
+        truth = float(np.linalg.norm(change, axis=1).max() / np.linalg.norm(whole, axis=1).max())
+        assert size == pytest.approx(truth, rel=0.15), name

@@ -65,7 +65,9 @@ class Steps:
         return self.q[i] + (share * h)[:, None] * self.v[i] + (h**2)[:, None] * twice, v
 
 
-def collocate(operators: Operators, nodes: Callable[..., Array], ends: Array, q: Array, v: Array) -> Steps:
+def collocate(
+    operators: Operators, nodes: Callable[..., Array], ends: Array, q: Array, v: Array, forces: Array | None = None
+) -> Steps:
     """Return the solution over steps.
 
     Args:
@@ -74,6 +76,7 @@ def collocate(operators: Operators, nodes: Callable[..., Array], ends: Array, q:
         ends: of the steps, the first the start, s.
         q: coordinates at the start, (m,).
         v: rates at the start, (m,).
+        forces: f at the nodes of all steps, (n, nodes, m), in the place of that of the operators.
     """
     n, m = len(ends) - 1, len(q)
     x = np.empty((n + 1, 2 * m))
@@ -83,7 +86,8 @@ def collocate(operators: Operators, nodes: Callable[..., Array], ends: Array, q:
         part = slice(first, min(first + BATCH, n))
         begin, h = ends[part], np.diff(ends[first : part.stop + 1])
         t = nodes(begin, begin + h, NODES)
-        answers = _answers(operators(t.ravel()), h, m)
+        M, C, K, f = operators(t.ravel())
+        answers = _answers((M, C, K, f if forces is None else forces[part]), h, m)
         propagator, offset = _propagators(answers, h, m)
         for k in range(len(h)):
             x[first + k + 1] = propagator[k] @ x[first + k] + offset[k]

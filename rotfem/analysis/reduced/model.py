@@ -119,6 +119,10 @@ class ReducedModel:
         zero = np.zeros_like(self.V[self.owned])
         return np.asarray(sum((c[i] * self._products[i] for i in self.kinds[kind]), zero))
 
+    def product(self, number: int) -> Array:
+        """Return the matrix of a piece times V, owned rows (n, m)."""
+        return self._products[number]
+
     def stiffness(self, c: Array) -> DirectSolver:
         """Return a solver with the stiffness of the full system, from the factors of all pieces (pieces,)."""
         A = self.system.A.duplicate()

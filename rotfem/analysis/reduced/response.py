@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.reduced.drive import Drive
 from rotfem.analysis.reduced.model import ReducedModel
-from rotfem.analysis.reduced.solution import Trajectory, Solution
+from rotfem.analysis.reduced.solution import Solution, Trajectory
 
 Array = npt.NDArray[np.float64]
 
@@ -44,29 +44,37 @@ class Response:
 
     Attributes:
         model: the basis and its small matrices.
-        drive: what is prescribed.
-        times: of the rows, s.
-        q, v: coordinates and rates at them, (n, m).
+        solution: how it is solved in time.
+        trajectory: coordinates and rates in the rows.
         projection_error, time_error: estimates, relative to the largest displacement of the tip.
         met: whether both are within what was asked for.
-        steps: of the last solution in time.
-        exact: whether that is exact for its forces.
         rounds: solutions until the basis was large enough.
         seconds: of processor and clock, what all of it took, compilation apart.
     """
 
     model: ReducedModel
-    drive: Drive
-    times: Array
-    q: Array
-    v: Array
+    solution: Solution
+    trajectory: Trajectory
     projection_error: float
     time_error: float
     met: bool
-    steps: int
-    exact: bool
     rounds: int
     seconds: dict[str, float]
+
+    @property
+    def times(self) -> Array:
+        """Times of the rows, s."""
+        return self.solution.times
+
+    @property
+    def q(self) -> Array:
+        """Coordinates in the rows, (n, m)."""
+        return self.trajectory.q
+
+    @property
+    def v(self) -> Array:
+        """Rates of the coordinates in the rows, (n, m)."""
+        return self.trajectory.v
 
     @property
     def tips(self) -> Array:
@@ -79,15 +87,15 @@ class Response:
 
     def factors(self) -> Array:
         """Return the factors of all pieces in all rows, just after what jumps there, (n, pieces)."""
-        return self.drive.factors(after(self.times))
+        return self.solution.drive.factors(after(self.times))
 
     def summary(self) -> dict[str, Any]:
         """Return what a summary says of it."""
         return {
             "vectors": self.model.size,
             "rounds": self.rounds,
-            "method": "exact exponential" if self.exact else "collocation",
-            "steps": self.steps,
+            "method": "exact exponential" if self.trajectory.exact else "collocation",
+            "steps": self.trajectory.steps,
             "projection_error": self.projection_error,
             "time_error": self.time_error,
             "seconds": self.seconds,
@@ -109,25 +117,13 @@ def reduced_response(system: Any, times: Array, start: Array | None = None, accu
     began = process_time(), perf_counter()
     drive = Drive(system, times)
     active = np.flatnonzero(np.abs(drive.factors(np.append(drive.looks(), times[:1]))).max(axis=0) > 0.0)
-    growth = Growth(ReducedModel(system, active), drive, Solution(drive, times, active), start)
+    solution = Solution(drive, times, active)
+    growth = Growth(ReducedModel(system, active), drive, solution, start)
     path, projection = growth.grow(accuracy)
     path, error = growth.refine(path, accuracy)
     seconds = {"cpu": process_time() - began[0], "wall": perf_counter() - began[1]}
     met = projection <= accuracy and error <= accuracy
-    return Response(
-        growth.model,
-        drive,
-        times,
-        path.q,
-        path.v,
-        projection,
-        error,
-        met,
-        path.steps,
-        path.exact,
-        growth.rounds,
-        seconds,
-    )
+    return Response(growth.model, solution, path, projection, error, met, growth.rounds, seconds)
 
 
 class Growth:
@@ -188,8 +184,7 @@ class Growth:
         model, lacking, error = self.model, np.inf, np.inf
         before: Array | None = None
         if model.size == 0:
-            nothing = np.zeros((len(self.solution.times), 0))
-            return Trajectory(nothing, nothing, 0, True), 0.0
+            return nothing(len(self.solution.times)), 0.0
         while True:
             self.rounds += 1
             path = self.solve()
@@ -213,9 +208,8 @@ class Growth:
     def solve(self) -> Trajectory:
         """Return the history in the basis that is there."""
         model = self.model
-        nothing: Array = np.zeros(model.size)
-        q = nothing if self.start is None else model.coordinates(self.start)
-        return self.solution.solve(model, q, nothing)
+        rest: Array = np.zeros(model.size)
+        return self.solution.solve(model, rest if self.start is None else model.coordinates(self.start), rest)
 
     def _answers(self, path: Trajectory) -> Array:
         """Return the static answers to the residual at instants of the history, local dof arrays (k, n)."""
@@ -252,10 +246,17 @@ class Growth:
         return path, error
 
 
-def tips_of(model: ReducedModel) -> Array:
-    """Return the unknowns at the tip of every column of the basis, (components, m)."""
-    columns = [model.system.structure.tip_values(column.copy()) for column in model.V.T]
-    return np.array(columns).reshape(model.size, -1).T
+def nothing(rows: int) -> Trajectory:
+    """Return the history of a basis without columns."""
+    none = np.zeros((rows, 0))
+    return Trajectory(none, none, 0, True, lambda t: (np.zeros((len(t), 0)), np.zeros((len(t), 0))))
+
+
+def tips_of(model: ReducedModel, shapes: Array | None = None) -> Array:
+    """Return the unknowns at the tip of shapes, a local dof array a column, of the basis if None; (components, m)."""
+    shapes = model.V if shapes is None else shapes
+    columns = [model.system.structure.tip_values(column.copy()) for column in shapes.T]
+    return np.array(columns).reshape(shapes.shape[1], -1).T
 
 
 def largest(model: ReducedModel, tips: Array) -> float:

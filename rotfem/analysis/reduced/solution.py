@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.reduced.collocation import collocate
+from rotfem.analysis.reduced.collocation import NODES, Operators, collocate
 from rotfem.analysis.reduced.drive import Drive
 from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.analysis.reduced.propagator import Propagator, cubics
@@ -32,12 +33,14 @@ class Trajectory:
         q, v: coordinates and rates.
         steps: number of steps or intervals.
         exact: whether the solution is exact but for the cubics that stand for what drives it.
+        at: (t (n,)) ↦ coordinates and rates (n, m) at other times (s), increasing.
     """
 
     q: Array
     v: Array
     steps: int
     exact: bool
+    at: Callable[[Array], tuple[Array, Array]]
 
 
 class Solution:
@@ -78,11 +81,15 @@ class Solution:
             raise ComputationError("the solution of the reduced model is not finite")
         return path
 
-    @cached_property
-    def _cubics(self) -> tuple[Array, Array]:
-        grid = np.union1d(self.drive.knots, self.times)
+    def _cubics(self, times: Array) -> tuple[Array, Array]:
+        """Return a grid that has these times, and coefficients of all loads' factors between its times."""
+        grid = np.union1d(self.drive.knots, times)
         grid, coefficients, self.off = cubics(lambda t: self.drive.factors(t)[:, self._loads], self.drive.within, grid)
         return grid, coefficients
+
+    @cached_property
+    def _at_rows(self) -> tuple[Array, Array]:
+        return self._cubics(self.times)
 
     def _exact(self, model: ReducedModel, q: Array, v: Array) -> Trajectory | None:
         """Return the exact solution; None where modal coordinates lose too many digits."""
@@ -91,22 +98,53 @@ class Solution:
             propagator = Propagator(M[0], C[0], K[0])
         except ComputationError:
             return None
-        grid, coefficients = self._cubics
         wanted = np.searchsorted(self._loads, model.kinds["f"])
-        x, rates = propagator.solve(grid, coefficients[:, :, wanted] @ model.small["f"], q, v)
-        at = np.searchsorted(grid, self.times)
-        return Trajectory(x[at], rates[at], len(grid) - 1, True)
+
+        def solved(times: Array, cubes: tuple[Array, Array]) -> tuple[Array, Array]:
+            grid, coefficients = cubes
+            x, rates = propagator.solve(grid, coefficients[:, :, wanted] @ model.small["f"], q, v)
+            rows = np.searchsorted(grid, times)
+            return x[rows], rates[rows]
+
+        here = self._at_rows
+        return Trajectory(*solved(self.times, here), len(here[0]) - 1, True, lambda t: solved(t, self._cubics(t)))
 
     def _collocated(self, model: ReducedModel, q: Array, v: Array) -> Trajectory:
+        ends = self.ends(model)
+        steps = collocate(self._operators(model), self.drive.within, ends, q, v)
+        return Trajectory(*steps.at(self.times), len(ends) - 1, False, steps.at)
+
+    def resolved(self, model: ReducedModel, path: Trajectory) -> Trajectory:
+        """Return a trajectory without the vibrations that steps of a collocation do not resolve."""
+        return self._collocated(model, *(x[0] for x in (path.q, path.v))) if path.exact else path
+
+    def again(self) -> Solution:
+        """Return a solution by the same steps, for equations some of whose effects are switched off or on."""
+        other = Solution(self.drive, self.times, self.active)
+        other.parts, other._steps = self.parts, self._steps
+        return other
+
+    def answer(self, model: ReducedModel, forces: Callable[[Array], Array]) -> Trajectory:
+        """Return the history from rest of a model under other forces than its own, by collocation.
+
+        Args:
+            model: the reduced model.
+            forces: t (n,) ↦ f (n, m) in M a + C v + K q + f = 0.
+        """
+        ends, nothing = self.ends(model), np.zeros(model.size)
+        t = self.drive.within(ends[:-1], ends[1:], NODES)
+        f = forces(t.ravel()).reshape(*t.shape, model.size)
+        steps = collocate(self._operators(model), self.drive.within, ends, nothing, nothing, f)
+        return Trajectory(*steps.at(self.times), len(ends) - 1, False, steps.at)
+
+    def _operators(self, model: ReducedModel) -> Operators:
+        return lambda t: model.operators(self.drive.factors(t))
+
+    def ends(self, model: ReducedModel) -> Array:
+        """Return the ends of the steps of a collocation, s."""
         if self._steps is None:
             self._steps = self._first_steps(model)
-        ends = cut(self._steps, np.full(len(self._steps) - 1, self.parts))
-
-        def operators(t: Array) -> tuple[Array, Array, Array, Array]:
-            return model.operators(self.drive.factors(t))
-
-        steps = collocate(operators, self.drive.within, ends, q, v)
-        return Trajectory(*steps.at(self.times), len(ends) - 1, False)
+        return cut(self._steps, np.full(len(self._steps) - 1, self.parts))
 
     def _first_steps(self, model: ReducedModel) -> Array:
         """Return the ends of steps that land on all knots and resolve the lowest vibration."""

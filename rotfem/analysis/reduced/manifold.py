@@ -1,0 +1,216 @@
+"""Foreshortening given back to a reduced linear model: q = V η + ½ Θ η η, the motion on that manifold, and its forces.
+
+A beam that bends comes nearer to its clamp, a second-order displacement that linear strains do not have. Θ_ij is the
+answer of the membrane to a pair of bending shapes,
+
+    K₀ Θ_ij + ∫ N(δq) D²Γ₁[V_i, V_j] = 0,
+
+with which the membrane is not strained by them to second order. What moves in the second order also has inertia. Its
+forces, projected on the tangent V + Θ η of the manifold (Jain, Tiso, Rutzmoser & Rixen 2017, section 3), are those that
+the linear equations lack: the answer to them is an estimate of what is left, and of how large an effect is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations_with_replacement
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
+
+from rotfem.analysis.projection import summed, times
+from rotfem.analysis.reduced.response import Response, largest, tips_of
+from rotfem.analysis.reduced.solution import Solution, Trajectory
+from rotfem.analysis.theory_error import TheoryError, stiffened
+from rotfem.equations.pieces import PRESTRESS
+from rotfem.mechanics.effects import INTERNAL, Effect
+from rotfem.numerics import compat, forms
+from rotfem.numerics.linear import DirectSolver
+
+Array = npt.NDArray[np.float64]
+
+#: Amplitude of a shape, relative to the largest, from which its foreshortening matters, and most shapes.
+MATTERS, MOST = 2e-3, 6
+
+
+@dataclass(frozen=True)
+class Motion2:
+    """Second-order coordinates s of the pairs (n, p), and their rates and accelerations."""
+
+    s: Array
+    v: Array
+    a: Array
+
+
+class Manifold:
+    """The second-order displacements of a response, and the forces of their inertia.
+
+    Args:
+        response: history of a reduced model.
+
+    Attributes:
+        shapes: coordinates of the shapes whose pairs are taken, (m, r).
+        pairs: numbers (i, j) of these, i ≤ j.
+        Theta: answers to the pairs, local dof arrays (n, p).
+    """
+
+    def __init__(self, response: Response):
+        self.response, self.model = response, response.model
+        _, sizes, turns = np.linalg.svd(response.q, full_matrices=False)
+        keep = sizes > MATTERS * sizes[:1].max(initial=0.0)
+        self.shapes: Array = turns[keep][:MOST].T
+        self.pairs = list(combinations_with_replacement(range(self.shapes.shape[1]), 2))
+        self._i, self._j = np.array(self.pairs, dtype=int).reshape(-1, 2).T
+        self._factor = np.where(self._i == self._j, 0.5, 1.0)
+        self.Theta = self._answers()
+        self.tips = tips_of(self.model, self.Theta)
+        self._project()
+
+    def _answers(self) -> Array:
+        """Return Θ of all pairs, one solution each."""
+        system, V = self.model.system, self.model.V @ self.shapes
+        first, second = fem.Function(system.V), fem.Function(system.V)
+        work = system.geometric(first, second, ufl.TestFunction(system.V), stiffened())
+        out = np.zeros((len(V), len(self.pairs)))
+        if not self.pairs:
+            return out
+        form, solver = forms.form(work, once=True), DirectSolver(system.material, symmetric=True)
+        for column, (i, j) in zip(out.T, self.pairs, strict=True):
+            first.x.array[:], second.x.array[:] = V[:, i], V[:, j]
+            b = compat.create_vector(system.V)
+            fem_petsc.assemble_vector(b, form)
+            b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
+            b.array[system.clamped] = 0.0
+            column[:] = -self.model.solve(solver, b.array[self.model.owned])
+        return out
+
+    def _project(self) -> None:
+        """Project the pieces of inertia and loads on V and Θ; those of strains and prestress vanish or are linear."""
+        model, system = self.model, self.model.system
+        owned, V = model.owned, model.V[model.owned]
+        Theta = self.Theta[owned]
+        self._pieces: dict[str, tuple[list[int], Array, Array]] = {}
+        for kind in "MCK":
+            numbers = [i for i in model.kinds[kind] if not inside(system.pieces[i].of)]
+            on_pairs = [times(system.pieces[i].operator, Theta) for i in numbers]
+            on_basis = [model.product(i) for i in numbers]
+            whole = np.hstack([V, Theta])
+            second = np.array([summed(model.comm, whole.T @ P) for P in on_pairs])
+            first = np.array([summed(model.comm, Theta.T @ P) for P in on_basis])
+            m, p = model.size, len(self.pairs)
+            self._pieces[kind] = (numbers, second.reshape(-1, m + p, p), first.reshape(-1, p, m))
+
+    # --- motion on the manifold --------------------------------------------------------------------------------------
+
+    def second(self, q: Array, v: Array | None = None, a: Array | None = None) -> Motion2:
+        """Return the coordinates of the pairs, and their rates, of coordinates, rates and accelerations (n, m)."""
+        x = q @ self.shapes
+        i, j, c = self._i, self._j, self._factor
+        dx, ddx = (np.zeros_like(x) if y is None else y @ self.shapes for y in (v, a))
+        rate = c * (dx[:, i] * x[:, j] + x[:, i] * dx[:, j])
+        return Motion2(
+            c * x[:, i] * x[:, j], rate, c * (ddx[:, i] * x[:, j] + 2 * dx[:, i] * dx[:, j] + x[:, i] * ddx[:, j])
+        )
+
+    def tip(self, q: Array) -> Array:
+        """Return the unknowns at the tip of coordinates (n, m), foreshortening with them, (n, components)."""
+        return q @ tips_of(self.model).T + self.second(q).s @ self.tips.T
+
+    def shape(self, q: Array) -> Array:
+        """Return the displacement (local dof array) of coordinates (m,)."""
+        return np.asarray(self.model.V @ q + self.Theta @ self.second(q[None, :]).s[0])
+
+    def forces(self, c: Array, q: Array, v: Array, a: Array) -> Array:
+        """Return the forces of inertia and loads that the linear equations lack, on the tangent, (n, m).
+
+        Args:
+            c: factors of all pieces, (n, pieces).
+            q: coordinates, (n, m).
+            v: rates.
+            a: accelerations.
+        """
+        m, motion, p = self.model.size, self.second(q, v, a), len(self.pairs)
+        on_basis, on_pairs = np.zeros((len(q), m)), np.zeros((len(q), p))
+        for kind, x, s in (("M", a, motion.a), ("C", v, motion.v), ("K", q, motion.s)):
+            numbers, second, first = self._pieces[kind]
+            for number, P, B in zip(numbers, second, first, strict=True):
+                weight = c[:, number, None]
+                both = weight * (s @ P.T)
+                on_basis += both[:, :m]
+                on_pairs += both[:, m:] + weight * (x @ B.T)
+        return on_basis + self._along(q, on_pairs)
+
+    def _along(self, q: Array, on_pairs: Array) -> Array:
+        """Return the transpose of ∂s/∂η times forces on the pairs, (n, m)."""
+        x, out = q @ self.shapes, np.zeros((len(q), self.shapes.shape[1]))
+        for k, (i, j) in enumerate(self.pairs):
+            force = self._factor[k] * on_pairs[:, k]
+            out[:, i] += force * x[:, j]
+            out[:, j] += force * x[:, i]
+        return out @ self.shapes.T
+
+    def correction(self, solution: Solution, path: Trajectory) -> Array:
+        """Return the answer of the linear equations to the forces that they lack on a trajectory, (rows, m).
+
+        Args:
+            solution: of the trajectory.
+            path: one by collocation, which has no vibrations faster than its steps: their forces average to nothing.
+        """
+        model = self.model
+
+        def lacking(t: Array) -> Array:
+            q, v = path.at(t)
+            c = solution.drive.factors(t)
+            return self.forces(c, q, v, model.accelerations(c, q, v))
+
+        return solution.answer(model, lacking).q
+
+
+def recover(response: Response) -> Foreshortened:
+    """Return a response with its foreshortening, and an estimate of what is left, the answer to the forces it lacks."""
+    manifold = Manifold(response)
+    solution = response.solution
+    path = solution.resolved(response.model, response.trajectory)
+    tips, left = manifold.tip(path.q), manifold.correction(solution, path)
+    size = largest(response.model, tips)
+    off = largest(response.model, manifold.tip(path.q + left) - tips) / size if size > 0.0 else 0.0
+    return Foreshortened(response, manifold, off)
+
+
+@dataclass(frozen=True)
+class Foreshortened:
+    """A response with its foreshortening.
+
+    Attributes:
+        response: the linear one.
+        manifold: on which it moves.
+        error: estimate of what the foreshortened displacements are off, relative to the largest of the tip.
+    """
+
+    response: Response
+    manifold: Manifold
+    error: float
+
+    @property
+    def tips(self) -> Array:
+        """The unknowns at the tip in all rows, (n, components)."""
+        return self.manifold.tip(self.response.q)
+
+    def theory_error(self) -> TheoryError:
+        """Return the error of the theory as far as the foreshortening does not take it away."""
+        basis = "its foreshortening is given back; the forces of second order that it lacks"
+        return TheoryError(self.error, basis, self.response.model.system.model.theory.name)
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a summary says of it."""
+        return {"shapes": self.manifold.shapes.shape[1], "error": self.error}
+
+
+def inside(of: frozenset[str]) -> bool:
+    """Return whether a piece is of stresses, damping or prestress; the manifold leaves the membrane unstrained."""
+    effects = [Effect.registry[name] for name in of if name in Effect.registry]
+    return PRESTRESS in of or INTERNAL.name in of or any(effect.internal for effect in effects)
