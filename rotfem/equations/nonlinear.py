@@ -30,7 +30,7 @@ class NonlinearSystem(System):
             self._F = forms.form(self.model.residual)
             self._pattern = self._J = forms.form(self._tangent_form)
         else:
-            self._F = forms.form(self._at_rest(self.model.residual), once=True)
+            self._F = forms.form(self._at_rest["f"], once=True)
             self._pattern = self._parts["K"]
         return fem_petsc.create_matrix(self._pattern)
 
@@ -55,21 +55,17 @@ class NonlinearSystem(System):
         change = self._stresses.change(ufl.TrialFunction(self.V))
         if self.moving:
             return forms.form(self._tangent_form + self._shifts[0] * change)
-        K = self._at_rest(ufl.derivative(self.model.residual, self.q, ufl.TrialFunction(self.V)))
-        return forms.form(K + change, once=True)
+        return forms.form(self._at_rest["K"] + change, once=True)
 
-    def _at_rest(self, form: Any) -> Any:
-        return forms.without(form, self.v, self.a)
+    @cached_property
+    def _at_rest(self) -> dict[str, Any]:
+        return forms.at_rest(self.model.residual, self.q, self.v, self.a)
 
     @cached_property
     def _parts(self) -> dict[str, Any]:
         """K, C and M at v = a = 0, compiled; None where one vanishes."""
-        F, du = self.model.residual, ufl.TrialFunction(self.V)
-        out = {}
-        for name, x in (("K", self.q), ("C", self.v), ("M", self.a)):
-            form = self._at_rest(ufl.derivative(F, x, du))
-            out[name] = None if form.empty() else forms.form(form, once=True)
-        return out
+        found = {name: self._at_rest[name] for name in "KCM"}
+        return {name: None if form.empty() else forms.form(form, once=True) for name, form in found.items()}
 
     @property
     def integrals(self) -> dict[str, int]:

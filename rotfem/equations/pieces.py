@@ -92,9 +92,7 @@ class Pieces:
     def _forms_at_rest(self) -> dict[str, Any]:
         """Return f, K, C and M at q = v = a = 0 as UFL forms; those that vanish are left out."""
         k = self.structure.k
-        F, du, state = self.model.residual, ufl.TrialFunction(self.V), (k.q, k.v, k.a)
-        tangents = {kind: ufl.derivative(F, x, du) for kind, x in zip("KCM", state, strict=True)}
-        at_rest = {kind: forms.without(form, *state) for kind, form in {"f": F, **tangents}.items()}
+        at_rest = {kind: forms.without(f, k.q) for kind, f in forms.at_rest(self.model.residual, k.q, k.v, k.a).items()}
         return {kind: form for kind, form in at_rest.items() if not form.empty()}
 
     def _zero_constants(self) -> None:

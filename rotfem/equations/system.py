@@ -175,7 +175,9 @@ class System(Solutions, ABC):
         motion = motion or self.motion
         self.time = t
         values = self.model.frame.values(motion, t)
-        self.model.frame.set({n: v * load_factor if n in ("a_o", "gravity") else v for n, v in values.items()})
+        if load_factor != 1.0:
+            values = {n: v * load_factor if n in ("a_o", "gravity") else v for n, v in values.items()}
+        self.model.frame.set(values)
         for name, value in self.load_values(t, motion).items():
             self.structure.load_constants[name][0].value[...] = load_factor * value
 

@@ -31,12 +31,14 @@ class Frame:
         self._domain, self.planar, self.fixed = domain, planar, fixed
         self._gravity = np.asarray(gravity, dtype=float)
         self.constants: dict[str, fem.Constant] = {}
+        self._entries: dict[str, Array] = {}  # of the constants, where they are
         turn, plane = (slice(2, 3), slice(0, 2)) if planar else (slice(0, 3), slice(0, 3))
         self._slices = {"w": turn, "dw": turn, "a_o": plane, "gravity": plane}
 
     def _constant(self, name: str, size: int) -> fem.Constant:
         if name not in self.constants:
             self.constants[name] = fem.Constant(self._domain, np.zeros(size, dtype=default_scalar_type))
+            self._entries[name] = self.constants[name].value
         return self.constants[name]
 
     def _spin(self, name: str) -> Any:
@@ -89,4 +91,4 @@ class Frame:
     def set(self, values: dict[str, Array]) -> None:
         """Write values (from `values`) into the constants."""
         for name, value in values.items():
-            self.constants[name].value[...] = value
+            self._entries[name][:] = value

@@ -9,7 +9,7 @@ import basix
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
-from ufl.algorithms import expand_derivatives
+from ufl.algorithms import expand_derivatives, extract_coefficients
 from ufl.algorithms.map_integrands import map_integrand_dags
 from ufl.constantvalue import Zero
 from ufl.corealg.multifunction import MultiFunction
@@ -50,11 +50,32 @@ def expression(e: Any, points: npt.NDArray[Any], comm: Any) -> fem.Expression:
 
 def without(f: Any, *functions: Any) -> Any:
     """Return a UFL form or expression with these functions set to zero: what vanishes with them is not compiled."""
-    expanded = expand_derivatives(f)
+    return zeroed(expand_derivatives(f), *functions)
+
+
+def zeroed(expanded: Any, *functions: Any) -> Any:
+    """Return a UFL form or expression, its derivatives expanded already, with these functions set to zero."""
     if isinstance(expanded, ufl.Form) and expanded.empty():
         return expanded
     zero = {u: ufl.as_vector([0] * u.ufl_shape[0]) for u in functions}
     return map_integrand_dags(_NoEmptyBranches(), ufl.replace(expanded, zero))
+
+
+def containing(f: ufl.Form, function: Any) -> ufl.Form:
+    """Return the integrals of a UFL form that a function is in."""
+    return ufl.Form([part for part in f.integrals() if function in extract_coefficients(part.integrand())])
+
+
+def at_rest(f: Any, q: Any, v: Any, a: Any) -> dict[str, Any]:
+    """Return f and its derivatives K, C and M to q, v and a, at v = a = 0, as UFL forms; they may be empty.
+
+    Expanded once: each derivative is that of what is left where the others vanish.
+    """
+    expanded, du = expand_derivatives(f), ufl.TrialFunction(q.function_space)
+    rest = zeroed(expanded, v, a)
+    C = ufl.derivative(zeroed(containing(expanded, v), a), v, du)
+    M = ufl.derivative(zeroed(containing(expanded, a), v), a, du)
+    return {"f": rest, "K": ufl.derivative(rest, q, du), "C": without(C, v), "M": expand_derivatives(M)}
 
 
 class _NoEmptyBranches(MultiFunction):  # type: ignore[misc]
