@@ -74,14 +74,30 @@ class AlphaFamily(Scheme):
         """Return the state with the auxiliary acceleration moved to where the next step takes it.
 
         It stands for q̈ at t + h (α_m − α_f), so it moves when h does; without this a change of step would cost an
-        order. From a short step to a much longer one it would be an extrapolation, of vibrations too that the long one
-        does not resolve, and their multiple would go on with it: there the memory starts afresh, with q̈.
+        order. Where `forgets` says so it starts afresh, with q̈.
         """
-        last, (alpha_m, alpha_f, _, _) = new.t - old.t, self.coefficients
-        lag = (alpha_m - alpha_f) * (h - last)
-        if h > LONGER * last and abs(lag) > FAR * last:
+        last = new.t - old.t
+        if self.forgets(last, h):
             return self.start(new)
-        return new.changed(memory=new.memory + lag / last * (new.memory - old.memory))
+        return new.changed(memory=new.memory + self.lag * (1 - h / last) * (new.memory - old.memory))
+
+    @property
+    def lag(self) -> float:
+        """How many steps the auxiliary acceleration is behind, α_f − α_m: 0 to 1, 0 with ρ∞ = 1."""
+        alpha_m, alpha_f, _, _ = self.coefficients
+        return alpha_f - alpha_m
+
+    def forgets(self, last: float, h: float) -> bool:
+        """Return whether the memory is left behind.
+
+        From a short step to a much longer one it would be an extrapolation, of vibrations too that the long one does
+        not resolve, and their multiple would go on with it.
+        """
+        return h > LONGER * last and self.lag * (h / last - 1) > FAR
+
+    def bent(self, state: State, change: Array) -> State:
+        """Return the state whose auxiliary acceleration lies on the line that q̈ goes on along."""
+        return state.changed(memory=state.memory - self.lag * change)
 
 
 @dataclass(frozen=True)

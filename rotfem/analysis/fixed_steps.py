@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rotfem.analysis.itinerary import Itinerary, Leg
+from rotfem.analysis.kinks import bends, bent
 from rotfem.analysis.schemes import Array, State
 from rotfem.analysis.stepper import Stepper, seen
 from rotfem.mechanics.courses import View
@@ -96,4 +97,6 @@ def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State
         before = View(-1 if leg.lands else 0, (leg.length, 0.0) if leg.averaged else None)
         ahead = View(1 if leg.lands else 0, (0.0, after.length) if after.averaged else None)
         state = stepper.restart(state, before, ahead)
+    if old is not None and not (after.drifts or leg.averaged or after.averaged) and bends(stepper.scheme, leg, after):
+        state = bent(stepper, state, leg.length, after.length)
     return state

@@ -44,6 +44,7 @@ class Leg:
         averaged: whether it sees the courses averaged.
         drifts: whether it is too short to be solved for.
         whole: whether the step ends with it.
+        plain: whether it is a step as long as the others.
     """
 
     end: float
@@ -52,6 +53,7 @@ class Leg:
     averaged: bool = False
     drifts: bool = False
     whole: bool = True
+    plain: bool = True
 
     def joins(self, after: Leg) -> bool:
         """Return whether this leg and the one after it see one average at the instant between them."""
@@ -91,7 +93,7 @@ class Itinerary:
                 known = (c for c in (self.step, length) if abs(stop - begin - c) <= self.close)
                 length = next(known, stop - begin)
                 drifts = length < LEAST * self.step * (1 + 1e-6)
-                yield i, Leg(stop, length, lands, averaged, drifts, stop == stops[-1][0])
+                yield i, Leg(stop, length, lands, averaged, drifts, stop == stops[-1][0], length == self.step)
                 begin = stop
 
     def landings(self) -> tuple[Array, Array]:

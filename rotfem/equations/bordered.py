@@ -125,12 +125,21 @@ class BorderedSystem:
 
     def acceleration(self, t: float) -> Array:
         """Return what is to be added to a so that the equations hold at the state (after a jump of the torque)."""
+        return self.accelerated(self.forces(t))
+
+    def forces(self, t: float) -> Array:
+        """Return −F of the structure at the state and the time t that is set, and that of the hub behind it."""
+        return np.append(self.inner.forces(t), -self.row.residual(t))
+
+    def accelerated(self, forces: Array) -> Array:
+        """Return the acceleration that forces (as of `forces`) give."""
         s, row, shifts = self.inner, self.row, (0.0, 0.0, 1.0)
         solver, massless = s.mass_solver()
         R, b = s.residual(), s.spin_derivative(0.0, 1.0)
+        R.array[:] = forces[:-1]
         R.array[massless] = 0.0
         b.array[massless] = 0.0
-        return self._eliminated(solver, (R, b), row.row(shifts), -row.residual(t), row.diagonal(0.0, 1.0))
+        return self._eliminated(solver, (R, b), row.row(shifts), float(forces[-1]), row.diagonal(0.0, 1.0))
 
     def _eliminated(self, solver: Any, right: tuple[Any, Any], c: Any, r: float, d: float) -> Array:
         y, z = self.inner._dx.solve(solver, right[0]), self._dz.solve(solver, right[1])

@@ -122,13 +122,22 @@ class Solutions:
         return self.factored_before + (self._solver.factorisations if self._solver else 0)
 
     def acceleration(self, t: float) -> Array:
-        """Return what is to be added to a so that F = 0 at the state, M δa = −F; `set_time` has been called for t.
+        """Return what is to be added to a so that F = 0 at the state; `set_time` has been called for t."""
+        return self.accelerated(self.forces(t))
+
+    def forces(self, t: float) -> Array:
+        """Return −F at the state and the time t that is set (a local array), for `accelerated`."""
+        return np.array(self.residual().array)
+
+    def accelerated(self, forces: Array) -> Array:
+        """Return the acceleration that forces (as of `forces`) give, M δa = forces.
 
         Unknowns without inertia (the rotation, where rotary inertia is absent or off) follow the others at once: their
         acceleration keeps their equation in balance, K δa = 0 in their rows.
         """
         solver, massless = self.mass_solver()
         b = self.residual()
+        b.array[:] = forces
         b.array[massless] = 0.0
         return self._dx.solve(solver, b)
 
