@@ -99,6 +99,8 @@ class AdaptiveSteps:
                 continue
             if h >= wanted or factor < 1.0:
                 wanted = min(self.longest, h if KEEP[0] <= factor <= KEEP[1] else h * factor)
+            if stepper.watch is not None and not drifts:
+                stepper.watch(start, new)
             following = self._next(new.t, wanted)[1] if new.t < self.end else h
             if not drifts and following != h:
                 new = stepper.scheme.resized(new, start, following)

@@ -22,6 +22,7 @@ class EnergyConserving(Scheme):
 
     name: ClassVar[str] = "energy_conserving"
     order: ClassVar[int] = 2
+    balanced_at_end: ClassVar[bool] = False
 
     def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
         """Return the middle of the step, predicted by the acceleration of the last one."""

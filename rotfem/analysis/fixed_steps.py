@@ -89,6 +89,8 @@ def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State
         window = (leg.length, after.length if after is not None and joined else 0.0) if leg.averaged else None
         with seen(stepper.system, View(-1 if leg.lands else 0, window)):
             old, state = state, stepper.advance(state, leg.length, leg.end)
+        if stepper.watch is not None:
+            stepper.watch(old, state)
     if after is None:
         return state
     if old is not None and not after.drifts and after.length != leg.length:

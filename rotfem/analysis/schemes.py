@@ -11,7 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -115,6 +115,8 @@ class Scheme(ABC):
     name: ClassVar[str]
     order: ClassVar[int]
     stages: ClassVar[int] = 1
+    #: Whether the equations hold with the q, v, a that a step ends in; otherwise with its mean q and v, and that a.
+    balanced_at_end: ClassVar[bool] = True
 
     @abstractmethod
     def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
@@ -170,3 +172,13 @@ class Scheme(ABC):
     def check(cls, parameters: dict[str, Any]) -> dict[str, str]:
         """Return name ↦ what is allowed, for every parameter whose value (a finite number) is not."""
         return {}
+
+
+class Watch(Protocol):
+    """Who is told of the steps of a march."""
+
+    def __call__(self, old: State, new: State) -> None:
+        """Take note of a step from an old to a new state."""
+
+    def landed(self) -> None:
+        """Take note that what is prescribed is not smooth where the last step has ended."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rotfem.analysis.roots import came_true, check_root, fed, turned_with_clamp
-from rotfem.analysis.schemes import Array, Scheme, Shifts, Stage, State
+from rotfem.analysis.schemes import Array, Scheme, Shifts, Stage, State, Watch
 from rotfem.analysis.turning import keep_rotations_small
 from rotfem.errors import ComputationError
 from rotfem.mechanics.courses import View
@@ -56,12 +56,14 @@ class Stepper:
     Attributes:
         substeps, rejected: steps that were halved (Newton failed, or energy rose), and adaptive ones taken back.
         pace: length of the next adaptive step (s), and largest displacement so far (scaled); None before the first.
+        watch: told of every step that counts; None tells nobody.
     """
 
     def __init__(self, system: Any, scheme: Scheme, newton: Newton):
         self.system, self.scheme, self.newton = system, scheme, newton
         self.substeps = self.rejected = 0
         self.pace: tuple[float, float] | None = None
+        self.watch: Watch | None = None
         self._held: Shifts | None = None
         #: Whether Newton's way is a long one, so that tangents that know where it came from are worth compiling.
         self._far = False
@@ -95,6 +97,8 @@ class Stepper:
             after: how the next one does.
         """
         s, t = self.system, state.t
+        if self.watch is not None:
+            self.watch.landed()
         s.count_rotations_from(state.datum)
         with seen(s, before):
             old = s.driven(t)

@@ -17,6 +17,7 @@ from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
 from rotfem.commands.finite import check_rows
+from rotfem.commands.known_error import error_of_modes
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows, unstiffened
 from rotfem.commands.modes import analysis_of, hints_of, theory_error
 from rotfem.commands.problem import Problem, case_of
@@ -164,6 +165,7 @@ class Diagram:
             "speeds": len(values),
             "speeds_solved": sweep.solves,
             "theory_error": off.summary(),
+            **({"error": error_of_modes(rows, off).summary()} if self.scene.output.error else {}),
             "checks": self_checks(analysis, sweep.nodes[-1].spinning),
             **analysis.report(),
             "lowest_frequency": lowest,

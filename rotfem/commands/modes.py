@@ -22,6 +22,7 @@ from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.stability import stability_of_pencil
 from rotfem.analysis.theory_error import TheoryCheck, TheoryError
 from rotfem.commands.finite import check_rows
+from rotfem.commands.known_error import error_of_modes
 from rotfem.commands.mode_tables import advice, mode_tables, scaled
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.summary import modal_summary
@@ -100,6 +101,7 @@ def _modes(
         "speed": speed,
         "stability": stability.summary(),
         "theory_error": off.summary(),
+        **({"error": error_of_modes(found.rows, off).summary()} if scene.output.error else {}),
         "modes": found.rows,
         "checks": self_checks(analysis, spinning),
         "warnings": warnings,

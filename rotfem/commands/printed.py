@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from rotfem.analysis.error_estimate import error_line
+
 
 def run_report(summary: dict[str, Any], folder: Path) -> list[str]:
     """Return the lines a run prints."""
@@ -30,7 +32,12 @@ def run_report(summary: dict[str, Any], folder: Path) -> list[str]:
         values = (f"{name} = {value:.6g}" for name, value in finals.items())
         held = {True: "stable", False: "unstable", None: ""}[summary.get("stability", {}).get("stable")]
         lines.append(f"{held} steady state in {time['total']:.2f} s: {', '.join(values)}".lstrip())
-    return [*lines, f"results in {folder}"]
+    return [*lines, *error_report(summary), f"results in {folder}"]
+
+
+def error_report(summary: dict[str, Any]) -> list[str]:
+    """Return the line that says how far the results may be off, if that is known."""
+    return [error_line(summary["error"])] if "error" in summary else []
 
 
 def modes_report(summary: dict[str, Any], folder: Path) -> list[str]:
@@ -47,7 +54,7 @@ def modes_report(summary: dict[str, Any], folder: Path) -> list[str]:
             f"{row['mode']:>4}  {row['label']:<16}{row['frequency']:>14.6f}{row['frequency_hz']:>12.6f}"
             f"{row['damping']:>12.3e}{row['error_bound']:>10.1e}"
         )
-    return [*lines, f"results in {folder}"]
+    return [*lines, *error_report(summary), f"results in {folder}"]
 
 
 def campbell_report(summary: dict[str, Any], folder: Path) -> list[str]:
@@ -63,7 +70,7 @@ def campbell_report(summary: dict[str, Any], folder: Path) -> list[str]:
         lines.append(f"{b['branch']:>6}  {b['label']:<16}{first:>14}{last:>14}{b['confidence']:>12.3f}")
     for c in summary["critical_speeds"]:
         lines.append(f"critical speed {c['speed']:.6f} rad/s: {c['label']} meets {c['per_rev']}Ω")
-    return [*lines, f"results in {folder}"]
+    return [*lines, *error_report(summary), f"results in {folder}"]
 
 
 def choice_report(summary: dict[str, Any]) -> list[str]:

@@ -12,6 +12,8 @@ from mpi4py import MPI
 from rotfem.analysis.constant_conditions import stability_ahead
 from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.equilibrium import static_tip_shape, steady_state
+from rotfem.analysis.error_estimate import ErrorEstimate
+from rotfem.analysis.error_watch import ErrorWatch
 from rotfem.analysis.farthest_state import Farthest
 from rotfem.analysis.reduced.manifold import Foreshortened
 from rotfem.analysis.reduced.response import Response
@@ -23,6 +25,7 @@ from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
 from rotfem.commands import energy_growth
 from rotfem.commands.interrupts import Interrupted
 from rotfem.commands.keeper import Keeper
+from rotfem.commands.known_error import error_of_run, warning_of_run
 from rotfem.commands.problem import scheme_of
 from rotfem.commands.recorder import Recorder
 from rotfem.commands.reduced_history import by_reduced_model
@@ -85,6 +88,9 @@ class Simulation:
         self.stability: Stability | None = None
         self.farthest = Farthest(self.system)
         self.theory_error: TheoryError | None = None
+        self.watch: ErrorWatch | None = None
+        self.last: State | None = None
+        self.error: ErrorEstimate | None = None
         self._critical_since: float | None = None
         self._exceeded = ""
 
@@ -116,6 +122,8 @@ class Simulation:
         self.stability = stability_of(self.system, q, omega)
         q, v = self.system.start(q)
         self._keep(State.at_rest(self.system, q, v))
+        if self.scene.output.error:
+            self.watch = ErrorWatch(self.system)
         if said := self.stability.warning():
             if self.critical is not None and abs(omega) > self.critical:
                 said += (
@@ -133,7 +141,11 @@ class Simulation:
             return
         march = March(self.system, scheme, steps, newton, start)
         self.stepper = march.stepper
+        if self.scene.output.error:
+            self.watch = self.stepper.watch = ErrorWatch(self.system, time.end, scheme)
         march.reached = self.keeper.start(self)
+        if self.watch is not None and march.reached is not None:
+            self.watch.since = march.reached.t
         with self.keeper.interrupts():
             first = 0 if march.reached is None else self.steps + 1
             for self.steps, state in enumerate(march, first):
@@ -183,6 +195,7 @@ class Simulation:
         if not self.system.linear:
             self.system.structure.check_range(state.q, state.t)
         self.record(state)
+        self.last = state
         self.farthest(state.q, state.t)
         if self.choice is None or self._exceeded:
             return
@@ -236,6 +249,9 @@ class Simulation:
         self._warn_of_what_the_strains_lack(history)
         self.theory_error = self.farthest.error() if self.foreshortened is None else self.foreshortened.theory_error()
         if self.theory_error is not None and (said := self.theory_error.warning()):
+            self.warnings.append(said)
+        self.error = None if failure is not None else error_of_run(self)
+        if self.error is not None and (said := warning_of_run(self, self.error)):
             self.warnings.append(said)
         summary = run_summary(self, status, history)
         if failure is not None:

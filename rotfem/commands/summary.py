@@ -104,6 +104,8 @@ def run_summary(run: Simulation, status: str, history: dict[str, npt.NDArray[np.
         out["reduced"] = run.reduced.summary()
     if run.foreshortened is not None:
         out["reduced"]["foreshortening"] = run.foreshortened.summary()
+    if run.error is not None:
+        out["error"] = run.error.summary()
     if run.theory_error is not None:
         out["theory_error"] = run.theory_error.summary()
     if run.stability is not None:

@@ -234,6 +234,8 @@ class OutputTable(SceneModel):
 
     Attributes:
         quantities: names of registered outputs, to be computed beside what is always recorded.
+        error: whether the error of what is computed is estimated.
     """
 
     quantities: Annotated[tuple[str, ...], PlainValidator(_as_outputs)] = ()
+    error: bool = True

@@ -419,7 +419,7 @@ def test_outputs_are_named_in_their_table(add: Add) -> None:
     add(Output("root_moment", strains, "N·m"))
     asked = scene(output={"quantities": ["root_moment"]})
     assert asked.output.quantities == ("root_moment",)
-    assert asked.to_dict()["output"] == {"quantities": ["root_moment"]}
+    assert asked.to_dict()["output"] == {"quantities": ["root_moment"], "error": True}
     message = refusal(output={"quantities": ["rot_moment"]})
     assert 'is not an output; did you mean "root_moment"? allowed: a list of root_moment' in message
     assert "listed twice" in refusal(output={"quantities": ["root_moment", "root_moment"]})

@@ -1,0 +1,58 @@
+"""What a result says of its own error: shares of time, space, model and round-off, each relative, and their sum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+#: Sum of the shares above which it is said, where no accuracy was asked for.
+NOTICED = 0.01
+
+#: What the shares are called in text.
+WORDS = {"time": "steps", "space": "mesh", "model": "model", "round_off": "round-off"}
+
+
+@dataclass(frozen=True)
+class ErrorEstimate:
+    """Shares of an error, relative to `scale` of a run and to each frequency of modes; None where nothing is known.
+
+    Attributes:
+        shares: name (`time`, `space`, `model`, `round_off`) ↦ relative error.
+        found: further facts: instants, the scale, how a share was found.
+    """
+
+    shares: dict[str, float | None]
+    found: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def total(self) -> float | None:
+        """Sum of the shares that are known; None if none is."""
+        known = [share for share in self.shares.values() if share is not None]
+        return sum(known) if known else None
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a summary has of it."""
+        return {**self.shares, "total": self.total, **self.found}
+
+    def line(self) -> str:
+        """Return it as a line of text."""
+        return error_line(self.summary())
+
+    def exceeds(self, allowed: float = NOTICED) -> bool:
+        """Return whether the sum is more than what is allowed."""
+        return self.total is not None and not self.total <= allowed
+
+
+def error_line(summary: dict[str, Any]) -> str:
+    """Return the line about `error` of a summary."""
+    if summary["total"] is None:
+        return "error: unknown"
+    parts = ", ".join(f"{WORDS[n]} {percent(summary[n])}" for n in WORDS if n in summary)
+    return f"error (estimated): {percent(summary['total'])} ({parts})"
+
+
+def percent(share: float | None) -> str:
+    """Return a share in per cent with two digits."""
+    if share is None:
+        return "unknown"
+    return "0 %" if share < 5e-9 else f"{100 * share:.2g} %" if share < 1.0 else f"{100 * share:.3g} %"

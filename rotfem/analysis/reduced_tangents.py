@@ -1,0 +1,66 @@
+"""M, C and K of a motion in a few shapes, at any of its states; of a free hub with its angle as last coordinate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.ritz_vectors import RitzVectors
+
+Array = npt.NDArray[np.float64]
+
+#: c_k, c_v, c_m of K, C and M, and what they are of the speed and its rate.
+SHIFTS = {"M": (0.0, 0.0, 1.0), "C": (0.0, 1.0, 0.0), "K": (1.0, 0.0, 0.0)}
+OF_SPIN = {"M": (0.0, 1.0), "C": (1.0, 0.0), "K": (0.0, 0.0)}
+
+
+@dataclass(frozen=True)
+class Border:
+    """What the angle of a free hub adds to a matrix: its row, its column, the corner."""
+
+    row: Array
+    column: Array
+    corner: float
+
+
+class Tangents:
+    """M, C and K of a system at one state.
+
+    Args:
+        system: equations of motion; time and state are set in it.
+        state: where.
+    """
+
+    def __init__(self, system: Any, state: Any):
+        self.system, self.t = system, state.t
+        system.count_rotations_from(state.datum)
+        system.set_time(state.t)
+        system.set_state(state.q, state.v, state.a)
+        inner = system.held
+        self.speed = abs(float(system.motion.speed(state.t)))
+        self.matrices = {n: inner.matrix(*shift, 1.0 if n == "K" else 0.0) for n, shift in SHIFTS.items()}
+        self.borders: dict[str, Border] = {}
+        if system.hub is not None:
+            for name, shift in SHIFTS.items():
+                row, column = system.row.row(shift).array.copy(), inner.spin_derivative(*OF_SPIN[name]).array.copy()
+                self.borders[name] = Border(row, column, system.row.diagonal(*OF_SPIN[name]))
+
+    def shapes(self) -> RitzVectors:
+        """Return the shapes that move the tip here."""
+        return RitzVectors(self.system.held, self.matrices["M"], self.matrices["K"], self.speed**2)
+
+    def reduced(self, shapes: RitzVectors) -> tuple[Array, Array, Array]:
+        """Return M, C, K in shapes, (r, r) each; of a free hub (r + 1, r + 1)."""
+        out = []
+        for name, A in self.matrices.items():
+            product = np.stack([shapes.times(A, x) for x in shapes.V.T], axis=1)
+            small = shapes.sum(shapes.V.T @ product)
+            if name in self.borders:
+                border = self.borders[name]
+                row, column = shapes.sum(np.array([border.row @ shapes.V, border.column @ shapes.V]))
+                small = np.block([[small, column[:, None]], [row[None, :], np.array([[border.corner]])]])
+            out.append(small)
+        return out[0], out[1], out[2]

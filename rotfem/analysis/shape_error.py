@@ -1,0 +1,50 @@
+"""How far the mesh puts off a deflection, told from its own shape (see `rotfem.analysis.mesh_estimate`)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+
+from rotfem.analysis.mesh_estimate import MeshEstimate
+
+Array = npt.NDArray[np.float64]
+
+
+class ShapeError:
+    """Errors of the shapes of one structure on its mesh.
+
+    Args:
+        system: equations of the structure, its hub held.
+    """
+
+    def __init__(self, system: Any):
+        self.system, self._estimate = system, MeshEstimate(system.V)
+        names = system.structure.components
+        self._size = len(names)
+        self._moves = [i for i, name in enumerate(names) if name.startswith("u")]
+        self._turns = [i for i, name in enumerate(names) if not name.startswith("u")]
+
+    def of_modes(self, V: Array) -> Array:
+        """Return the relative errors of the frequencies of shapes that bend, columns of owned unknowns."""
+        components, function = self._turns or self._moves, fem.Function(self.system.V)
+        out = []
+        for x in V.T:
+            function.x.array[: len(x)] = x
+            function.x.scatter_forward()
+            out.append(self._estimate(function.x.array.reshape(-1, self._size)[:, components]))
+        return np.array(out)
+
+    def of_shape(self, q: Array, datum: Any = None) -> float:
+        """Return the relative error of a deflection (local dof array): twice that of a frequency.
+
+        Args:
+            q: of the deflection.
+            datum: what its rotations are counted from; they are no shape of their own where that is another one.
+        """
+        nodal = q.reshape(-1, self._size)
+        sizes = self.system.sizes(q)
+        bends = datum is None and self._turns and np.any(sizes[self._turns] > 0.0)
+        return min(1.0, 2.0 * self._estimate(nodal[:, self._turns if bends else self._moves]))

@@ -1,0 +1,90 @@
+"""What the commands say of the error of their results: shares put together, and when they are worth a warning."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from rotfem.analysis.error_estimate import ErrorEstimate, percent
+from rotfem.analysis.error_watch import TipErrors
+from rotfem.analysis.theory_error import TheoryError
+from rotfem.scene import Scene
+from rotfem.selection.model_choice import Choice
+
+if TYPE_CHECKING:
+    from rotfem.commands.simulation import Simulation
+
+#: Share that the steps are to have after the change that a warning advises, and the part of it that is aimed at.
+WANTED, AIM = 0.01, 0.5
+
+
+def error_of_run(run: Simulation) -> ErrorEstimate | None:
+    """Return the error of a run so far; None where it is not wanted, or nothing was computed."""
+    if run.watch is None or run.last is None:
+        return None
+    tip = run.watch.errors(run.last)
+    shares = {
+        "time": None if tip.time is None else _relative(tip.time[0], tip.scale),
+        "space": _space(tip),
+        "model": model_share(run.theory_error, run.choice),
+    }
+    found: dict[str, Any] = {"scale": tip.scale}
+    if run.scene.time is not None:
+        found["time_at"] = None if tip.time is None else tip.time[1]
+    if run.watch.since > 0.0:
+        found["since"] = run.watch.since
+    return ErrorEstimate(shares, found)
+
+
+def _space(tip: TipErrors) -> float:
+    return min(1.0, tip.shape + _relative(tip.space[0], tip.scale))
+
+
+def _relative(size: float, scale: float) -> float:
+    return size / scale if scale > 0.0 else 0.0
+
+
+def model_share(theory: TheoryError | None, choice: Choice | None) -> float | None:
+    """Return what the theory and the effects that a choice has left out may put off; None where that is unknown."""
+    own = None if theory is None else theory.estimate
+    if choice is None or choice.full:
+        return own
+    return max(own or 0.0, choice.estimated_error)
+
+
+def error_of_modes(rows: Iterable[Mapping[str, Any]], theory: TheoryError) -> ErrorEstimate:
+    """Return the largest relative error of the frequencies of rows."""
+    flexible = [row for row in rows if row.get("stability") != "neutral"]
+    space, bound = (max((row[key] for row in flexible), default=0.0) for key in ("mesh_error", "error_bound"))
+    return ErrorEstimate({"space": float(space), "model": theory.estimate, "round_off": float(bound)})
+
+
+def warning_of_run(run: Simulation, error: ErrorEstimate) -> str:
+    """Return what is to be said of the error of a run; empty where that is small, asked for, or said already."""
+    scene = run.scene
+    tolerance = None if scene.time is None else scene.time.tolerance
+    if not error.exceeds(max(WANTED, scene.model.tolerance or 0.0, tolerance or 0.0)):
+        return ""
+    steps, mesh, model = (error.shares[name] or 0.0 for name in ("time", "space", "model"))
+    if steps + mesh <= WANTED and run.theory_error is not None and run.theory_error.warning():
+        return ""
+    cures = []
+    if steps >= WANTED / 2 and scene.time is not None:
+        cures.append(finer_steps(scene, run.stepper, steps))
+    if mesh >= WANTED / 2:
+        cures.append("more mesh.elements")
+    if model >= WANTED / 2:
+        cures.append("a richer theory")
+    off = f"the tip may be off by {percent(error.total)} of its largest displacement"
+    parts = f"{percent(steps)} by the steps, {percent(mesh)} by the mesh, {percent(model)} by the model"
+    return f"{off} (estimated: {parts})" + (f": {', '.join(cures)}" if cures else "")
+
+
+def finer_steps(scene: Scene, stepper: Any, share: float) -> str:
+    """Return which steps would have a share of the error that is not noticed."""
+    time = scene.time
+    assert time is not None
+    factor = min(1.0, AIM * WANTED / share)
+    if time.tolerance is not None:
+        return f"time.tolerance = {time.tolerance * factor:.1g}"
+    return f"time.step = {time.step * factor ** (1 / stepper.scheme.order):.1g} or shorter"

@@ -1,0 +1,142 @@
+"""What a run says of its own error: exact where theory says so, else within a factor of the error it really has."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rotfem
+from rotfem.analysis.error_recursion import Propagator, Spans, accumulated, interpolated, moments
+
+BEAM = {
+    "type": "planar_beam",
+    "length": 10.0,
+    "section": {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4},
+}
+SPIN_UP = {"type": "spin_up", "speed": 6.0, "duration": 15.0}
+STILL = {"type": "constant", "speed": 0.0}
+PULSE = {"tip_force": [[0.0, 0.0, 0.0], [0.1, 0.0, 40.0], [0.2, 0.0, 0.0]]}
+
+
+def scene(step: float | None, **more: Any) -> dict[str, Any]:
+    """Return tables of a history of the beam, or of its steady state."""
+    time = {} if step is None else {"time": {"end": 4.0, "step": step, **more.pop("time", {})}}
+    return {"structure": BEAM, "motion": STILL, "mesh": {"elements": 4}, **time, **more}
+
+
+def true_error(tables: dict[str, Any], parts: int = 8) -> tuple[float, dict[str, Any]]:
+    """Return the largest difference of the tip from that of so many times the steps, relative, and the summary."""
+    run = rotfem.run(tables)
+    fine = rotfem.run({**tables, "time": {**tables["time"], "step": tables["time"]["step"] / parts}})
+    tip, finer = (np.column_stack([r.tip[name] for name in ("u1", "u2")]) for r in (run, fine))
+    off = np.linalg.norm(tip - finer[::parts], axis=1).max() / np.linalg.norm(tip, axis=1).max()
+    return float(off) / (1.0 - parts**-2), run.summary
+
+
+# --- the error equation ----------------------------------------------------------------------------------------------
+
+
+def test_moments_are_integrals() -> None:
+    """∫₀¹ e^{z(1−θ)} θ^k dθ for small and large z, by 40 Gauss points: round-off for |z| ≤ 30."""
+    z = np.array([1e-9, 0.3 + 0.2j, 1.0j, -5.0 + 3.0j, 30.0j])
+    x, w = np.polynomial.legendre.leggauss(40)
+    theta = 0.5 + 0.5 * x
+    expected = [(0.5 * w * np.exp(np.outer(z, 1 - theta)) * theta**k).sum(axis=1) for k in range(6)]
+    np.testing.assert_allclose(moments(z, 6), expected, rtol=1e-12, atol=1e-14)
+
+
+def test_exact_motion_has_no_error() -> None:
+    """A motion under a force that is a cubic in time is propagated exactly, in unequal steps and with damping."""
+    C, K = np.array([[0.2, 0.5], [-0.5, 0.1]]), np.array([[4.0, 1.0], [1.0, 30.0]])
+    t = np.cumsum(np.r_[0.0, 0.1 + 0.05 * np.sin(np.arange(20))])
+    powers = np.array([t**3 - t, 0.5 * t**2]).T  # c(t), from which the force follows
+    rates, accelerations = np.array([3 * t**2 - 1, t]).T, np.array([6 * t, np.ones_like(t)]).T
+    gamma = accelerations + rates @ C.T + powers @ K.T
+    n, begin = len(t) - 1, np.arange(len(t) - 1)
+    spans = Spans(t[:-1], np.diff(t), begin, np.zeros(n, int), np.full(n, n))
+    exact = Propagator(C, K, np.diff(t))
+    states = exact.modal(powers, rates)
+    defects = states[1:] - exact.factors * states[:-1] - exact.forced(interpolated(t, gamma, spans, 4))
+    errors = accumulated(np.zeros(states.shape[1], complex), exact.factors, defects)
+    assert np.abs(exact.displacements(errors)).max() < 1e-12
+
+
+def test_phase_of_the_trapezoidal_rule() -> None:
+    """A free vibration of the trapezoidal rule has the frequency 2/h arctan(ωh/2): its error has a closed form."""
+    omega, h, n = 3.0, 0.3, 200
+    t, slow = h * np.arange(n + 1), 2 / h * np.arctan(0.5 * omega * h)
+    c, rate = np.cos(slow * t)[:, None], -omega * np.sin(slow * t)[:, None]
+    exact = Propagator(np.zeros((1, 1)), np.array([[omega**2]]), np.full(n, h))
+    states = exact.modal(c, rate)
+    errors = accumulated(np.zeros(1, complex), exact.factors, states[1:] - exact.factors * states[:-1])
+    np.testing.assert_allclose(exact.displacements(errors)[:, 0], (c[:, 0] - np.cos(omega * t))[1:], atol=1e-12)
+
+
+def test_rough_samples_are_joined_by_lines() -> None:
+    """Samples that go up and down with every step overshoot nowhere; smooth ones of the same piece are cubics."""
+    t = np.arange(9.0)
+    values = np.array([(-1.0) ** np.arange(9), t**3]).T
+    spans = Spans(t[:-1], np.ones(8), np.arange(8), np.zeros(8, int), np.full(8, 8))
+    out = interpolated(t, values, spans, 4)
+    assert np.all(out[:, 2:, 0] == 0.0)
+    np.testing.assert_allclose(out.sum(axis=1)[:, 1], t[1:] ** 3)
+    np.testing.assert_allclose(out[:, 3, 1], 1.0)
+
+
+# --- runs ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "tables"),
+    [
+        ("spin-up", scene(0.05, motion=SPIN_UP, time={"end": 20.0})),
+        ("pulse", scene(0.02, loads=PULSE)),
+        ("linear pulse", scene(0.02, loads=PULSE, model={"theory": "consistent_linear"})),
+        ("pulse, energy-conserving", scene(0.02, loads=PULSE, time={"scheme": "energy_conserving"})),
+    ],
+)
+def test_steps_are_judged(name: str, tables: dict[str, Any]) -> None:
+    """Estimated over true error of the steps lies within ½ … 2, resolved or not."""
+    true, summary = true_error(tables)
+    assert 0.5 * true < summary["error"]["time"] < 2.0 * true
+
+
+def test_estimate_has_the_order_of_the_scheme() -> None:
+    """Half the step, a quarter of the estimate, where the motion is resolved (within a tenth)."""
+    found = [rotfem.run(scene(h, motion=SPIN_UP, time={"end": 20.0})).summary["error"]["time"] for h in (0.02, 0.01)]
+    assert np.log2(found[0] / found[1]) == pytest.approx(2.0, abs=0.1)
+
+
+def test_estimate_changes_nothing_and_can_be_left_out() -> None:
+    """The history with and without it is the same to the last bit."""
+    tables = scene(0.02, loads=PULSE, motion={"type": "constant", "speed": 3.0})
+    known, unknown = rotfem.run(tables), rotfem.run({**tables, "output": {"error": False}})
+    assert "error" in known.summary
+    assert "error" not in unknown.summary
+    for name, column in known.history.items():
+        np.testing.assert_array_equal(column, unknown.history[name])
+
+
+def test_unresolved_motion_is_said() -> None:
+    """A pulse that is as short as the steps: more than 1 % off, and said so with a step that would do."""
+    run = rotfem.run(scene(0.05, loads=PULSE))
+    assert run.summary["error"]["time"] > 0.01
+    assert any("time.step" in line and "off by" in line for line in run.warnings)
+
+
+def test_steady_state_has_no_error_of_steps() -> None:
+    """Of a steady state only mesh and model are in doubt, and a tip force on beam elements of degree 3 is not."""
+    error = rotfem.run(scene(None, loads={"tip_force": [0.0, 5.0]})).summary["error"]
+    assert error["time"] == 0.0
+    assert error["space"] < 1e-5
+    assert error["total"] == pytest.approx(error["space"] + error["model"])
+
+
+def test_modes_say_theirs() -> None:
+    """The largest estimates of the rows, and their sum."""
+    modes = rotfem.modes(scene(None))
+    error = modes.summary["error"]
+    assert error["space"] == max(row["mesh_error"] for row in modes.rows)
+    assert error["total"] == error["space"] + error["model"] + error["round_off"]
