@@ -63,11 +63,12 @@ class ErrorWatch:
         scheme: that steps it; None of a steady state.
 
     Attributes:
-        since: from when on (s) it has looked.
+        since: from when on (s) it has looked; None before the first step.
     """
 
     def __init__(self, system: Any, end: float = 0.0, scheme: Any = None):
-        self.system, self.end, self.scheme, self.since = system, end, scheme, 0.0
+        self.system, self.end, self.scheme = system, end, scheme
+        self.since: float | None = None
         self._mesh = ShapeError(system.held)
         self._fewest = FEWEST[system.A.getSize()[0] > LARGE]
         self._samples: list[tuple[float, Array, Array, Array, Any]] = []
@@ -85,6 +86,8 @@ class ErrorWatch:
     def __call__(self, old: Any, new: Any) -> None:
         """Look at a step from an old to a new state."""
         samples = self._samples
+        if self.since is None:
+            self.since = old.t
         if self._landed or not samples or samples[-1][3] is not old.a or samples[-1][1] is not old.q:
             self._landed = False
             self._pieces.append(len(samples))

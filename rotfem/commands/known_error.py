@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from rotfem.analysis.error_estimate import ErrorEstimate, percent
-from rotfem.analysis.error_watch import TipErrors
+from rotfem.analysis.error_watch import ErrorWatch
+from rotfem.analysis.shape_error import ShapeError
 from rotfem.analysis.theory_error import TheoryError
 from rotfem.scene import Scene
 from rotfem.selection.model_choice import Choice
@@ -17,27 +18,34 @@ if TYPE_CHECKING:
 #: Share that the steps are to have after the change that a warning advises, and the part of it that is aimed at.
 WANTED, AIM = 0.01, 0.5
 
+#: Part of the sum from which a share is told.
+TELLING = 0.1
+
 
 def error_of_run(run: Simulation) -> ErrorEstimate | None:
     """Return the error of a run so far; None where it is not wanted, or nothing was computed."""
-    if run.watch is None or run.last is None:
+    if not run.scene.output.error or not len(run.record.history):
         return None
-    tip = run.watch.errors(run.last)
+    model = model_share(run.theory_error, run.choice)
+    if run.reduced is not None:
+        _, _, farthest = run.farthest.seen
+        shape = ShapeError(run.system.held).of_shape(farthest)
+        time = run.reduced.time_error + run.reduced.projection_error
+        return ErrorEstimate({"time": time, "space": shape, "model": model})
+    assert run.last is not None
+    watch = run.watch or ErrorWatch(run.system)
+    tip = watch.errors(run.last)
     shares = {
         "time": None if tip.time is None else _relative(tip.time[0], tip.scale),
-        "space": _space(tip),
-        "model": model_share(run.theory_error, run.choice),
+        "space": min(1.0, tip.shape + _relative(tip.space[0], tip.scale)),
+        "model": model,
     }
     found: dict[str, Any] = {"scale": tip.scale}
-    if run.scene.time is not None:
-        found["time_at"] = None if tip.time is None else tip.time[1]
-    if run.watch.since > 0.0:
-        found["since"] = run.watch.since
+    if tip.time is not None and run.watch is not None:
+        found["time_at"] = tip.time[1]
+    if watch.since:
+        found["since"] = watch.since
     return ErrorEstimate(shares, found)
-
-
-def _space(tip: TipErrors) -> float:
-    return min(1.0, tip.shape + _relative(tip.space[0], tip.scale))
 
 
 def _relative(size: float, scale: float) -> float:
@@ -59,25 +67,26 @@ def error_of_modes(rows: Iterable[Mapping[str, Any]], theory: TheoryError) -> Er
     return ErrorEstimate({"space": float(space), "model": theory.estimate, "round_off": float(bound)})
 
 
-def warning_of_run(run: Simulation, error: ErrorEstimate) -> str:
-    """Return what is to be said of the error of a run; empty where that is small, asked for, or said already."""
+def warnings_of_run(run: Simulation, error: ErrorEstimate) -> list[str]:
+    """Return what is to be said of the error of a run; nothing where that is small, asked for, or said already."""
     scene = run.scene
     tolerance = None if scene.time is None else scene.time.tolerance
     if not error.exceeds(max(WANTED, scene.model.tolerance or 0.0, tolerance or 0.0)):
-        return ""
+        return []
     steps, mesh, model = (error.shares[name] or 0.0 for name in ("time", "space", "model"))
     if steps + mesh <= WANTED and run.theory_error is not None and run.theory_error.warning():
-        return ""
+        return []
     cures = []
-    if steps >= WANTED / 2 and scene.time is not None:
+    if steps >= WANTED / 2 and run.stepper is not None:
         cures.append(finer_steps(scene, run.stepper, steps))
     if mesh >= WANTED / 2:
         cures.append("more mesh.elements")
     if model >= WANTED / 2:
         cures.append("a richer theory")
-    off = f"the tip may be off by {percent(error.total)} of its largest displacement"
-    parts = f"{percent(steps)} by the steps, {percent(mesh)} by the mesh, {percent(model)} by the model"
-    return f"{off} (estimated: {parts})" + (f": {', '.join(cures)}" if cures else "")
+    shares = {"steps": steps, "mesh": mesh, "model": model}
+    telling = [f"{percent(share)} by the {n}" for n, share in shares.items() if share > TELLING * sum(shares.values())]
+    off = f"the tip may be off by {percent(error.total)} of its largest displacement (estimated: {', '.join(telling)})"
+    return [f"{off}: {', '.join(cures)}" if cures else off]
 
 
 def finer_steps(scene: Scene, stepper: Any, share: float) -> str:

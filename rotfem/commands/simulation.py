@@ -25,7 +25,7 @@ from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
 from rotfem.commands import energy_growth
 from rotfem.commands.interrupts import Interrupted
 from rotfem.commands.keeper import Keeper
-from rotfem.commands.known_error import error_of_run, warning_of_run
+from rotfem.commands.known_error import error_of_run, warnings_of_run
 from rotfem.commands.problem import scheme_of
 from rotfem.commands.recorder import Recorder
 from rotfem.commands.reduced_history import by_reduced_model
@@ -122,8 +122,6 @@ class Simulation:
         self.stability = stability_of(self.system, q, omega)
         q, v = self.system.start(q)
         self._keep(State.at_rest(self.system, q, v))
-        if self.scene.output.error:
-            self.watch = ErrorWatch(self.system)
         if said := self.stability.warning():
             if self.critical is not None and abs(omega) > self.critical:
                 said += (
@@ -144,8 +142,6 @@ class Simulation:
         if self.scene.output.error:
             self.watch = self.stepper.watch = ErrorWatch(self.system, time.end, scheme)
         march.reached = self.keeper.start(self)
-        if self.watch is not None and march.reached is not None:
-            self.watch.since = march.reached.t
         with self.keeper.interrupts():
             first = 0 if march.reached is None else self.steps + 1
             for self.steps, state in enumerate(march, first):
@@ -251,8 +247,7 @@ class Simulation:
         if self.theory_error is not None and (said := self.theory_error.warning()):
             self.warnings.append(said)
         self.error = None if failure is not None else error_of_run(self)
-        if self.error is not None and (said := warning_of_run(self, self.error)):
-            self.warnings.append(said)
+        self.warnings += [] if self.error is None else warnings_of_run(self, self.error)
         summary = run_summary(self, status, history)
         if failure is not None:
             summary["failure"] = {"what": failure.what, "time": failure.time, "advice": failure.advice}
