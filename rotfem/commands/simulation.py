@@ -68,7 +68,7 @@ class Simulation:
         self.started = perf_counter()
         self.keeper = keeper or Keeper(comm)
         self.scene, self.comm, self.choice = scene, comm, choice
-        self.warnings: list[str] = [] if choice is None else upgrade_warnings(choice)
+        self.warnings: list[str] = [] if choice is None else choice.upgrade_warnings()
         self.advice: list[str] = []
         if scene.time is None and problem.frame == "inertial":
             problem = problem.replace(frame="rotating")
@@ -291,12 +291,3 @@ def better_theories(theory: Theory) -> str:
         return f'use model.theory = "{exact}", which holds for any deflection'
     stiffened = next(t.name for t in theories() if t.linear and t.prestress)
     return f'use model.theory = "{stiffened}" for small or "{exact}" for any deflection'
-
-
-def upgrade_warnings(choice: Choice) -> list[str]:
-    """Return what a run says of the models it has given up."""
-    return [
-        f"{note['why']}{'' if note['time'] is None else ' at t = {:.6g} s'.format(note['time'])}; "
-        f"started again with {note['to']} and all effects"
-        for note in choice.upgrades
-    ]

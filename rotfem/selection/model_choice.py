@@ -157,6 +157,14 @@ class Choice:
             upgrades=[*self.upgrades, note],
         )
 
+    def upgrade_warnings(self) -> list[str]:
+        """Return what a run says of the models it has given up."""
+        return [
+            f"{note['why']}{'' if note['time'] is None else ' at t = {:.6g} s'.format(note['time'])}; "
+            f"started again with {note['to']} and all effects"
+            for note in self.upgrades
+        ]
+
     def summary(self) -> dict[str, Any]:
         """Return what summary.json says of the choice."""
         expected = {"largest_expected": self.size, "largest_allowed": self.limit if np.isfinite(self.limit) else None}
