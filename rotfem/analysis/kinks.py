@@ -1,10 +1,10 @@
 """Kinks of what is prescribed, where the memory of a scheme goes on along another line than it came.
 
 Generalised-α keeps an acceleration that stands for an instant θ h before the start of the next step, θ = α_f − α_m.
-Where the accelerations jump there, it jumps with them; where their rate jumps by Δȧ, it is off by θ h Δȧ, and velocities
-are off by θ² h² Δȧ/2 from then on. Over steps of one length that adds up to an error of the order of the scheme. Where a
-step is gone in legs, short ones beside long ones, it does not: a blow of two short legs has up to eight times its
-impulse with ρ∞ = 0. So the memory is put on the line that the accelerations take after the kink.
+Where the accelerations jump there, it jumps with them; where their rate jumps by Δȧ, it is off by θ h Δȧ, and
+velocities are off by θ² h² Δȧ/2 from then on. Over steps of one length that adds up to an error of the order of the
+scheme. Where a step is gone in legs, short ones beside long ones, it does not: a blow of two short legs has up to eight
+times its impulse with ρ∞ = 0. So the memory is put on the line that the accelerations take after the kink.
 """
 
 from __future__ import annotations
