@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.lost_digits import lost_digits
 from rotfem.analysis.theory_error import TheoryCheck, TheoryError
 from rotfem.errors import ComputationError
 
 Array = npt.NDArray[np.float64]
+
+T = TypeVar("T")
 
 #: By how much a rotation must exceed the largest one so far to be looked at in its place.
 MORE = 1.02
@@ -33,7 +38,7 @@ class Farthest:
 
     def __call__(self, q: Array, t: float) -> None:
         """Look at a state (local dof array) of time t (s)."""
-        if not self.check.known:
+        if not (self.check.known or self.system.linear):
             return
         size = float(np.max(self.system.sizes(q)[self._turned], initial=0.0))
         if size > MORE * self.seen[0]:
@@ -41,15 +46,23 @@ class Farthest:
 
     def error(self) -> TheoryError | None:
         """Return the error of the theory there; None where that fails. State and time of the system stay."""
-        system, (size, t, q) = self.system.held, self.seen
         if not self.check.known:
-            return self.check.of_state(q)
+            return self.check.of_state(self.seen[2])
+        return self._there(self.check.of_state)
+
+    def lost_digits(self) -> float | None:
+        """Return what round-off of the stiffness may have done there, relative; None where that cannot be said."""
+        return self._there(partial(lost_digits, self.system.held))
+
+    def _there(self, of_state: Callable[[Array], T]) -> T | None:
+        """Return a function of the state, with its time set; None where nothing was seen, or it fails."""
+        system, (size, t, q) = self.system.held, self.seen
         if size < 0.0:
             return None
         state, time = [x.x.array.copy() for x in (system.q, system.v, system.a)], system.time
         system.set_time(t)
         try:
-            return self.check.of_state(q[: len(state[0])])
+            return of_state(q[: len(state[0])])
         except ComputationError:
             return None
         finally:

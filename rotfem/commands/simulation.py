@@ -15,6 +15,7 @@ from rotfem.analysis.equilibrium import static_tip_shape, steady_state
 from rotfem.analysis.error_estimate import ErrorEstimate
 from rotfem.analysis.error_watch import ErrorWatch
 from rotfem.analysis.farthest_state import Farthest
+from rotfem.analysis.lost_digits import said_of
 from rotfem.analysis.reduced.manifold import Foreshortened
 from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.schemes import State
@@ -245,6 +246,8 @@ class Simulation:
         self._warn_of_what_the_strains_lack(history)
         self.theory_error = self.farthest.error() if self.foreshortened is None else self.foreshortened.theory_error()
         if self.theory_error is not None and (said := self.theory_error.warning()):
+            self.warnings.append(said)
+        if said := said_of(self.farthest.lost_digits() or 0.0):
             self.warnings.append(said)
         self.error = None if failure is not None else error_of_run(self)
         self.warnings += [] if self.error is None else warnings_of_run(self, self.error)
