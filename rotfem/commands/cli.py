@@ -235,13 +235,14 @@ def cost(
     write: Annotated[
         Path | None, typer.Option("--write", metavar="FILE", parser=as_path, help="write the tuned scene there")
     ] = None,
-    of: Annotated[str | None, typer.Option("--of", metavar="OUTPUT", help="tip or frequencies")] = None,
+    of: Annotated[str | None, typer.Option("--of", metavar="OUTPUT", help="tip, frequencies or campbell")] = None,
     theories: Annotated[str | None, typer.Option("--theories", metavar="A,B,…", help="theories to try")] = None,
     elements: Annotated[str | None, typer.Option("--elements", metavar="N,…", help="numbers of elements")] = None,
     degrees: Annotated[str | None, typer.Option("--degrees", metavar="K,…", help="polynomial degrees")] = None,
     steps: Annotated[str | None, typer.Option("--steps", metavar="H,…", help="time steps (s)")] = None,
     schemes: Annotated[str | None, typer.Option("--schemes", metavar="A,B,…", help="time-stepping schemes")] = None,
     repeat: Annotated[int, typer.Option("--repeat", min=1, help="repetitions; times are medians")] = 3,
+    budget: Annotated[str | None, typer.Option("--budget", metavar="TIME", help="of the study: 60s, 2min, 1h")] = None,
     resume: Annotated[bool, typer.Option("--resume/--fresh", help="go on with what is in the result folder")] = True,
 ) -> None:
     """Measure what accuracy costs: error and time of SCENE over theory, mesh, degree, step and scheme."""
@@ -256,6 +257,7 @@ def cost(
             accuracy=accuracy,
             output=of,
             repeat=repeat,
+            budget=budget,
             folder=todo.results.path,
             resume=resume,
             theories=listed("--theories", theories, str),

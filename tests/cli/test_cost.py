@@ -56,6 +56,19 @@ def test_cost_writes_table_figure_and_tuned_scene(rotfem: Rotfem, folder: Path) 
     assert rotfem("run", "tuned.toml", "--no-plots").status == 0
 
 
+def test_what_the_budget_leaves_out_is_said(rotfem: Rotfem, folder: Path) -> None:
+    """A second is enough for the coarsest runs, and for no reference."""
+    done = rotfem("cost", "beam.toml", "--quick", "--budget", "1s", "--accuracy", "1e-9", "--no-plots")
+    assert done.status in (0, 3)
+    summary = json.loads((folder / "results" / "beam" / "summary.json").read_text())
+    if done.status == 0:
+        assert summary["budget"]["seconds"] == 1.0
+        assert summary["budget"]["refused"]
+        assert summary["recommended"] is None
+        assert "no setting is known to be within 1e-09" in done.out
+        assert "left" in summary["missing"]
+
+
 def test_second_start_and_fresh(rotfem: Rotfem) -> None:
     first = json.loads(rotfem("cost", "beam.toml", *SMALL, "--json", "--no-plots").out)
     second = json.loads(rotfem("cost", "beam.toml", *SMALL, "--json", "--no-plots").out)
@@ -70,6 +83,7 @@ def test_an_accuracy_out_of_reach(rotfem: Rotfem, folder: Path) -> None:
     done = rotfem("cost", "beam.toml", *SMALL, "--accuracy", "1e-12", "--write", "tuned.toml")
     assert done.status == 3
     assert "no setting tried is within 1e-12" in done.err
+    assert "no setting is known to be within 1e-12: the best error is" in done.out
     assert (folder / "results" / "beam" / "cost.csv").exists()
     assert not (folder / "tuned.toml").exists()
 
@@ -81,6 +95,8 @@ def test_an_accuracy_out_of_reach(rotfem: Rotfem, folder: Path) -> None:
         (("--theories", "reisner"), 'did you mean "reissner"'),
         (("--of", "tipp"), "allowed: tip, frequencies"),
         (("--accuracy", "0"), "must be a number greater than 0"),
+        (("--budget", "soon"), 'cost --budget = "soon": must be a time greater than 0, such as 60s'),
+        (("--of", "campbell", "--set", "motion.speed=0.0"), "the scene has no speed to go up to"),
         (("--degrees", "9"), "cost --degrees = 9: must be"),
         (("--theories", "linear", "--set", "model.frame=inertial"), 'cost --theories = "linear"'),
         (("--write", "no/where.toml"), '--write = "no/where.toml": there is no folder no'),

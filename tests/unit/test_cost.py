@@ -12,8 +12,9 @@ import pytest
 
 from rotfem.commands.cost.front import Row, pareto, recommend
 from rotfem.commands.cost.record import Measurement, Record, fingerprint
-from rotfem.commands.cost.reference import Samples, distance, observed_order, reference
-from rotfem.commands.cost.settings import Setting, grid, ladder, own_setting, reference_settings
+from rotfem.commands.cost.reference import Samples, combined, distance, limit, observed_order
+from rotfem.commands.cost.refinement import Plan, Refinement, finer_meshes
+from rotfem.commands.cost.settings import Setting, grid, ladder, own_setting
 from rotfem.commands.cost.tuned import write_tuned
 from rotfem.errors import SceneError
 from rotfem.scene import Scene, load_scene
@@ -34,32 +35,95 @@ def wave(h: float, order: float, noise: float = 0.0) -> Samples:
 
 
 @pytest.mark.parametrize("order", [2.0, 3.0, 6.0])
-def test_reference_finds_order_and_bounds_its_own_error(order: float) -> None:
+def test_limit_finds_order_and_bounds_its_own_error(order: float) -> None:
     levels = [wave(h, order) for h in (0.1, 0.05, 0.025)]
-    found = reference(levels, each=False)
+    found = limit(levels, each=False)
     assert found.order == pytest.approx(order, abs=0.1)
     exact = Samples(np.sin(TIMES)[:, None], TIMES)
     true = distance(found.samples, exact, each=False)
     assert true < 0.2 * distance(levels[2], exact, each=False)
     assert true <= found.uncertainty < distance(levels[0], exact, each=False)
+    assert found.error == pytest.approx(distance(levels[2], exact, each=False), rel=0.2)
 
 
-def test_reference_without_an_order_is_the_finest_level() -> None:
+def test_limit_without_an_order_is_the_finest_level() -> None:
     levels = [wave(0.0, 2.0, noise) for noise in (1e-12, -2e-12, 3e-12)]
-    found = reference(levels, each=False)
+    found = limit(levels, each=False)
     assert found.order is None
     np.testing.assert_array_equal(found.samples.values, levels[2].values)
     assert found.uncertainty == pytest.approx(distance(levels[1], levels[2], each=False))
     assert observed_order(levels[0], levels[0], levels[0], each=False) is None
+    assert limit(levels[:1], each=False).uncertainty == np.inf
 
 
-def test_reference_counts_the_mesh_too() -> None:
-    levels = [wave(h, 2.0) for h in (0.1, 0.05, 0.025)]
-    shifted = Samples(levels[0].values + 1e-3, TIMES)
-    found, without = reference(levels, False, shifted), reference(levels, False)
-    np.testing.assert_allclose(found.samples.values, without.samples.values + 1e-3, atol=1e-15)
-    assert found.parts["mesh"] == pytest.approx(1e-3, rel=1e-2)
+def test_levels_that_agree_by_chance_are_not_extrapolated_beyond_the_order_of_the_method() -> None:
+    """The differences shrink by 64 where the method says 4: a third of the last one is what may be missing."""
+    levels = [Samples(np.full((1, 1), v), np.empty(0)) for v in (1.0 + 64e-3, 1.0, 1.0 - 1e-3)]
+    found = limit(levels, each=False, highest=2.0)
+    assert found.order == pytest.approx(6.0, abs=0.1)
+    assert found.error == pytest.approx(1e-3 / 3, rel=1e-2)
+
+
+def test_reference_counts_the_mesh_and_the_product_of_both_errors() -> None:
+    """Of u(t; h, m) = w(t; h) + m c(t), refined in h for m = 1 and in m for h = 0.1, the limit is w(t; 0)."""
+    time = limit([wave(h, 2.0) for h in (0.1, 0.05, 0.025)], each=False)
+    change = np.cos(TIMES)[:, None]
+    coarse = wave(0.1, 2.0)
+    meshes = [Samples(coarse.values + 1e-3 * (m - 1.0) * change, TIMES) for m in (1.0, 0.25, 0.0625)]
+    space = limit(meshes, each=False)
+    found = combined(time, coarse, space, 0.02, each=False)
+    np.testing.assert_allclose(found.samples.values, time.samples.values - 1e-3 * change, atol=1e-9)
+    assert found.parts["mixed"] == pytest.approx(0.02 * 1e-3, rel=1e-2)
     assert found.uncertainty == pytest.approx(sum(found.parts.values()))
+
+
+def measured(setting: Setting) -> Measurement:
+    """Return a wave with an error of the order of the setting's scheme, which takes as long as there are steps."""
+    assert setting.step is not None
+    assert isinstance(setting.elements, int)
+    order = {"generalised_alpha": 2.0, "newmark": 2.0, "esdirk4": 4.0}[setting.scheme or ""]
+    samples = wave(setting.step, order)
+    samples.values += setting.elements**-6.0 * np.cos(3 * TIMES)[:, None]
+    wall = {"esdirk4": 5.0}.get(setting.scheme or "", 1.0) / setting.step
+    return Measurement(samples=samples, wall=[wall], dofs=3 * setting.elements, steps=round(2 / setting.step))
+
+
+def test_reference_is_refined_with_the_scheme_that_gets_there_first() -> None:
+    own = Setting("reissner", 8, 3, "generalised_alpha", 0.02)
+    plan = Plan(own, each=False, first_step=0.08, interval=0.02, schemes=("newmark", "esdirk4"))
+    asked: list[Setting] = []
+
+    def get(setting: Setting, share: float) -> Measurement:
+        asked.append(setting)
+        return measured(setting)
+
+    goal = 1e-9
+    found = Refinement(plan, get).reference("reissner", goal, 0.5, plan.schemes)
+    assert found is not None
+    exact = Samples(np.sin(TIMES)[:, None], TIMES)
+    assert distance(found.samples, exact, each=False) <= found.uncertainty
+    assert found.parts["time"] <= goal
+    assert found.order == pytest.approx(4.0, abs=0.3)
+    shortest = {s: min(x.step or 1.0 for x in asked if x.scheme == s) for s in ("generalised_alpha", "esdirk4")}
+    assert shortest["esdirk4"] < shortest["generalised_alpha"]
+
+
+def test_reference_says_what_the_budget_leaves_uncertain() -> None:
+    plan = Plan(Setting("reissner", 8, 3, "newmark", 0.02), each=False, first_step=0.08, interval=0.02)
+    found = Refinement(plan, lambda s, share: measured(s) if s.elements in (2, 4, 8) else None)
+    there = found.reference("reissner", 1e-9, 0.5)
+    assert there is not None
+    assert 1e-9 < there.parts["mesh"] < 1e-6  # 8⁻⁶ is 4e-6
+    refused = Refinement(plan, lambda s, share: None)
+    assert refused.reference("reissner", 1e-6, 0.5) is None
+    assert "budget" in refused.reasons["reissner"]
+
+
+@pytest.mark.parametrize(
+    ("elements", "there"), [(8, [2, 4, 8, 16]), (10, [5, 10, 20, 40]), ((6, 1), [(6, 1), (12, 2), (24, 4), (48, 8)])]
+)
+def test_meshes_of_a_chain_are_halved_exactly(elements: Any, there: list[Any]) -> None:
+    assert [s.elements for s in finer_meshes(Setting("reissner", elements, 2))][:4] == there
 
 
 def test_samples_at_other_times_are_interpolated() -> None:
@@ -83,7 +147,8 @@ def rows(number: int) -> list[Row]:
     """Return rows with random times and errors, some failed."""
     rng = np.random.default_rng(7)
     return [
-        {"time": float(t), "total_error": float(e), "error": float(e), "status": "failed" if i % 9 == 0 else "done"}
+        {"cost": float(t), "total_error": float(e), "error": float(e), "status": "failed" if i % 9 == 0 else "done"}
+        | {"candidate": i % 7 > 0}
         for i, (t, e) in enumerate(10.0 ** rng.uniform(-3, 0, (number, 2)))
     ]
 
@@ -91,21 +156,21 @@ def rows(number: int) -> list[Row]:
 def test_front_is_what_no_setting_beats() -> None:
     table = rows(60)
     front = pareto(table)
-    done = [row for row in table if row["status"] == "done"]
+    done = [row for row in table if row["status"] == "done" and row["candidate"]]
     better = [
         row
         for row in done
-        if not any(o["time"] <= row["time"] and o["total_error"] <= row["total_error"] and o is not row for o in done)
+        if not any(o["cost"] <= row["cost"] and o["total_error"] <= row["total_error"] and o is not row for o in done)
     ]
     assert sorted(map(id, front)) == sorted(map(id, better))
     assert 1 < len(front) < len(done)
-    assert all(a["time"] < b["time"] and a["total_error"] > b["total_error"] for a, b in itertools.pairwise(front))
+    assert all(a["cost"] < b["cost"] and a["total_error"] > b["total_error"] for a, b in itertools.pairwise(front))
 
 
-def test_recommendation_is_the_fastest_that_is_good_enough() -> None:
+def test_recommendation_is_the_cheapest_that_is_good_enough() -> None:
     table = rows(60)
-    good = [row for row in table if row["status"] == "done" and row["total_error"] + 1e-3 <= 0.03]
-    assert recommend(table, 0.03, 1e-3) is min(good, key=lambda row: row["time"])
+    good = [row for row in table if row["status"] == "done" and row["candidate"] and row["total_error"] + 1e-3 <= 0.03]
+    assert recommend(table, 0.03, 1e-3) is min(good, key=lambda row: row["cost"])
     assert recommend(table, 1e-9) is None
 
 
@@ -120,9 +185,6 @@ def test_grid_holds_the_scene_itself_and_samples_coincide() -> None:
             interval = s.step * s.every
             assert interval / 0.02 == pytest.approx(round(interval / 0.02))
     assert len(grid(scene, "tip", True, 0.004, {})) < 30
-    levels = reference_settings(settings, own_setting(scene), "reissner", 0.02)
-    assert len({round(level.step * level.every, 9) for level in levels if level.step}) == 1
-    assert levels[3].elements == 2 * levels[0].elements == 40
 
 
 def test_ladder_is_one_of_powers_of_two() -> None:

@@ -8,11 +8,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
-from rotfem.commands.cost.front import judged
+from rotfem.commands.cost.front import judged, mesh_name
 from rotfem.commands.cost.result import CostResult
 
-#: A marker a degree.
-MARKERS = {1: "v", 2: "s", 3: "o", 4: "D", 5: "P", 6: "*"}
+#: A marker a scheme, or, where there are none, a degree.
+MARKERS = "osD^Pv*X<>"
+
+#: Size of a letter beside a point, and how far it stands above the line through it, in parts of the axes.
+NAME_SIZE, ABOVE = (0.0085, 0.026), 0.013
 
 #: What an output's error is relative to.
 ERRORS = {
@@ -22,22 +25,23 @@ ERRORS = {
 
 
 def cost_figure(result: CostResult) -> Figure:
-    """Return error over time: points by theory and degree, Pareto front, floors of the models, uncertainty.
+    """Return error over time: points by theory and scheme, Pareto front, floors of the models, uncertainty.
 
     A full point holds the error of the model; the faint ring is the error of its discretisation alone.
     """
-    figure = Figure(figsize=(9, 6), layout="constrained")
+    figure = Figure(figsize=(10.5, 6), layout="constrained")
     axis = figure.add_subplot()
     summary = result.summary
     theories = list(dict.fromkeys(row["theory"] for row in result.rows))
     colours = {theory: f"C{i}" for i, theory in enumerate(theories)}
     done = [row for row in result.rows if judged(row)]
+    markers = dict(zip(dict.fromkeys(_kind(row) for row in result.rows), MARKERS, strict=False))
     for row in done:
-        style: dict[str, Any] = {"marker": MARKERS[row["degree"]], "color": colours[row["theory"]], "ls": "none"}
+        style: dict[str, Any] = {"marker": markers[_kind(row)], "color": colours[row["theory"]], "ls": "none"}
         if row["total_error"] is not None and row["error"]:
-            axis.plot(row["time"], row["error"], mfc="none", ms=5, alpha=0.35, **style)
-        axis.plot(row["time"], judged(row) or 0.0, ms=6, **style)
-    front = sorted((row["time"], judged(row)) for row in done if row["pareto"])
+            axis.plot(row["cost"], row["error"], mfc="none", ms=5, alpha=0.35, **style)
+        axis.plot(row["cost"], judged(row) or 0.0, ms=6, **style)
+    front = sorted((row["cost"], judged(row)) for row in done if row["pareto"])
     axis.plot(*zip(*front, strict=True), "k-", lw=1.2, drawstyle="steps-post", zorder=0)
     axis.set(xscale="log", yscale="log")
     axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -46,20 +50,63 @@ def cost_figure(result: CostResult) -> Figure:
     for theory, floor in summary["model_errors"].items():
         if floor > 0 and theory in colours:
             axis.axhline(floor, color=colours[theory], ls="--", lw=1.0)
-    failed = [row for row in result.rows if row["status"] == "failed" and row["time"] == row["time"]]
+    failed = [row for row in result.rows if row["status"] == "failed" and row["cost"] == row["cost"]]
     for row in failed:
         top = axis.get_xaxis_transform()
-        axis.plot(row["time"], 0.98, "x", color=colours[row["theory"]], transform=top, ms=6, clip_on=False)
+        axis.plot(row["cost"], 0.98, "x", color=colours[row["theory"]], transform=top, ms=6, clip_on=False)
     _uncertainty(axis, summary, [judged(row) or 0.0 for row in done])
     chosen = summary["recommended"]
     if chosen is not None and judged(chosen):
-        axis.plot(chosen["time"], judged(chosen) or 0.0, "o", ms=14, mfc="none", mec="black", mew=1.2)
-    axis.set_xlabel("time of one run without set-up, median (s)")
+        axis.plot(chosen["cost"], judged(chosen) or 0.0, "o", ms=14, mfc="none", mec="black", mew=1.2)
+    _names(axis, done, chosen)
+    axis.set_xlabel("CPU time of one run with its set-up, median (s)")
     axis.set_ylabel(ERRORS[summary["output"]])
     axis.set_title(f"{summary['name']}: what accuracy costs")
     axis.grid(True, which="both", lw=0.3, alpha=0.5)
-    axis.legend(handles=_legend(result, colours, bool(failed)), fontsize="small", ncols=2, loc="best")
+    handles = _legend(result, colours, markers, bool(failed))
+    axis.legend(handles=handles, fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
     return figure
+
+
+def _kind(row: dict[str, Any]) -> str:
+    """Return what the marker of a setting stands for: its scheme, or its degree."""
+    return str(row["scheme"] or f"degree {row['degree']}")
+
+
+def _names(axis: Any, done: list[dict[str, Any]], chosen: dict[str, Any] | None) -> None:
+    """Write mesh and step beside the points, the front first, on whatever side there is room; without room not at all."""
+    width, height = NAME_SIZE
+    taken = [tuple(_place(axis, row)) for row in done]
+    boxes = [(x - 0.008, y - 0.012, x + 0.008, y + 0.012) for x, y in taken]
+    for row in sorted(done, key=lambda r: (r is not chosen, not r["pareto"], judged(r) or 0.0)):
+        (x, y), name = _place(axis, row), short_name(row)
+        for side in (1, -1):
+            left = x + 0.012 if side > 0 else x - 0.012 - width * len(name)
+            box = (left, y - height / 2, left + width * len(name), y + height / 2)
+            if left > 0.0 and box[2] < 1.0 and not any(_overlap(box, other) for other in boxes):
+                align = {"ha": "left", "va": "center", "fontsize": "x-small", "transform": axis.transAxes}
+                axis.text(left, y + ABOVE, name, **align)
+                boxes.append(box)
+                break
+
+
+def _place(axis: Any, row: dict[str, Any]) -> tuple[float, float]:
+    """Return where a point is, in parts of the axes."""
+    x, y = axis.transAxes.inverted().transform(axis.transData.transform((row["cost"], judged(row))))
+    return float(x), float(y)
+
+
+def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+def short_name(row: dict[str, Any]) -> str:
+    """Return mesh, degree, scheme, and step or tolerance."""
+    name = mesh_name(row)
+    if row["scheme"] is None:
+        return name
+    step = f"{row['step']:.3g} s" if row["step"] is not None else f"tol {row['tolerance']:.0e}"
+    return f"{name}, {row['scheme']} {step}"
 
 
 def _uncertainty(axis: Any, summary: dict[str, Any], errors: list[float]) -> None:
@@ -71,15 +118,14 @@ def _uncertainty(axis: Any, summary: dict[str, Any], errors: list[float]) -> Non
         axis.axhspan(axis.get_ylim()[0], level, color="0.85", zorder=-1)
 
 
-def _legend(result: CostResult, colours: dict[str, str], failed: bool) -> list[Line2D]:
+def _legend(result: CostResult, colours: dict[str, str], markers: dict[str, str], failed: bool) -> list[Line2D]:
     """Return what the colours, markers and lines stand for."""
     rows, summary = result.rows, result.summary
     handles = []
     for theory, colour in colours.items():
         lost = all(row["status"] == "failed" for row in rows if row["theory"] == theory)
         handles.append(Line2D([], [], color=colour, lw=4, label=theory + (" (failed)" if lost else "")))
-    for degree in sorted({row["degree"] for row in rows}):
-        handles.append(Line2D([], [], color="0.3", marker=MARKERS[degree], ls="none", label=f"degree {degree}"))
+    handles += [Line2D([], [], color="0.3", marker=m, ls="none", label=kind) for kind, m in markers.items()]
     handles.append(Line2D([], [], color="black", lw=1.2, label="Pareto front"))
     if any(summary["model_errors"].values()):
         handles.append(Line2D([], [], color="0.3", lw=1.0, ls="--", label="error of the model"))

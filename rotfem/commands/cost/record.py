@@ -23,11 +23,12 @@ class Measurement:
     """One setting, computed.
 
     Attributes:
-        status: "done" or "failed".
+        status: "done", "failed", or "stopped" where the time of the study was over.
         reason: why it failed.
         samples: the output, None where it failed.
         wall, cpu: of every repetition, s, without set-up.
-        setup: of every repetition, s: mesh, forms (compiled before, on disk), constant operators.
+        setup, setup_cpu: of every repetition, s: mesh, forms (compiled before, on disk), constant operators.
+        memory: bytes at the height, above what the program needs by itself; of all processes.
         dofs, steps, iterations: sizes and counts.
     """
 
@@ -37,14 +38,21 @@ class Measurement:
     wall: list[float] = field(default_factory=list)
     cpu: list[float] = field(default_factory=list)
     setup: list[float] = field(default_factory=list)
+    setup_cpu: list[float] = field(default_factory=list)
+    memory: float = 0.0
     dofs: int = 0
     steps: int = 0
     iterations: int = 0
 
     def median(self, name: str) -> float:
-        """Return the median of `wall`, `cpu` or `setup`, s; nan where nothing was measured."""
+        """Return the median of `wall`, `cpu`, `setup` or `setup_cpu`, s; nan where nothing was measured."""
         values = getattr(self, name)
         return float(np.median(values)) if values else float("nan")
+
+    @property
+    def cost(self) -> float:
+        """CPU time (s) of set-up and computation, by which settings are ranked; that of other programs is not in it."""
+        return self.median("setup_cpu") + self.median("cpu")
 
     def to_json(self) -> dict[str, Any]:
         """Return a JSON-able dictionary."""
@@ -60,11 +68,13 @@ class Measurement:
 def fingerprint(scene: Scene, output: str, ranks: int) -> str:
     """Return a hash of all that a measurement depends on besides its setting: scene, output, version, processes.
 
-    A mesh file counts by its content, a Python function in the scene by its name only.
+    A mesh file counts by its content, a Python function in the scene by its name only. What a measurement consists of
+    counts too.
     """
     mesh = getattr(scene.structure, "mesh", None)
     content = hashlib.sha256(Path(mesh).read_bytes()).hexdigest() if mesh is not None else None
-    text = json.dumps([scene.to_dict(), content, output, __version__, ranks], sort_keys=True, default=str)
+    of_what = sorted(vars(Measurement()))
+    text = json.dumps([scene.to_dict(), content, output, __version__, ranks, of_what], sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
@@ -114,8 +124,12 @@ class Record:
 
     def get(self, setting: Setting, repeat: int) -> Measurement | None:
         """Return the measurement of a setting, if there is one and it was repeated often enough."""
-        found = self._found.get(_text(setting.key()))
+        found = self.find(setting)
         return found if found is not None and (found.status == "failed" or len(found.wall) >= repeat) else None
+
+    def find(self, setting: Setting) -> Measurement | None:
+        """Return the measurement of a setting, if there is one."""
+        return self._found.get(_text(setting.key()))
 
     def put(self, setting: Setting, measurement: Measurement) -> None:
         """Keep a measurement.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,10 @@ from scipy.interpolate import CubicSpline
 Array = npt.NDArray[np.float64]
 
 #: Observed orders below this are noise, or of levels not yet fine enough: nothing is extrapolated.
-LEAST_ORDER = 1.5
+LEAST_ORDER = 1.0
+
+#: Part of what an extrapolation of order 3/2 adds that is uncertain, however well levels agree; steeper, it is less.
+DOUBT = 0.2
 
 #: Samples closer than this part of the interval are taken to be at the same time.
 SAME_TIME = 1e-9
@@ -42,6 +46,23 @@ class Samples:
 
 
 @dataclass
+class Limit:
+    """What a chain of refinements tends to.
+
+    Attributes:
+        samples: its values.
+        uncertainty: relative, in the norm that errors are measured in; infinite where there is one level only.
+        order: observed order of the refinement; None where it was not sensible and the finest level is taken as it is.
+        error: about that of the finest level, relative.
+    """
+
+    samples: Samples
+    uncertainty: float
+    order: float | None
+    error: float
+
+
+@dataclass
 class Reference:
     """The converged output of one theory.
 
@@ -49,7 +70,7 @@ class Reference:
         samples: its values.
         uncertainty: relative, in the norm that errors are measured in.
         order: observed order of the refinement; None where it was not sensible and the finest level is taken as it is.
-        parts: uncertainty by what was refined, `time` and `mesh`.
+        parts: uncertainty by what was refined, `time` and `mesh`, and of their product, `mixed`.
     """
 
     samples: Samples
@@ -82,13 +103,16 @@ def size(samples: Samples) -> float:
 
 
 def aligned(a: Samples, b: Samples) -> tuple[Array, Array]:
-    """Return the values of a and b at common times."""
+    """Return the values of a and b at common times: those of a where b has them, of the one with fewer otherwise."""
     if a.times.size == 0 or b.times.size == 0:
         return a.values, b.values
     close = SAME_TIME * float(b.times[-1])
     nearest = np.clip(np.searchsorted(b.times, a.times - close), 0, len(b.times) - 1)
     if np.all(np.abs(b.times[nearest] - a.times) <= close):
         return a.values, b.values[nearest]
+    if len(a.times) < len(b.times):
+        inside = a.times <= b.times[-1] + close
+        return a.values[inside], CubicSpline(b.times, b.values)(a.times[inside])
     inside = b.times <= a.times[-1] + close
     return CubicSpline(a.times, a.values)(b.times[inside]), b.values[inside]
 
@@ -108,31 +132,85 @@ def observed_order(coarse: Samples, middle: Samples, fine: Samples, each: bool) 
 def extrapolated(coarse: Samples, fine: Samples, order: float) -> Samples:
     """Return Richardson's u_{h/2} + (u_{h/2} − u_h) / (2^p − 1), at the times of the fine one."""
     rough, good = aligned(coarse, fine)
-    return Samples(good + (good - rough) / (2.0**order - 1.0), fine.times)
+    return shifted(fine, Samples((good - rough) / (2.0**order - 1.0), coarse.times))
 
 
-def reference(levels: list[Samples], each: bool, finer_mesh: Samples | None = None) -> Reference:
-    """Return the reference that three levels of refinement give, and its uncertainty.
+def shifted(samples: Samples, change: Samples) -> Samples:
+    """Return samples with a change added, which is interpolated where it is known at fewer times."""
+    values = change.values
+    if len(values) != len(samples.values):
+        values = CubicSpline(change.times, values)(samples.times)
+    return Samples(samples.values + values, samples.times)
+
+
+def limit(levels: Sequence[Samples], each: bool, highest: float = np.inf) -> Limit:
+    """Return what levels of refinement tend to, each with half the size of the one before; the last three count.
 
     Where the differences shrink with an order p, the two finest levels are extrapolated; the uncertainty is the
-    difference to what the two coarsest ones give. Otherwise it is the finest level, and the larger of the differences
-    between levels. The change that half the element size makes at the coarsest step is added to the value, and in full
-    to the uncertainty.
+    difference to what the two before give, and at least a part of what was added. Otherwise it is the finest level, and
+    the larger of the differences between levels. A degree raised by one may stand for half the size: only the ratio of
+    the differences counts.
 
     Args:
-        levels: the output for h, h/2, h/4, sampled at the same times.
+        levels: the output for h, h/2, h/4, …
         each: see `distance`.
-        finer_mesh: the output for h on a mesh of half the size, of a history refined in time.
+        highest: order of the method: levels that differ less than it says do so by chance.
     """
-    order = observed_order(levels[0], levels[1], levels[2], each)
+    fine = levels[-1]
+    if len(levels) == 1:
+        return Limit(fine, np.inf, None, np.inf)
+    last = _known(distance(levels[-2], fine, each))
+    if len(levels) == 2:
+        return Limit(fine, last, None, last)
+    order = observed_order(levels[-3], levels[-2], fine, each)
     if order is None:
-        best = levels[2]
-        uncertain = max(distance(levels[0], levels[1], each), distance(levels[1], best, each))
-    else:
-        best = extrapolated(levels[1], levels[2], order)
-        uncertain = distance(extrapolated(levels[0], levels[1], order), best, each)
-    parts = {"time" if finer_mesh is not None else "mesh": uncertain}
-    if finer_mesh is not None:
-        parts["mesh"] = distance(levels[0], finer_mesh, each)
-        best = Samples(best.values + (finer_mesh.values - levels[0].values), best.times)
-    return Reference(best, sum(parts.values()), order, parts)
+        worst = max(_known(distance(levels[-3], levels[-2], each)), last)
+        return Limit(fine, worst, None, worst)
+    p = min(order, highest)
+    best = extrapolated(levels[-2], fine, p)
+    added = distance(fine, best, each)
+    uncertain = max(distance(extrapolated(levels[-3], levels[-2], p), best, each), DOUBT * added / (p - 0.5))
+    return Limit(best, uncertain, order, added)
+
+
+def neighbour(known: Reference, there: Samples, here: Samples, error: float) -> Reference:
+    """Return the reference of a theory from that of another, and the outputs of both for one setting.
+
+    The errors of the setting are nearly the same in both, and leave the difference with a part of it uncertain.
+
+    Args:
+        known: the other's.
+        there: output of the theory.
+        here: output of the other.
+        error: about that of the setting, relative.
+    """
+    a, b = aligned(there, here)
+    times = there.times if len(a) == len(there.times) else here.times
+    apart = distance(there, here, each=False)
+    parts = {**known.parts, "theory": apart * min(error, 1.0)}
+    return Reference(shifted(known.samples, Samples(a - b, times)), sum(parts.values()), None, parts)
+
+
+def _known(value: float) -> float:
+    """Return a distance, infinite where the samples cannot be compared."""
+    return value if np.isfinite(value) else np.inf
+
+
+def combined(time: Limit, base: Samples, mesh: Limit, mesh_step: float, each: bool) -> Reference:
+    """Return the reference of a history refined in time on one mesh, and in space at one step.
+
+    What the refinement in space changes at that step is added to the limit in time. Both errors together change each
+    other: the product of their sizes is counted as uncertain.
+
+    Args:
+        time: limit of the steps on one mesh.
+        base: the output on that mesh at the step with which meshes are refined.
+        mesh: limit of the meshes at that step.
+        mesh_step: about the error of that step.
+        each: see `distance`.
+    """
+    fine, coarse = aligned(mesh.samples, base)
+    change = Samples(fine - coarse, mesh.samples.times)
+    mixed = distance(base, mesh.samples, each) * min(mesh_step, 1.0)
+    parts = {"time": time.uncertainty, "mesh": mesh.uncertainty, "mixed": mixed}
+    return Reference(shifted(time.samples, change), sum(parts.values()), time.order, parts)

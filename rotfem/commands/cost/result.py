@@ -34,12 +34,14 @@ class CostPoint:
     Attributes:
         setting: theory, mesh, degree, scheme and step.
         time: of one run without its set-up, median, s.
+        cost: CPU time of one run with its set-up, s: what settings are ranked by.
         error: relative, that of the theory included where it is known.
         pareto: whether no other setting is as fast and as exact, and better in one.
     """
 
     setting: Setting
     time: float
+    cost: float
     error: float
     pareto: bool
 
@@ -47,10 +49,14 @@ class CostPoint:
     def of(cls, row: Row) -> CostPoint | None:
         """Return the point of a row; None if its setting failed or there is nothing to judge it by."""
         error = judged(row)
-        return None if error is None else cls(setting_of(row), float(row["time"]), error, bool(row["pareto"]))
+        return (
+            None
+            if error is None
+            else cls(setting_of(row), float(row["time"]), float(row["cost"]), error, bool(row["pareto"]))
+        )
 
     def __str__(self) -> str:
-        return f"{describe(self.setting.key())}: error {self.error:.1e}, {self.time:.3g} s"
+        return f"{describe(self.setting.key())}: error {self.error:.1e}, {self.cost:.3g} s of CPU time"
 
 
 @dataclass
@@ -77,17 +83,17 @@ class CostResult(Result):
 
     @property
     def front(self) -> list[CostPoint]:
-        """The points that no other one beats in both time and error, fastest first."""
-        return sorted((point for point in self.points if point.pareto), key=lambda point: point.time)
+        """The points that no other one beats in both time and error, cheapest first."""
+        return sorted((point for point in self.points if point.pareto), key=lambda point: point.cost)
 
     @property
     def recommended(self) -> CostPoint | None:
-        """The fastest setting within the accuracy that was asked for, uncertainty included; None if there is none."""
+        """The cheapest setting within the accuracy that was asked for, uncertainty included; None if there is none."""
         row = self.summary["recommended"]
         return None if row is None else CostPoint.of(row)
 
     def recommend(self, accuracy: float) -> Row | None:
-        """Return the fastest row within a relative accuracy, uncertainty included; None if there is none."""
+        """Return the cheapest row within a relative accuracy, uncertainty included; None if there is none."""
         return recommend(self.rows, accuracy, self.summary["uncertainty"] or 0.0)
 
     def write_tuned(self, path: str | Path, accuracy: float | None = None) -> Path:
@@ -111,7 +117,8 @@ class CostResult(Result):
         error = row["error"] if row["total_error"] is None else row["total_error"]
         remark = (
             f"{self.scene.name}, tuned to a relative accuracy of {wanted:g} of {self.summary['output']}: "
-            f"{describe(row)}.\nMeasured: error {error:.1e}, {row['time']:.3g} s."
+            f"{describe(row)}.\nMeasured: error {error:.1e}, known to {self.summary['uncertainty']:.0e}; "
+            f"{row['cost']:.3g} s of CPU time with set-up."
         )
         return write_tuned(self.scene, setting_of(row), Path(path), remark)
 
@@ -133,10 +140,12 @@ class CostResult(Result):
         }
 
     def drawings(self) -> dict[str, Callable[[], Figure]]:
-        """Return cost.png."""
+        """Return cost.png, and scaling.png where more than one size of a theory was computed."""
         from rotfem.commands.cost.plot import cost_figure
+        from rotfem.commands.cost.plot_scaling import scaling_figure
 
-        return {"cost.png": partial(cost_figure, self)}
+        further = {"scaling.png": partial(scaling_figure, self)} if self.summary["scaling"] else {}
+        return {"cost.png": partial(cost_figure, self), **further}
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return one row a setting, as in cost.csv.

@@ -16,7 +16,11 @@ from rotfem.scene.stepping import estimates_error
 
 Elements = int | tuple[int, int] | None
 
-OUTPUTS = ("tip", "frequencies")
+#: What errors may be of: the tip's motion, eigenvalues at the scene's speed, frequencies over a range of speeds.
+OUTPUTS = ("tip", "frequencies", "campbell")
+
+#: Speeds of a Campbell diagram that is studied: from rest to the scene's speed.
+SPEEDS = 9
 
 #: Steps tried, as multiples of the scene's own; a step is never longer than this part of the interval.
 STEPS_FULL, STEPS_QUICK, LONGEST = (0.45, 10.5), (1.9, 10.5), 1 / 20
@@ -71,21 +75,6 @@ class Setting:
             out |= {"time.scheme": self.scheme, "time.spectral_radius": None, "time.beta": None, "time.gamma": None}
         return out
 
-    def refined(self, mesh: int = 0, time: int = 0) -> Setting:
-        """Return the setting with mesh and step halved so many times; the samples stay where they are.
-
-        A mesh from a file cannot be refined: its degree is raised instead.
-        """
-        new = self
-        for _ in range(mesh):
-            if new.elements is None:
-                new = replace(new, degree=min(new.degree + 1, HIGHEST_DEGREE))
-            else:
-                new = replace(new, elements=scaled(new.elements, 2.0))
-        if time and new.step is not None:
-            new = replace(new, step=new.step / 2**time, every=new.every * 2**time)
-        return new
-
 
 def cells(elements: Elements) -> int:
     """Return the number of cells."""
@@ -126,7 +115,7 @@ def grid(
 
     Args:
         scene: validated scene.
-        output: "tip" or "frequencies".
+        output: one of OUTPUTS.
         quick: a small grid.
         base_step: a fixed step (s) of about the scene's accuracy; its own where it has one.
         chosen: `theories`, `elements`, `degrees`, `steps`, `schemes` that replace the default ones, or None each.
@@ -167,7 +156,7 @@ def _ways(
     tolerances = [] if own is None else [own * factor for factor in factors]
     others = [] if quick else [name for name in registry.schemes.names if name != time.scheme]
     schemes = chosen.get("schemes") or [time.scheme, *others]
-    fixed = [(scheme, h, None, max(1, round(interval / h))) for scheme in schemes for h in steps]
+    fixed = [(scheme, h, None, samples_every(interval, h)) for scheme in schemes for h in steps]
     adaptive = [scheme for scheme in schemes if estimates_error(registry.schemes[scheme])]
     return [*fixed, *((scheme, None, tolerance, 1) for scheme in adaptive for tolerance in tolerances)]
 
@@ -196,20 +185,26 @@ def sample_interval(scene: Scene, base_step: float) -> float:
     return base_step * (scene.time.output_every if scene.time.tolerance is None else 1)
 
 
-def reference_settings(settings: Sequence[Setting], own: Setting, theory: str, interval: float | None) -> list[Setting]:
-    """Return the settings a theory's reference is made of.
+def sweep_speeds(scene: Scene) -> list[float]:
+    """Return the speeds (rad/s) of the Campbell diagram that a study computes.
 
-    The finest mesh and step of the grid halved 0, 1 and 2 times in what converges slowest: in time for a history, whose
-    mesh is then halved once at the longest of these steps; in space otherwise.
+    Raises:
+        SceneError: the scene does not turn.
     """
-    finest = max((s.elements for s in settings), key=cells)
-    first = Setting(theory, finest, max(s.degree for s in settings))
-    steps = [s.step for s in settings if s.step is not None]
-    if interval is None:
-        return [first.refined(mesh=i) for i in range(3)]
-    h = min(steps)
-    first = replace(first, scheme=own.scheme, step=h, every=max(1, round(interval / h)))
-    return [*(first.refined(time=i) for i in range(3)), first.refined(mesh=1)]
+    top = scene.motion.top_speed(None if scene.time is None else scene.time.end)
+    if not top > 0.0:
+        raise SceneError(scene.file, "cost --of", "campbell", "the scene has no speed to go up to")
+    return [top * i / (SPEEDS - 1) for i in range(SPEEDS)]
+
+
+def estimating_schemes(names: Sequence[str] | None = None) -> list[str]:
+    """Return the schemes, of these or of all, whose steps can be adaptive."""
+    return [name for name in names or registry.schemes.names if estimates_error(registry.schemes[name])]
+
+
+def samples_every(interval: float, step: float) -> int:
+    """Return how many steps (s) there are from one sample to the next, where they are an interval (s) apart."""
+    return max(1, round(interval / step))
 
 
 def check_choice(scene: Scene, chosen: Mapping[str, Sequence[Any] | None]) -> None:

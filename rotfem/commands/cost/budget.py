@@ -1,0 +1,103 @@
+"""What a study may take: time in all, memory of one computation; what is refused is told. No dolfinx in it."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from mpi4py import MPI
+
+from rotfem.commands.cost.settings import Setting
+from rotfem.errors import SceneError
+
+#: Time of a study (s) where nothing is said.
+DEFAULT_QUICK, DEFAULT_FULL = 120.0, 1200.0
+
+#: Part of the free memory that one computation may be predicted to need.
+MEMORY_SHARE = 0.6
+
+UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
+
+
+def seconds_of(text: str | float, file: str = "") -> float:
+    """Return seconds from a number, or text such as "60s", "2min", "1h".
+
+    Raises:
+        SceneError: it is neither, or not greater than 0.
+    """
+    found = re.fullmatch(r"\s*([0-9.]+(?:e[+-]?[0-9]+)?)\s*(s|min|h|)\s*", str(text))
+    try:
+        value = float(found[1]) * UNITS[found[2]] if found else 0.0
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < 1e9:
+        raise SceneError(file, "cost --budget", text, "must be a time greater than 0, such as 60s, 2min or 1h")
+    return value
+
+
+def free_memory() -> float:
+    """Return the memory (bytes) that can be had without swapping; infinite where the system does not say."""
+    try:
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+        return float(next(line for line in lines if line.startswith("MemAvailable:")).split()[1]) * 1024
+    except (OSError, StopIteration, ValueError, IndexError):
+        pass
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, AttributeError):
+        return float("inf")
+
+
+@dataclass
+class Budget:
+    """What is left of the time of a study, and what it did not do for want of time or memory.
+
+    Attributes:
+        seconds: that the study may take in all, compilation included.
+        comm: MPI communicator; the clock of rank 0 counts, so that all decide alike.
+        memory: bytes that all ranks together may be predicted to need.
+        refused: what was not computed: setting, reason, predicted time (s) and memory (bytes).
+    """
+
+    seconds: float
+    comm: MPI.Comm
+    started: float = field(default_factory=perf_counter)
+    memory: float = field(init=False)
+    refused: list[dict[str, Any]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.memory = self.comm.bcast(MEMORY_SHARE * free_memory())
+
+    def left(self) -> float:
+        """Return the time left, s."""
+        return float(self.comm.bcast(self.seconds - (perf_counter() - self.started)))
+
+    def allows(self, setting: Setting, predicted: Mapping[str, float | None], share: float) -> bool:
+        """Return whether a setting may be computed, and keep what is refused.
+
+        Args:
+            setting: what is to be computed.
+            predicted: its `time` (s) and `memory` (bytes), None where nothing is known of them.
+            share: of the time left that it may take.
+        """
+        left, time, memory = self.left(), predicted["time"], predicted["memory"]
+        if memory is not None and memory > self.memory:
+            why = f"would need about {memory / 1e9:.2g} GB of {self.memory / 1e9:.2g} GB allowed"
+        elif left <= 0.0 or (time is not None and time > share * left):
+            known = "" if time is None else f"would take about {time:.2g} s, "
+            why = f"{known}{max(left, 0.0):.2g} s of the budget are left"
+        else:
+            return True
+        entry = {"setting": setting.key(), "why": why, "time": time, "memory": memory}
+        if all(other["setting"] != entry["setting"] for other in self.refused):
+            self.refused.append(entry)
+        return False
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a summary says of it."""
+        return {"seconds": self.seconds, "used": self.seconds - self.left(), "refused": self.refused}

@@ -1,0 +1,266 @@
+"""References by refinement: chains of settings, each with half the size of the one before, as far as they are needed.
+
+A chain is followed until what it tends to is known well enough, or the budget refuses its next level. Of several
+schemes the one is refined that promises to get there soonest: a reference costs what the accuracy asked for calls for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from math import ceil, log2
+
+from rotfem.commands.cost.prediction import order
+from rotfem.commands.cost.record import Measurement
+from rotfem.commands.cost.reference import Limit, Reference, Samples, combined, distance, limit
+from rotfem.commands.cost.settings import HIGHEST_DEGREE, Elements, Setting, cells, samples_every, scaled
+
+#: Returns the measurement of a setting that may take a share of the time left; None where the budget refuses it.
+Get = Callable[[Setting, float], Measurement | None]
+
+#: A step whose error is below this is fine enough to refine meshes with.
+FINE_ENOUGH = 0.03
+
+#: Differences below this are round-off where they do not shrink.
+ROUND_OFF = 1e-6
+
+#: Failures in a row after which a chain is given up, and levels that it has at most.
+MOST_FAILURES, MOST_LEVELS = 3, 14
+
+#: Part of the wanted uncertainty that the product of both errors may have for a coarser mesh to serve in time.
+MIXED_SHARE = 0.25
+
+
+@dataclass
+class Plan:
+    """What chains begin with.
+
+    Attributes:
+        own: the scene's setting, on the mesh that steps are refined on.
+        each: see `distance`.
+        first_step: the longest step tried, s; None outside a history.
+        interval: between samples, s.
+        least_step: the reference has one at most this long, s; None where the uncertainty alone decides.
+        least_mesh: likewise, the coarsest mesh at the end of a chain.
+        schemes: that may be refined.
+    """
+
+    own: Setting
+    each: bool
+    first_step: float | None = None
+    interval: float = 0.0
+    least_step: float | None = None
+    least_mesh: Elements = None
+    schemes: Sequence[str] = ()
+
+
+@dataclass
+class Chain:
+    """Settings that were refined one after the other.
+
+    Attributes:
+        ahead: the settings to come.
+        each: see `distance`.
+        settings, samples: of the levels that could be computed.
+        walls: their times, s.
+        reason: why the last one that failed did.
+        ended: no further level is to be had.
+    """
+
+    ahead: Iterator[Setting]
+    each: bool
+    settings: list[Setting] = field(default_factory=list)
+    samples: list[Samples] = field(default_factory=list)
+    walls: list[float] = field(default_factory=list)
+    reason: str = ""
+    ended: bool = False
+    _failures: int = 0
+
+    def extend(self, get: Get, share: float) -> None:
+        """Add the next level, if it is to be had."""
+        setting = next(self.ahead, None)
+        found = None if setting is None or len(self.samples) >= MOST_LEVELS else get(setting, share)
+        if setting is None or found is None:
+            self.ended = True
+            self.reason = self.reason or "the budget is too small for it"
+            return
+        if found.samples is None:
+            self.reason = found.reason
+            self._failures += 1
+            self.ended = self._failures >= MOST_FAILURES
+            return
+        self._failures = 0
+        self.settings.append(setting)
+        self.samples.append(found.samples)
+        self.walls.append(found.median("wall"))
+        self.ended = self._at_round_off()
+
+    def _at_round_off(self) -> bool:
+        """Return whether levels differ by so little that the differences do not shrink any more."""
+        if len(self.samples) < 4:
+            return False
+        before, last = (distance(self.samples[i], self.samples[i + 1], self.each) for i in (-3, -2))
+        return last < ROUND_OFF and last > 0.7 * before
+
+    def limit(self) -> Limit:
+        """Return what the levels tend to."""
+        return limit(self.samples, self.each, self.highest)
+
+    @property
+    def highest(self) -> float:
+        """Order of the method that is refined."""
+        first = self.settings[0]
+        return float(order(first)) if len(self.settings) > 1 and first.step != self.settings[1].step else float("inf")
+
+    def to_go(self, goal: float) -> float:
+        """Return about how long (s) it will take until the limit is known to a goal; infinite where it never is."""
+        if self.ended or not self.samples:
+            return float("inf")
+        found = self.limit()
+        p = found.order or self.highest
+        uncertain = found.uncertainty if len(self.samples) > 1 else 1.0
+        further = (
+            1 if uncertain <= goal or p == float("inf") else max(1, ceil(log2(uncertain / goal) / min(p, self.highest)))
+        )
+        return self.walls[-1] * 2.0 ** (further + 1)
+
+
+class Refinement:
+    """References of theories.
+
+    Args:
+        plan: what chains begin with.
+        get: computes settings.
+
+    Attributes:
+        meshes: theory ↦ settings of its meshes, and the error of each one's mesh.
+        base, errors: theory ↦ a setting of its chains, and about its error.
+        reasons: theory ↦ why it has no reference.
+    """
+
+    def __init__(self, plan: Plan, get: Get):
+        self.plan, self.get = plan, get
+        self.meshes: dict[str, list[tuple[Setting, float]]] = {}
+        self.base: dict[str, Setting] = {}
+        self.errors: dict[str, float] = {}
+        self.reasons: dict[str, str] = {}
+
+    def reference(self, theory: str, goal: float, share: float, schemes: Sequence[str] = ()) -> Reference | None:
+        """Return the reference of a theory; None where no level could be computed, with the reason in `reasons`.
+
+        Args:
+            theory: whose.
+            goal: uncertainty, relative, at which no level is added any more.
+            share: of the time left that each level may take.
+            schemes: that may be refined besides the scene's.
+        """
+        if self.plan.first_step is None:
+            chain = self._meshes(replace(self.plan.own, theory=theory), goal, share)
+            if not chain.samples:
+                self.reasons[theory] = chain.reason
+                return None
+            found = chain.limit()
+            base = self.base[theory] = min(chain.settings[-2:], key=lambda s: cells(s.elements) + s.degree)
+            self.errors[theory] = dict(self.meshes[theory])[base]
+            return Reference(found.samples, found.uncertainty, found.order, {"mesh": found.uncertainty})
+        return self._history(theory, goal, share, schemes)
+
+    def _history(self, theory: str, goal: float, share: float, schemes: Sequence[str]) -> Reference | None:
+        own = replace(self.plan.own, theory=theory)
+        scout = self._steps(own)
+        while not scout.ended and (len(scout.samples) < 2 or scout.limit().error > FINE_ENOUGH):
+            scout.extend(self.get, share)
+        if not scout.samples:
+            self.reasons[theory] = scout.reason
+            return None
+        base, error = scout.settings[-1], min(scout.limit().error, 1.0)
+        self.base[theory], self.errors[theory] = base, error
+        meshes = self._meshes(base, goal / 2, share)
+        if not meshes.samples:
+            self.reasons[theory] = meshes.reason
+            return None
+        space = meshes.limit()
+        chain = self._cheaper(scout, meshes, space, goal, error)
+        others = [self._steps(replace(chain.settings[0] if chain.settings else own, scheme=s)) for s in schemes]
+        best = self._refined([chain, *others], goal / 2, share)
+        at = replace(base, elements=best.settings[0].elements)
+        there = self.get(at, share)
+        if there is None or there.samples is None:
+            return None
+        return combined(best.limit(), there.samples, space, error, self.plan.each)
+
+    def _refined(self, chains: list[Chain], goal: float, share: float) -> Chain:
+        """Refine whatever chain promises to reach the goal soonest; return the one whose limit is known best."""
+        for chain in chains:
+            while len(chain.samples) < 2 and not chain.ended:
+                chain.extend(self.get, share)
+        first = chains[0]
+        while not first.ended and (len(first.samples) < 3 or not self._long_enough(first)):
+            first.extend(self.get, share)
+        able = [chain for chain in chains if chain.samples]
+        while True:
+            best = min(able, key=lambda chain: chain.limit().uncertainty)
+            promising = min(able, key=lambda chain: chain.to_go(goal))
+            if best.limit().uncertainty <= goal or promising.to_go(goal) == float("inf"):
+                return best
+            promising.extend(self.get, share)
+
+    def _long_enough(self, chain: Chain) -> bool:
+        least = self.plan.least_step
+        return least is None or (chain.settings[-1].step or 0.0) <= least * (1 + 1e-9)
+
+    def _cheaper(self, scout: Chain, meshes: Chain, space: Limit, goal: float, error: float) -> Chain:
+        """Return the chain of steps on the coarsest mesh that the answer allows; what it saves must count."""
+        if self.plan.least_step is not None or scout.to_go(goal) < 1.0:
+            return scout
+        for setting, samples in zip(meshes.settings, meshes.samples, strict=True):
+            if setting.elements == self.plan.own.elements:
+                return scout
+            if distance(samples, space.samples, self.plan.each) * error <= MIXED_SHARE * goal:
+                chain = self._steps(replace(setting, step=None))
+                while not chain.ended and len(chain.samples) < len(scout.samples):
+                    chain.extend(self.get, 1.0)
+                return chain if chain.samples else scout
+        return scout
+
+    def _meshes(self, base: Setting, goal: float, share: float) -> Chain:
+        """Return the chain of meshes with the other values of a setting."""
+        chain = Chain(iter(finer_meshes(base)), self.plan.each)
+        while not chain.ended:
+            chain.extend(self.get, share)
+            if len(chain.samples) >= 3 and chain.limit().uncertainty <= goal and self._fine_enough(chain):
+                break
+        if chain.samples:
+            space = chain.limit()
+            self.meshes[base.theory] = [
+                (setting, distance(samples, space.samples, self.plan.each))
+                for setting, samples in zip(chain.settings, chain.samples, strict=True)
+            ]
+        return chain
+
+    def _fine_enough(self, chain: Chain) -> bool:
+        least, reached = self.plan.least_mesh, chain.settings[-1].elements
+        return least is None or reached is None or cells(reached) >= cells(least)
+
+    def _steps(self, own: Setting) -> Chain:
+        """Return the chain of steps with the other values of a setting."""
+        step, interval = self.plan.first_step, self.plan.interval
+        assert step is not None
+        halved = (step / 2**i for i in range(MOST_LEVELS + MOST_FAILURES))
+        levels = (replace(own, step=h, tolerance=None, every=samples_every(interval, h)) for h in halved)
+        return Chain(levels, self.plan.each)
+
+
+def finer_meshes(base: Setting) -> list[Setting]:
+    """Return settings on finer and finer meshes, from one that the own one is refined from, where it is.
+
+    A mesh from a file cannot be refined: its degree is raised instead.
+    """
+    if base.elements is None:
+        return [replace(base, degree=degree) for degree in range(base.degree, HIGHEST_DEGREE + 1)]
+    down = 0
+    counts = base.elements if isinstance(base.elements, tuple) else (base.elements,)
+    while down < 2 and all(n % 2 ** (down + 1) == 0 for n in counts):
+        down += 1
+    start = scaled(base.elements, 0.5**down)
+    return [replace(base, elements=scaled(start, 2.0**i)) for i in range(MOST_LEVELS)]

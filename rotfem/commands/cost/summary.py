@@ -1,0 +1,126 @@
+"""The summary of a work–precision study. No dolfinx in it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rotfem.commands.cost.front import Row, describe, judged, model_errors, recommend, truth_of
+from rotfem.mechanics.theories import richest
+from rotfem.version import versions
+
+if TYPE_CHECKING:
+    from rotfem.commands.cost.exploration import Study
+
+#: Uncertainties below this are not worth a warning.
+ROUND_OFF = 1e-9
+
+#: What misses the best that was reached by this factor is as good where it is cheaper.
+NEAR = 1.05
+
+#: Accuracies a setting is recommended for besides the wanted one.
+DECADES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+
+
+def study_summary(study: Study, rows: list[Row], accuracy: float, quick: bool) -> dict[str, Any]:
+    """Return the summary of a study.
+
+    Args:
+        study: what was done.
+        rows: of its settings.
+        accuracy: asked for.
+        quick: whether the grid was the small one.
+    """
+    references, laboratory = study.references, study.laboratory
+    truth = truth_of(references)
+    uncertainty = 0.0 if truth is None else references[truth].uncertainty
+    best = {a: recommend(rows, a, uncertainty) for a in sorted({*DECADES, accuracy}, reverse=True)}
+    nearest = closest(rows, accuracy, uncertainty) if best[accuracy] is None else None
+    used, compiling = study.budget.summary(), laboratory.bench.compiling
+    return {
+        "command": "cost",
+        "status": "done",
+        "name": study.scene.name,
+        "output": study.output,
+        "quick": quick,
+        "accuracy": accuracy,
+        "truth": truth,
+        "uncertainty": uncertainty,
+        "references": {
+            t: {"order": r.order, "uncertainty": r.uncertainty, "parts": r.parts} for t, r in references.items()
+        },
+        "reference_failures": study.failures,
+        "reference_largest": largest(rows),
+        "model_errors": model_errors(references, study.each),
+        "recommended": best[accuracy],
+        "promise": promise(best[accuracy], uncertainty),
+        "closest": nearest,
+        "missing": missing(rows, accuracy, uncertainty, used["refused"]) if best[accuracy] is None else "",
+        "recommendations": [{"accuracy": a, "setting": r and describe(r), "row": r} for a, r in best.items()],
+        "scaling": laboratory.prediction.scaling(),
+        "settings": len(rows),
+        "failed": sum(row["status"] == "failed" for row in rows),
+        "measured": laboratory.new,
+        "resumed": len(laboratory.taken),
+        "budget": used,
+        "timings": {"compile": compiling, "other": used["used"] - compiling, "total": used["used"]},
+        "warnings": _warnings(study, rows, accuracy, uncertainty),
+        "versions": versions(),
+        "ranks": laboratory.comm.size,
+        "scene": study.scene.digest(),
+    }
+
+
+def promise(row: Row | None, uncertainty: float) -> dict[str, float] | None:
+    """Return what a recommended setting promises: its error as measured, and its bound; times (s), memory (bytes)."""
+    if row is None:
+        return None
+    error = judged(row) or 0.0
+    names = ("time", "cpu_time", "setup", "setup_cpu", "cost", "memory")
+    return {"error": error, "bound": error + uncertainty, **{name: row[name] for name in names}}
+
+
+def largest(rows: list[Row]) -> dict[str, float]:
+    """Return the most unknowns, time (s, with set-up) and memory (bytes) of a setting computed for references."""
+    made = [row for row in rows if row["purpose"] == "reference" and row["status"] == "done"]
+    return {
+        "dofs": max((row["dofs"] or 0 for row in made), default=0),
+        "time": max((row["setup"] + row["time"] for row in made), default=0.0),
+        "memory": max((row["memory"] or 0.0 for row in made), default=0.0),
+    }
+
+
+def closest(rows: list[Row], accuracy: float, uncertainty: float) -> dict[str, Any] | None:
+    """Return `within`, the least accuracy above the one asked for that is known to be met, and the `row` that does."""
+    errors = [error for error in map(judged, rows) if error is not None]
+    if not errors:
+        return None
+    within = float(f"{NEAR * max(min(errors) + uncertainty, accuracy):.1e}")
+    return {"within": within, "row": recommend(rows, within, uncertainty)}
+
+
+def missing(rows: list[Row], accuracy: float, uncertainty: float, refused: list[dict[str, Any]]) -> str:
+    """Return what it takes to recommend a setting where there is none."""
+    errors = [error for error in map(judged, rows) if error is not None]
+    said = f"the best error is {min(errors):.1e}, known to {uncertainty:.0e}" if errors else "nothing could be judged"
+    wanted = [entry for entry in refused if entry["time"] is not None]
+    if wanted:
+        least = min(wanted, key=lambda entry: entry["time"])
+        said += f"; the budget left out {len(refused)} settings, as {describe(least['setting'])}: {least['why']}"
+    elif refused:
+        said += f"; {describe(refused[0]['setting'])} {refused[0]['why']}"
+    return said
+
+
+def _warnings(study: Study, rows: list[Row], accuracy: float, uncertainty: float) -> list[str]:
+    out = []
+    if richest().name not in study.references:
+        reason = study.failures.get(richest().name, "")
+        out.append(f"no reference of {richest().name} ({reason}): errors do not include that of the model")
+    for theory, r in study.references.items():
+        mine = [row["error"] for row in rows if row["theory"] == theory and row["error"]]
+        if mine and r.uncertainty > max(ROUND_OFF, 0.5 * min(mine)) and r.uncertainty > accuracy / 2:
+            out.append(
+                f"the reference of {theory} is uncertain by {r.uncertainty:.1e}, the best setting off by "
+                f"{min(mine):.1e}: errors near that are not resolved"
+            )
+    return out
