@@ -74,7 +74,7 @@ def _kind(row: dict[str, Any]) -> str:
 
 
 def _names(axis: Any, done: list[dict[str, Any]], chosen: dict[str, Any] | None) -> None:
-    """Write mesh and step beside the points, the front first, on whatever side there is room; without room not at all."""
+    """Write mesh and step beside the points, the front first, on a side where there is room, or not at all."""
     width, height = NAME_SIZE
     taken = [tuple(_place(axis, row)) for row in done]
     boxes = [(x - 0.008, y - 0.012, x + 0.008, y + 0.012) for x, y in taken]

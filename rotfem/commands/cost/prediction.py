@@ -17,7 +17,7 @@ from rotfem.commands.cost.settings import Setting
 TIME_EXPONENT, MEMORY_EXPONENT = {1: 1.0, 2: 1.4}, {1: 1.0, 2: 1.15}
 
 #: What measured exponents of time are taken to be within: small systems take the same whatever their size.
-TIME_RANGE = (0.3, 2.2)
+TIME_RANGE = (0.0, 2.2)
 
 #: Bytes for an unknown at least, where small systems show nothing but what every one needs.
 LEAST_MEMORY = 1500.0
@@ -57,8 +57,8 @@ class Prediction:
         m, larger = self.known[near], nodes(setting, self.dimension) / nodes(near, self.dimension)
         march = larger ** self.exponent(near.theory) * self._steps(setting, near) * stages(setting) / stages(near)
         return {
-            "time": m.median("setup") * larger + m.median("wall") * march,
-            "cpu": m.median("setup_cpu") * larger + m.median("cpu") * march,
+            "time": m.median("setup") * max(larger, 1.0) + m.median("wall") * march,
+            "cpu": m.median("setup_cpu") * max(larger, 1.0) + m.median("cpu") * march,
             "memory": self.memory(near.theory, m.dofs * larger),
         }
 
@@ -79,7 +79,7 @@ class Prediction:
             return None
         floor, large = min(size["memory"] for size in sizes), sizes[-1]
         excess = max(large["memory"] - floor, LEAST_MEMORY * large["dofs"])
-        return floor + excess * (dofs / large["dofs"]) ** MEMORY_EXPONENT[self.dimension]
+        return float(floor + excess * (dofs / large["dofs"]) ** MEMORY_EXPONENT[self.dimension])
 
     def scaling(self) -> list[dict[str, Any]]:
         """Return time (s, CPU, of a step or in all) and memory (bytes) over the unknowns, by theory, and predictions.
