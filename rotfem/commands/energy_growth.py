@@ -34,20 +34,31 @@ def growth(history: dict[str, Array]) -> float:
         history: columns by name; a row that is not finite and all after it are left out.
     """
     energies = np.array([history[name] for name in ("jacobi", "kinetic", "strain")])
-    fine = np.isfinite(energies).all(axis=0)
+    return _growth(energies[0], energies[1:])
+
+
+def growth_on_hub(history: dict[str, Array]) -> float:
+    """Return by how much the energy of hub and structure grew beyond the work of torque and brake (see `growth`)."""
+    kinetic = history["kinetic"] + history["hub_kinetic"]
+    return _growth(kinetic + history["strain"] - history["work"], np.array([kinetic, history["strain"]]))
+
+
+def _growth(constant: Array, moving: Array) -> float:
+    """Return the growth of what should stay, shape (n,), relative to the range of energies, shape (m, n)."""
+    fine: npt.NDArray[np.bool_] = np.all(np.isfinite(np.vstack([constant, moving])), axis=0)
     n = len(fine) if fine.all() else int(np.argmin(fine))
     if n < FEWEST:
         return 0.0
-    (jacobi, kinetic, strain), part = energies[:, :n], n // 10
-    exchanged = float(max(np.ptp(kinetic), np.ptp(strain)))
-    grown = float(np.max(jacobi[-part:]) - np.max(jacobi[:part]))
-    return grown / exchanged if exchanged > ROUND_OFF * np.max(np.abs(energies[1:, :n])) and grown > 0.0 else 0.0
+    constant, moving, part = constant[:n], moving[:, :n], n // 10
+    exchanged = float(np.max(np.ptp(moving, axis=1)))
+    grown = float(np.max(constant[-part:]) - np.max(constant[:part]))
+    return grown / exchanged if exchanged > ROUND_OFF * np.max(np.abs(moving)) and grown > 0.0 else 0.0
 
 
 def said(system: Any, history: dict[str, Array]) -> str:
     """Return what a run says of energy that came from nowhere; nothing where something gives it, or none came."""
     if system.hub is not None:
-        return _said_of_momentum(history)
+        return _said_of_momentum(history) or (_said_of_hub(history) if system.inner.model.driven_by_hub else "")
     share = growth(history) if system.model.closed else 0.0
     if share < GROWN:
         return ""
@@ -67,6 +78,17 @@ def _said_of_momentum(history: dict[str, Array]) -> str:
         f"the angular momentum of hub and structure is {off / largest:.2g} of itself off the impulse they were given: "
         "the steps do not resolve how the hub moves, as where it has little inertia of its own; "
         'give a smaller time.step or time.scheme = "energy_conserving"'
+    )
+
+
+def _said_of_hub(history: dict[str, Array]) -> str:
+    share = growth_on_hub(history)
+    if share < GROWN:
+        return ""
+    return (
+        f"the energy of hub and structure has grown by {share:.2g} of what is exchanged beyond the work of the torque: "
+        "the steps do not resolve how the hub moves, as where it has little inertia of its own, or are unstable; "
+        "give a smaller time.step or more motion.hub_inertia"
     )
 
 

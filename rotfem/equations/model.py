@@ -171,6 +171,19 @@ class Model:
         )
         return motion.hub is None and motion.constant and not turning and steady and dead and known
 
+    @cached_property
+    def driven_by_hub(self) -> bool:
+        """Whether nothing but torque and brake of a free hub gives energy to it and the structure, which feels it."""
+        loads, motion = self.problem.loads, self.motion
+        given = (loads.tip_force, loads.tip_moment, loads.distributed)
+        none = all(load is None or load.is_zero for load in given) and not np.any(loads.gravity)
+        known = all(
+            effect.work is None or effect.momentum or effect.passive or (effect.potential and not effect.internal)
+            for effect in self.acting.values()
+        )
+        whole = "hub_coupling" in self.effects
+        return motion.hub is not None and not motion.is_accelerated and none and known and whole
+
     def outputs(self) -> dict[str, Any]:
         """Return name ↦ UFL form of the functionals that are to be recorded."""
         return {name: resolved(form)(self.mechanics) for name, form in self.problem.outputs.items()}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rotfem import ComputationError, run
-from rotfem.commands.energy_growth import growth, said, with_cause
+from rotfem.commands.energy_growth import growth, growth_on_hub, said, with_cause
 from tests.beams import STRUCTURE
 
 T = np.linspace(0.0, 100.0, 1001)
@@ -104,3 +104,24 @@ def test_a_hub_without_inertia_has_that_of_the_structure(theory: str) -> None:
         ends.append([history["psi"][-1], history["angular_momentum"][-1]])
     assert ends[0] == pytest.approx(ends[1], rel=1e-3)
     assert ends[1][1] == pytest.approx(10.0, rel=2e-3)  # 20 N·m for 0.5 s
+
+
+def on_hub(inertia: float, step: float, **more: Any) -> Any:
+    """Return the run of the beam on a free hub under a pulse of its torque."""
+    motion = {"type": "torque", "hub_inertia": inertia, "pulses": [[0.0, 0.3, 20.0]]}
+    time = {"end": 4.0, "step": step, **more.pop("time", {})}
+    return run({"structure": STRUCTURE, "motion": motion, "mesh": {"elements": 4}, "time": time, **more})
+
+
+def test_energy_on_a_free_hub() -> None:
+    """Beyond the work of the torque it has none; a hub without inertia whose motion steps do not resolve gains some."""
+    scheme = {"scheme": "energy_conserving"}
+    light = on_hub(1e-4, 0.02, time=scheme)
+    assert growth_on_hub(light.history) > 0.1
+    assert any("energy of hub and structure has grown" in warning for warning in light.summary["warnings"])
+    heavy = on_hub(100.0, 0.02, time=scheme)
+    assert growth_on_hub(heavy.history) < 1e-4
+    pushed = on_hub(100.0, 0.02, loads={"tip_force": {"value": [0.0, 5.0], "kind": "follower"}})
+    assert growth_on_hub(pushed.history) > 0.02
+    for fine in (heavy, pushed):
+        assert not any("energy" in warning for warning in fine.summary["warnings"])
