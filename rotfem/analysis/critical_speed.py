@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
+from rotfem.analysis.projection import summed, times
 from rotfem.errors import ComputationError
 from rotfem.numerics.balance import unknown_scale
 from rotfem.numerics.linear import use_direct_solver
@@ -46,4 +48,18 @@ def critical_speed(system: Any) -> float | None:
     if eps.getConverged() == 0:
         raise ComputationError("the eigenproblem of the critical speed did not converge")
     nu = eps.getEigenvalue(0).real
+    return float(1 / np.sqrt(nu)) if nu > 0 else None
+
+
+def critical_speed_within(system: Any, V: npt.NDArray[np.float64]) -> float | None:
+    """Return the critical speed (rad/s) of a linear theory in a basis, not less than its own; None if there is none.
+
+    Args:
+        system: equations of motion.
+        V: owned unknowns of the basis, shape (n, m).
+    """
+    K_1, K_2 = (summed(system.comm, V.T @ times(K, V)) for K in system.stiffness_pieces())
+    if not np.any(K_2):
+        return None
+    nu = float(np.linalg.eigvals(np.linalg.solve(K_1, -K_2)).real.max())
     return float(1 / np.sqrt(nu)) if nu > 0 else None

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.critical_speed import critical_speed, critical_speed_within
 from rotfem.analysis.fixed_steps import Steps, grid
 from rotfem.analysis.reduced.energies import ReducedEnergies
 from rotfem.analysis.reduced.manifold import recover
@@ -35,6 +36,15 @@ def by_reduced_model(run: Simulation, start: Array | None, progress: Progress) -
     Raises:
         ComputationError: it failed.
     """
+    if _recorded(run, start):
+        progress(1.0)
+        return True
+    run.critical = critical_speed(run.system)
+    return False
+
+
+def _recorded(run: Simulation, start: Array | None) -> bool:
+    """Record the history of a reduced model; return whether one serves."""
     asked = run.scene.model.reduced
     accuracy = ACCURACY if asked is True else float(asked)
     if run.system.hub is not None:
@@ -50,6 +60,7 @@ def by_reduced_model(run: Simulation, start: Array | None, progress: Progress) -
             )
             return False
         run.reduced, run.steps = response, response.trajectory.steps
+        run.critical = critical_speed_within(run.system, response.model.V[response.model.owned])
         if run.scene.model.foreshortening:
             run.foreshortened = recover(response)
         Rows(run, response).record()
@@ -58,7 +69,6 @@ def by_reduced_model(run: Simulation, start: Array | None, progress: Progress) -
             f"the steps of the reduced model leave an error of {response.time_error:.2g}, more than model.reduced "
             f"allows ({accuracy:.2g})"
         )
-    progress(1.0)
     return True
 
 

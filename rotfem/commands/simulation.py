@@ -85,7 +85,8 @@ class Simulation:
         self.foreshortened: Foreshortened | None = None
         self.steps, self.elapsed = 0, 0.0
         self.resumed: list[dict[str, Any]] = []
-        self.critical = critical_speed(self.system)
+        by_basis = scene.time is not None and bool(scene.model.reduced)
+        self.critical = None if by_basis else critical_speed(self.system)
         self.stability: Stability | None = None
         self.farthest = Farthest(self.system)
         self.theory_error: TheoryError | None = None
