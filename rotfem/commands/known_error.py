@@ -29,7 +29,8 @@ def error_of_run(run: Simulation) -> ErrorEstimate | None:
     model = model_share(run.theory_error, run.choice)
     if run.reduced is not None:
         _, _, farthest = run.farthest.seen
-        shape = ShapeError(run.system.held).of_shape(farthest)
+        held = run.system.held
+        shape = ShapeError(held).of_shape(farthest[: len(held.zeros())])
         time = run.reduced.time_error + run.reduced.projection_error
         return ErrorEstimate({"time": time, "space": shape, "model": model})
     assert run.last is not None

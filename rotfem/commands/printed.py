@@ -20,7 +20,9 @@ def run_report(summary: dict[str, Any], folder: Path) -> list[str]:
     lines += choice_report(summary)
     if summary["kind"] == "history":
         lines.append(
-            f"{summary['steps']} steps, {summary['newton_iterations']} iterations in {time['total']:.2f} s "
+            reduced_report(summary)
+            if "reduced" in summary
+            else f"{summary['steps']} steps, {summary['newton_iterations']} iterations in {time['total']:.2f} s "
             f"(compile {time['compile']:.2f}, assemble {time['assemble']:.2f}, solve {time['solve']:.2f})"
         )
         for name in ("tip_u1", "tip_u2", "tip_u3"):
@@ -38,6 +40,16 @@ def run_report(summary: dict[str, Any], folder: Path) -> list[str]:
 def error_report(summary: dict[str, Any]) -> list[str]:
     """Return the line that says how far the results may be off, if that is known."""
     return [error_line(summary["error"])] if "error" in summary else []
+
+
+def reduced_report(summary: dict[str, Any]) -> str:
+    """Return the line that a run prints of its reduced model."""
+    model, time = summary["reduced"], summary["timings"]
+    return (
+        f"reduced model of {model['vectors']} vectors, {model['method']} in {model['steps']} steps, "
+        f"{time['total']:.2f} s (compile {time['compile']:.2f}, reduce {time['reduce']:.2f}); "
+        f"errors: basis {model['projection_error']:.1e}, time {model['time_error']:.1e}"
+    )
 
 
 def modes_report(summary: dict[str, Any], folder: Path) -> list[str]:

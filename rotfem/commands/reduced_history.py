@@ -47,9 +47,6 @@ def _recorded(run: Simulation, start: Array | None) -> bool:
     """Record the history of a reduced model; return whether one serves."""
     asked = run.scene.model.reduced
     accuracy = ACCURACY if asked is True else float(asked)
-    if run.system.hub is not None:
-        run.warnings.append("there are no reduced models of a free hub; the full system was used")
-        return False
     run.keeper.start(run)
     with run.keeper.interrupts():
         response = reduced_response(run.system, times_of(run.scene.time), start, accuracy)
@@ -95,35 +92,56 @@ class Rows:
 
     def record(self) -> None:
         """Add all rows to the run's history, and look at states of it as a march does."""
-        response, system = self.response, self.system
-        kept = set(range(0, len(response.times), stride(len(response.times)))) | {len(response.times) - 1}
-        motion, energies, a = system.motion, self._energies(), response.accelerations()
+        response, system, times = self.response, self.system, self.response.times
+        kept = set(range(0, len(times), stride(len(times)))) | {len(times) - 1}
         tips = response.tips if self.foreshortened is None else self.foreshortened.tips
-        for i, t in enumerate(map(float, response.times)):
-            state = self._state(i, a) if i in kept or system.model.problem.outputs else None
-            row = [t, motion.angle(t), motion.speed(t), *tips[i], *(energy[i] for energy in energies)]
+        turn, a = self._turn(), response.accelerations()
+        columns = np.column_stack([times, *turn[:2], tips, *self._energies(turn[1])])
+        for i, values in enumerate(columns):
+            row = [float(value) for value in values]
+            state = self._state(i, a, turn) if i in kept or system.model.problem.outputs else None
             if state is not None:
                 self.run.look(state)
                 row += self._outputs(state)
             self.run.record.add(row, self._shown(state, i) if i in kept else None)
 
+    def _turn(self) -> tuple[Array, Array, Array]:
+        """Return angle, speed and its rate of the frame in all rows, rad, rad/s, rad/s²."""
+        drive, t = self.response.solution.drive, self.response.times
+        if self.system.hub is not None:
+            return drive.angle(t), drive.speed(t), drive.rate(t)
+        motion = self.system.motion
+        return np.array([motion.angle(float(x)) for x in t]), drive.speed(t), drive.rate(t)
+
+    def _energies(self, speed: Array) -> list[Array]:
+        """Return the columns of energies, and of a free hub those of its own."""
+        response, hub = self.response, self.system.hub
+        energies = ReducedEnergies(response.model)
+        found = energies(response.factors(), speed, response.q, response.v)
+        out = [found[name] for name in ("kinetic", "strain", "jacobi")]
+        if hub is None:
+            return out
+        coupled = float(self.system.row.coupled)
+        momentum = hub.inertia * speed + energies.momentum(speed, coupled * response.q, coupled * response.v)
+        given = response.solution.given()
+        torque = hub.torque.many(response.times, after=True)
+        return [*out, torque, 0.5 * hub.inertia * speed**2, momentum, given["impulse"], given["work"]]
+
     def _shown(self, state: State | None, i: int) -> State | None:
         """Return a state as fields show it: with its foreshortening if that is given back."""
         if state is None or self.foreshortened is None:
             return state
-        return state.changed(q=self.foreshortened.manifold.shape(self.response.q[i]))
+        q = state.q.copy()
+        q[: len(self.response.model.V)] = self.foreshortened.manifold.shape(self.response.q[i])
+        return state.changed(q=q)
 
-    def _energies(self) -> list[Array]:
-        response = self.response
-        c = response.factors()
-        energies = ReducedEnergies(response.model)(
-            c, response.solution.drive.speed(response.times), response.q, response.v
-        )
-        return [energies[name] for name in ("kinetic", "strain", "jacobi")]
-
-    def _state(self, i: int, a: Array) -> State:
+    def _state(self, i: int, a: Array, turn: tuple[Array, Array, Array]) -> State:
+        """Return the state of a row; of a free hub its angle comes last."""
         response, V = self.response, self.response.model.V
-        return State(float(response.times[i]), V @ response.q[i], V @ response.v[i], V @ a[i])
+        parts = [V @ x[i] for x in (response.q, response.v, a)]
+        if self.system.hub is not None:
+            parts = [np.append(x, angle[i]) for x, angle in zip(parts, turn, strict=True)]
+        return State(float(response.times[i]), *parts)
 
     def _outputs(self, state: State) -> list[float]:
         if not self.system.model.problem.outputs:

@@ -76,6 +76,8 @@ def run_summary(run: Simulation, status: str, history: dict[str, npt.NDArray[np.
     system, stepper, choice = run.system, run.stepper, run.choice
     space, mesh = system.V.dofmap, system.structure.mesh
     parts = {"compile": run.compiled, **(system.seconds if stepper else {})}
+    if run.reduced is not None:
+        parts["reduce"] = run.reduced.seconds["wall"]
     before = {} if choice is None or run.resumed else {"choice": choice.seconds}
     before |= {"before": run.elapsed} if run.resumed else {}
     out = {

@@ -63,7 +63,11 @@ class HubRow:
         """Return I_R psi'' + c psi' + (work in the turn) − M(t), N·m."""
         _, speed, rate = self.angle.values
         own = self.hub.inertia * rate + self.hub.damping * speed
-        return float(own + self._value(self._moment) - self.hub.torque.at(t))
+        return float(own + self.work() - self.hub.torque.at(t))
+
+    def work(self) -> float:
+        """Return the work of the structure in the rigid turn, N·m."""
+        return self._value(self._moment)
 
     def diagonal(self, c_v: float, c_m: float) -> float:
         """Return ∂(residual)/∂psi: c_v ∂/∂psi' + c_m ∂/∂psi''."""

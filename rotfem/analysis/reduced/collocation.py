@@ -64,6 +64,19 @@ class Steps:
         v = self.v[i] + h[:, None] * once
         return self.q[i] + (share * h)[:, None] * self.v[i] + (h**2)[:, None] * twice, v
 
+    def nodes(self) -> tuple[Array, Array, Array]:
+        """Return coordinates, rates and accelerations at the nodes of all steps, (n, nodes, m) each."""
+        h = np.diff(self.ends)[:, None, None]
+        q, v = self.q[:-1, None, :], self.v[:-1, None, :]
+        once, twice = (np.einsum("ij,njm->nim", matrix, self.a) for matrix in (ONCE, TWICE))
+        return q + NODES[:, None] * h * v + h**2 * twice, v + h * once, self.a
+
+    def rates_of(self, t: Array) -> Array:
+        """Return the accelerations (n, m) at times (n,) within the steps, by the polynomials through the nodes'."""
+        i = np.clip(np.searchsorted(self.ends, t, side="left") - 1, 0, len(self.ends) - 2)
+        share = (t - self.ends[i]) / (self.ends[i + 1] - self.ends[i])
+        return np.asarray(np.einsum("nj,njm->nm", _integrals(share, 0), self.a[i]))
+
 
 def collocate(
     operators: Operators, nodes: Callable[..., Array], ends: Array, q: Array, v: Array, forces: Array | None = None

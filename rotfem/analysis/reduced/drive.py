@@ -47,32 +47,49 @@ class Drive:
         low, high = begin[:, None] * (1 + BESIDE), end[:, None] * (1 - BESIDE)
         return np.asarray(np.clip(t, np.minimum(low, high), high))
 
-    def factors(
-        self, t: Array, angle: Array | None = None, speed: Array | None = None, rate: Array | None = None
-    ) -> Array:
-        """Return the factor of every piece at times (n,), shape (n, pieces).
+    @property
+    def whole(self) -> Any:
+        """The system with its hub, whose effects can be switched."""
+        return self.system
+
+    def factors(self, t: Array) -> Array:
+        """Return the factor of every piece at times (n,), shape (n, pieces)."""
+        return self.made_of(self.constants(t, self.angle(t), self.speed(t), self.rate(t)), len(t))
+
+    def made_of(self, constants: dict[str, Array], n: int) -> Array:
+        """Return the factor of every piece, shape (n, pieces), from the values of constants (n, size)."""
+        return np.asarray(self.system.factors(constants) if constants else np.ones((n, len(self.system.pieces))))
+
+    def constants(self, t: Array, angle: Array, speed: Array, rate: Array) -> dict[str, Array]:
+        """Return the values of all constants of frame and loads, by name, (n, size).
 
         Args:
-            t: times, s.
-            angle: psi there (rad), where it is an unknown.
-            speed: psi' (rad/s) there, likewise.
-            rate: psi'' (rad/s²) there, likewise.
+            t: times (n,), s.
+            angle: of the frame there, rad.
+            speed: rad/s.
+            rate: of the speed, rad/s².
         """
         turn = slice(2, 3) if self.frame.planar else slice(0, 3)
         plane = slice(0, 2) if self.frame.planar else slice(0, 3)
         values: dict[str, Array] = {}
         for name in self.frame.constants:
             if name == "w":
-                values[name] = np.outer(self.speed(t) if speed is None else speed, self.motion.axis[turn])
+                values[name] = np.outer(speed, self.motion.axis[turn])
             elif name == "dw":
-                values[name] = np.outer(self.rate(t) if rate is None else rate, self.motion.axis[turn])
+                values[name] = np.outer(rate, self.motion.axis[turn])
             elif name == "a_o":
                 values[name] = self._course("motion.base_acceleration", self.motion.base_acceleration, t)[:, plane]
             else:
-                values[name] = self._gravity(t, angle)[:, plane]
+                values[name] = self._gravity(angle)[:, plane]
         for name, (constant, at) in self.system.structure.load_constants.items():
             values[name] = self._course(f"loads.{name}", at, t)[:, : constant.value.size]
-        return np.asarray(self.system.factors(values) if values else np.ones((len(t), len(self.system.pieces))))
+        return values
+
+    def angle(self, t: Array) -> Array:
+        """Return the angle of the frame at times (n,), rad; 0 where nothing asks for it."""
+        if "gravity" not in self.frame.constants:
+            return np.zeros(len(t))
+        return np.array([self.motion.angle(float(s)) for s in t])
 
     def speed(self, t: Array) -> Array:
         """Return the speed at times (n,), rad/s."""
@@ -81,6 +98,10 @@ class Drive:
     def rate(self, t: Array) -> Array:
         """Return the rate of the speed at times (n,), rad/s²."""
         return self._course("motion.rate", self.motion.rate, t)[:, 0]
+
+    def active(self) -> npt.NDArray[np.int64]:
+        """Return the numbers of the pieces that are ever there."""
+        return np.flatnonzero(np.abs(self.factors(self.looks())).max(axis=0) > 0.0)
 
     def looks(self) -> Array:
         """Return times in all legs at which what is prescribed is typical of them, s."""
@@ -93,10 +114,9 @@ class Drive:
         values = known.values(t) if known else np.tile(np.atleast_1d(np.asarray(at(0.0), dtype=float)), (len(t), 1))
         return np.asarray(values, dtype=float)
 
-    def _gravity(self, t: Array, angle: Array | None) -> Array:
+    def _gravity(self, angle: Array) -> Array:
         """Return gravity in the turning frame (Rodrigues' formula, backwards), shape (n, 3)."""
         e, g = self.motion.axis, np.asarray(self.system.model.problem.loads.gravity, dtype=float)
-        psi = np.array([self.motion.angle(float(s)) for s in t]) if angle is None else angle
         along = e * (e @ g)
-        turned = along + np.outer(np.cos(psi), g - along) - np.outer(np.sin(psi), np.cross(e, g))
+        turned = along + np.outer(np.cos(angle), g - along) - np.outer(np.sin(angle), np.cross(e, g))
         return np.asarray(turned)

@@ -27,7 +27,7 @@ def effect_sizes(response: Response, effects: Collection[str] | None = None) -> 
         effects: those that are asked for; all of the model if None.
     """
     model, manifold = response.model, Manifold(response)
-    system = model.system
+    system = response.solution.drive.whole
     wanted = system.model.effects if effects is None else effects
     whole = _tips(response, manifold)
     size = largest(model, whole)

@@ -56,6 +56,18 @@ class ReducedEnergies:
         jacobi = moving + 0.5 * _form(K, q, q) + np.einsum("ni,ni->n", f, q) - inertia * speed**2
         return {"kinetic": kinetic, "strain": strain, "jacobi": jacobi}
 
+    def momentum(self, speed: Array, q: Array, v: Array) -> Array:
+        """Return the angular momentum of the structure about the axis, ∂T/∂Omega, (n,), kg·m²/s (see `__call__`)."""
+        out = np.zeros(len(speed))
+        if self._T0 is not None:
+            load, stiffness = self._T0
+            turned = self.system.rest_inertia - q @ load - 0.5 * np.einsum("ni,ij,nj->n", q, stiffness, q)
+            out += 2 * speed * turned
+        if self._T1 is not None:
+            load, coupling = self._T1
+            out += v @ load + np.einsum("ni,ij,nj->n", v, coupling, q)
+        return out
+
     def _of(self, effect: str, degree: int) -> tuple[Array, Array]:
         """Return f (m,) and K (m, m) of an effect at unit speed or rate about the axis; prestress is none of it."""
         model, axis, m = self.model, self.system.motion.axis, self.model.size

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.reduced.drive import Drive
+from rotfem.analysis.reduced.free_hub import free_solution
 from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.analysis.reduced.solution import Solution, Trajectory
 
@@ -103,10 +104,10 @@ class Response:
 
 
 def reduced_response(system: Any, times: Array, start: Array | None = None, accuracy: float = ACCURACY) -> Response:
-    """Return the history of a linear theory at prescribed speed by a reduced model.
+    """Return the history of a linear theory by a reduced model.
 
     Args:
-        system: compiled equations of a linear theory.
+        system: compiled equations of a linear theory, its hub held or free.
         times: times of the rows, the first 0, s.
         start: shape at t = 0, at rest in the turning frame, local dof array; undeformed if None.
         accuracy: error of basis and time, relative to the largest displacement of the tip, each.
@@ -115,10 +116,8 @@ def reduced_response(system: Any, times: Array, start: Array | None = None, accu
         ComputationError: the stiffness is singular, or the history not finite.
     """
     began = process_time(), perf_counter()
-    drive = Drive(system, times)
-    active = np.flatnonzero(np.abs(drive.factors(np.append(drive.looks(), times[:1]))).max(axis=0) > 0.0)
-    solution = Solution(drive, times, active)
-    growth = Growth(ReducedModel(system, active), drive, solution, start)
+    solution = Solution(Drive(system, times), times) if system.hub is None else free_solution(system, times)
+    growth = Growth(ReducedModel(system.held, solution.active), solution, start)
     path, projection = growth.grow(accuracy)
     path, error = growth.refine(path, accuracy)
     seconds = {"cpu": process_time() - began[0], "wall": perf_counter() - began[1]}
@@ -131,13 +130,13 @@ class Growth:
 
     Args:
         model: the reduced model, its basis empty.
-        drive: what is prescribed.
         solution: of the history.
         start: shape at t = 0, local dof array; None where undeformed.
     """
 
-    def __init__(self, model: ReducedModel, drive: Drive, solution: Solution, start: Array | None):
-        self.model, self.drive, self.solution, self.start = model, drive, solution, start
+    def __init__(self, model: ReducedModel, solution: Solution, start: Array | None):
+        self.model, self.solution, self.start = model, solution, start
+        self.drive = drive = solution.drive
         self.rounds = 0
         looks = drive.looks()
         speeds = np.abs(drive.speed(looks))

@@ -49,19 +49,20 @@ class Solution:
     Args:
         drive: what is prescribed.
         times: times at which the history is wanted, the first its start, s.
-        active: numbers of the pieces that are ever there.
 
     Attributes:
+        active: numbers of the pieces that are ever there.
         parts: in how many parts each of the first steps is cut.
         constant: whether the matrices are constant.
         off: relative error of the cubics that stand for the forces, of an exact solution.
     """
 
-    def __init__(self, drive: Drive, times: Array, active: Index):
-        self.drive, self.times, self.active = drive, times, active
+    def __init__(self, drive: Drive, times: Array):
+        self.drive, self.times = drive, times
         self.parts = 1
         self.off = 0.0
         looks = drive.factors(drive.looks())
+        self.active: Index = drive.active()
         kinds = np.array([p.kind for p in drive.system.pieces])
         matrices = looks[:, kinds != "f"]
         self.constant = bool(np.all(np.ptp(matrices, axis=0) <= SAME * np.abs(matrices).max(axis=0, initial=0.0)))
@@ -118,9 +119,13 @@ class Solution:
         """Return a trajectory without the vibrations that steps of a collocation do not resolve."""
         return self._collocated(model, *(x[0] for x in (path.q, path.v))) if path.exact else path
 
+    def given(self) -> dict[str, Array]:
+        """Return what a free hub was given in the rows (see `FreeSolution`); nothing where none is free."""
+        return {}
+
     def again(self) -> Solution:
         """Return a solution by the same steps, for equations some of whose effects are switched off or on."""
-        other = Solution(self.drive, self.times, self.active)
+        other = Solution(self.drive, self.times)
         other.parts, other._steps = self.parts, self._steps
         return other
 

@@ -1,0 +1,227 @@
+"""Reduced models on a free hub: its angle is one more unknown, and Newton's method is one of whole trajectories.
+
+The equations are linear in the coordinates at a given speed, and linear in speed and rate but for Omega². So they are
+linearised about a trajectory of some steps, the linear ones solved by batched collocation, and again about that one: a
+few rounds are enough.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.reduced.collocation import NODES, Steps, collocate
+from rotfem.analysis.reduced.drive import Drive
+from rotfem.analysis.reduced.hub_moment import HubMoment
+from rotfem.analysis.reduced.model import ReducedModel
+from rotfem.analysis.reduced.solution import Solution, Trajectory
+from rotfem.errors import ComputationError
+from rotfem.mechanics.courses import POINTS, WEIGHTS
+
+Array = npt.NDArray[np.float64]
+
+#: Steps that are solved together, Newton iterations that they may take, and relative change that ends them.
+WINDOW, ITERATIONS, CLOSE = 64, 15, 1e-11
+
+#: Change of an angle, of a speed and of a rate by which derivatives are taken; the last two are exact.
+BESIDE = np.array([1e-6, 1.0, 1.0])
+
+
+class FreeDrive(Drive):
+    """What drives a structure whose hub is free: angle and speed are those of the last trajectory found.
+
+    Before there is one they are those of a rigid structure.
+
+    Args:
+        system: bordered equations of a linear theory.
+        times: times of the history, increasing, s.
+    """
+
+    def __init__(self, system: Any, times: Array):
+        super().__init__(system.held, times)
+        self.hub, self.bordered = system.hub, system
+        self.steps: Steps | None = None
+        inertia = self.hub.inertia + (2 * self.system.rest_inertia if "w" in self.frame.constants else 0.0)
+        fine = np.unique(np.concatenate([self.knots, np.linspace(self.knots[0], self.knots[-1], 2001)]))
+        h = np.diff(fine)
+        torque = self.hub.torque.many(self.within(fine[:-1], fine[1:], np.array([0.5]))[:, 0])
+        speed, decay = np.full(len(fine), self.hub.speed), self.hub.damping / inertia
+        for k, M in enumerate(torque):
+            speed[k + 1] = (speed[k] + h[k] * M / inertia) / (1 + h[k] * decay)
+        self._rigid = fine, speed
+
+    @property
+    def whole(self) -> Any:
+        """The system with its hub, whose effects can be switched."""
+        return self.bordered
+
+    def active(self) -> npt.NDArray[np.int64]:
+        """Return the numbers of the pieces that are there at any speed and rate, as nobody knows what they will be."""
+        t = self.looks()
+        ones = np.ones(len(t))
+        return np.flatnonzero(np.abs(self.made_of(self.constants(t, ones, ones, ones), len(t))).max(axis=0) > 0.0)
+
+    def angle(self, t: Array) -> Array:
+        """Return the angle of the hub at times (n,), rad."""
+        if self.steps is not None:
+            return self.steps.at(t)[0][:, -1]
+        fine, speed = self._rigid
+        turned = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(fine) * (speed[1:] + speed[:-1]))])
+        return np.asarray(np.interp(t, fine, turned))
+
+    def speed(self, t: Array) -> Array:
+        """Return the speed of the hub at times (n,), rad/s."""
+        return np.asarray(np.interp(t, *self._rigid) if self.steps is None else self.steps.at(t)[1][:, -1])
+
+    def rate(self, t: Array) -> Array:
+        """Return the rate of the speed of the hub at times (n,), rad/s²."""
+        if self.steps is not None:
+            return self.steps.rates_of(t)[:, -1]
+        fine, speed = self._rigid
+        return np.asarray((np.diff(speed) / np.diff(fine))[np.clip(np.searchsorted(fine, t) - 1, 0, len(fine) - 2)])
+
+
+class FreeSolution(Solution):
+    """Solves reduced models on a free hub; what follows them sees the angle as something prescribed."""
+
+    drive: FreeDrive
+
+    def __init__(self, drive: FreeDrive, times: Array):
+        super().__init__(drive, times)
+        self.constant = False
+        self.moment: HubMoment | None = None
+
+    def again(self) -> FreeSolution:
+        """Return a solution by the same steps, for equations some of whose effects are switched off or on."""
+        other = free_solution(self.drive.bordered, self.times)
+        other.parts, other._steps = self.parts, self._steps
+        return other
+
+    def solve(self, model: ReducedModel, q: Array, v: Array) -> Trajectory:
+        """Return the history of a model from coordinates and rates (m,), and leave its angle in the drive.
+
+        Raises:
+            ComputationError: no trajectory is found, or it is not finite.
+        """
+        if self.moment is None or self.moment.size != model.size:
+            self.moment = HubMoment(model, self.drive.bordered.row)
+        ends = self.ends(model)
+        y, dy = np.append(q, 0.0), np.append(v, self.drive.hub.speed)
+        parts: list[Steps] = []
+        first, width = 0, WINDOW
+        while first < len(ends) - 1:
+            window = ends[first : first + width + 1]
+            found = self._window(model, window, y, dy)
+            if found is None:
+                if width == 1:
+                    raise ComputationError("the motion of the hub was not found", time=float(window[0]))
+                width //= 2
+                continue
+            parts.append(found)
+            y, dy, first, width = found.q[-1], found.v[-1], first + len(window) - 1, min(2 * width, WINDOW)
+        steps = Steps(
+            ends,
+            np.vstack([parts[0].q[:1], *(p.q[1:] for p in parts)]),
+            np.vstack([parts[0].v[:1], *(p.v[1:] for p in parts)]),
+            np.concatenate([p.a for p in parts]),
+        )
+        self.drive.steps = steps
+
+        def at(t: Array) -> tuple[Array, Array]:
+            x, rates = steps.at(t)
+            return x[:, :-1], rates[:, :-1]
+
+        return Trajectory(*at(self.times), len(ends) - 1, False, at)
+
+    def _window(self, model: ReducedModel, ends: Array, y: Array, dy: Array) -> Steps | None:
+        """Return the solution over some steps; None where Newton's method does not find it."""
+        elapsed = ends[:-1, None] + np.diff(ends)[:, None] * NODES - ends[0]
+        q: Array = y + elapsed[..., None] * np.append(0 * dy[:-1], dy[-1])
+        v: Array = np.broadcast_to(np.append(0 * dy[:-1], dy[-1]), q.shape)
+        a = np.zeros_like(q)
+        before = np.inf
+        for _ in range(ITERATIONS):
+            state = (q.reshape(-1, len(y)), v.reshape(-1, len(y)), a.reshape(-1, len(y)))
+            steps = collocate(partial(self.linearised, model, state), self.drive.within, ends, y, dy)
+            new = steps.nodes()
+            if not all(np.all(np.isfinite(x)) for x in new):
+                return None
+            change = float(np.abs(new[1][..., -1] - v[..., -1]).max())
+            size = float(np.abs(new[1][..., -1]).max())
+            q, v, a = new
+            if change <= CLOSE * size or (change <= 1e-7 * size and change >= 0.5 * before):
+                return steps
+            before = change
+        return None
+
+    def linearised(
+        self, model: ReducedModel, state: tuple[Array, Array, Array], t: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """Return M, C, K (n, m + 1, m + 1) and f (n, m + 1) of the equations linearised about states.
+
+        Args:
+            model: of the structure.
+            state: coordinates and angle, rates and accelerations, (n, m + 1).
+            t: times, s.
+        """
+        q, v, a = state
+        m, drive, hub, moment = model.size, self.drive, self.drive.hub, self.moment
+        assert moment is not None
+        x, turn = (q[:, :-1], v[:, :-1], a[:, :-1]), np.stack([q[:, -1], v[:, -1], a[:, -1]], axis=1)
+
+        def weighed(turn: Array) -> tuple[Array, Array]:
+            constants = drive.constants(t, *turn.T)
+            return drive.made_of(constants, len(t)), moment.weights(constants, turn[:, 1], turn[:, 2])
+
+        c, w = weighed(turn)
+        slopes = moment.slopes(w, *x)
+        out = []
+        for kind, operator, slope, k in zip("KCM", model.operators(c)[2::-1], slopes, range(3), strict=True):
+            step = np.zeros(3)
+            step[k] = BESIDE[k]
+            (c_plus, w_plus), (c_minus, w_minus) = weighed(turn + step), weighed(turn - step)
+            by_c, by_w = (c_plus - c_minus) / (2 * step[k]), (w_plus - w_minus) / (2 * step[k])
+            A = np.empty((len(t), m + 1, m + 1))
+            A[:, :m, :m] = operator
+            A[:, :m, m] = self._force(model, by_c, *x)
+            A[:, m, :m] = slope
+            A[:, m, m] = moment.value(by_w, *x) + {"K": 0.0, "C": hub.damping, "M": hub.inertia}[kind]
+            out.append(A)
+        K, C, M = out
+        F = np.empty((len(t), m + 1))
+        F[:, :m] = self._force(model, c, *x)
+        F[:, m] = moment.value(w, *x) + hub.inertia * a[:, -1] + hub.damping * v[:, -1] - hub.torque.many(t)
+        f = F - sum(np.einsum("nij,nj->ni", A, y) for A, y in ((M, a), (C, v), (K, q)))
+        return M, C, K, f
+
+    def _force(self, model: ReducedModel, c: Array, q: Array, v: Array, a: Array) -> Array:
+        """Return M a + C v + K q + f with these factors, (n, m)."""
+        M, C, K, f = model.operators(c)
+        return np.asarray(f + sum(np.einsum("nij,nj->ni", A, y) for A, y in ((M, a), (C, v), (K, q))))
+
+    def given(self) -> dict[str, Array]:
+        """Return work (J) and angular impulse (N·m·s) from outside in the rows: torque, brake, loads (see `State`)."""
+        drive, hub, moment, steps = self.drive, self.drive.hub, self.moment, self.drive.steps
+        assert steps is not None
+        assert moment is not None
+        grid = np.union1d(steps.ends, self.times)
+        t = drive.within(grid[:-1], grid[1:], POINTS)
+        state = steps.at(t.ravel())
+        speed, torque = state[1][:, -1], hub.torque.many(t.ravel())
+        weights = moment.weights(drive.constants(t.ravel(), state[0][:, -1], speed, 0 * speed), speed, 0 * speed)
+        outside = moment.outside(weights, state[0][:, :-1])
+        brake = hub.damping * speed
+        rows = np.searchsorted(grid, self.times)
+        out = {}
+        for name, rate in (("impulse", torque - brake + outside), ("work", (torque - brake) * speed)):
+            parts = np.diff(grid) * (rate.reshape(t.shape) @ WEIGHTS)
+            out[name] = np.concatenate([[0.0], np.cumsum(parts)])[rows]
+        return out
+
+
+def free_solution(system: Any, times: Array) -> FreeSolution:
+    """Return what solves reduced models of bordered equations (see `FreeDrive`), at times (s)."""
+    return FreeSolution(FreeDrive(system, times), times)

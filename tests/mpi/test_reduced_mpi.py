@@ -1,0 +1,60 @@
+"""Reduced models on two processes: small arrays on both, the basis shared out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rotfem.results.files import read_csv
+from tests.launch import MPIRUN, rotfem
+
+pytestmark = [pytest.mark.mpi, pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")]
+
+BEAM = """\
+[structure]
+type = "planar_beam"
+length = 10.0
+[structure.section]
+EA = 2.8e7
+GA = 1.0e7
+EI = 1.4e4
+mass_per_length = 1.2
+rotary_inertia = 6.0e-4
+[model]
+theory = "consistent_linear"
+reduced = 1e-5
+foreshortening = true
+[mesh]
+elements = 8
+[time]
+end = 4.0
+step = 0.02
+"""
+
+MOTIONS = {
+    "collocation": '[motion]\ntype = "spin_up"\nspeed = 2.0\nduration = 3.0\n',
+    "exact exponential": (
+        '[motion]\ntype = "constant"\nspeed = 2.0\n[loads]\n'
+        'tip_force = { kind = "dead", table = [[0, 0, 0], [1, 0, 5], [3, 0, -2]] }\n'
+    ),
+    "free": '[motion]\ntype = "torque"\nhub_inertia = 400.0\ntable = [[0, 0], [1, 300], [3, 0]]\n',
+}
+
+
+@pytest.mark.parametrize("kind", MOTIONS)
+def test_reduced_history_is_that_of_one_process(tmp_path: Path, kind: str) -> None:
+    (tmp_path / "beam.toml").write_text(BEAM + MOTIONS[kind])
+    done = [rotfem(tmp_path, n, "run", "beam.toml", "--no-plots", "--json", "-o", f"r{n}") for n in (1, 2)]
+    for result in done:
+        assert result.returncode == 0, result.stderr
+    one, two = (json.loads(result.stdout)["reduced"] for result in done)
+    assert one["vectors"] == two["vectors"]
+    assert one["method"] == two["method"] == kind.replace("free", "collocation")
+    serial, parallel = (read_csv(tmp_path / f"r{n}" / "history.csv") for n in (1, 2))
+    assert list(serial) == list(parallel)
+    for column, values in serial.items():  # sums in another order make another basis of the same span
+        scale = float(np.max(np.abs(values)))
+        np.testing.assert_allclose(parallel[column], values, rtol=0, atol=1e-6 * scale, err_msg=column)
