@@ -90,7 +90,11 @@ class Registry(Generic[E]):
 theories: Registry[Theory] = Registry("theory", "rotfem.mechanics.theories")
 effects: Registry[Effect] = Registry("effect", "rotfem.mechanics.effects")
 schemes: Registry[Any] = Registry(
-    "scheme", "rotfem.analysis.alpha_family", "rotfem.analysis.esdirk", "rotfem.analysis.energy_conserving"
+    "scheme",
+    "rotfem.analysis.alpha_family",
+    "rotfem.analysis.esdirk",
+    "rotfem.analysis.radau",
+    "rotfem.analysis.energy_conserving",
 )
 shapes: Registry[Shape] = Registry("section shape", "rotfem.scene.section_shapes")
 outputs: Registry[Output] = Registry("output", "rotfem.mechanics.outputs")

@@ -19,15 +19,18 @@ from rotfem.mechanics.courses import SAME, View
 
 Array = npt.NDArray[Any]
 
-#: Safety factor, bounds of a change, changes not worth a new factorisation, smallest relative scale.
-SAFETY, SHRINK, GROW, KEEP, FLOOR = 0.9, 0.2, 2.0, (0.9, 1.25), 1e-6
+#: Safety factor, smallest change, changes not worth a new factorisation, smallest relative scale.
+SAFETY, SHRINK, KEEP, FLOOR = 0.9, 0.2, (0.9, 1.25), 1e-6
 
 #: Local errors are estimates: the tolerance is divided by this.
-MARGIN = 2.5
+MARGIN = 7.0
+
+#: Growth, from step to step, of what errors allow: those of a vibration are small twice in a period, wherever it is.
+STEADY = 1.5
 
 #: Steps by which the scale of a motion is found, how alike their results must be, and errors that are noise, in units
 #: of Newton's tolerance.
-SCOUTED, ALIKE, NOISE = (30, 60), 0.6, 10.0
+SCOUTED, ALIKE, NOISE = (20, 40), 0.6, 10.0
 
 #: The first step, the longest and the shortest, and the stretch within which knots may be too dense to be met, as parts
 #: of the end.
@@ -35,6 +38,9 @@ FIRST, LONGEST, SHORTEST, CELL = 1e-4, 1 / 20, 1e-9, 1 / 2000
 
 #: Most a course may be off a straight line over a step, as a part of its largest value.
 BENT = 0.1
+
+#: Error, as a part of what is allowed, of a step that could not be solved, and halvings of one that is short already.
+FAILED, HALVINGS = 100.0, 5
 
 #: Steps, with those taken back, after which a march is given up.
 MOST_STEPS = 500_000
@@ -62,7 +68,7 @@ class AdaptiveSteps:
         self.tolerance = float(steps.tolerance)
         self.longest = steps.max_step or LONGEST * self.end
         self.shortest = steps.min_step or SHORTEST * self.end
-        self.measure = ErrorMeasure(stepper.system, self.end)
+        self.measure = ErrorMeasure(stepper.system, stepper.scheme, self.end)
         cells = np.append(np.arange(round(1 / CELL)) * (CELL * self.end), self.end)
         self.cells = Itinerary(stepper.system.courses, cells, CELL * self.end)
         self.landings, self.dense = self.cells.landings()
@@ -71,7 +77,7 @@ class AdaptiveSteps:
         if stepper.pace is not None:
             self.wanted, self.largest = stepper.pace
             return
-        self.largest = stepper.system.deflection(state.q, state.t)
+        self.largest = self.measure.displacement(state)
         if self.largest < FLOOR:
             coarse, fine = (self._scouted(n) for n in SCOUTED)
             self.largest = max(FLOOR, 0.5 * min(coarse, fine) if ALIKE * max(coarse, fine) < min(coarse, fine) else 0.0)
@@ -82,7 +88,7 @@ class AdaptiveSteps:
         Raises:
             ComputationError: a step failed, or would have to be shorter than allowed, or there are too many.
         """
-        state, wanted, stepper = self.state, self.wanted, self.stepper
+        state, wanted, stepper, allowed = self.state, self.wanted, self.stepper, np.inf
         for _ in range(MOST_STEPS):
             if state.t >= self.end:
                 return
@@ -92,11 +98,15 @@ class AdaptiveSteps:
             finish = View(-1 if lands else 0, (h, 0.0) if averaged else None)
             drifts = h <= LEAST * (1 + 1e-6) * min(self.cells.step, wanted)
             new, ratio = self._drifted(start, h, stop, finish) if drifts else self._tried(start, h, stop, finish)
-            factor = float(np.clip(SAFETY * max(ratio, 1e-12) ** (-1 / stepper.scheme.order), SHRINK, GROW))
+            power, most = 1 / (stepper.scheme.estimate[1] - 1), stepper.scheme.growth
+            factor = float(np.clip(SAFETY * max(ratio, 1e-12) ** -power, SHRINK, most))
             if ratio > 1.0:
                 stepper.rejected += 1
+                allowed = h if ratio == FAILED else allowed
                 wanted = self._shorter(state.t, h * min(factor, SAFETY))
                 continue
+            allowed = min(h * max(ratio, 1e-12) ** -power, STEADY * allowed)
+            factor = min(factor, max(SAFETY * allowed / h, SHRINK))
             if h >= wanted or factor < 1.0:
                 wanted = min(self.longest, h if KEEP[0] <= factor <= KEEP[1] else h * factor)
             if stepper.watch is not None and not drifts:
@@ -124,7 +134,7 @@ class AdaptiveSteps:
         scout = Scout(system, GeneralisedAlpha(0.0), self.stepper.newton)
         try:
             for state in fixed_steps(scout, scout.scheme.start(self.state), Steps(self.end, self.end / number)):
-                size = max(size, system.deflection(state.q, state.t))
+                size = max(size, self.measure.displacement(state))
                 self.stepper.rejected += 1
         except ComputationError:
             return 0.0
@@ -132,12 +142,18 @@ class AdaptiveSteps:
 
     def _tried(self, start: State, h: float, stop: float, finish: View) -> tuple[State, float]:
         """Return the state at the end of a step, and its error as a part of what is allowed."""
-        stepper, system = self.stepper, self.stepper.system
-        with seen(system, finish):
-            new = stepper.advance(start, h, stop)
+        stepper = self.stepper
+        with seen(stepper.system, finish):
+            try:
+                new = stepper.advance(start, h, stop, 0 if h > LEAST * self.longest else HALVINGS)
+            except ComputationError:
+                if h <= LEAST * self.longest:
+                    raise
+                return start, FAILED
         local = stepper.scheme.local_error(new, start)
-        assert local is not None
-        self.largest = max(self.largest, system.deflection(new.q, new.t))
+        self.largest = max(self.largest, self.measure.displacement(new))
+        if local is None:  # an understudy has taken it
+            return new, 1.0
         return new, MARGIN * self.measure(local, h) / max(self.tolerance * self.largest, self.least)
 
     def _drifted(self, start: State, h: float, stop: float, finish: View) -> tuple[State, float]:

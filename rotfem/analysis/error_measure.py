@@ -1,14 +1,14 @@
 """What a step's local error makes of a history: the error at its end if every step were like this one.
 
-A vibration of frequency ω and amplitude A has a local error of c (ωh)³ A in every step of a scheme of second order. N
-such steps add up to N c (ωh)³ A, but never to more than the vibration itself, 2 A: what is small need not be resolved.
-The filter
+A vibration of frequency ω and amplitude A has a local error of C (ωh)ᵐ A in every step. N such steps add up to
+N C (ωh)ᵐ A, but never to much more than the vibration itself: what is small need not be resolved. With filters
+F(τ) = (M + τ² K)⁻¹ M, which leave a vibration 1/(1 + τ²ω²), the size of the error is the larger of
 
-    ê = N (M + τ² K)⁻¹ M e,    τ = 2.5 h (½ c N)^⅓,
+    N F(τ₁) … F(τ_k) e    and    F(h) e,    N C (h/τ)ᵐ = 2,
 
-leaves N e of what is resolved so far that N c (ωh)³ is small. Of what is not resolved, whose local error in
-accelerations is at most 2 c (ωh)² A, a few A are left, whatever N; of the stiffest, axial motions, which are noise,
-nothing, though their e is the largest there is.
+the τ such that N e is left where it is below 2 A, and about 2 A beyond; what is not resolved at all has an e of up to
+(ωh)² A, of which F(h) leaves A, once: it is damped, or hardly moved. Stiff axial motions, whose e is the largest there
+is, thus count with their amplitude.
 """
 
 from __future__ import annotations
@@ -18,39 +18,80 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.schemes import Scheme, State
 from rotfem.numerics import compat
 from rotfem.numerics.linear import DirectSolver, Increment
 
 Array = npt.NDArray[np.float64]
 
-#: c of the trapezoidal rule, and τ in units of the time within which a vibration is resolved.
-COEFFICIENT, PLATEAU = 1 / 12, 2.5
+#: Filters are made anew where the step has changed by more than this factor.
+COARSE = 1.5
+
+#: Where filters start, of τ: some in a row turn off less sharply than (1 + (τω)ᵐ)⁻¹ does.
+SHARP = 0.85
+
+#: Error of a vibration that is not resolved, in units of what its filter leaves: up to 2 A, of which that may be A / 2.
+ONCE = 3.0
 
 
 class ErrorMeasure:
     """Size of the error of a whole history that a step stands for.
 
     Args:
-        system: equations of motion; the state of the step is set in it.
+        system: equations of motion; the state of the step is set in it where filters are made.
+        scheme: whose local errors are measured.
         end: length of the history, s.
     """
 
-    def __init__(self, system: Any, end: float):
-        self.inner, self.end = system.held, end
+    def __init__(self, system: Any, scheme: Scheme, end: float):
+        self.inner, self.end, self.scheme = system.held, end, scheme
         self._e, self._b = (compat.create_vector(self.inner.V) for _ in range(2))
         self._filtered = Increment(self.inner.V)
+        self._displacements = [i for i, name in enumerate(self.inner.structure.components) if name.startswith("u")]
+        self._step = 0.0
+        self._filters: dict[float, DirectSolver] = {}
 
     def __call__(self, error: Array, h: float) -> float:
-        """Return the largest entry of ê, in units of the unknowns' scale.
+        """Return the largest entry of the error, in units of the unknowns' scale.
 
         Args:
             error: local error of q, local dof array; of a free hub with that of its angle last.
             h: length of the step, s.
         """
+        if not self._step / COARSE < h < self._step * COARSE:
+            self._make(h)
         number = self.end / h
-        tau = PLATEAU * h * (0.5 * COEFFICIENT * number) ** (1 / 3)
-        self._e.array[:] = error[: len(self._e.array)]
-        self.inner.matrix(0.0, 0.0, 1.0, 0.0).mult(self._e, self._b)
-        self._b.array[self.inner.clamped] = 0.0
-        solver = DirectSolver(self.inner.matrix(tau**2, 0.0, 1.0, 1.0))
-        return float(number * self.inner.size(self._filtered.solve(solver, self._b)))
+        adds_up, remains = (self._through(error, times) for times in (self._times, (self.scheme.estimate[2],)))
+        return max(number * self.size(adds_up), ONCE * self.size(remains))
+
+    def size(self, x: Array) -> float:
+        """Return the largest displacement of a local dof array, in units of their scale."""
+        return float(self.inner.sizes(x)[self._displacements].max())
+
+    def displacement(self, state: State) -> float:
+        """Return the largest displacement of a state relative to the turning frame, in units of its scale."""
+        q, clamp = state.q[: len(self._e.array)], self.inner.clamp
+        if clamp is not None:
+            x = self.inner.V.tabulate_dof_coordinates()[:, 0]
+            q = clamp.relative(q.reshape(len(x), -1), x, state.t).ravel()
+        return self.size(q)
+
+    def _make(self, h: float) -> None:
+        """Make the filters for steps of about h (s)."""
+        number, (constant, order, lost) = self.end / h, self.scheme.estimate
+        slow = SHARP * (0.5 * constant * number) ** (1 / order)
+        self._times = (slow,) * (order // 2) + ((slow**0.5,) if order % 2 else ())
+        self._step, self._mass = h, self.inner.matrix(0.0, 0.0, 1.0, 0.0)
+        self._filters = {
+            tau: DirectSolver(self.inner.matrix((tau * h) ** 2, 0.0, 1.0, 1.0)) for tau in {lost, *self._times}
+        }
+
+    def _through(self, error: Array, times: tuple[float, ...]) -> Array:
+        """Return an error after filters, a local array of the structure's unknowns (reused)."""
+        x = error[: len(self._e.array)]
+        for tau in times:
+            self._e.array[:] = x[: len(self._e.array)]
+            self._mass.mult(self._e, self._b)
+            self._b.array[self.inner.clamped] = 0.0
+            x = self._filtered.solve(self._filters[tau], self._b)
+        return x.copy()

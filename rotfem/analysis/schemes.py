@@ -103,6 +103,35 @@ class Stage:
         self.a += self.c_a * dq
 
 
+class Equations(Protocol):
+    """What a scheme may ask of the equations of motion to solve its stages."""
+
+    system: Any
+    newton: Any
+
+    def predicted(self, stage: Stage, state: State) -> Array:
+        """Return q of a stage as it would be if all turned with the clamp; its own q where that does not move."""
+
+    def solve(self, stage: Stage, state: State) -> None:
+        """Solve one stage of a step from a state.
+
+        Raises:
+            ComputationError: it cannot be solved.
+        """
+
+    def imbalance(self, stage: Stage) -> Array:
+        """Return −F at a stage, zero at clamped unknowns; the owned part, of a free hub with that of its angle last."""
+
+    def linearised(self, stage: Stage | None) -> Any:
+        """Return the equations linearised about a stage; of None those at hand, or None where they do not serve."""
+
+
+def divided_difference(points: Sequence[float], values: Sequence[Array]) -> Array:
+    """Return the divided difference of values at distinct points: the derivative of order n − 1 over (n − 1)!."""
+    weights = (1 / np.prod([p - other for other in points if other != p]) for p in points)
+    return np.asarray(sum(w * value for w, value in zip(weights, values, strict=True)))
+
+
 class Scheme(ABC):
     """One time-stepping scheme; its dataclass fields are its parameters, keys of a scene's [time] table.
 
@@ -117,6 +146,11 @@ class Scheme(ABC):
     stages: ClassVar[int] = 1
     #: Whether the equations hold with the q, v, a that a step ends in; otherwise with its mean q and v, and that a.
     balanced_at_end: ClassVar[bool] = True
+
+    #: (C, m, s) of the error estimate C (ωh)^m A of a vibration of amplitude A, which grows as (s ωh)² A where it is
+    #: not resolved, and most by which a step may grow.
+    estimate: ClassVar[tuple[float, int, float]] = (1 / 12, 3, 0.3)
+    growth: ClassVar[float] = 2.0
 
     @abstractmethod
     def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
@@ -134,6 +168,27 @@ class Scheme(ABC):
     def finish(self, state: State, h: float, done: Sequence[Stage]) -> State:
         """Return the state at the end of a step, all its stages solved."""
 
+    def solved(self, state: State, h: float, end: float, equations: Equations) -> list[Stage]:
+        """Return the stages of a step, solved: one after the other, each of which may depend on those before.
+
+        Args:
+            state: where the step starts.
+            h: its length, s.
+            end: its last instant.
+            equations: that are solved.
+
+        Raises:
+            ComputationError: a stage cannot be solved.
+        """
+        done: list[Stage] = []
+        for i in range(self.stages):
+            stage = self.stage(i, state, h, end, done)
+            if (q := equations.predicted(stage, state)) is not stage.q:
+                stage.correct(q - stage.q)
+            equations.solve(stage, state)
+            done.append(stage)
+        return done
+
     def start(self, state: State) -> State:
         """Return a first state, or one after a jump, with the memory that a step from it needs."""
         return state
@@ -142,8 +197,16 @@ class Scheme(ABC):
         """Return a state whose acceleration has jumped by a change, with the memory that a step from it needs."""
         return self.start(state)
 
+    def kinked(self, state: State) -> State:
+        """Return a state after which what drives the motion goes on along another line, its acceleration the same."""
+        return state
+
     def local_error(self, new: State, old: State) -> Array | None:
         """Return an estimate of the error of q that the step from old to new made; None if there is none."""
+        return None
+
+    def understudy(self) -> Scheme | None:
+        """Return a more robust scheme that takes the steps that this one cannot; None if there is none."""
         return None
 
     def resized(self, new: State, old: State, h: float) -> State:

@@ -8,28 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from rotfem.analysis.roots import came_true, check_root, fed, turned_with_clamp
-from rotfem.analysis.schemes import Array, Scheme, Shifts, Stage, State, Watch
+from rotfem.analysis.roots import fed
+from rotfem.analysis.schemes import Array, Scheme, State, Watch
+from rotfem.analysis.stage_solver import StageSolver
 from rotfem.analysis.turning import keep_rotations_small
 from rotfem.errors import ComputationError
 from rotfem.mechanics.courses import View
-from rotfem.numerics.newton import REACH, Newton
+from rotfem.numerics.newton import Newton
 
-#: Iterations with an old factor after which the next step gets a new one.
-LONG = 5
-
-#: After an old factor has failed k times in a row, none is tried for 2^k steps; k grows to this.
-PATIENCE = 5
-
-#: Newton iterations after which a way is long; halvings left with which a step is taken though it feeds the motion.
-SOON, STUBBORN = 6, 3
-
-#: Newton iterations after which the prediction of the next step is questioned, and its share that is taken for all.
-MANY, WHOLE = 3, 0.9
-
-#: A linear step is refined with an old factor up to this relative error, as long as that shrinks at this rate, or to
-#: where it stays at round-off.
-REFINED, RATE, ROUND_OFF = 1e-11, 0.3, 1e-8
+#: Halvings left with which a step is taken though it feeds the motion, or by an understudy; parts that one takes it in.
+STUBBORN, PARTS = 3, 4
 
 #: Relative jump of what is prescribed that is none.
 STEADY = 1e-7
@@ -45,7 +33,7 @@ def seen(system: Any, view: View) -> Iterator[None]:
         system.view.side, system.view.window = 0, None
 
 
-class Stepper:
+class Stepper(StageSolver):
     """Advances a system in time.
 
     Args:
@@ -55,26 +43,19 @@ class Stepper:
 
     Attributes:
         substeps, rejected: steps that were halved (Newton failed, or energy rose), and adaptive ones taken back.
+        stood_in: steps that the scheme could not take, and its understudy did.
         pace: length of the next adaptive step (s), and largest displacement so far (scaled); None before the first.
         watch: told of every step that counts; None tells nobody.
     """
 
     def __init__(self, system: Any, scheme: Scheme, newton: Newton):
-        self.system, self.scheme, self.newton = system, scheme, newton
-        self.substeps = self.rejected = 0
+        super().__init__(system, newton)
+        self.scheme = scheme
+        self.substeps = self.rejected = self.stood_in = 0
         self.pace: tuple[float, float] | None = None
         self.watch: Watch | None = None
-        self._held: Shifts | None = None
-        #: Whether Newton's way is a long one, so that tangents that know where it came from are worth compiling.
-        self._far = False
-        #: Whether a step was hard to solve, and whether the scheme keeps the balance of energy by itself.
-        self._hard = self._balanced = False
         #: Energy at the first step that was hard, and ranges of the energies that were seen since (see `fed`).
         self._exchange: tuple[float, ...] | None = None
-        #: Share of the last predicted move that came true.
-        self._share = 1.0
-        #: How often in a row an old factor has failed, and for how many steps none is tried for that.
-        self._failed = self._pause = 0
 
     def start(self, t: float, q: Array, v: Array) -> State:
         """Return the state at t (s) with the acceleration that the equations of motion give."""
@@ -104,7 +85,7 @@ class Stepper:
             old = s.driven(t)
         with seen(s, after):
             if np.allclose(s.driven(t), old, rtol=STEADY, atol=0.0):
-                return state
+                return self.scheme.kinked(state)
             new = state.changed(q=state.q.copy(), v=state.v.copy(), a=state.a.copy())
             s.prescribe(t, new.q, new.v, new.a)
             s.set_time(t)
@@ -141,127 +122,12 @@ class Stepper:
         """
         end = state.t + h if end is None else end
         self._hard = False
-        stages: list[Stage] = []
-        for i in range(self.scheme.stages):
-            stage = self.scheme.stage(i, state, h, end, stages)
-            if self.system.clamp is not None:  # a prediction that turns with the hub is the better one
-                turned = turned_with_clamp(self.system.clamp, state, stage)
-                stage.correct(turned - stage.q)
-            self._solve(stage, state)
-            stages.append(stage)
+        stages = self.scheme.solved(state, h, end, self)
         new = self.scheme.finish(state, h, stages)
         new.datum = state.datum
         self.system.check_reach(new.q, new.t)
         new.given = self.system.given(new, state)
         return new
-
-    def _solve(self, stage: Stage, state: State) -> None:
-        """Solve a stage of a step from a state, with the factor of an earlier one if that serves."""
-        if self._held == stage.shifts and self.system.keeps_factor and not self._new_factor_pays(stage.t):
-            if self._pause == 0:
-                predicted = stage.q.copy(), stage.v.copy(), stage.a.copy()
-                try:
-                    self._iterate(stage, state, chord=True)
-                except ComputationError:  # the old factor does not serve here; nor will the next ones, perhaps
-                    self._held, self._failed = None, min(self._failed + 1, PATIENCE)
-                    self._pause = 2**self._failed
-                    stage.q, stage.v, stage.a = predicted
-                else:
-                    self._failed = 0
-                    return
-            self._pause = max(self._pause - 1, 0)
-        if self.system.solved_at_once:
-            self._iterate(stage, state)
-            return
-        move = stage.q - state.q
-        if self._share < WHOLE:
-            stage.correct((self._share - 1.0) * move)
-        v, a = stage.v - stage.c_v * stage.q, stage.a - stage.c_a * stage.q
-        try:
-            iterations = self._root(stage, state)
-        except ComputationError:
-            if self._share == 0.0:
-                raise
-            stage.q[:] = state.q  # from where the step starts, whatever was predicted
-            self._share, self._far = 0.0, True
-            stage.v[:], stage.a[:] = v + stage.c_v * stage.q, a + stage.c_a * stage.q
-            iterations = self._root(stage, state)
-        self._hard |= self.newton.strayed or iterations > MANY
-        self._balanced = stage.over is not None
-        if self._share < WHOLE or iterations > MANY:
-            self._share = came_true(self.system, stage.q - state.q, move)
-
-    def _root(self, stage: Stage, state: State) -> int:
-        """Solve a stage of a nonlinear system, see that it is the motion's and return the iterations."""
-        iterations = self._iterate(stage, state)
-        if self.newton.strayed:
-            check_root(self.system, stage, state)
-        return iterations
-
-    def _new_factor_pays(self, t: float) -> bool:
-        """Return whether the matrix stays as it is from now on, while the factor is that of another."""
-        s = self.system
-        if not s.linear:
-            return False
-        s.set_time(t)
-        return bool(s.settled and not s.current)
-
-    def _iterate(self, stage: Stage, state: State, chord: bool = False) -> int:
-        """Solve a stage by Newton's method, or with the factor of an earlier step throughout; return the iterations."""
-        span = None if self.system.linear else stage.over
-        s, before = self.system if span is None else self.system.balance, state.q
-        followed = 0
-        s.set_time(stage.t)
-        if span is not None:
-            s.begin(span.start, span.end)
-        s.prescribe(stage.t, stage.q, stage.v, stage.a)
-
-        def increment() -> float:
-            nonlocal before, followed
-            s.set_state(stage.q, stage.v, stage.a)
-            self._far |= followed >= SOON or self.newton.strayed
-            dq = s.chord() if chord else s.correction(stage.shifts, before if self._far else None)
-            followed += 1
-            size = float(s.increment_size(dq))
-            if not s.solved_at_once:
-                before = stage.q.copy()
-            stage.correct(dq if s.solved_at_once or size <= REACH else dq * (REACH / size))
-            return size
-
-        try:
-            if s.solved_at_once:
-                iterations = self._solve_linear(increment, stage, chord)
-            else:
-                iterations = self.newton.solve(increment, lambda: s.size(stage.q), chord)
-        except ComputationError as error:
-            raise ComputationError(error.what, time=stage.t, advice=error.advice) from None
-        self._held = stage.shifts if s.keeps_factor and not (chord and iterations > LONG) else None
-        self._far = iterations > SOON
-        if span is not None:
-            stage.memory = s.finish(stage)
-        return iterations
-
-    def _solve_linear(self, increment: Any, stage: Stage, chord: bool) -> int:
-        """Solve the linear equations of a stage; return the iterations: one, or those that refine with an old factor.
-
-        Raises:
-            ComputationError: not finite, or the old factor is too far from the matrix.
-        """
-        previous = np.inf
-        for k in range(1, LONG + 3):
-            d = increment()
-            self.newton.iterations += 1
-            if not np.isfinite(d):
-                raise ComputationError("the solution is not finite")
-            size = self.system.size(stage.q)
-            if not chord or self.system.current or d <= REFINED * size:
-                return k
-            if d > RATE * previous:
-                if d <= ROUND_OFF * size:
-                    return k
-                break
-            previous = d
-        raise ComputationError("the old factor is too far from the matrix")
 
     def advance(self, state: State, h: float, end: float | None = None, halvings: int = 5) -> State:
         """Return the state at state.t + h (see `step`), in halved steps where the whole one fails or feeds the motion.
@@ -276,7 +142,10 @@ class Stepper:
             if halvings <= STUBBORN or not self._feeds(new, state):
                 return new
         except ComputationError as error:
-            if self.system.solved_at_once:
+            understudy = self.scheme.understudy()
+            if understudy is not None and 0 < halvings <= STUBBORN:
+                return self._stood_in(understudy, state, h, end)
+            if self.system.solved_at_once and understudy is None:
                 raise
             if halvings == 0:
                 raise ComputationError(
@@ -288,9 +157,33 @@ class Stepper:
         middle = self.advance(state, h / 2, None, halvings - 1)
         return self.advance(middle, h / 2, state.t + h if end is None else end, halvings - 1)
 
+    def _stood_in(self, understudy: Scheme, state: State, h: float, end: float | None) -> State:
+        """Return the state at the end of a step that another scheme takes, in parts.
+
+        Raises:
+            ComputationError: it fails, too.
+        """
+        other = Stepper(self.system, understudy, self.newton)
+        now, last = understudy.start(state), state.t + h if end is None else end
+        for part in range(1, PARTS + 1):
+            now = other.advance(now, h / PARTS, last if part == PARTS else None)
+        self.stood_in += 1
+        self.substeps += other.substeps
+        return self.scheme.start(now)
+
     def _feeds(self, new: State, state: State) -> bool:
         """Return whether a step that was hard to solve raises an energy that is too large already (see `fed`)."""
         if not self._hard or self._balanced or self.system.linear or not self.system.model.closed:
             return False
         self._exchange, feeds = fed(self.system, new, state, self._exchange)
         return feeds
+
+    def said(self) -> list[str]:
+        """Return what a run says of its steps."""
+        out = [f"{self.substeps} steps were halved where Newton failed or energy rose"] if self.substeps else []
+        if self.stood_in:
+            other = self.scheme.understudy()
+            assert other is not None
+            taken = f"{self.stood_in} steps that {self.scheme.name} could not solve were taken by {other.name}"
+            out.append(f"{taken}: their errors are those of that scheme")
+        return out

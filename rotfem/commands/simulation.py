@@ -264,8 +264,7 @@ class Simulation:
         return energy_growth.with_cause(error, self.system, self.record.history.arrays())
 
     def _warn_of_steps(self) -> None:
-        if self.stepper is not None and self.stepper.substeps:
-            self.warnings.append(f"{self.stepper.substeps} steps were halved where Newton failed or energy rose")
+        self.warnings += [] if self.stepper is None else self.stepper.said()
         if self.iteration.roundoff > 0:
             self.warnings.append(f"Newton stopped at round-off, increments {self.iteration.roundoff:.1e} (relative)")
 

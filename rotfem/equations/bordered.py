@@ -18,6 +18,7 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from rotfem.equations.hub_row import HubRow
+from rotfem.equations.linearised import BorderedLinearised
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.motion import Motion
@@ -150,6 +151,14 @@ class BorderedSystem:
             raise ComputationError("the hub equation is singular")
         dpsi = float((r - cy) / (d - cz))
         return np.append(y - z * dpsi, dpsi)
+
+    def imbalance(self) -> Array:
+        """Return the owned part of −F at the state, and that of the hub."""
+        return np.append(self.inner.imbalance(), -self.row.residual(self.inner.time))
+
+    def linearised(self) -> BorderedLinearised:
+        """Return the equations linearised about the state and time set."""
+        return BorderedLinearised(self)
 
     def with_hub(self, matrices: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
         """Return M, C, K of the structure with the angle of the hub as last unknown, about the state and speed set."""

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
+from rotfem.equations.linearised import Linearised
 from rotfem.errors import ComputationError
 from rotfem.numerics.linear import DirectSolver, Increment
 
@@ -107,6 +108,14 @@ class Solutions:
             self.set_time(known["t"])
             self.set_state(known["q"], known["v"], known["a"])
             self.correction(known["shifts"], known["before"])
+
+    def imbalance(self) -> Array:
+        """Return the owned part of −F at the state, a copy."""
+        return np.array(self.residual().array)
+
+    def linearised(self) -> Linearised:
+        """Return the equations linearised about the state and time set."""
+        return Linearised(self)
 
     def factor(self, A: Any, changed: bool = True) -> DirectSolver:
         """Return the solver of the system's tangent, with a new factor where it has changed."""

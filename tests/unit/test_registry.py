@@ -130,7 +130,7 @@ def test_the_classes_share_the_registries_of_the_ground() -> None:
     assert (Scheme.registry, Output.registry) == (registry.schemes, registry.outputs)
     assert ladder()[0] == "linear"
     assert set(ladder()) == set(registry.theories.names)
-    assert registry.schemes.names == ("generalised_alpha", "newmark", "esdirk4", "energy_conserving")
+    assert registry.schemes.names == ("generalised_alpha", "newmark", "esdirk4", "radau5", "energy_conserving")
 
 
 @pytest.mark.parametrize("name", ["", "two words", "2nd", "a-b", "a.b", None])
@@ -295,7 +295,7 @@ def test_adaptive_steps_need_an_estimate_of_the_error(add: Add) -> None:
     message = refusal(time=table | {"scheme": "damped", "decay": 0.5})
     assert 'time.tolerance = 0.001: scheme = "damped" does not estimate its error' in message
     assert message.endswith(
-        'give step instead (adaptive steps: "generalised_alpha", "newmark", "esdirk4", "estimated")'
+        'give step instead (adaptive steps: "generalised_alpha", "newmark", "esdirk4", "radau5", "estimated")'
     )
 
 
@@ -314,7 +314,7 @@ def test_a_parameter_cannot_have_the_name_of_a_key(add: Add) -> None:
 def test_unknown_schemes(scheme: Any) -> None:
     message = refusal(time={"end": 1, "step": 0.1, "scheme": scheme})
     assert message.startswith("test.toml: time.scheme")
-    assert 'allowed: "generalised_alpha", "newmark", "esdirk4"' in message
+    assert 'allowed: "generalised_alpha", "newmark", "esdirk4", "radau5"' in message
 
 
 # --- section shapes -------------------------------------------------------------------------------------------------

@@ -1,0 +1,197 @@
+"""Radau IIA of fifth order: three stages that hang together.
+
+With V_i and A_i the rates at t_n + c_i h, the collocation method (Hairer & Wanner 1996, section IV.5)
+
+    Q_i = q_n + h Σ_j a_ij V_j,    V_i = v_n + h Σ_j a_ij A_j,    F(Q_i, V_i, A_i) = 0,    i = 1, 2, 3,
+
+is L-stable, and its last stage is the end of the step. With W = a⁻¹ a change dQ of the stages changes V by W dQ/h and A
+by W² dQ/h², so in the basis of W = T Λ T⁻¹ simplified Newton iterations fall into K + s C + s² M with s = λ/h: one real
+system and a complex one, for two conjugate λ (IV.8). M, C and K serve for as many steps as they are good for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from rotfem.analysis.alpha_family import GeneralisedAlpha
+from rotfem.analysis.schemes import Array, Equations, Scheme, Stage, State, divided_difference
+from rotfem.errors import ComputationError
+from rotfem.registry import register
+
+ROOT = np.sqrt(6.0)
+
+#: a_ij, and c_i.
+A = np.array(
+    [
+        [(88 - 7 * ROOT) / 360, (296 - 169 * ROOT) / 1800, (-2 + 3 * ROOT) / 225],
+        [(296 + 169 * ROOT) / 1800, (88 + 7 * ROOT) / 360, (-2 - 3 * ROOT) / 225],
+        [(16 - ROOT) / 36, (16 + ROOT) / 36, 1 / 9],
+    ]
+)
+C = A.sum(axis=1)
+
+W = np.linalg.inv(A)
+_EIGENVALUES, _VECTORS = np.linalg.eig(W)
+_FIRST = [int(np.argmin(np.abs(_EIGENVALUES.imag))), int(np.argmax(_EIGENVALUES.imag))]
+
+#: The real eigenvalue and the one above the axis, with their columns of T and rows of T⁻¹.
+REAL, ABOVE = float(_EIGENVALUES[_FIRST[0]].real), complex(_EIGENVALUES[_FIRST[1]])
+COLUMNS, ROWS = _VECTORS[:, _FIRST], np.linalg.inv(_VECTORS)[_FIRST]
+
+#: Iterations before a solution is given up, and from which on the next step gets new matrices.
+MOST, LONG = 10, 5
+
+#: How often matrices are made anew in a step, about where the iterations have come; not if that is farther than this
+#: from their start, in the units of the unknowns.
+FRESH, REACH = 3, 0.5
+
+#: Part of Newton's tolerance that the error of an iteration may leave: it adds up over the steps.
+LEFT = 1e-2
+
+#: Local error of q in units of h⁶ q⁽⁶⁾ (of a vibration, |R(iωh) − e^{iωh}|), and, where there is no step before, what
+#: stands for it in units of h⁵ q⁽⁵⁾.
+ERROR, FIRST_ERROR = 1 / 14400, 5e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Before:
+    """Accelerations of a step's stages, as the memory of the step after it.
+
+    Attributes:
+        h: length of the step, s.
+        accelerations: at its stages, shape (3, …).
+        error: its local error of q.
+    """
+
+    h: float
+    accelerations: Array
+    error: Array
+
+
+@dataclass(frozen=True)
+class RadauIIA(Scheme):
+    """Fifth order in smooth motions; what it does not resolve is damped within a few steps."""
+
+    name: ClassVar[str] = "radau5"
+    order: ClassVar[int] = 5
+    stages: ClassVar[int] = 3
+    estimate: ClassVar[tuple[float, int, float]] = (ERROR, 6, 0.2)
+    growth: ClassVar[float] = 5.0
+
+    def start(self, state: State) -> State:
+        """Return the state without a step before it."""
+        return state.changed(memory=None)
+
+    def kinked(self, state: State) -> State:
+        """Return the state without the step before it: the next one is no continuation of that."""
+        return self.start(state)
+
+    def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
+        """Return stage i + 1, predicted by a constant acceleration."""
+        t = end if i == self.stages - 1 else state.t + C[i] * h
+        step = C[i] * h
+        q, v = state.q + step * state.v + 0.5 * step**2 * state.a, state.v + step * state.a
+        return Stage(t, q, v, state.a.copy(), REAL / h, (REAL / h) ** 2)
+
+    def solved(self, state: State, h: float, end: float, equations: Equations) -> list[Stage]:
+        """Return the stages, solved together: with the matrices at hand, or with new ones about where that has led."""
+        stages = [self.stage(i, state, h, end, ()) for i in range(self.stages)]
+        if state.memory is not None:
+            extrapolate(stages, state, h)
+        else:
+            correct(stages, np.array([equations.predicted(s, state) - s.q for s in stages]), h)
+        start = [(s.q.copy(), s.v.copy(), s.a.copy()) for s in stages]
+        if (known := equations.linearised(None)) is not None and iterate(stages, h, equations, known, False) is None:
+            return stages
+        for fresh in range(1, FRESH + 1):
+            moved = [s.q - q for s, (q, _, _) in zip(stages, start, strict=True)]
+            if not max(map(equations.system.increment_size, moved)) < REACH:
+                for s, (q, v, a) in zip(stages, start, strict=True):
+                    s.q, s.v, s.a = q.copy(), v.copy(), a.copy()
+            size = iterate(stages, h, equations, equations.linearised(stages[1]), fresh == FRESH)
+            if size is None:
+                return stages
+        raise ComputationError(f"simplified Newton stays at increments of {size:.1e} (scaled)", time=stages[-1].t)
+
+    def finish(self, state: State, h: float, done: Sequence[Stage]) -> State:
+        """Return the last stage, with the accelerations of all and the local error."""
+        accelerations, end = np.array([s.a for s in done]), done[-1]
+        return State(end.t, end.q, end.v, end.a, Before(h, accelerations, local_error(state, h, accelerations)))
+
+    def local_error(self, new: State, old: State) -> Array | None:
+        """Return the leading term of the error, by the fourth divided difference of accelerations."""
+        return new.memory.error if new.memory is not None else None
+
+    def understudy(self) -> Scheme:
+        """Return generalised-α, whose one stage Newton's method solves from farther away."""
+        return GeneralisedAlpha()
+
+
+def iterate(stages: list[Stage], h: float, equations: Equations, linearised: Any, last: bool) -> float | None:
+    """Correct stages by simplified Newton iterations, until nothing is left; return the increment if that fails.
+
+    Args:
+        stages: changed.
+        h: length of the step, s.
+        equations: that are solved.
+        linearised: matrices.
+        last: whether increments below Newton's own tolerance are small enough, if they shrink no more.
+    """
+    linearised.take((REAL / h, ABOVE / h))
+    newton, previous, size = equations.newton, np.inf, np.inf
+    for k in range(1, MOST + 1):
+        residuals = np.array([equations.imbalance(s) for s in stages])
+        real, above = linearised.solve(ROWS[0].real @ residuals, ROWS[1] @ residuals)
+        dq = np.outer(COLUMNS[:, 0].real, real) + 2 * np.outer(COLUMNS[:, 1], above).real
+        correct(stages, dq, h)
+        newton.iterations += 1
+        size = max(equations.system.increment_size(d) for d in dq)
+        rate = size / previous if previous > 0.0 else 0.0
+        enough = LEFT * newton.tolerance
+        if k > 1 and (size <= enough or (rate < 1.0 and rate / (1 - rate) * size <= enough)):
+            linearised.serves = k < LONG
+            return None
+        if not np.isfinite(size) or (k > 2 and (rate >= 1.0 or size * rate ** (MOST - k) > enough)):
+            break
+        previous = size
+    if last and size <= newton.tolerance:
+        newton.roundoff = max(newton.roundoff, size)
+        return None
+    return float(size)
+
+
+def correct(stages: Sequence[Stage], dq: Array, h: float) -> None:
+    """Change all stages by dq (3, …), and their rates by what follows from it."""
+    for stage, d, dv, da in zip(stages, dq, W @ dq / h, W @ W @ dq / h**2, strict=True):
+        stage.q += d
+        stage.v += dv
+        stage.a += da
+
+
+def extrapolate(stages: Sequence[Stage], state: State, h: float) -> None:
+    """Predict the stages by the parabola through the accelerations of the step before."""
+    before: Before = state.memory
+    points = (C - 1) * before.h
+    others = [np.delete(points, j) for j in range(3)]
+    weights = np.array([[np.prod((x - o) / (p - o)) for p, o in zip(points, others, strict=True)] for x in C * h])
+    a = weights @ before.accelerations - np.array([s.a for s in stages])
+    correct(stages, h**2 * A @ A @ a, h)
+
+
+def local_error(state: State, h: float, accelerations: Array) -> Array:
+    """Return the local error of q, of a step with one before it by fourth differences of q̈, of others by third ones."""
+    before = state.memory
+    points, values = [0.0, *(C * h)], [state.a, *accelerations]
+    if before is not None:
+        points, values = [(C[1] - 1) * before.h, *points], [before.accelerations[1], *values]
+    difference = divided_difference(points, values)
+    if before is not None:
+        return np.asarray(24 * ERROR * h**6 * difference)
+    return np.asarray(6 * FIRST_ERROR * h**5 * difference)
+
+
+register(RadauIIA)

@@ -1,0 +1,90 @@
+"""Schemes of high order: their orders in both frames and on a free hub, what is stiff, and who takes over."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from rotfem import run
+from rotfem.analysis.radau import A, C
+from tests.beams import STRUCTURE
+
+Array = npt.NDArray[np.float64]
+
+#: A short spin-up of the unit beam, whose first frequency is 3.5 rad/s, and a hub that is turned forth and back.
+SPIN_UP = {"motion": {"type": "spin_up", "speed": 1.0, "duration": 2.0}}
+HUB = {"motion": {"type": "torque", "hub_inertia": 1.0, "table": [[0.0, 0.0], [1.0, 0.5], [2.0, -0.5]]}}
+BEAM = {"mesh": {"elements": 1, "degree": 2}, "solver": {"increment_tolerance": 1e-11}}
+#: A section so soft in every way that these steps resolve all motions: a method has its order then.
+SOFT = {f"structure.section.{k}": v for k, v in (("EA", 20.0), ("GA", 20.0), ("rotary_inertia", 0.5))}
+
+STILL = {"type": "constant", "speed": 0.0}
+
+
+def orders(make: Any, tables: dict[str, Any], scheme: str, number: int, names: tuple[str, ...]) -> Array:
+    """Return the last observed order of columns, of histories in number, 2 number … 8 number steps of 2 s."""
+    histories = []
+    for k in range(4):
+        time = {"end": 2.0, "step": 2.0 / number / 2**k, "output_every": 2**k, "scheme": scheme}
+        history = run(make(SOFT, **BEAM, **tables, time=time)).history
+        histories.append(np.array([history[name] for name in names]))
+    change = np.array([np.abs(b - a).max(axis=1) for a, b in pairwise(histories)])
+    return np.asarray(np.log2(change[-2] / change[-1]))
+
+
+@pytest.mark.parametrize(
+    "model",
+    [{"theory": "reissner"}, {"theory": "consistent_linear"}, {"theory": "reissner", "frame": "inertial"}],
+    ids=["reissner", "linear", "inertial"],
+)
+def test_radau_is_of_fifth_order(unit_beam: Any, model: dict[str, Any]) -> None:
+    assert np.all(orders(unit_beam, SPIN_UP | {"model": model}, "radau5", 20, ("tip_u2", "tip_alpha")) > 4.6)
+
+
+@pytest.mark.parametrize(("scheme", "number", "order"), [("radau5", 20, 5.0), ("esdirk4", 20, 4.0)])
+@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
+def test_order_on_a_free_hub(unit_beam: Any, scheme: str, number: int, order: float, theory: str) -> None:
+    """The knot of the torque is met, so its kink costs nothing."""
+    assert orders(unit_beam, HUB | {"model": {"theory": theory}}, scheme, number, ("tip_u2",)) > order - 0.4
+
+
+def test_coefficients_of_radau() -> None:
+    """Collocation, Σ_j a_ij c_jᵏ⁻¹ = c_iᵏ/k for k ≤ 3, and quadrature of fifth order by the last row."""
+    for k in range(1, 4):
+        np.testing.assert_allclose(A @ C ** (k - 1), C**k / k, atol=1e-14)
+    for k in range(1, 6):
+        assert A[-1] @ C ** (k - 1) == pytest.approx(1 / k, abs=1e-14)
+
+
+@pytest.mark.parametrize(("scheme", "left"), [("radau5", 1e-6), ("esdirk4", 1e-2)])
+def test_a_stiff_vibration_is_damped(scheme: str, left: float) -> None:
+    """An axial force at once, in steps of 120 axial periods: of the vibration it starts |R(iωh)|⁴ is left.
+
+    With ωh = 759 it is (3/ωh)⁴ = 2e-10 of Radau's method, where stage errors of bending are more, and (9.3/ωh)⁴ of
+    the other. Generalised-α keeps 0.9⁴.
+    """
+    tables = {"structure": STRUCTURE, "motion": STILL, "loads": {"tip_force": [1000.0, 0.0]}, "mesh": {"elements": 2}}
+    static = 1000.0 * 10.0 / 2.8e7
+
+    def off(name: str) -> float:
+        return abs(
+            run({**tables, "time": {"end": 4.0, "step": 1.0, "scheme": name}}).history["tip_u1"][-1] / static - 1
+        )
+
+    assert off(scheme) < left
+    assert off("generalised_alpha") > 0.1
+
+
+def test_steps_that_cannot_be_solved_are_taken_by_the_understudy() -> None:
+    """A beam let go from a tenth of its length, in steps of a quarter of its period; the summary says so."""
+    tables = {"structure": STRUCTURE, "motion": STILL, "initial": {"tip_displacement": 1.0}, "mesh": {"elements": 4}}
+    result = run({**tables, "time": {"end": 2.0, "step": 0.4, "scheme": "radau5"}})
+    assert any(
+        "steps that radau5 could not solve were taken by generalised_alpha" in w for w in result.summary["warnings"]
+    )
+    fine = run({**tables, "time": {"end": 2.0, "step": 0.01, "scheme": "esdirk4"}}).history["tip_u2"][::40]
+    np.testing.assert_allclose(result.history["tip_u2"], fine, atol=0.05)
