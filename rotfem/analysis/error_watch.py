@@ -170,7 +170,7 @@ class ErrorWatch:
     def _tip_sizes(self, shapes: list[Array]) -> Array:
         """Return the displacement of the tip in shapes (local dof arrays), m."""
         inner = self.system.held
-        values, names = inner.structure.tip_values, inner.structure.components
+        values, names = inner.structure.tip_values, inner.structure.unknowns
         dofs = [values.dofs.start + i for i, name in enumerate(names) if name.startswith("u")]
         here: Array = np.linalg.norm(np.array([q[dofs] for q in shapes]), axis=1)
         if inner.comm.size > 1:

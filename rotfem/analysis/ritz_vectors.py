@@ -45,7 +45,7 @@ class RitzVectors:
         A = K.copy()
         A.axpy(shift, M)
         self._solver, self._M, self._clamped = DirectSolver(A), M, system.clamped
-        moves = [i for i, name in enumerate(system.structure.components) if name.startswith("u")]
+        moves = [i for i, name in enumerate(system.structure.unknowns) if name.startswith("u")]
         columns: list[Array] = []
         massed: list[Array] = []
         for i in moves:

@@ -22,7 +22,7 @@ class ShapeError:
 
     def __init__(self, system: Any):
         self.system, self._estimate = system, MeshEstimate(system.V)
-        names = system.structure.components
+        names = system.structure.unknowns
         self._size = len(names)
         self._moves = [i for i, name in enumerate(names) if name.startswith("u")]
         self._turns = [i for i, name in enumerate(names) if not name.startswith("u")]

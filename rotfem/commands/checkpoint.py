@@ -126,6 +126,7 @@ class Memory:
             "rows": np.array(run.record.history.rows()).reshape(len(run.record.history), -1),
             "snapshots": None if snapshots is None else self._packed(vars(snapshots)),
             "choice": None if run.choice is None else vars(run.choice),
+            "left_out": list(run.problem.left_out),
         }
 
     def put_back(self, path: Path, tree: Tree) -> State:

@@ -135,6 +135,10 @@ class Keeper:
 
         return Choice(**self._tree["choice"])
 
+    def left_out(self) -> tuple[str, ...] | None:
+        """Return the unknowns that the run which is gone on with has left out; None where there is none."""
+        return None if self._tree is None else tuple(self._tree.get("left_out", ()))
+
     def interrupts(self) -> Interrupts:
         """Return the context in which a march is interrupted between steps, where that is needed."""
         self._interrupts = Interrupts(self.comm, self._secure, self.comm.size > 1 or self.every is not None)

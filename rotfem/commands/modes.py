@@ -118,7 +118,7 @@ def _modes(
     if done.triangles is not None:
         first, right = 1 + int(spinning.rigid), spinning.pairs.right
         states = [(float(first + i), scaled(comm, right[:, i])) for i in range(right.shape[1])]
-        done.fields = writer(analysis.system.V, "modes", states)
+        done.fields = writer(analysis.structure, "modes", states)
     if sensitivities:
         from rotfem.analysis.sensitivity import sensitivities as derivatives
 

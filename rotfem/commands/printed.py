@@ -17,6 +17,8 @@ def run_report(summary: dict[str, Any], folder: Path) -> list[str]:
         f"effects: {', '.join(summary['effects']) or 'none'} "
         f"({summary['integrals']['F']} integrals in F, {summary['integrals']['J']} in J)",
     ]
+    if "left_out" in summary:
+        lines.append(f"left out, as nothing moves them: {', '.join(summary['left_out']['unknowns'])}")
     lines += choice_report(summary)
     if summary["kind"] == "history":
         lines.append(

@@ -76,5 +76,5 @@ class Recorder:
         shape = self.system.shape() if len(self.history) else {}
         out = RunResult(summary, history, shape, triangles=structure.surface())
         if self.snapshots is not None:
-            out.fields = writer(self.system.V, "fields", self.snapshots.kept)
+            out.fields = writer(structure, "fields", self.snapshots.kept)
         return out

@@ -15,6 +15,7 @@ from rotfem.analysis.equilibrium import static_tip_shape, steady_state
 from rotfem.analysis.error_estimate import ErrorEstimate
 from rotfem.analysis.error_watch import ErrorWatch
 from rotfem.analysis.farthest_state import Farthest
+from rotfem.analysis.left_aside import LeftAside
 from rotfem.analysis.lost_digits import said_of
 from rotfem.analysis.reduced.manifold import Foreshortened
 from rotfem.analysis.reduced.response import Response
@@ -27,6 +28,7 @@ from rotfem.commands import energy_growth
 from rotfem.commands.interrupts import Interrupted
 from rotfem.commands.keeper import Keeper
 from rotfem.commands.known_error import error_of_run, warnings_of_run
+from rotfem.commands.other_models import better_theories, lacking
 from rotfem.commands.problem import scheme_of
 from rotfem.commands.recorder import Recorder
 from rotfem.commands.reduced_history import by_reduced_model
@@ -35,16 +37,13 @@ from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
 from rotfem.mechanics.problem import Problem
-from rotfem.mechanics.theories import Theory, richest, theories
 from rotfem.numerics.newton import Newton
 from rotfem.results.run import RunResult
 from rotfem.scene import Scene, Time
+from rotfem.selection.left_out import leave_out, without, worth_a_look
 from rotfem.selection.model_choice import Choice, RangeExceeded
 
 Array = npt.NDArray[np.float64]
-
-#: Displacement over L in the plane of a plate from which a run says what its strains leave out there.
-NOTICED = 1e-3
 
 
 class Simulation:
@@ -74,6 +73,7 @@ class Simulation:
         if scene.time is None and problem.frame == "inertial":
             problem = problem.replace(frame="rotating")
             self.warnings.append("a steady state is one only in the rotating frame, where it was computed")
+        problem, beside = self._with_few_unknowns(problem)
         self.problem = problem
         self.system: Any = compile_system(problem, comm, moving=scene.time is not None)
         self.system.compile_readings()
@@ -89,12 +89,25 @@ class Simulation:
         self.critical = None if by_basis else critical_speed(self.system)
         self.stability: Stability | None = None
         self.farthest = Farthest(self.system)
+        self.aside = None if beside is None else LeftAside(self.system, beside)
+        self.left_out: dict[str, Any] | None = None
         self.theory_error: TheoryError | None = None
         self.watch: ErrorWatch | None = None
         self.last: State | None = None
         self.error: ErrorEstimate | None = None
         self._critical_since: float | None = None
         self._exceeded = ""
+
+    def _with_few_unknowns(self, problem: Problem) -> tuple[Problem, Any]:
+        """Return the problem without unknowns that stay zero, and the equations of these, None of none."""
+        scene, model, known = self.scene, self.scene.model, self.keeper.left_out()
+        if known is not None:
+            return without(problem, known, self.comm)
+        if scene.time is None or self.choice is not None or model.all_unknowns or model.reduced:
+            return problem, None
+        if scene.initial.state == "steady" or not worth_a_look(problem, scene.time):
+            return problem, None
+        return leave_out(problem, self.comm, scene.initial.tip_displacement is not None)
 
     def run(self, progress: Progress | None = None) -> RunResult:
         """Return the result of the scene (see `rotfem.run`).
@@ -195,6 +208,8 @@ class Simulation:
         self.record(state)
         self.last = state
         self.farthest(state.q, state.t)
+        if self.aside is not None:
+            self.aside(state.q, state.t)
         if self.choice is None or self._exceeded:
             return
         sizes = self.system.sizes(state.q)
@@ -244,7 +259,12 @@ class Simulation:
                 f"the speed is above {self.critical:.6g} rad/s, where the {self.problem.theory.name} stiffness is no "
                 f"longer definite, since t = {self._critical_since:.4g} s"
             )
-        self._warn_of_what_the_strains_lack(history)
+        if said := lacking(self.system, history):
+            self.warnings.append(said)
+        if self.aside is not None:
+            self.left_out = self.aside.summary()
+            if said := self.aside.warning(self.left_out):
+                self.warnings.append(said)
         self.theory_error = self.farthest.error() if self.foreshortened is None else self.foreshortened.theory_error()
         if self.theory_error is not None and (said := self.theory_error.warning()):
             self.warnings.append(said)
@@ -272,25 +292,3 @@ class Simulation:
     def iteration(self) -> Newton:
         """The iteration control that did the work."""
         return self.newton if self.stepper is None else self.stepper.newton
-
-    def _warn_of_what_the_strains_lack(self, history: dict[str, Array]) -> None:
-        """Warn where a structure moves in a way that its theory's strains do not stiffen by the spin."""
-        structure, theory = self.system.structure, self.problem.theory
-        spins = np.any(history.get("psi_dot", np.zeros(1)) != 0.0)
-        if not structure.unstiffened or theory.exact or not spins or "centrifugal" not in self.system.model.effects:
-            return
-        size = float(np.max(np.abs(history["tip_u2"]), initial=0.0)) / structure.length
-        if size > NOTICED:
-            self.warnings.append(
-                f"the tip moves by up to {size:.2g} L in the plane: the strains of {theory.name} for this structure "
-                f'leave out the stiffening of such motions by the spin; model.theory = "{richest().name}" has it'
-            )
-
-
-def better_theories(theory: Theory) -> str:
-    """Return which theories to use in the place of a linear one that diverged."""
-    exact = richest().name
-    if theory.prestress:
-        return f'use model.theory = "{exact}", which holds for any deflection'
-    stiffened = next(t.name for t in theories() if t.linear and t.prestress)
-    return f'use model.theory = "{stiffened}" for small or "{exact}" for any deflection'

@@ -108,6 +108,8 @@ def run_summary(run: Simulation, status: str, history: dict[str, npt.NDArray[np.
         out["reduced"]["foreshortening"] = run.foreshortened.summary()
     if run.error is not None:
         out["error"] = run.error.summary()
+    if run.left_out is not None:
+        out["left_out"] = run.left_out
     if run.theory_error is not None:
         out["theory_error"] = run.theory_error.summary()
     if run.stability is not None:

@@ -17,7 +17,7 @@ from rotfem.equations.system import System
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
-from rotfem.numerics.linear import combine
+from rotfem.numerics.linear import DirectSolver, Increment, combine
 
 __all__ = ["PRESTRESS", "AffineSystem"]
 
@@ -49,6 +49,7 @@ class AffineSystem(System):
         self._coefficients: Array | None = None
         self._shift: tuple[float, float, float] | None = None
         self._changed = True
+        self._at_rest: tuple[DirectSolver, Increment] | None = None
         self.settled = False
         return pattern.duplicate()
 
@@ -64,6 +65,13 @@ class AffineSystem(System):
         left_out = set(effects)
         self._weights = np.array([0.0 if left_out & p.of else 1.0 for p in self.pieces])
         self._coefficients = None
+
+    def displaced(self) -> Array:
+        """Return the displacement (local dof array) of the structure at rest under the loads at the time set."""
+        if self._at_rest is None:
+            self._at_rest = DirectSolver(self.material, symmetric=True), Increment(self.V)
+        solver, x = self._at_rest
+        return -x.solve(solver, self._load)
 
     @property
     def material(self) -> Any:

@@ -55,6 +55,7 @@ class EnergyBalance(Solutions):
         self.system, self.model, self.comm = system, system.model, system.comm
         self.seconds, self._dx, self._solver = system.seconds, system._dx, None
         self._k = system.structure.k
+        *self._functions, self._test = self._k.functions
         self._start, self._end, self._before, self._ahead, self._move = (fem.Function(system.V) for _ in range(5))
         self._shifts = [system.structure.constant(c) for c in (1.0, 0.0, 0.0)]
         self._F, self._J = forms.form(self._residual), forms.form(self._tangent)
@@ -78,7 +79,7 @@ class EnergyBalance(Solutions):
         return sum(term for name, term in self.model.terms.items() if name != INTERNAL.name)
 
     def _at(self, strain: Any, q: Any) -> Any:
-        return ufl.replace(strain.value, {self._k.q: q})
+        return ufl.replace(strain.value, {self._functions[0]: q})
 
     @property
     def _residual(self) -> Any:
@@ -92,14 +93,14 @@ class EnergyBalance(Solutions):
     def _tangent(self) -> Any:
         """The derivative, with stresses that are linear in the last correction (see `PointStresses`)."""
         k, du = self._k, ufl.TrialFunction(self.system.V)
-        J = sum(c * ufl.derivative(self._others, x, du) for c, x in zip(self._shifts, (k.q, k.v, k.a), strict=True))
+        J = sum(c * ufl.derivative(self._others, x, du) for c, x in zip(self._shifts, self._functions, strict=True))
         for s in self.model.mechanics.strains:
             change = ufl.derivative(self._at(s, self._end), self._end, du)  # twice the half of it: q_1 = 2q − q_0
             before = self._at(s, self._before)
             end = before + ufl.derivative(before, self._before, self._ahead)
             mean, varied = (self._at(s, self._start) + end) / 2, k.variation(s.value)
             J += ufl.inner(s.force(change), varied) * s.measure
-            J += ufl.inner(s.force(mean), ufl.derivative(varied, k.q, du)) * s.measure
+            J += ufl.inner(s.force(mean), ufl.derivative(varied, self._functions[0], du)) * s.measure
         return J
 
     @cached_property
@@ -110,7 +111,7 @@ class EnergyBalance(Solutions):
     def _work(self) -> Any:
         """F of the terms that have no part in the energy, on Δq; None if there are none."""
         terms = self.model.terms_without_energy()
-        return forms.form(ufl.replace(sum(terms), {self._k.dq: self._move})) if terms else None
+        return forms.form(ufl.replace(sum(terms), {self._test: self._move})) if terms else None
 
     @cached_property
     def _N(self) -> Any:

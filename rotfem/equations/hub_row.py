@@ -43,9 +43,9 @@ class HubRow:
 
     @cached_property
     def _row(self) -> tuple[list[Any], Any]:
-        k = self.system.structure.k
+        *state, dq = self.system.structure.k.functions
         shifts = [self.system.structure.constant(0.0) for _ in range(3)]
-        parts = (ufl.derivative(self._work, x, k.dq) for x in (k.q, k.v, k.a))
+        parts = (ufl.derivative(self._work, x, dq) for x in state)
         return shifts, forms.form(sum(c * part for c, part in zip(shifts, parts, strict=True)))
 
     def _value(self, form: Any) -> float:

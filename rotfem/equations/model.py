@@ -17,6 +17,7 @@ from rotfem.mechanics.effects import INERTIA, INTERNAL, LOADS, Effect
 from rotfem.mechanics.frame import Frame
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
+from rotfem.mechanics.sums import added
 from rotfem.mechanics.work import Mechanics, RigidTurn, Variation
 from rotfem.numerics import forms
 from rotfem.registry import resolved
@@ -105,7 +106,7 @@ class Model:
     @property
     def residual(self) -> Any:
         """F(q, v, a; δq), a UFL form."""
-        return sum(self.terms.values())
+        return added(self.terms.values())
 
     @cached_property
     def turn(self) -> RigidTurn:
@@ -127,7 +128,7 @@ class Model:
         potentials = [resolved(effect.potential)(m) for effect in acting if effect.potential is not None]
         potentials = [potential for potential in potentials if not isinstance(potential, int)]
         if potentials:
-            out["potential"] = sum(potentials)
+            out["potential"] = added(potentials)
         return out
 
     def energy(self) -> Any:

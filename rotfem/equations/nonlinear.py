@@ -15,6 +15,7 @@ from ufl.algorithms import expand_derivatives
 from rotfem.equations.energy_balance import EnergyBalance
 from rotfem.equations.point_stresses import PointStresses
 from rotfem.equations.system import System
+from rotfem.mechanics.sums import added
 from rotfem.numerics import compat, forms
 
 Array = npt.NDArray[np.float64]
@@ -38,7 +39,7 @@ class NonlinearSystem(System):
     def _tangent_form(self) -> Any:
         F, du = self.model.residual, ufl.TrialFunction(self.V)
         parts = (ufl.derivative(F, x, du) for x in (self.q, self.v, self.a))
-        return sum(c * form for c, form in zip(self._shifts, parts, strict=True))
+        return added(c * form for c, form in zip(self._shifts, parts, strict=True))
 
     @cached_property
     def balance(self) -> EnergyBalance:

@@ -72,7 +72,7 @@ class Pieces:
 
     def __init__(self, model: Model, bcs: list[Any], clamped: npt.NDArray[Any]):
         self.model, self.structure, self.bcs, self.clamped = model, model.structure, bcs, clamped
-        self.q, self.V = model.structure.k.q, model.structure.V
+        self.q, self.V = model.structure.k.functions[0], model.structure.V
         self.assembled = 0.0
         loads = {name: constant for name, (constant, _) in self.structure.load_constants.items()}
         self.at_rest = self._forms_at_rest()
@@ -91,8 +91,8 @@ class Pieces:
 
     def _forms_at_rest(self) -> dict[str, Any]:
         """Return f, K, C and M at q = v = a = 0 as UFL forms; those that vanish are left out."""
-        k = self.structure.k
-        at_rest = {kind: forms.without(f, k.q) for kind, f in forms.at_rest(self.model.residual, k.q, k.v, k.a).items()}
+        *state, _ = self.structure.k.functions
+        at_rest = {kind: forms.without(f, self.q) for kind, f in forms.at_rest(self.model.residual, *state).items()}
         return {kind: form for kind, form in at_rest.items() if not form.empty()}
 
     def _zero_constants(self) -> None:

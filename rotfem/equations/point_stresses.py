@@ -36,7 +36,7 @@ class PointStresses:
 
     def __init__(self, mechanics: Mechanics, V: fem.FunctionSpace):
         self.mechanics = mechanics
-        self._q = mechanics.k.q
+        self._q = mechanics.k.functions[0]
         self._before, self._step = fem.Function(V), fem.Function(V)
         self._now, self._p, self._d = (x.x.array for x in (self._q, self._before, self._step))
 
@@ -51,6 +51,6 @@ class PointStresses:
         for s in self.mechanics.strains:
             before = ufl.replace(s.value, {self._q: self._before})
             linear = before + ufl.derivative(before, self._before, self._step)
-            bent = ufl.derivative(k.variation(s.value), k.q, trial)
+            bent = ufl.derivative(k.variation(s.value), self._q, trial)
             out += ufl.inner(s.force(linear - s.value), bent) * s.measure
         return out

@@ -65,8 +65,8 @@ class System(Solutions, ABC):
     def __init__(self, model: Model, moving: bool = True):
         self.model, self.structure, self.motion, self.moving = model, model.structure, model.motion, moving
         self.comm = model.comm
-        k = self.structure.k
-        self.q, self.v, self.a, self.V = k.q, k.v, k.a, self.structure.V
+        self.q, self.v, self.a, _ = self.structure.k.functions
+        self.V = self.structure.V
         self._state = tuple(x.x.array for x in (self.q, self.v, self.a))
         self.scale = self.structure.scales()
         self.time = self.assembled = 0.0
@@ -247,13 +247,14 @@ class System(Solutions, ABC):
     def sizes(self, x: Array) -> Array:
         """Return the largest entry of each component in units of `scale`, over all ranks, shape (components,)."""
         here = (np.abs(x) / self.scale).reshape(-1, self.V.dofmap.index_map_bs).max(axis=0, initial=0.0)
+        here = self.structure.whole_values(here)
         if self.comm.size > 1:
             self.comm.Allreduce(MPI.IN_PLACE, here, op=MPI.MAX)
         return np.asarray(here)
 
     def tip(self, q: Array, t: float) -> Array:
         """Return the values of the unknowns at the tip, relative to the turning frame, shape (components,)."""
-        tip = self.structure.tip_values(self.structure.total(q))
+        tip = self.structure.whole_values(self.structure.tip_values(self.structure.total(q)))
         return tip if self.clamp is None else self.clamp.relative(tip[None, :], self.structure.length, t)[0]
 
     def shape(self) -> dict[str, Array]:

@@ -112,21 +112,39 @@ class Damping:
 
 @dataclass(frozen=True)
 class Kinematics:
-    """The unknown and its rates: coefficients q, v = q̇, a = q̈ and the test function dq of one space."""
+    """The unknown and its rates, q, v = q̇, a = q̈, and its variation dq: all components that a structure has.
+
+    Attributes:
+        made_of: see `functions`; None for themselves.
+        varied: another function that q is made of too, and its test function, where the equations are those of it.
+    """
 
     q: Any
     v: Any
     a: Any
     dq: Any
+    made_of: tuple[Any, Any, Any, Any] | None = None
+    varied: tuple[Any, Any] | None = None
+
+    @property
+    def functions(self) -> tuple[Any, Any, Any, Any]:
+        """The coefficients q, v, a and the test function of the space of the unknowns.
+
+        Themselves, unless components are left out, which then are zeros in q, v, a and dq.
+        """
+        return self.made_of or (self.q, self.v, self.a, self.dq)
 
     def rate(self, x: Any) -> Any:
         """Return ẋ of an expression x(q)."""
-        return ufl.derivative(x, self.q, self.v)
+        q, v, _, _ = self.functions
+        return ufl.derivative(x, q, v)
 
     def second_rate(self, x: Any) -> Any:
         """Return ẍ of an expression x(q)."""
-        return ufl.derivative(x, self.q, self.a) + ufl.derivative(self.rate(x), self.q, self.v)
+        q, v, a, _ = self.functions
+        return ufl.derivative(x, q, a) + ufl.derivative(self.rate(x), q, v)
 
     def variation(self, x: Any) -> Any:
         """Return δx of an expression x(q)."""
-        return ufl.derivative(x, self.q, self.dq)
+        q, _, _, dq = self.functions
+        return ufl.derivative(x, *(self.varied or (q, dq)))

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import ufl
+from ufl.algorithms import extract_coefficients
+from ufl.constantvalue import Zero
 
 
 @dataclass(frozen=True)
@@ -27,12 +29,12 @@ class PlateGradients:
     @property
     def du(self) -> Any:
         """u_γ,β, shape (2, 2)."""
-        return ufl.as_matrix([[self.q[i].dx(j) for j in range(2)] for i in range(2)])
+        return ufl.as_matrix([[along(self.q[i], j) for j in range(2)] for i in range(2)])
 
     @property
     def dw(self) -> Any:
         """u_3,β, shape (2,)."""
-        return ufl.as_vector([self.q[2].dx(j) for j in range(2)])
+        return ufl.as_vector([along(self.q[2], j) for j in range(2)])
 
     @property
     def alpha(self) -> Any:
@@ -42,13 +44,23 @@ class PlateGradients:
     @property
     def dalpha(self) -> Any:
         """alpha_γ,β, shape (2, 2)."""
-        return ufl.as_matrix([[self.q[3 + i].dx(j) for j in range(2)] for i in range(2)])
+        return ufl.as_matrix([[along(self.q[3 + i], j) for j in range(2)] for i in range(2)])
 
     @property
     def dr(self) -> Any:
         """r_i,β, shape (3, 2)."""
         du, dw = self.du, self.dw
         return ufl.as_matrix([[1 + du[0, 0], du[0, 1]], [du[1, 0], 1 + du[1, 1]], [dw[0], dw[1]]])
+
+
+def along(component: Any, j: int) -> Any:
+    """Return ∂/∂x_j of one of the unknowns, 0 of one that is left out."""
+    return 0 if isinstance(component, Zero) else component.dx(j)
+
+
+def gradient(t: Any) -> Any:
+    """Return t_i,β of a director, shape (3, 2), 0 of one that stands still."""
+    return ufl.grad(t) if extract_coefficients(t) else ufl.zero(3, 2)
 
 
 def triad(alpha: Any) -> tuple[Any, Any, Any]:

@@ -49,6 +49,7 @@ class Problem:
         frame: "rotating", or "inertial" (translates with the hub, does not rotate).
         terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form, as of an `Effect`.
         outputs: functionals that are recorded, by name, mechanics ↦ UFL form, as of an `Output`.
+        left_out: names of the unknowns that are zero at all times and are none (see `rotfem.selection.left_out`).
     """
 
     structure: Any
@@ -60,6 +61,7 @@ class Problem:
     frame: str = "rotating"
     terms: Mapping[str, Work] = field(default_factory=dict)
     outputs: Mapping[str, Functional] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("terms", "outputs"):

@@ -21,6 +21,7 @@ from ufl import cross
 
 from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, Strain
 from rotfem.mechanics.frame import Frame
+from rotfem.mechanics.sums import added
 
 
 @dataclass(frozen=True)
@@ -93,12 +94,8 @@ class Mechanics:
 
 def _of_acceleration(m: Mechanics, delta: Any, acceleration: Callable[[Body], Any]) -> Any:
     """Return Σ ∫ ρ a·δx over the bodies that feel an acceleration."""
-    work: Any = 0
-    for body in m.bodies:
-        a = acceleration(body)
-        if a is not None:
-            work += body.density * ufl.inner(a, delta.of(body)) * body.measure
-    return work
+    felt = ((body, a) for body in m.bodies if (a := acceleration(body)) is not None)
+    return added(body.density * ufl.inner(a, delta.of(body)) * body.measure for body, a in felt)
 
 
 def inertia(m: Mechanics, delta: Any) -> Any:
@@ -133,7 +130,7 @@ def gravity(m: Mechanics, delta: Any) -> Any:
 
 def internal(m: Mechanics, delta: Variation) -> Any:
     """Return δ(∫ ½ Γ·C Γ): the work of the stresses is the derivative of the stored energy."""
-    return sum(ufl.derivative(s.energy, m.k.q, m.k.dq) for s in m.strains)
+    return added(m.k.variation(s.energy) for s in m.strains)
 
 
 def damping(m: Mechanics, delta: Variation) -> Any:
@@ -141,18 +138,18 @@ def damping(m: Mechanics, delta: Variation) -> Any:
 
     The mass part acts on the velocity relative to the frame; the stiffness part a1 adds to η.
     """
-    work: Any = 0
+    work: list[Any] = []
     k, eta, a0 = m.k, m.damping.stiffness, m.damping.mass
     if eta is not None:
-        work += sum(ufl.inner(eta * s.force(k.rate(s.value)), k.variation(s.value)) * s.measure for s in m.strains)
+        work += [ufl.inner(eta * s.force(k.rate(s.value)), k.variation(s.value)) * s.measure for s in m.strains]
     if a0 is not None:
-        work += sum(a0 * b.density * ufl.inner(b.rate(k), delta.of(b)) * b.measure for b in m.bodies)
-    return work
+        work += [a0 * b.density * ufl.inner(b.rate(k), delta.of(b)) * b.measure for b in m.bodies]
+    return added(work)
 
 
 def loads(m: Mechanics, delta: Any) -> Any:
     """Return −Σ ∫ (force · δx) over applied forces and moments."""
-    return -sum(ufl.inner(load.force, delta.of(load)) * load.measure for load in m.loads)
+    return added(-ufl.inner(load.force, delta.of(load)) * load.measure for load in m.loads)
 
 
 # --- momentum and energies --------------------------------------------------------------------------------------------
@@ -160,19 +157,19 @@ def loads(m: Mechanics, delta: Any) -> Any:
 
 def momentum(m: Mechanics, delta: Any) -> Any:
     """Return Σ ∫ ρ (ẋ + w×x)·δx, a UFL form: of a rigid turn the angular momentum about its axis."""
-    return sum(b.density * ufl.inner(delta.of(b), m.velocity(b)) * b.measure for b in m.bodies)
+    return added(b.density * ufl.inner(delta.of(b), m.velocity(b)) * b.measure for b in m.bodies)
 
 
 def strain_energy(m: Mechanics) -> Any:
     """Return ∫ ½ Γ·C Γ (J), a UFL form."""
-    return sum(s.energy for s in m.strains)
+    return added(s.energy for s in m.strains)
 
 
 def kinetic_parts(m: Mechanics) -> dict[str, Callable[[], Any]]:
     """Return T2, T1, T0 of T = ∫ ½ρ |ẋ + w×x|², by degree in the velocities relative to the frame (J), as UFL forms."""
 
     def product(first: Callable[[Body], Any], second: Callable[[Body], Any]) -> Any:
-        return sum(b.density * ufl.inner(first(b), second(b)) * b.measure for b in m.bodies)
+        return added(b.density * ufl.inner(first(b), second(b)) * b.measure for b in m.bodies)
 
     def relative(body: Body) -> Any:
         return body.rate(m.k)
@@ -186,7 +183,7 @@ def kinetic_parts(m: Mechanics) -> dict[str, Callable[[], Any]]:
 
 def _potential_in(m: Mechanics, field: Any) -> Any:
     """Return −∫ ρ field·x over the positions, field an acceleration (m/s²)."""
-    return -sum(b.density * ufl.inner(field, b.x) * b.measure for b in m.bodies if b.is_position)
+    return added(-b.density * ufl.inner(field, b.x) * b.measure for b in m.bodies if b.is_position)
 
 
 def potential_of_base(m: Mechanics) -> Any:
@@ -201,4 +198,4 @@ def potential_of_gravity(m: Mechanics) -> Any:
 
 def potential_of_loads(m: Mechanics) -> Any:
     """Return −Σ ∫ force·x over the dead loads."""
-    return -sum(ufl.inner(load.force, load.x) * load.measure for load in m.loads if load.dead)
+    return added(-ufl.inner(load.force, load.x) * load.measure for load in m.loads if load.dead)

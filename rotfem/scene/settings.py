@@ -56,6 +56,7 @@ class Model(SceneModel):
         on_exceed: what a run does that leaves the range its model was chosen for.
         reduced: whether a history is that of a reduced model, of a linear theory; a number is its accuracy.
         foreshortening: whether a reduced model gives back the foreshortening that linear strains lack.
+        all_unknowns: whether unknowns that are zero by symmetry are unknowns of a history all the same.
     """
 
     theory: Annotated[str, PlainValidator(_as_theory)] = "reissner"
@@ -65,6 +66,7 @@ class Model(SceneModel):
     on_exceed: Literal["upgrade", "stop", "warn"] = "upgrade"
     reduced: Annotated[bool | float, PlainValidator(_as_reduced)] = False
     foreshortening: bool = False
+    all_unknowns: bool = False
 
     @model_validator(mode="after")
     def _check_choice(self) -> Self:

@@ -42,9 +42,9 @@ class Snapshots:
         self._count += 1
 
 
-def writer(V: fem.FunctionSpace, name: str, states: Iterable[tuple[float, Array]]) -> Any:
-    """Return the function that writes displacement fields into a folder (see `write`)."""
-    return partial(write, V, name, list(states))
+def writer(structure: Any, name: str, states: Iterable[tuple[float, Array]]) -> Any:
+    """Return the function that writes displacement fields of a structure into a folder (see `write`)."""
+    return partial(write, structure, name, list(states))
 
 
 def size_of_one(W: fem.FunctionSpace, fields: int) -> int:
@@ -79,11 +79,11 @@ def reserve(comm: Any, path: Path, size: int) -> None:
         raise problem
 
 
-def write(V: fem.FunctionSpace, name: str, states: list[tuple[float, Array]], folder: Path) -> list[Path]:
+def write(structure: Any, name: str, states: list[tuple[float, Array]], folder: Path) -> list[Path]:
     """Write the displacements of local dof arrays as name.bp (VTX), or name.xdmf without ADIOS2; return the path.
 
     Args:
-        V: space of the plate's five unknowns.
+        structure: the plate.
         name: of the file, without ending.
         states: (time in s or number of the mode, dof array); a complex one gives the fields of both its parts.
         folder: where the file goes.
@@ -91,6 +91,7 @@ def write(V: fem.FunctionSpace, name: str, states: list[tuple[float, Array]], fo
     Raises:
         OutputError: it cannot be written.
     """
+    V = structure.V
     mesh, degree, vtx = V.mesh, V.element.basix_element.degree, hasattr(io, "VTXWriter")
     W = fem.functionspace(mesh, element("Lagrange", mesh.basix_cell(), degree if vtx else 1, shape=(3,)))
     full = fem.functionspace(mesh, element("Lagrange", mesh.basix_cell(), degree, shape=(3,)))
@@ -113,7 +114,8 @@ def write(V: fem.FunctionSpace, name: str, states: list[tuple[float, Array]], fo
         with file:
             for t, q in states:
                 for f, part in zip(out, parts, strict=True):
-                    own = part(q[:size]).reshape(-1, V.dofmap.index_map_bs)[:, :3].ravel()
+                    nodal = structure.whole_values(part(q[:size]).reshape(-1, V.dofmap.index_map_bs))
+                    own = nodal[:, :3].ravel()
                     whole.x.array[: len(own)] = own
                     whole.x.scatter_forward()
                     f.interpolate(whole)

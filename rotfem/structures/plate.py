@@ -63,6 +63,8 @@ class Plate(Structure):
 
     type = "plate"
     components = ("u1", "u2", "u3", "alpha1", "alpha2")
+    planes: ClassVar = {2: (0, 1)}
+    across: ClassVar = {2: (2, 3, 4)}
     prestressing: ClassVar = ("membrane",)
     stiff: ClassVar = ("shear",)
     unstiffened: ClassVar = ("in-plane",)
@@ -97,7 +99,7 @@ class Plate(Structure):
         self.tip = self.grid.along("tip") if self._has_tip else None
         self.tip_values = TipValues(self.V, self._tip_point(low, high))
         self._properties()
-        self.turns = DirectorTurns.of(self)
+        self.turns = DirectorTurns.of(self) if self.size == len(self.components) else None
 
     # --- mesh -------------------------------------------------------------------------------------------------------
 
@@ -291,5 +293,5 @@ class Plate(Structure):
         Raises:
             ComputationError: says how far it has come.
         """
-        if self.turns is None:
+        if self.turns is None and self.size == len(self.components):
             check_directors(self, q, time)

@@ -22,7 +22,7 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
+from rotfem.mechanics.bodies import AppliedLoad, Body, Kinematics, Strain
 from rotfem.mechanics.loads import Load
 from rotfem.mechanics.problem import Problem
 from rotfem.structures.beam import Beam
@@ -55,6 +55,8 @@ class SpatialBeam(Beam):
     type = "spatial_beam"
     planar = False
     components = ("u1", "u2", "u3", "theta1", "theta2", "theta3")
+    planes: ClassVar = {1: (0, 2, 4), 2: (0, 1, 5)}
+    across: ClassVar = {1: (1, 5), 2: (2, 4)}
     dimension = 3
     #: Conjugates of the tip's components: inputs of the state-space model (a moment works on θ there).
     tip_inputs = ("tip_force_1", "tip_force_2", "tip_force_3", "tip_moment_1", "tip_moment_2", "tip_moment_3")
@@ -66,7 +68,6 @@ class SpatialBeam(Beam):
         knots = {x for x, _ in s.pretwist[1:-1]} if isinstance(s.pretwist, tuple) else set()
         bends = {x for x, _ in s.sweep[1:-1]} if isinstance(s.sweep, tuple) else set()
         super().__init__(problem, comm, tuple(sorted(knots | bends | set(s.section.breakpoints))))
-        self._turn = SectionTurn(rotation_part(self.k.q), exact=not problem.theory.linear)
         self._forms = SectionForms(self, s.section)
         if s.hub_offset is None:
             self._root = ufl.as_vector((self.scalar("hub_radius", s.hub_radius), 0, 0))
@@ -74,7 +75,12 @@ class SpatialBeam(Beam):
             parts = [self.scalar(f"hub_offset_{i}", x) for i, x in enumerate(s.hub_offset, start=1)]
             self._root = ufl.as_vector(parts)
         self._triad = self._undeformed_triad()
-        self.turns = SectionTurns.of(self)
+        self.turns = SectionTurns.of(self) if self.size == len(self.components) else None
+
+    def use(self, kinematics: Kinematics) -> None:
+        """Take these unknowns, and the turn of the sections that they are."""
+        super().use(kinematics)
+        self._turn = SectionTurn(rotation_part(kinematics.q), exact=not self.problem.theory.linear)
 
     # --- the undeformed beam ------------------------------------------------------------------------------------
 
@@ -197,8 +203,11 @@ class SpatialBeam(Beam):
     def check_range(self, q: Array, time: float | None = None) -> None:
         """Refuse a state in which some section has turned by more than a turn, where that is not counted from a datum.
 
+        In a plane a rotation vector has one component, and no limit.
+
         Raises:
             ComputationError: says where.
         """
-        if self.turns is None:
+        in_plane = self.size < len(self.components) and self.problem.theory.exact
+        if self.turns is None and not in_plane:
             check_sections(self, q, time)

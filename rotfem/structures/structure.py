@@ -49,6 +49,10 @@ class Structure:
     planar: ClassVar[bool] = False
     #: Names of the unknowns.
     components: ClassVar[tuple[str, ...]]
+    #: Direction that is normal to a plane of symmetry ↦ the components of motions in that plane.
+    planes: ClassVar[dict[int, tuple[int, ...]]] = {}
+    #: Direction of forces ↦ the components that, in a linear theory, may be moved by them alone.
+    across: ClassVar[dict[int, tuple[int, ...]]] = {}
     #: Components of a force.
     dimension: ClassVar[int] = 3
     #: Strains whose force makes geometric stiffness in the prestressed linear theories.
@@ -72,7 +76,9 @@ class Structure:
 
     def __init__(self, problem: Problem, comm: MPI.Comm):
         self.problem, self.comm, self.data = problem, comm, problem.structure
-        self.size = len(self.components)
+        #: Numbers of the components that are unknowns; the others are left out, and zero.
+        self.kept = tuple(i for i, name in enumerate(self.components) if name not in problem.left_out)
+        self.size = len(self.kept)
         #: Section properties by name: a constant each where the section is uniform, a field each where it is not.
         self.section: dict[str, Any] = {}
         #: Single numbers that the forms contain, by name.
@@ -86,7 +92,45 @@ class Structure:
         self.mesh = mesh
         self.V = fem.functionspace(mesh, element("Lagrange", mesh.basix_cell(), degree, shape=(self.size,)))
         q, v, a = (fem.Function(self.V, name=name) for name in "qva")
-        self.k = Kinematics(q, v, a, ufl.TestFunction(self.V))
+        self.use(self.kinematics((q, v, a, ufl.TestFunction(self.V))))
+
+    def use(self, kinematics: Kinematics) -> None:
+        """Take these unknowns for those that positions, strains, bodies and loads are written in."""
+        self.k = kinematics
+
+    def kinematics(self, functions: tuple[Any, Any, Any, Any], beside: tuple[Any, Any] | None = None) -> Kinematics:
+        """Return q, v, a and δq with all components, made of functions of those kept, zeros in the place of others.
+
+        Args:
+            functions: q, v, a and the test function of the components that are kept.
+            beside: q and test function of those that are left out, for equations of their own.
+        """
+        if self.size == len(self.components):
+            return Kinematics(*functions)
+        others = [i for i in range(len(self.components)) if i not in self.kept]
+        if beside is None:
+            q, v, a, dq = (self._whole({c: f[i] for i, c in enumerate(self.kept)}) for f in functions)
+            return Kinematics(q, v, a, dq, made_of=functions)
+        kept = [{c: f[i] for i, c in enumerate(self.kept)} for f in functions[:3]]
+        p, test = ({c: f[i] for i, c in enumerate(others)} for f in beside)
+        q, v, a, dq = (self._whole(parts) for parts in (kept[0] | p, *kept[1:], test))
+        return Kinematics(q, v, a, dq, made_of=functions, varied=beside)
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """Names of the unknowns of a node: of the components that are not left out."""
+        return tuple(self.components[i] for i in self.kept)
+
+    def _whole(self, parts: dict[int, Any]) -> Any:
+        return ufl.as_vector([parts.get(i, 0) for i in range(len(self.components))])
+
+    def whole_values(self, values: Array) -> Array:
+        """Return all components of values (…, unknowns of a node), zeros for those left out."""
+        if self.size == len(self.components):
+            return values
+        out = np.zeros((*values.shape[:-1], len(self.components)), dtype=values.dtype)
+        out[..., self.kept] = values
+        return out
 
     def check_shared(self) -> None:
         """Refuse a mesh that leaves a process without cells or unknowns, where it would fail or wait for ever.
@@ -187,7 +231,7 @@ class Structure:
     def scales(self) -> Array:
         """Return the natural size of every local unknown: length (m) for displacements, 1 for rotations."""
         nodes = self.V.dofmap.index_map.size_local + self.V.dofmap.index_map.num_ghosts
-        return np.tile([self.length if name.startswith("u") else 1.0 for name in self.components], nodes)
+        return np.tile([self.length if name.startswith("u") else 1.0 for name in self.unknowns], nodes)
 
     def gather(self, values: Array) -> tuple[Array, Array]:
         """Return (x, q): positions (n, 3) in m and values (n, components) at all nodes, on every rank.
@@ -197,7 +241,7 @@ class Structure:
         """
         owned = self.V.dofmap.index_map.size_local
         x = self.V.tabulate_dof_coordinates()[:owned]
-        q = values[: self.size * owned].reshape(-1, self.size)
+        q = self.whole_values(values[: self.size * owned].reshape(-1, self.size))
         if self.comm.size == 1:
             return x, q
         return np.concatenate(self.comm.allgather(x)), np.concatenate(self.comm.allgather(q))

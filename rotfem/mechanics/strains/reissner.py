@@ -6,7 +6,7 @@ from typing import Any
 
 import ufl
 
-from rotfem.mechanics.mindlin import PlateGradients, director
+from rotfem.mechanics.mindlin import PlateGradients, director, gradient
 from rotfem.mechanics.rotations import Turn
 
 
@@ -42,4 +42,4 @@ def plate(q: Any, t: Any = None) -> tuple[Any, Any, Any]:
     """
     p = PlateGradients(q)
     dr, t = p.dr, director(p.alpha) if t is None else t
-    return (ufl.dot(dr.T, dr) - ufl.Identity(2)) / 2, ufl.dot(t, dr), -ufl.sym(ufl.dot(dr.T, ufl.grad(t)))
+    return (ufl.dot(dr.T, dr) - ufl.Identity(2)) / 2, ufl.dot(t, dr), -ufl.sym(ufl.dot(dr.T, gradient(t)))
