@@ -63,23 +63,26 @@ def steady_state(
     if past_limits:
         return _followed(system, omega, newton, notes)
     try:
-        q = raised(system, omega, newton)
+        found = raised(system, omega, newton)
     except ComputationError as error:
         path = _path(system, omega, newton, past_limits, notes)
         if path is None or path.share < 1.0:
             raise error if path is None or not path.limits else _at_limit(omega, path) from None
         return counted(system, omega, 1.0, path.q, newton)
-    if not _has_descent(system):
-        return q
-    datum, found = system.datum, system.structure.total(q)
+    if found.sure and not _has_descent(system):
+        return found.q
+    system.count_rotations_from(found.datum)
+    total = system.structure.total(found.q)
     path = _path(system, omega, newton, past_limits, notes)
     if path is not None and path.limits:
         raise _at_limit(omega, path)
     if path is None or path.share < 1.0:
-        system.count_rotations_from(datum)
-        return balance(system, omega, 1.0, q, newton)
-    if system.size(system.structure.total(path.q) - found) > SAME_STATE:
-        notes.append("Newton met another, unstable equilibrium first; this is the one that the growing load leads to")
+        if not found.sure:
+            notes.append("whether this is the equilibrium that the growing load leads to, or another one, is not known")
+        system.count_rotations_from(found.datum)
+        return balance(system, omega, 1.0, found.q, newton)
+    if system.size(system.structure.total(path.q) - total) > SAME_STATE:
+        notes.append("Newton met another equilibrium first; this is the one that the growing load leads to")
     return counted(system, omega, 1.0, path.q, newton)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -29,24 +30,55 @@ SMALLEST_SHARE = 1e-3
 NEAR = 0.3
 
 
-def raised(system: System, omega: float, newton: Newton) -> Array:
-    """Return the equilibrium at full load, in one step or by halved ones."""
+@dataclass
+class Raised:
+    """Where a growing load has led.
+
+    Attributes:
+        q: the equilibrium at full load, a local dof array.
+        datum: what its rotations are counted from.
+        sure: whether it is the one of the growing load; not, where Newton's method wandered to it.
+    """
+
+    q: Array
+    datum: Any
+    sure: bool = True
+
+
+def raised(system: System, omega: float, newton: Newton) -> Raised:
+    """Return the equilibrium at full load, in one step or by halved ones.
+
+    Where there are several equilibria, a way that wanders may end at any of them. Then smaller steps are taken, whose
+    ways do not, and where the load cannot be raised by them, the first equilibrium that was found is returned.
+
+    Raises:
+        ComputationError: none was found; says how far the load got.
+    """
     datum: Any = None
     system.count_rotations_from(datum)
     q, done, share = system.zeros(), 0.0, 1.0
+    other: Raised | None = None
     while done < 1.0:
         target = min(1.0, done + share)
         try:
-            q = counted(system, omega, target, balance(system, omega, target, q, newton), newton)
+            new = balance(system, omega, target, q, newton)
+            wandered = newton.wandered
+            new = counted(system, omega, target, new, newton)
         except BeyondReach as error:
             failure, afresh = error.what, reached(system, q) > NEAR
         except ComputationError as error:
             failure, afresh = error.what, False
         else:
-            done, share, datum = target, 1.5 * share, system.datum
-            continue
+            if not wandered:
+                q, done, share, datum = new, target, 1.5 * share, system.datum
+                continue
+            failure, afresh = "Newton's way was a long one", False
+            if other is None and target == 1.0:
+                other = Raised(new, system.datum, False)
         share /= 2
         if share < SMALLEST_SHARE:
+            if other is not None:
+                return other
             raise ComputationError(
                 f"no steady state at {omega:g} rad/s: the last equilibrium was at {done:.3g} of the load "
                 f"({np.sqrt(done) * omega:.4g} rad/s); {failure}",
@@ -57,7 +89,7 @@ def raised(system: System, omega: float, newton: Newton) -> Array:
             q, _ = recounted(system, q)
             datum = system.datum
     system.structure.check_range(q)
-    return np.asarray(q)
+    return Raised(np.asarray(q), datum)
 
 
 def counted(system: System, omega: float, share: float, q: Array, newton: Newton) -> Array:

@@ -55,6 +55,22 @@ def test_column_without_a_side_stays_straight_and_is_said_to_be_unstable() -> No
     assert float(line.split(" at ")[1].split(" of ")[0]) == pytest.approx(np.pi**2 / 4 * EI / LENGTH**2 / 520, rel=1e-5)
 
 
+def test_newton_does_not_jump_to_another_stable_branch() -> None:
+    """One step of the whole load ends at the buckled shape of the other side, stable too: u₂ = −7.55 m.
+
+    The path of equilibria ends at +7.78 m. Both ways solve the same equations to 1e-9; 1e-6 leaves them the condition of
+    a shape near buckling.
+    """
+    loads = {"tip_force": [-607.9834934025005, 40.88110935649087], "tip_moment": 744.2598935708211}
+    loads["distributed"] = [0.0, 0.01781308616664456]
+    section = {"EA": 2.8e7, "GA": 1.0e7, "EI": EI, "mass_per_length": MASS, "rotary_inertia": 6e-4}
+    scene = column(0.0, loads=loads, mesh={"elements": 6})
+    scene["structure"]["section"] = section
+    tips = [rotfem.run(scene | {"solver": {"continuation": way}}).tip["u2"][-1] for way in ("load", "arc_length")]
+    assert tips[0] > 7.0
+    assert tips[0] == pytest.approx(tips[1], rel=1e-6)
+
+
 def traced(scene: dict[str, Any], past_limits: bool = False) -> LoadPath:
     problem = rotfem.Problem.of(scene)
     system = problem.system(moving=False).held
