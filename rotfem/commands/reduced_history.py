@@ -132,7 +132,7 @@ class Rows:
         if state is None or self.foreshortened is None:
             return state
         q = state.q.copy()
-        q[: len(self.response.model.V)] = self.foreshortened.manifold.shape(self.response.q[i])
+        q[: len(self.response.model.V)] = self.foreshortened.manifold.shape(self.foreshortened.q[i])
         return state.changed(q=q)
 
     def _state(self, i: int, a: Array, turn: tuple[Array, Array, Array]) -> State:

@@ -73,6 +73,11 @@ class AffineSystem(System):
         solver, x = self._at_rest
         return -x.solve(solver, self._load)
 
+    def scale_prestress(self, factor: float) -> None:
+        """Multiply the geometric stiffness by a factor, until effects are switched."""
+        self._weights = np.array([factor if PRESTRESS in p.of else 1.0 for p in self.pieces]) * self._weights
+        self._coefficients = None
+
     @property
     def material(self) -> Any:
         """Stiffness of the strains alone, clamped rows 1."""

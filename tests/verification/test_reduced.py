@@ -199,3 +199,15 @@ def test_effects_are_as_large_as_the_full_models_say(spin_up: MakeScene) -> None
         change = tips(tuple(n for n in names if n != name)) - whole
         truth = float(np.linalg.norm(change, axis=1).max() / np.linalg.norm(whole, axis=1).max())
         assert size == pytest.approx(truth, rel=0.15), name
+
+
+def test_nothing_moves_where_nothing_drives(spin_up: MakeScene) -> None:
+    """A beam at rest has a reduced model of no vectors."""
+    still = spin_up(
+        {"model.theory": "linear", "model.reduced": True},
+        motion={"type": "constant", "speed": 0.0},
+        time={"end": 1.0, "step": 0.1},
+    )
+    result = run(still)
+    assert result.summary["reduced"]["vectors"] == 0
+    assert np.array_equal(result.history["tip_u2"], np.zeros(11))

@@ -36,6 +36,10 @@ Array = npt.NDArray[np.float64]
 #: Amplitude of a shape, relative to the largest, from which its foreshortening matters, and most shapes.
 MATTERS, MOST = 2e-3, 6
 
+#: By how many times its stretch the geometric stiffness of a structure may be off: forces N⁰ change stiffnesses by N⁰
+#: over that of shear, a few times less than that of the membrane, and the tip shows the mean of the stretch only.
+STRETCHED = 4.0
+
 
 @dataclass(frozen=True)
 class Motion2:
@@ -124,7 +128,7 @@ class Manifold:
         """Return the displacement (local dof array) of coordinates (m,)."""
         return np.asarray(self.model.V @ q + self.Theta @ self.second(q[None, :]).s[0])
 
-    def forces(self, c: Array, q: Array, v: Array, a: Array) -> Array:
+    def forces(self, c: Array, q: Array, v: Array, a: Array, third: bool) -> Array:
         """Return the forces of inertia and loads that the linear equations lack, on the tangent, (n, m).
 
         Args:
@@ -132,16 +136,19 @@ class Manifold:
             q: coordinates, (n, m).
             v: rates.
             a: accelerations.
+            third: whether with those of third order, to which the rate of the speed counts as of first.
         """
         m, motion, p = self.model.size, self.second(q, v, a), len(self.pairs)
         on_basis, on_pairs = np.zeros((len(q), m)), np.zeros((len(q), p))
         for kind, x, s in (("M", a, motion.a), ("C", v, motion.v), ("K", q, motion.s)):
             numbers, second, first = self._pieces[kind]
             for number, P, B in zip(numbers, second, first, strict=True):
+                if not third and any(name == "dw" for name, _ in self.model.system.pieces[number].key):
+                    continue
                 weight = c[:, number, None]
                 both = weight * (s @ P.T)
                 on_basis += both[:, :m]
-                on_pairs += both[:, m:] + weight * (x @ B.T)
+                on_pairs += weight * (x @ B.T) + third * both[:, m:]
         return on_basis + self._along(q, on_pairs)
 
     def _along(self, q: Array, on_pairs: Array) -> Array:
@@ -153,32 +160,49 @@ class Manifold:
             out[:, j] += force * x[:, i]
         return out @ self.shapes.T
 
-    def correction(self, solution: Solution, path: Trajectory) -> Array:
+    def correction(self, solution: Solution, path: Trajectory, third: bool = True) -> Array:
         """Return the answer of the linear equations to the forces that they lack on a trajectory, (rows, m).
 
         Args:
             solution: of the trajectory.
             path: one by collocation, which has no vibrations faster than its steps: their forces average to nothing.
+            third: see `forces`.
         """
         model = self.model
 
         def lacking(t: Array) -> Array:
             q, v = path.at(t)
             c = solution.drive.factors(t)
-            return self.forces(c, q, v, model.accelerations(c, q, v))
+            return self.forces(c, q, v, model.accelerations(c, q, v), third)
 
         return solution.answer(model, lacking).q
 
 
 def recover(response: Response) -> Foreshortened:
-    """Return a response with its foreshortening, and an estimate of what is left, the answer to the forces it lacks."""
-    manifold = Manifold(response)
-    solution = response.solution
+    """Return a response with its foreshortening and the answer to the forces of second order.
+
+    The forces of third order, which cubic terms of the strains oppose, move it by what is taken as the error left; to
+    it comes what the stretch may do that linear theories take for none.
+    """
+    manifold, solution = Manifold(response), response.solution
     path = solution.resolved(response.model, response.trajectory)
-    tips, left = manifold.tip(path.q), manifold.correction(solution, path)
+    second, all_of_them = (manifold.correction(solution, path, third) for third in (False, True))
+    tips = manifold.tip(response.q + second)
     size = largest(response.model, tips)
-    off = largest(response.model, manifold.tip(path.q + left) - tips) / size if size > 0.0 else 0.0
-    return Foreshortened(response, manifold, off)
+    off = largest(response.model, manifold.tip(response.q + all_of_them) - tips) / size if size > 0.0 else 0.0
+    return Foreshortened(response, manifold, response.q + second, off + (_stretched(response) / size if size else 0.0))
+
+
+def _stretched(response: Response) -> float:
+    """Return how far the tip is with a geometric stiffness that is off by what the stretch may do to it, m."""
+    model, solution = response.model, response.solution
+    stretch = float(np.abs(response.tips[:, 0]).max(initial=0.0)) / model.system.structure.length
+    model.system.scale_prestress(1 + STRETCHED * stretch)
+    try:
+        other = solution.again().solve(model, response.q[0], response.v[0]).q
+    finally:
+        solution.drive.whole.leave_out(())
+    return largest(model, (other - response.q) @ tips_of(model).T)
 
 
 @dataclass(frozen=True)
@@ -188,21 +212,23 @@ class Foreshortened:
     Attributes:
         response: the linear one.
         manifold: on which it moves.
+        q: coordinates in the rows, (n, m), with what the forces of second order add to those of the response.
         error: estimate of what the foreshortened displacements are off, relative to the largest of the tip.
     """
 
     response: Response
     manifold: Manifold
+    q: Array
     error: float
 
     @property
     def tips(self) -> Array:
         """The unknowns at the tip in all rows, (n, components)."""
-        return self.manifold.tip(self.response.q)
+        return self.manifold.tip(self.q)
 
     def theory_error(self) -> TheoryError:
         """Return the error of the theory as far as the foreshortening does not take it away."""
-        basis = "its foreshortening is given back; the forces of second order that it lacks"
+        basis = "its foreshortening is given back; the forces of third order that it lacks"
         return TheoryError(self.error, basis, self.response.model.system.model.theory.name)
 
     def summary(self) -> dict[str, Any]:

@@ -39,8 +39,8 @@ class ReducedModel:
         self.V: Array = np.empty((len(system.zeros()), 0))
         owned = self.V[self.owned]
         self._products = {i: owned for kind in "MCK" for i in self.kinds[kind]}
-        loads = [system.pieces[i].operator.array for i in self.kinds["f"]]
-        self._loads = np.array(loads).reshape(len(loads), -1)[:, self.owned]
+        loads = [system.pieces[i].operator.array[self.owned] for i in self.kinds["f"]]
+        self._loads = np.array(loads).reshape(len(loads), self.owned.stop)
         self.small: dict[str, Array] = {kind: np.empty((len(self.kinds[kind]), 0, 0)) for kind in "MCK"}
         self.small["f"] = np.empty((len(self.kinds["f"]), 0))
         self._increment = Increment(system.V)
@@ -100,8 +100,7 @@ class ReducedModel:
 
     def operators(self, c: Array) -> tuple[Array, Array, Array, Array]:
         """Return M, C, K (n, m, m) and f (n, m) from the factors of all pieces (n, pieces)."""
-        m = self.size
-        M, C, K = ((c[:, self.kinds[k]] @ self.small[k].reshape(-1, m * m)).reshape(-1, m, m) for k in "MCK")
+        M, C, K = (np.asarray(np.tensordot(c[:, self.kinds[k]], self.small[k], 1)) for k in "MCK")
         return M, C, K, c[:, self.kinds["f"]] @ self.small["f"]
 
     def accelerations(self, c: Array, q: Array, v: Array) -> Array:

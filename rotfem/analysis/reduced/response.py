@@ -255,7 +255,7 @@ def tips_of(model: ReducedModel, shapes: Array | None = None) -> Array:
     """Return the unknowns at the tip of shapes, a local dof array a column, of the basis if None; (components, m)."""
     shapes = model.V if shapes is None else shapes
     columns = [model.system.structure.tip_values(column.copy()) for column in shapes.T]
-    return np.array(columns).reshape(shapes.shape[1], -1).T
+    return np.array(columns).reshape(shapes.shape[1], len(model.system.structure.components)).T
 
 
 def largest(model: ReducedModel, tips: Array) -> float:
