@@ -58,8 +58,8 @@ def test_column_without_a_side_stays_straight_and_is_said_to_be_unstable() -> No
 def test_newton_does_not_jump_to_another_stable_branch() -> None:
     """One step of the whole load ends at the buckled shape of the other side, stable too: u₂ = −7.55 m.
 
-    The path of equilibria ends at +7.78 m. Both ways solve the same equations to 1e-9; 1e-6 leaves them the condition of
-    a shape near buckling.
+    The path of equilibria ends at +7.78 m. Both ways solve the same equations to 1e-9; 1e-6 leaves them the condition
+    of a shape near buckling.
     """
     loads = {"tip_force": [-607.9834934025005, 40.88110935649087], "tip_moment": 744.2598935708211}
     loads["distributed"] = [0.0, 0.01781308616664456]
