@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from rotfem.analysis.schemes import Array, State
 from rotfem.analysis.stability import Stability, stability_of
+from rotfem.errors import InputError
 
 
 class Moment:
@@ -78,3 +81,30 @@ def hub_values(system: Any, state: State) -> dict[str, float]:
     work, impulse = (0.0, 0.0) if state.given is None else map(float, state.given[:2])
     own = {"torque": system.hub.torque.at(state.t, after=True), "hub_kinetic": system.row.kinetic()}
     return {**own, "angular_momentum": system.row.angular_momentum(), "impulse": impulse, "work": work}
+
+
+def first_shape(system: Any, start: Array | Moment | None) -> Array | None:
+    """Return the shape that a motion starts from (local dof array), and let the system count its rotations as it does.
+
+    Args:
+        system: equations of the motion.
+        start: a shape with rotations counted from the undeformed structure, or a moment of this system or another one.
+
+    Raises:
+        InputError: it is a shape of another mesh.
+    """
+    if start is None:
+        return None
+    held, datum = system.held, None
+    q = np.asarray(start.state.q if isinstance(start, Moment) else start)
+    if isinstance(start, Moment):
+        source, datum = start.system.held, start.state.datum
+        q = q[: len(source.zeros())]
+        if datum is not None and held.structure.turns is None:
+            source.count_rotations_from(datum)
+            q, datum = source.structure.total(q), None
+    if q.shape != held.zeros().shape:
+        allowed = f"must have the {len(held.zeros())} unknowns of this structure and mesh on this process"
+        raise InputError("start", f"{q.size} unknowns", allowed)
+    held.count_rotations_from(datum)
+    return q

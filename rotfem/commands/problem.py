@@ -13,7 +13,7 @@ from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import Array, Scheme, State
 from rotfem.analysis.time_loop import March, Steps
 from rotfem.commands.mode_tables import mode_tables
-from rotfem.commands.moment import Moment
+from rotfem.commands.moment import Moment, first_shape
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import InputError, SceneError, input_of
 from rotfem.mechanics.effects import Work
@@ -83,7 +83,7 @@ class Problem(ProblemData):
         step: float | None = None,
         tolerance: float | None = None,
         scheme: Scheme | None = None,
-        start: Array | None = None,
+        start: Array | Moment | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
     ) -> Iterator[Moment]:
         """Yield the motion at t = 0 and at the end of every step.
@@ -93,18 +93,20 @@ class Problem(ProblemData):
             step: fixed step, s; None for adaptive ones.
             tolerance: error of all adaptive steps together, relative to the largest displacement.
             scheme: generalised-α with ρ∞ = 0.9 if None.
-            start: shape at t = 0 (a local dof array), at rest in the turning frame; undeformed if None.
+            start: shape at t = 0, at rest in the turning frame: that of a moment (`steady`), or a local dof array with
+                rotations counted from the undeformed structure; undeformed if None.
             comm: communicator the structure is distributed over.
 
         Raises:
             InputError: neither step nor tolerance, or both, or one that is not positive; a tolerance for a scheme
-                that does not estimate its error; a mesh or a section that cannot be computed with.
+                that does not estimate its error; a start of another mesh; a mesh or a section that cannot be computed
+                with.
             ComputationError: a step failed, however short.
         """
         scheme = scheme or Scheme.registry["generalised_alpha"]()
         check_steps(end, step, tolerance, scheme)
         system = self.system(comm=comm)
-        march = March(system, scheme, Steps(end, step, tolerance), Newton(), start)
+        march = March(system, scheme, Steps(end, step, tolerance), Newton(), first_shape(system, start))
         return (Moment(system, state) for state in march)
 
     def steady(self, *, speed: float | None = None, comm: MPI.Comm = MPI.COMM_WORLD) -> Moment:

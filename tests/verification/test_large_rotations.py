@@ -244,3 +244,27 @@ def test_the_way_there_matters_less_with_every_mesh() -> None:
         left.append(np.sqrt(system.energies()["strain"]))
     assert left[1] < left[0] / 2**3.8
     assert left[1] < 1e-3
+
+
+@pytest.mark.slow
+def test_a_motion_starts_where_another_system_is() -> None:
+    """An equilibrium beyond a turn is one for a motion too, whose rotations are counted from the same shape.
+
+    The tolerance is that of the equilibrium, 1e-9 of the length, and the vibration that what it leaves sets off.
+    """
+    section = {"EA": 2.8e5, "GA2": 1e5, "GA3": 1e5, "GJ": 1e4, "EI2": 1.4e4, "EI3": 1.4e4, "mass_per_length": 1.2}
+    scene = {
+        "structure": {"type": "spatial_beam", "length": 10.0, "section": section},
+        "motion": {"type": "constant", "speed": 0.0},
+        "loads": {"tip_moment": {"value": [0.0, 0.0, 2.2 * np.pi * 1.4e3], "kind": "follower"}},
+        "mesh": {"elements": 8},
+    }
+    problem = rotfem.Problem.of(scene)
+    steady = problem.steady()
+    assert steady.state.datum is not None
+    *_, last = problem.march(end=0.01, step=0.005, start=steady)
+    np.testing.assert_allclose(list(last.tip.values()), list(steady.tip.values()), rtol=0, atol=1e-7)
+    assert last.tip["theta3"] == pytest.approx(2.2 * np.pi, abs=1e-9)
+    coarse = problem.replace(mesh=rotfem.BeamMesh(elements=3))
+    with pytest.raises(rotfem.InputError, match="unknowns of this structure and mesh"):
+        next(coarse.march(end=0.01, step=0.005, start=steady))
