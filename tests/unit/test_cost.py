@@ -85,7 +85,9 @@ def measured(setting: Setting) -> Measurement:
     samples = wave(setting.step, order)
     samples.values += setting.elements**-6.0 * np.cos(3 * TIMES)[:, None]
     wall = {"esdirk4": 5.0}.get(setting.scheme or "", 1.0) / setting.step
-    return Measurement(samples=samples, wall=[wall], dofs=3 * setting.elements, steps=round(2 / setting.step))
+    return Measurement(
+        samples=samples, wall=[wall], cpu=[wall], dofs=3 * setting.elements, steps=round(2 / setting.step)
+    )
 
 
 def test_reference_is_refined_with_the_scheme_that_gets_there_first() -> None:

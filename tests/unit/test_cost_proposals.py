@@ -126,14 +126,14 @@ def test_time_and_memory_are_continued_over_unknowns() -> None:
 def test_budget_refuses_what_takes_too_long_or_too_much_memory() -> None:
     budget = Budget(60.0, MPI.COMM_WORLD)
     one, two, three = (Setting("reissner", n, 3) for n in (1, 2, 3))
-    assert budget.allows(one, {"time": 20.0, "memory": 1e6}, 0.5)
-    assert not budget.allows(two, {"time": 40.0, "memory": 1e6}, 0.5)
-    assert not budget.allows(three, {"time": 1.0, "memory": 1e18}, 0.5)
-    assert budget.allows(one, {"time": None, "memory": None}, 0.5)
+    assert budget.allows(one, {"cpu": 20.0, "memory": 1e6}, 0.5)
+    assert not budget.allows(two, {"cpu": 40.0, "memory": 1e6}, 0.5)
+    assert not budget.allows(three, {"cpu": 1.0, "memory": 1e18}, 0.5)
+    assert budget.allows(one, {"cpu": None, "memory": None}, 0.5)
     reasons = [entry["why"] for entry in budget.summary()["refused"]]
     assert reasons[0].startswith("would take about 40 s")
     assert "GB" in reasons[1]
-    assert not Budget(1e-9, MPI.COMM_WORLD).allows(one, {"time": None, "memory": None}, 0.5)
+    assert not Budget(1e-9, MPI.COMM_WORLD).allows(one, {"cpu": None, "memory": None}, 0.5)
 
 
 def test_times_are_read_with_their_units() -> None:

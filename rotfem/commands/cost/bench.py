@@ -59,7 +59,7 @@ class Bench:
             setting: what is measured.
             repeat: how often in all.
             before: what was measured of it already.
-            limit: time (s) after which a computation on one process is stopped.
+            limit: CPU time (s) after which a computation on one process is stopped.
         """
         out = before or Measurement()
         try:
@@ -100,7 +100,7 @@ class Bench:
         ready = perf_counter(), process_time()
 
         def watch(share: float) -> None:
-            if self.comm.size == 1 and perf_counter() - ready[0] > limit:
+            if self.comm.size == 1 and process_time() - ready[1] > limit:
                 raise OverTime
 
         try:

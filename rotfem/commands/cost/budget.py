@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 from mpi4py import MPI
@@ -53,20 +53,26 @@ def free_memory() -> float:
         return float("inf")
 
 
+def cpu_time() -> float:
+    """Return the CPU time (s) of this process and of what it called, such as compilers."""
+    called = os.times()
+    return process_time() + called.children_user + called.children_system
+
+
 @dataclass
 class Budget:
     """What is left of the time of a study, and what it did not do for want of time or memory.
 
     Attributes:
-        seconds: that the study may take in all, compilation included.
+        seconds: CPU time that the study may take in all, compilation included; what other programs take is not counted.
         comm: MPI communicator; the clock of rank 0 counts, so that all decide alike.
         memory: bytes that all ranks together may be predicted to need.
-        refused: what was not computed: setting, reason, predicted time (s) and memory (bytes).
+        refused: what was not computed: setting, reason, predicted CPU time (s) and memory (bytes).
     """
 
     seconds: float
     comm: MPI.Comm
-    started: float = field(default_factory=perf_counter)
+    started: float = field(default_factory=lambda: cpu_time())
     memory: float = field(init=False)
     refused: list[dict[str, Any]] = field(default_factory=list)
 
@@ -75,17 +81,17 @@ class Budget:
 
     def left(self) -> float:
         """Return the time left, s."""
-        return float(self.comm.bcast(self.seconds - (perf_counter() - self.started)))
+        return float(self.comm.bcast(self.seconds - (cpu_time() - self.started)))
 
     def allows(self, setting: Setting, predicted: Mapping[str, float | None], share: float) -> bool:
         """Return whether a setting may be computed, and keep what is refused.
 
         Args:
             setting: what is to be computed.
-            predicted: its `time` (s) and `memory` (bytes), None where nothing is known of them.
+            predicted: its `cpu` time (s) and `memory` (bytes), None where nothing is known of them.
             share: of the time left that it may take.
         """
-        left, time, memory = self.left(), predicted["time"], predicted["memory"]
+        left, time, memory = self.left(), predicted["cpu"], predicted["memory"]
         if memory is not None and memory > self.memory:
             why = f"would need about {memory / 1e9:.2g} GB of {self.memory / 1e9:.2g} GB allowed"
         elif left <= 0.0 or (time is not None and time > share * left):

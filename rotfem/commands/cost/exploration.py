@@ -51,6 +51,9 @@ STILL: dict[str, Any] = {"scheme": None, "step": None, "tolerance": None, "every
 #: Part of the accuracy that a reference of the richest theory may be off by; of another theory, of the theory's error.
 CERTAIN, CERTAIN_OF_MODEL = 1 / 5, 1 / 10
 
+#: Uncertainty with which the richest theory's reference begins in a quick study.
+ROUGH = 0.02
+
 #: Uncertainty below which no reference is refined: what Newton leaves is not far below.
 LEAST_GOAL = 1e-8
 
@@ -160,9 +163,11 @@ class Study:
     def _refer(self, theories: Sequence[str], goal: float, quick: bool) -> None:
         """Make the references, that of the richest theory first; in a quick study others are told from it."""
         truth = theories[0]
-        self._refine(truth, goal, SHARES["truth"], self.plan.schemes)
-        for theory in theories[1:]:
-            there = self._beside(theory, truth)
+        self._refine(truth, max(goal, ROUGH) if quick else goal, SHARES["truth"], self.plan.schemes)
+        beside = {theory: self._beside(theory, truth) for theory in theories[1:]}
+        if quick:  # the others are known now, however much time the rest takes
+            self._refine(truth, goal, SHARES["truth"], self.plan.schemes)
+        for theory, there in beside.items():
             if quick and there is not None and truth in self.references:
                 self.references[theory] = neighbour(self.references[truth], *there, self.refinement.errors[truth])
             elif not quick or truth not in self.references:
@@ -194,7 +199,7 @@ class Study:
         get, known = self.laboratory.get, self.laboratory.prediction
         if self.own in settings:
             get(self.own, SHARES["own"], "grid")
-        order = sorted(settings, key=lambda s: known.of(s)["time"] or 0.0)
+        order = sorted(settings, key=lambda s: known.of(s)["cpu"] or 0.0)
         for i, setting in enumerate(order):
             if self.budget.left() < reserve * self.budget.seconds:
                 return

@@ -47,17 +47,16 @@ class Prediction:
             self.known[setting] = measurement
 
     def of(self, setting: Setting) -> dict[str, float | None]:
-        """Return the predicted wall `time` and `cpu` time (s, with set-up) and `memory` (bytes), None where unknown."""
+        """Return the predicted `cpu` time (s, with set-up) and `memory` (bytes), None where unknown."""
         if setting in self.known:
             m = self.known[setting]
-            return {"time": m.median("setup") + m.median("wall"), "cpu": m.cost, "memory": m.memory}
+            return {"cpu": m.cost, "memory": m.memory}
         if not self.known:
-            return {"time": None, "cpu": None, "memory": None}
+            return {"cpu": None, "memory": None}
         near = min(self.known, key=lambda other: self._far(setting, other))
         m, larger = self.known[near], nodes(setting, self.dimension) / nodes(near, self.dimension)
         march = larger ** self.exponent(near.theory) * self._steps(setting, near) * stages(setting) / stages(near)
         return {
-            "time": m.median("setup") * max(larger, 1.0) + m.median("wall") * march,
             "cpu": m.median("setup_cpu") * max(larger, 1.0) + m.median("cpu") * march,
             "memory": self.memory(near.theory, m.dofs * larger),
         }

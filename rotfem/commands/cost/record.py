@@ -100,6 +100,7 @@ class Record:
         if path is None:
             return
         try:
+            path.parent.mkdir(parents=True, exist_ok=True)
             if fresh:
                 path.unlink(missing_ok=True)
             elif path.exists():

@@ -147,8 +147,9 @@ def limit(levels: Sequence[Samples], each: bool, highest: float = np.inf) -> Lim
     """Return what levels of refinement tend to, each with half the size of the one before; the last three count.
 
     Where the differences shrink with an order p, the two finest levels are extrapolated; the uncertainty is the
-    difference to what the two before give, and at least a part of what was added. Otherwise it is the finest level, and
-    the larger of the differences between levels. A degree raised by one may stand for half the size: only the ratio of
+    difference to what the two before give, at most the last difference, which is all there is to come where differences
+    halve, and at least a part of what was added. Otherwise it is the finest level, and the larger of the differences
+    between levels. A degree raised by one may stand for half the size: only the ratio of
     the differences counts.
 
     Args:
@@ -169,7 +170,8 @@ def limit(levels: Sequence[Samples], each: bool, highest: float = np.inf) -> Lim
     p = min(order, highest)
     best = extrapolated(levels[-2], fine, p)
     added = distance(fine, best, each)
-    uncertain = max(distance(extrapolated(levels[-3], levels[-2], p), best, each), DOUBT * added / (p - 0.5))
+    unlike = min(distance(extrapolated(levels[-3], levels[-2], p), best, each), last)
+    uncertain = max(unlike, DOUBT * added / (p - 0.5))
     return Limit(best, uncertain, order, added)
 
 

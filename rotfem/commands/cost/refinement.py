@@ -21,6 +21,9 @@ Get = Callable[[Setting, float], Measurement | None]
 #: A step whose error is below this is fine enough to refine meshes with.
 FINE_ENOUGH = 0.03
 
+#: A scheme of no higher order is refined too if its error is below this part of the other's.
+MORE_EXACT = 0.3
+
 #: Differences below this are round-off where they do not shrink.
 ROUND_OFF = 1e-6
 
@@ -62,18 +65,20 @@ class Chain:
         ahead: the settings to come.
         each: see `distance`.
         settings, samples: of the levels that could be computed.
-        walls: their times, s.
+        costs: their CPU times, s.
         reason: why the last one that failed did.
         ended: no further level is to be had.
+        doubt: uncertainty at least, for what others say.
     """
 
     ahead: Iterator[Setting]
     each: bool
     settings: list[Setting] = field(default_factory=list)
     samples: list[Samples] = field(default_factory=list)
-    walls: list[float] = field(default_factory=list)
+    costs: list[float] = field(default_factory=list)
     reason: str = ""
     ended: bool = False
+    doubt: float = 0.0
     _failures: int = 0
 
     def extend(self, get: Get, share: float) -> None:
@@ -92,7 +97,7 @@ class Chain:
         self._failures = 0
         self.settings.append(setting)
         self.samples.append(found.samples)
-        self.walls.append(found.median("wall"))
+        self.costs.append(found.median("cpu"))
         self.ended = self._at_round_off()
 
     def _at_round_off(self) -> bool:
@@ -104,7 +109,8 @@ class Chain:
 
     def limit(self) -> Limit:
         """Return what the levels tend to."""
-        return limit(self.samples, self.each, self.highest)
+        found = limit(self.samples, self.each, self.highest)
+        return replace(found, uncertainty=max(found.uncertainty, self.doubt))
 
     @property
     def highest(self) -> float:
@@ -122,7 +128,7 @@ class Chain:
         further = (
             1 if uncertain <= goal or p == float("inf") else max(1, ceil(log2(uncertain / goal) / min(p, self.highest)))
         )
-        return self.walls[-1] * 2.0 ** (further + 1)
+        return self.costs[-1] * 2.0 ** (further + 1)
 
 
 class Refinement:
@@ -191,19 +197,38 @@ class Refinement:
 
     def _refined(self, chains: list[Chain], goal: float, share: float) -> Chain:
         """Refine whatever chain promises to reach the goal soonest; return the one whose limit is known best."""
-        for chain in chains:
-            while len(chain.samples) < 2 and not chain.ended:
-                chain.extend(self.get, share)
         first = chains[0]
         while not first.ended and (len(first.samples) < 3 or not self._long_enough(first)):
             first.extend(self.get, share)
-        able = [chain for chain in chains if chain.samples]
+        able = [first, *(chain for chain in chains[1:] if self._promising(chain, first, share))]
         while True:
             best = min(able, key=lambda chain: chain.limit().uncertainty)
-            promising = min(able, key=lambda chain: chain.to_go(goal))
-            if best.limit().uncertainty <= goal or promising.to_go(goal) == float("inf"):
-                return best
-            promising.extend(self.get, share)
+            soonest = min(able, key=lambda chain: chain.to_go(goal))
+            if best.limit().uncertainty <= goal or soonest.to_go(goal) == float("inf"):
+                return self._agreed(best, able)
+            soonest.extend(self.get, share)
+
+    def _agreed(self, best: Chain, others: Sequence[Chain]) -> Chain:
+        """Return the best chain, as uncertain as its limit is off from what the other schemes claim to know."""
+        known = best.limit().samples
+        for chain in others:
+            if chain is not best and len(chain.samples) > 2:
+                other = chain.limit()
+                best.doubt = max(best.doubt, distance(other.samples, known, self.plan.each) - other.uncertainty)
+        return best
+
+    def _promising(self, chain: Chain, first: Chain, share: float) -> bool:
+        """Start another chain, and go on if its scheme is of higher order or more exact; return whether it is."""
+        chain.extend(self.get, share)
+        if not chain.samples:
+            return False
+        known, each = first.limit().samples, self.plan.each
+        better = distance(chain.samples[0], known, each) < MORE_EXACT * distance(first.samples[0], known, each)
+        if not better and order(chain.settings[0]) <= order(first.settings[0]):
+            return False
+        while len(chain.samples) < 2 and not chain.ended:
+            chain.extend(self.get, share)
+        return True
 
     def _long_enough(self, chain: Chain) -> bool:
         least = self.plan.least_step
