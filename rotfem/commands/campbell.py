@@ -16,6 +16,7 @@ from rotfem.analysis.equilibrium import check_steady
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
+from rotfem.commands.accuracy import changes_of, pursue, refuse, settings_of
 from rotfem.commands.finite import check_rows
 from rotfem.commands.known_error import error_of_modes
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows, unstiffened
@@ -30,6 +31,7 @@ from rotfem.results import CampbellResult
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.limits import Limits
 from rotfem.scene.values import LARGEST
+from rotfem.selection.accuracy import Settings
 from rotfem.selection.distance import MODES
 from rotfem.selection.model_choice import choose
 
@@ -95,13 +97,20 @@ def campbell(
         SceneError: the scene or the speeds are not valid.
         ComputationError: no equilibrium at a speed, or eigenpairs that fail their check.
     """
-    started = perf_counter()
     scene = as_scene(scene)
     text = speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds)
     values = parse_speeds(text, scene.limits)
-    with input_of(scene.file):
-        sweep = Diagram(scene, Problem.of(scene, terms=terms), values, comm, hint)
+
+    def attempt(settings: Settings | None = None) -> CampbellResult:
+        started, variant = perf_counter(), scene if settings is None else scene.replace(changes_of(scene, settings))
+        sweep = Diagram(variant, Problem.of(variant, terms=terms), values, comm, hint)
         return sweep.result(orders, progress or (lambda share: None), started)
+
+    with input_of(scene.file):
+        if scene.accuracy is None:
+            return attempt()
+        refuse(scene, "frequencies", "campbell")
+        return pursue(scene, settings_of(scene, scene.modes.count), attempt)
 
 
 class Diagram:

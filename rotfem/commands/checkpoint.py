@@ -127,6 +127,7 @@ class Memory:
             "snapshots": None if snapshots is None else self._packed(vars(snapshots)),
             "choice": None if run.choice is None else vars(run.choice),
             "left_out": list(run.problem.left_out),
+            "settings": None if run.settings is None else vars(run.settings),
         }
 
     def put_back(self, path: Path, tree: Tree) -> State:

@@ -88,6 +88,9 @@ def job(
     overrides: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="change a scene key, repeatable")
     ] = None,
+    accuracy: Annotated[
+        float | None, typer.Option("--accuracy", metavar="E", help="relative error wanted: the rest follows from it")
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="print the summary as JSON, and nothing else, on stdout")
     ] = False,
@@ -98,7 +101,8 @@ def job(
 ) -> Iterator[Job]:
     """Give a command its job; these are, but for its name, the options of all commands."""
     with Session(as_json, quiet, debug) as session:
-        loaded = load_scene(scene, overrides or ())
+        wanted = [] if accuracy is None else [f"accuracy={accuracy!r}"]
+        loaded = load_scene(scene, [*(overrides or ()), *wanted])
         folder = session.folder(output or Path("results") / folder_name(loaded.name), command)
         yield Job(loaded, folder, session, not no_plots, session.hint(no_advice))
 
@@ -114,12 +118,16 @@ def folder_name(scene: str) -> str:
     return scene
 
 
-def command(advice: bool = True) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Make a command of a function of a job and its own options; `advice` says whether it gives any."""
+def command(computes: bool = True) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Make a command of a function of a job and its own options.
+
+    Args:
+        computes: whether it computes the scene, with advice, to an accuracy, and does not compare ways to.
+    """
 
     def decorate(work: Callable[..., None]) -> Callable[..., None]:
         options_of_all = list(signature(job, eval_str=True).parameters.values())[1:]
-        shared = [p for p in options_of_all if advice or p.name != "no_advice"]
+        shared = [p for p in options_of_all if computes or p.name not in ("no_advice", "accuracy")]
         own = list(signature(work, eval_str=True).parameters.values())[1:]
 
         def call(**given: Any) -> None:
@@ -214,7 +222,7 @@ def campbell(
     todo.finish(result, campbell_report)
 
 
-@command(advice=False)
+@command(computes=False)
 def explain(
     todo: Job,
     check: Annotated[bool, typer.Option("--check", help="run the full models too: truth beside the estimates")] = False,
@@ -227,7 +235,7 @@ def explain(
     todo.finish(result, explain_report)
 
 
-@command(advice=False)
+@command(computes=False)
 def cost(
     todo: Job,
     quick: Annotated[bool, typer.Option("--quick", help="a small grid")] = False,

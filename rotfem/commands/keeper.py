@@ -139,6 +139,14 @@ class Keeper:
         """Return the unknowns that the run which is gone on with has left out; None where there is none."""
         return None if self._tree is None else tuple(self._tree.get("left_out", ()))
 
+    def settings(self) -> Any:
+        """Return the settings of the run that goes on, which an accuracy has led to; None where none has."""
+        if self._tree is None or self._tree["settings"] is None:
+            return None
+        from rotfem.selection.accuracy import Settings
+
+        return Settings(**self._tree["settings"])
+
     def interrupts(self) -> Interrupts:
         """Return the context in which a march is interrupted between steps, where that is needed."""
         self._interrupts = Interrupts(self.comm, self._secure, self.comm.size > 1 or self.every is not None)

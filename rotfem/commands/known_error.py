@@ -72,6 +72,8 @@ def warnings_of_run(run: Simulation, error: ErrorEstimate) -> list[str]:
     """Return what is to be said of the error of a run; nothing where that is small, asked for, or said already."""
     scene = run.scene
     tolerance = None if scene.time is None else scene.time.tolerance
+    if scene.accuracy is not None:  # what asked for it says what was reached
+        return []
     if not error.exceeds(max(WANTED, scene.model.tolerance or 0.0, tolerance or 0.0)):
         return []
     steps, mesh, model = (error.shares[name] or 0.0 for name in ("time", "space", "model"))

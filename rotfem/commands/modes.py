@@ -21,6 +21,7 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.stability import stability_of_pencil
 from rotfem.analysis.theory_error import TheoryCheck, TheoryError
+from rotfem.commands.accuracy import changes_of, pursue, refuse, settings_of
 from rotfem.commands.finite import check_rows
 from rotfem.commands.known_error import error_of_modes
 from rotfem.commands.mode_tables import advice, mode_tables, scaled
@@ -34,6 +35,7 @@ from rotfem.numerics.newton import Newton
 from rotfem.results import ModesResult
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.advice import advise
+from rotfem.selection.accuracy import Settings
 from rotfem.selection.distance import MODES
 from rotfem.selection.model_choice import choose
 from rotfem.structures.paraview import writer
@@ -65,10 +67,17 @@ def modes(
         SceneError: the scene is not valid, or has no steady state.
         ComputationError: no equilibrium, or eigenpairs that fail the check of their backward error.
     """
-    started = perf_counter()
     scene = as_scene(scene)
+
+    def attempt(settings: Settings | None = None) -> ModesResult:
+        started, variant = perf_counter(), scene if settings is None else scene.replace(changes_of(scene, settings))
+        return _modes(variant, Problem.of(variant, terms=terms), comm, sensitivities, (hint, started))
+
     with input_of(scene.file):
-        return _modes(scene, Problem.of(scene, terms=terms), comm, sensitivities, (hint, started))
+        if scene.accuracy is None:
+            return attempt()
+        refuse(scene, "frequencies", "modes")
+        return pursue(scene, settings_of(scene, scene.modes.count), attempt)
 
 
 def _modes(

@@ -87,11 +87,25 @@ def campbell_report(summary: dict[str, Any], folder: Path) -> list[str]:
     return [*lines, *error_report(summary), f"results in {folder}"]
 
 
+def accuracy_report(summary: dict[str, Any]) -> list[str]:
+    """Return the line that says what an accuracy has led to, if one was asked for."""
+    wanted = summary.get("accuracy")
+    if wanted is None:
+        return []
+    chosen, tries = wanted["chosen"], len(wanted["attempts"])
+    model = chosen["theory"] + (" by a reduced model" if chosen.get("reduced") else "")
+    mesh = f"{chosen['elements']} elements" if "elements" in chosen else "the mesh of the file"
+    steps = f", {chosen['scheme']} to {chosen['tolerance']:.2g}" if "tolerance" in chosen else ""
+    met = "met" if wanted["met"] else "not met"
+    attempts = "" if tries == 1 else f" after {tries} attempts"
+    return [f"accuracy {wanted['asked']:g} {met}{attempts}: {model}, {mesh} of degree {chosen['degree']}{steps}"]
+
+
 def choice_report(summary: dict[str, Any]) -> list[str]:
     """Return the line that says which model was chosen, if one was."""
     choice = summary.get("choice")
     if choice is None:
-        return []
+        return accuracy_report(summary)
     dropped = ", ".join(row["name"] for row in choice["dropped"]) or "nothing"
     error = f"estimated error {choice['estimated_error']:.1e} of {choice['tolerance']:g} allowed"
     error = choice.get("remark", error)

@@ -72,7 +72,9 @@ def _recorded(run: Simulation, start: Array | None) -> bool:
 def times_of(time: Any) -> Array:
     """Return the times of the rows that a [time] table asks for, s."""
     steps = Steps.of(time)
-    if steps.step is None:
+    if time.output_step is not None:
+        steps = Steps(steps.end, time.output_step)
+    elif steps.step is None:
         steps = Steps(steps.end, steps.end / ROWS)
     ends, _ = grid(steps)
     return np.append(ends[: -1 : time.output_every], ends[-1])

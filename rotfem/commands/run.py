@@ -11,6 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady
+from rotfem.commands.accuracy import changes_of, pursue, refuse, settings_of
 from rotfem.commands.keeper import Interval, Keeper
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.result_folder import ResultFolder
@@ -22,6 +23,7 @@ from rotfem.mechanics.outputs import Functional
 from rotfem.results.run import RunResult
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.advice import advise
+from rotfem.selection.accuracy import Settings
 from rotfem.selection.distance import HISTORY, STEADY
 from rotfem.selection.model_choice import RangeExceeded, choose
 
@@ -90,6 +92,8 @@ def simulate(
     with input_of(scene.file):
         if scene.time is None or scene.initial.state == "steady":
             check_steady(problem)
+        if scene.accuracy is not None:
+            return run_to_accuracy(scene, keeper, progress, terms, outputs)
         if scene.model.tolerance is not None:
             return run_chosen(scene, problem, keeper, progress, hint)
         return hinted(Simulation(scene, problem, comm, keeper=keeper), hint).run(progress)
@@ -99,6 +103,30 @@ def hinted(simulation: Simulation, hint: Hint | None) -> Simulation:
     """Return a simulation after its hints are told."""
     simulation.advice = advise(simulation.scene, "run", hint, critical=simulation.critical)
     return simulation
+
+
+def run_to_accuracy(
+    scene: Scene,
+    keeper: Keeper,
+    progress: Progress | None,
+    terms: Mapping[str, Work] | None,
+    outputs: Mapping[str, Functional] | None,
+) -> RunResult:
+    """Return the result that meets the accuracy of a scene (see `rotfem.commands.accuracy`).
+
+    Raises:
+        Missed: it was not met.
+        ComputationError: the richest model failed.
+    """
+    refuse(scene, "tip", "run")
+
+    def attempt(settings: Settings) -> RunResult:
+        variant = scene.replace(changes_of(scene, settings))
+        simulation = Simulation(variant, Problem.of(variant, terms=terms, outputs=outputs), keeper.comm, keeper=keeper)
+        simulation.settings = settings
+        return simulation.run(progress)
+
+    return pursue(scene, keeper.settings() or settings_of(scene), attempt)
 
 
 def run_chosen(

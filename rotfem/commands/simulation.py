@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 from rotfem.analysis.constant_conditions import stability_ahead
 from rotfem.analysis.critical_speed import critical_speed
+from rotfem.analysis.dense_output import RowTimes
 from rotfem.analysis.equilibrium import static_tip_shape, steady_state
 from rotfem.analysis.error_estimate import ErrorEstimate
 from rotfem.analysis.error_watch import ErrorWatch
@@ -40,6 +41,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.numerics.newton import Newton
 from rotfem.results.run import RunResult
 from rotfem.scene import Scene, Time
+from rotfem.selection.accuracy import Settings
 from rotfem.selection.left_out import leave_out, without, worth_a_look
 from rotfem.selection.model_choice import Choice, RangeExceeded
 
@@ -68,6 +70,7 @@ class Simulation:
         self.started = perf_counter()
         self.keeper = keeper or Keeper(comm)
         self.scene, self.comm, self.choice = scene, comm, choice
+        self.settings: Settings | None = None
         self.warnings: list[str] = [] if choice is None else choice.upgrade_warnings()
         self.advice: list[str] = []
         if scene.time is None and problem.frame == "inertial":
@@ -93,6 +96,7 @@ class Simulation:
         self.left_out: dict[str, Any] | None = None
         self.theory_error: TheoryError | None = None
         self.watch: ErrorWatch | None = None
+        self.rows: RowTimes | None = None
         self.last: State | None = None
         self.error: ErrorEstimate | None = None
         self._critical_since: float | None = None
@@ -157,6 +161,9 @@ class Simulation:
         if self.scene.output.error:
             self.watch = self.stepper.watch = ErrorWatch(self.system, time.end, scheme)
         march.reached = self.keeper.start(self)
+        if time.output_step is not None:
+            passed = max(len(self.record.history) - 1, 0)
+            self.rows = self.stepper.watch = RowTimes(time.output_step, time.end, scheme.order, self.watch, passed)
         with self.keeper.interrupts():
             first = 0 if march.reached is None else self.steps + 1
             for self.steps, state in enumerate(march, first):
@@ -172,9 +179,15 @@ class Simulation:
         if (why := self.scene.limits.refusal("steps", self.steps)) is not None:
             raise ComputationError(f"the motion {why}", time=state.t)
         self._check(state)
-        if self.steps % time.output_every == 0 or state.t >= time.end * (1 - 1e-9):
-            self._keep(state)
-            progress(state.t / time.end)
+        rows = [state]
+        if self.rows is not None and state.t > 0.0:
+            rows = self.rows.taken()
+        elif self.steps % time.output_every and state.t < time.end * (1 - 1e-9):
+            rows = []
+        for row in rows:
+            self._keep(row)
+            progress(row.t / time.end)
+        self.last = state
         self.keeper.stepped(self, state)
 
     def _initial(self) -> Array | None:

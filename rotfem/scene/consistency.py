@@ -110,8 +110,23 @@ def check_initial(structure: AnyStructure, motion: Motion, initial: Initial) -> 
         raise problem("initial.state", initial.state, 'needs motion.type = "constant"')
 
 
+def check_accuracy(model: Model, accuracy: float | None) -> None:
+    """Refuse a tolerance of the model beside an accuracy, which has one in it.
+
+    Raises:
+        PydanticCustomError: there are both.
+    """
+    if accuracy is not None and model.tolerance is not None:
+        reason = "cannot be combined with accuracy, which allows the model a share of its own"
+        raise problem("model.tolerance", model.tolerance, reason)
+    if accuracy is not None and model.frame == "inertial":
+        raise problem("model.frame", model.frame, "cannot be combined with accuracy; the rotating frame is as true")
+
+
 def check_limits(limits: Limits, time: Time | None, modes: Modes) -> None:
     """Refuse more steps and modes than the scene's limits allow."""
     if time is not None and time.step is not None:
         limits.check("steps", time.end / time.step, "time.step", time.step)
+    if time is not None and time.output_step is not None:
+        limits.check("steps", time.end / time.output_step, "time.output_step", time.output_step)
     limits.check("modes", modes.count, "modes.count", modes.count)

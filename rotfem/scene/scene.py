@@ -8,14 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, Discriminator, Field, PrivateAttr, Tag, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    Discriminator,
+    Field,
+    PlainValidator,
+    PrivateAttr,
+    Tag,
+    ValidationError,
+    model_validator,
+)
 
 from rotfem import registry
 from rotfem.errors import SceneError
 from rotfem.scene.beams import Structure
 from rotfem.scene.consistency import (
+    check_accuracy,
     check_frame,
     check_initial,
     check_limits,
@@ -35,7 +45,10 @@ from rotfem.scene.problems import scene_error
 from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver
 from rotfem.scene.stepping import Time
 from rotfem.scene.toml import apply_overrides, read_toml, set_key, to_builtin
-from rotfem.scene.values import SceneModel
+from rotfem.scene.values import Bounds, SceneModel
+
+#: A relative error that may be asked for.
+Accuracy = Annotated[float, PlainValidator(Bounds(ge=1e-8, le=0.5).number)]
 
 
 class _PlateTable(dict[str, Any]):
@@ -61,6 +74,9 @@ class Scene(SceneModel):
         solver: settings of Newton's method.
         output: what to compute beside what is always recorded.
         limits: how much may be asked for.
+        accuracy: error that is wanted, relative to the largest displacement of the tip, or to each frequency; theory,
+            effects, mesh, scheme and step follow from it. None where the scene says them itself.
+        accuracy_of: what it is the accuracy of; None what a command computes first of all.
     """
 
     structure: Structure = Field(description="a table [structure]")
@@ -74,6 +90,8 @@ class Scene(SceneModel):
     solver: Solver = Solver()
     output: OutputTable = OutputTable()
     limits: Limits = Limits()
+    accuracy: Accuracy | None = None
+    accuracy_of: Literal["tip", "frequencies"] | None = None
 
     _name: str = PrivateAttr("scene")
     _file: str = PrivateAttr("scene")
@@ -97,7 +115,10 @@ class Scene(SceneModel):
     @classmethod
     def _validate(cls, tables: dict[str, Any], name: str, file: str, directory: str) -> Self:
         try:
-            scene = cls.model_validate(tables, context={"directory": directory, "limits": limits_of(tables)})
+            scene = cls.model_validate(
+                tables,
+                context={"directory": directory, "limits": limits_of(tables), "accuracy": tables.get("accuracy")},
+            )
         except ValidationError as error:
             raise scene_error(file, error) from None
         scene._name, scene._file, scene._directory, scene._tables = name, file, directory, tables
@@ -217,6 +238,7 @@ class Scene(SceneModel):
         check_frame(self.structure, self.motion, self.model)
         check_initial(self.structure, self.motion, self.initial)
         check_limits(self.limits, self.time, self.modes)
+        check_accuracy(self.model, self.accuracy)
         return self
 
 

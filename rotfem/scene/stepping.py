@@ -7,7 +7,7 @@ from dataclasses import MISSING, Field, fields, is_dataclass
 from typing import Any, Self
 
 import pydantic
-from pydantic import ConfigDict, model_validator
+from pydantic import ConfigDict, ValidationInfo, model_validator
 
 from rotfem import registry
 from rotfem.errors import show
@@ -38,6 +38,7 @@ class Time(SceneModel):
         min_step: shortest adaptive step (s), or None.
         scheme: name of a registered scheme.
         output_every: number of steps from one output to the next.
+        output_step: time (s) from one output to the next, wherever steps end; None where steps are counted.
     """
 
     model_config = ConfigDict(extra="allow")
@@ -50,6 +51,7 @@ class Time(SceneModel):
     min_step: Positive | None = None
     scheme: str = "generalised_alpha"
     output_every: Count = 1
+    output_step: Positive | None = None
 
     @classmethod
     def keys(cls) -> list[str]:
@@ -78,11 +80,17 @@ class Time(SceneModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _fill_scheme(cls, data: Any) -> Any:
-        """Add the parameters of the chosen scheme that are not given; a slip in its name comes before all others."""
+    def _fill_scheme(cls, data: Any, info: ValidationInfo) -> Any:
+        """Add the parameters of the chosen scheme that are not given; a slip in its name comes before all others.
+
+        Where an accuracy is wanted and no steps are given, they follow from it.
+        """
         if not isinstance(data, Mapping):
             return data
         given = {key: value for key, value in data.items() if value is not None}
+        wanted = (info.context or {}).get("accuracy")
+        if isinstance(wanted, float) and wanted > 0.0 and not {"step", "tolerance"} & given.keys():
+            given["tolerance"] = wanted
         name = as_name(given.get("scheme", cls.model_fields["scheme"].default), registry.schemes, "scheme")
         defaults = {}
         for key, field in parameters_of(registry.schemes[name]).items():
@@ -116,6 +124,8 @@ class Time(SceneModel):
             raise problem("step", self.step, reason)
         if self.step is not None and self.step > self.end:
             raise problem("step", self.step, f"must be at most time.end = {self.end:g}")
+        if self.output_step is not None and self.output_every != 1:
+            raise problem("output_step", self.output_step, "cannot be combined with output_every, which counts steps")
         for key in ("max_step", "min_step"):
             if self.tolerance is None and getattr(self, key) is not None:
                 raise problem(key, getattr(self, key), "has a meaning only with tolerance (adaptive steps)")

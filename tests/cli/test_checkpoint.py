@@ -42,6 +42,8 @@ HUB = {"type": "torque", "hub_inertia": 50.0, "pulses": [[0.0, 0.17, 30.0]]}
 KINDS: dict[str, dict[str, Any]] = {
     "fixed steps": {},
     "every third row": {"time.output_every": 3},
+    "rows between steps": {"time.output_step": 0.013},
+    "accuracy": {"accuracy": 1e-4, "time.output_step": 0.001},
     "inertial frame": {"model.frame": "inertial"},
     "linear": {"model.theory": "consistent_linear"},
     "Newmark": {"time.scheme": "newmark"},

@@ -1,0 +1,80 @@
+"""States between steps: rows of a history at equal distances, wherever the steps of a march end.
+
+Between two states the unknowns are the polynomial through what is known at both: through q and q̇ a cubic, of order 4,
+and through q, q̇ and q̈ a quintic, of order 6 (Hermite). So what is between is as good as the ends are: the cubic for
+schemes up to order 2, whose accelerations of vibrations that they do not resolve are noise, the quintic above.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import BPoly
+
+from rotfem.analysis.schemes import State, Watch
+
+#: Order of a scheme up to which accelerations are left out.
+LOW = 2
+
+#: Distance of two instants, as a part of the interval between rows, at which they are one.
+CLOSE = 1e-9
+
+
+class RowTimes:
+    """Takes the steps of a march, and gives the states at multiples of an interval and at the end.
+
+    Args:
+        interval: from one row to the next, s.
+        end: last time, s.
+        order: of the scheme that steps.
+        further: who else is told of the steps; None if nobody.
+        passed: rows there are already, beside that at t = 0.
+    """
+
+    def __init__(self, interval: float, end: float, order: int, further: Watch | None = None, passed: int = 0):
+        self.interval, self.end, self.order, self.further = interval, end, order, further
+        self._next, self._last = 1 + passed, int(np.ceil(end / interval - CLOSE))
+        self._reached: list[State] = []
+
+    def __call__(self, old: State, new: State) -> None:
+        """Find the rows in a step from an old to a new state."""
+        if self.further is not None:
+            self.further(old, new)
+        close, times = CLOSE * self.interval, []
+        while self._next <= self._last and (t := min(self._next * self.interval, self.end)) <= new.t + close:
+            times.append(t)
+            self._next += 1
+        ends = [new] if times and times[-1] > new.t - close else []
+        self._reached += between(old, new, times[: len(times) - len(ends)], self.order) + ends
+
+    def landed(self) -> None:
+        """Pass on that what is prescribed is not smooth where the last step has ended."""
+        if self.further is not None:
+            self.further.landed()
+
+    def taken(self) -> list[State]:
+        """Return the states of the rows since the last call."""
+        found, self._reached = self._reached, []
+        return found
+
+
+def between(old: State, new: State, times: list[float], order: int) -> list[State]:
+    """Return the states at times (s) within a step; work and impulse of a free hub are linear in it.
+
+    Args:
+        old: state that the step starts from.
+        new: state that it ends in.
+        times: between them, s.
+        order: of the scheme that made it.
+    """
+    if not times:
+        return []
+    known = [[s.q, s.v] if order <= LOW else [s.q, s.v, s.a] for s in (old, new)]
+    q = BPoly.from_derivatives([old.t, new.t], known)
+    v, a = q.derivative(1), q.derivative(2)
+    out = []
+    for t in times:
+        share, given = (t - old.t) / (new.t - old.t), None
+        if old.given is not None and new.given is not None:
+            given = np.asarray(old.given + share * (new.given - old.given))
+        out.append(new.changed(t=t, q=q(t), v=v(t), a=a(t), memory=None, given=given))
+    return out

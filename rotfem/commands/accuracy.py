@@ -1,0 +1,209 @@
+"""A wanted accuracy: settings are chosen, what they give says its error, and better ones follow until it is met."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from time import perf_counter
+from typing import Any, TypeVar
+
+import numpy as np
+
+from rotfem.analysis.schemes import Scheme
+from rotfem.errors import ComputationError, SceneError
+from rotfem.mechanics.theories import theories
+from rotfem.results.result import Result
+from rotfem.results.run import RunResult
+from rotfem.scene import Scene
+from rotfem.selection.accuracy import AIM, SHARES, Settings, part, shares
+from rotfem.selection.steps_ahead import plan
+
+R = TypeVar("R", bound=Result)
+
+#: Settings that are tried at most.
+MOST_ATTEMPTS = 6
+
+#: Error that a reduced model may add to that of its theory, as a part of the accuracy.
+PROJECTED = 0.05
+
+#: Scheme of adaptive steps, schemes whose fixed steps are chosen from, and rows of a history that does not say how many.
+ADAPTIVE, SCHEMES, ROWS = "esdirk4", ("generalised_alpha", "esdirk4"), 1000
+
+#: Nodes along a structure to start from, and for every mode that is wanted.
+NODES, NODES_A_MODE = 18, 4
+
+
+class Missed(ComputationError):
+    """No settings were found that meet the accuracy."""
+
+
+def settings_of(scene: Scene, modes: int = 0) -> Settings:
+    """Return the settings that a scene is first computed with.
+
+    Args:
+        scene: with an accuracy.
+        modes: number of modes that are wanted; 0 of a run.
+    """
+    mesh, nodes, time = scene.mesh, max(NODES, NODES_A_MODE * modes), None if modes else scene.time
+    elements: Any = None
+    if scene.structure.mesh_file is None:
+        elements = mesh.elements if isinstance(mesh.elements, tuple) else -(-nodes // mesh.degree)
+    return Settings(
+        models=models_of(scene, moving=time is not None),
+        elements=elements,
+        degree=mesh.degree,
+        scheme=None if time is None else ADAPTIVE,
+        tolerance=None if time is None else AIM * SHARES["time"] * (scene.accuracy or 0.0),
+    )
+
+
+def models_of(scene: Scene, moving: bool) -> tuple[dict[str, Any], ...]:
+    """Return the keys of [model] of the models that a scene may be computed with, from the cheapest on.
+
+    The theory that a scene names is the richest of them. A history of small motions is cheapest by a reduced linear
+    model; steady states and modes cost little by any theory.
+    """
+    kind, own = scene.structure.type, scene.model.theory
+    full = {"theory": own, "reduced": False, "foreshortening": False}
+    if not moving:
+        return (full,)
+    named = {theory.name: theory for theory in theories() if theory.holds_for(kind)}
+    linear = own if named[own].linear else next((n for n in named[own].poorer if named[n].prestress), None)
+    assert scene.accuracy is not None
+    gives_back = linear is not None and bool(named[linear].prestress)
+    quick = {"theory": linear, "reduced": PROJECTED * scene.accuracy, "foreshortening": gives_back}
+    return (quick, full) if linear else (full,)
+
+
+def pursue(scene: Scene, settings: Settings, attempt: Callable[[Settings], R]) -> R:
+    """Return the first result whose estimated error meets the accuracy of a scene.
+
+    Args:
+        scene: with an accuracy.
+        settings: to begin with.
+        attempt: settings ↦ their result, with an `error` in its summary.
+
+    Raises:
+        Missed: it was not met; its attribute `result` holds the best that was reached.
+        ComputationError: the richest model failed.
+    """
+    accuracy, started, tried = scene.accuracy, perf_counter(), list[dict[str, Any]]()
+    assert accuracy is not None
+    done: R | None = None
+    while True:
+        began = perf_counter()
+        try:
+            done = attempt(settings)
+        except ComputationError as failure:
+            richer = settings.richer()
+            if richer is None or len(tried) == MOST_ATTEMPTS:
+                raise
+            tried.append({**settings.summary(), "failed": failure.what, "seconds": perf_counter() - began})
+            settings = richer
+            continue
+        error = done.summary["error"]
+        tried.append({**settings.summary(), "error": error["total"], "seconds": perf_counter() - began})
+        is_met = known(error) and error["total"] <= accuracy
+        following = None if is_met or len(tried) == MOST_ATTEMPTS else settings.better(error, accuracy)
+        if is_met or following is None:
+            break
+        is_other = following.models != settings.models
+        settings = stepped(scene, following, done, error) if is_other and isinstance(done, RunResult) else following
+    done.summary["scene"] = scene.digest()
+    done.summary["accuracy"] = told(scene, settings, error, is_met, tried)
+    timings = done.summary["timings"]
+    timings["choice"] = began - started
+    timings["total"] += timings["choice"]
+    if not is_met:
+        raise missed(scene, done)
+    return done
+
+
+def refuse(scene: Scene, wanted: str, command: str) -> None:
+    """Refuse an accuracy of something that a command does not compute.
+
+    Args:
+        scene: with an accuracy.
+        wanted: what the command computes.
+        command: its verb.
+
+    Raises:
+        SceneError: the scene asks for another.
+    """
+    if scene.accuracy_of not in (None, wanted):
+        reason = f'is not what "{command}" computes; it must be "{wanted}", or not given'
+        raise SceneError(scene.file, "accuracy_of", scene.accuracy_of, reason)
+
+
+def known(error: dict[str, Any]) -> bool:
+    """Return whether all parts of an error were found."""
+    return all(error.get(name, 0.0) is not None for name in SHARES)
+
+
+def stepped(scene: Scene, settings: Settings, done: RunResult, error: dict[str, Any]) -> Settings:
+    """Return settings with the steps that resolve what a result of a poorer model shows.
+
+    Args:
+        scene: with an accuracy.
+        settings: of the next model.
+        done: result of the one before it.
+        error: of that.
+    """
+    tips = np.stack([done.column(name) for name in ("tip_u1", "tip_u2", "tip_u3") if name in done.history], axis=1)
+    assert scene.accuracy is not None
+    allowed = AIM * shares({**error, "time": 1.0, "model": 0.0}, scene.accuracy)["time"]
+    found = plan(done.t, tips, allowed, [scheme for scheme in Scheme.registry if scheme.name in SCHEMES])
+    if found is None:
+        return settings
+    if found.uneven:
+        return replace(settings, scheme=ADAPTIVE, step=None, tolerance=allowed)
+    return replace(settings, scheme=found.scheme, step=found.step, tolerance=None)
+
+
+def changes_of(scene: Scene, settings: Settings) -> dict[str, Any]:
+    """Return the keys ↦ values that make a scene one with these settings; None removes what it says."""
+    out: dict[str, Any] = settings.changes()
+    time = scene.time
+    if settings.moving and time is not None:
+        out |= {f"time.{key}": None for key in time.parameters}
+        out |= {"time.output_every": None, "time.output_step": time.output_step or time.end / ROWS}
+        if time.output_step is None and time.step is not None:
+            out["time.output_step"] = time.step * time.output_every
+    return out
+
+
+def told(
+    scene: Scene, settings: Settings, error: dict[str, Any], is_met: bool, tried: list[dict[str, Any]]
+) -> dict[str, Any]:
+    """Return what a summary says of how an accuracy was pursued."""
+    accuracy = scene.accuracy
+    assert accuracy is not None
+    return {
+        "asked": accuracy,
+        "of": scene.accuracy_of or ("tip" if "time" in error else "frequencies"),
+        "met": is_met,
+        "estimated": error["total"],
+        "allowed": shares(error, accuracy),
+        "chosen": settings.summary(),
+        "attempts": tried,
+    }
+
+
+def missed(scene: Scene, done: Result) -> Missed:
+    """Return the error that says what was reached instead of an accuracy."""
+    error, chosen = done.summary["error"], done.summary["accuracy"]["chosen"]
+    worst = max(("time", "space", "model"), key=lambda name: part(error, name))
+    advice = {
+        "time": "a looser accuracy, or fixed steps without one",
+        "space": "a looser accuracy" + (", or a finer mesh file" if scene.structure.mesh_file is not None else ""),
+        "model": f"a looser accuracy, or a richer model.theory than {chosen['theory']}",
+    }[worst]
+    failure = Missed(
+        f"an accuracy of {scene.accuracy:g} was not met: {error['total']:.2g} was reached, most of it ({worst}) "
+        f"{part(error, worst):.2g}",
+        advice=advice,
+    )
+    done.summary["status"] = "failed"
+    done.summary["failure"] = {"what": failure.what, "time": None, "advice": advice}
+    vars(failure)["result"] = done
+    return failure

@@ -1,0 +1,43 @@
+"""States between steps are on the polynomial that the ends ask for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rotfem.analysis.dense_output import RowTimes, between
+from rotfem.analysis.schemes import State
+
+
+def of_polynomial(p: np.polynomial.Polynomial, t: float) -> State:
+    return State(
+        t, np.array([p(t)]), np.array([p.deriv()(t)]), np.array([p.deriv(2)(t)]), given=np.array([t, 2 * t, 0.0])
+    )
+
+
+@pytest.mark.parametrize(("order", "degree"), [(2, 3), (4, 5)])
+def test_polynomials_are_met_exactly(order: int, degree: int) -> None:
+    """Cubics by q and q̇, quintics by q, q̇ and q̈ (Hermite); of the next degree they are not."""
+    rng = np.random.default_rng(1)
+    for extra in (0, 1):
+        p = np.polynomial.Polynomial(rng.uniform(0.5, 1.0, degree + 1 + extra))
+        old, new, times = of_polynomial(p, 1.0), of_polynomial(p, 1.5), [1.1, 1.25, 1.4]
+        for state in between(old, new, times, order):
+            exact = of_polynomial(p, state.t)
+            off = max(abs(float(x[0] - y[0])) for x, y in zip((state.q, state.v), (exact.q, exact.v), strict=True))
+            assert (off < 1e-12) == (extra == 0)
+            assert state.given is not None
+            assert state.given[0] == pytest.approx(state.t)
+
+
+def test_rows_are_at_multiples_of_the_interval_and_at_the_end() -> None:
+    """Whether steps are longer or shorter; a row at the end of a step is the state itself."""
+    p = np.polynomial.Polynomial([0.0, 1.0])
+    rows, found, t = RowTimes(0.25, 2.1, 4), [], 0.0
+    for h in (0.1, 0.15, 0.9, 0.05, 0.9):
+        old, new = of_polynomial(p, t), of_polynomial(p, t := t + h)
+        rows(old, new)
+        found += rows.taken()
+    np.testing.assert_allclose([state.t for state in found], [*np.arange(0.25, 2.1, 0.25), 2.1], atol=1e-12)
+    assert found[0].q[0] == pytest.approx(0.25)
+    assert found[-1] is new
