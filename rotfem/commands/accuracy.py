@@ -26,7 +26,7 @@ MOST_ATTEMPTS = 6
 #: Error that a reduced model may add to that of its theory, as a part of the accuracy.
 PROJECTED = 0.05
 
-#: Scheme of adaptive steps, schemes whose fixed steps are chosen from, and rows of a history that does not say how many.
+#: Scheme of adaptive steps, schemes whose fixed steps are chosen from, and rows of a history that does not say it.
 ADAPTIVE, SCHEMES, ROWS = "esdirk4", ("generalised_alpha", "esdirk4"), 1000
 
 #: Nodes along a structure to start from, and for every mode that is wanted.
