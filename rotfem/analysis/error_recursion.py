@@ -32,12 +32,13 @@ class Propagator:
     Args:
         C, K: of the equation, shape (r, r).
         h: lengths of the steps, s, shape (n,).
+        bounded: whether errors do not grow by themselves, whatever C and K say.
 
     Attributes:
-        factors: e^{λh}, shape (n, m).
+        factors, carried: e^{λh} of states and of errors, shape (n, m).
     """
 
-    def __init__(self, C: Array, K: Array, h: Array):
+    def __init__(self, C: Array, K: Array, h: Array, bounded: bool = False):
         r = len(K)
         A = np.block([[np.zeros((r, r)), np.eye(r)], [-K, -C]])
         values, vectors = np.linalg.eig(A)
@@ -50,6 +51,7 @@ class Propagator:
         lengths, self._of_length = np.unique(np.float32(h / h.max()), return_inverse=True)
         self._lengths = np.array([h[np.argmax(self._of_length == i)] for i in range(len(lengths))])
         self.factors: Complex = np.exp(self._lengths[:, None] * self._values)[self._of_length]
+        self.carried: Complex = self.factors / np.maximum(np.abs(self.factors), 1.0) if bounded else self.factors
 
     def modal(self, c: Array, rate: Array) -> Complex:
         """Return the coordinates of states, (n, r) each, shape (n, m)."""
@@ -76,9 +78,12 @@ class Propagator:
         c: Array = (z @ self._vectors[: len(self._vectors) // 2].T).real
         return c
 
-    def state(self, z: Complex) -> Array:
-        """Return (c, ċ) of coordinates (m,), one after the other."""
-        y: Array = (self._vectors @ z).real
+    def sampled(self, z: Complex) -> Array:
+        """Return (c, ċ) of coordinates (m,), one after the other, of what steps can sample: |λ| h < π.
+
+        The rest is none that a later motion could be off by: its rates are large, and not those of the motion.
+        """
+        y: Array = (self._vectors @ np.where(np.abs(self._values) * np.median(self._h) < np.pi, z, 0.0)).real
         return y
 
 

@@ -40,6 +40,9 @@ class Tangents:
         system.set_time(state.t)
         system.set_state(state.q, state.v, state.a)
         inner = system.held
+        if system.comm.size > 1:
+            for x in (inner.q, inner.v, inner.a):
+                x.x.scatter_forward()
         self.speed = abs(float(system.motion.speed(state.t)))
         self.matrices = {n: inner.matrix(*shift, 1.0 if n == "K" else 0.0) for n, shift in SHIFTS.items()}
         self.borders: dict[str, Border] = {}

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from dolfinx import fem
 
 from rotfem.analysis.mesh_estimate import MeshEstimate
+from rotfem.analysis.ritz_vectors import RitzVectors
 
 Array = npt.NDArray[np.float64]
 
@@ -27,15 +28,24 @@ class ShapeError:
         self._moves = [i for i, name in enumerate(names) if name.startswith("u")]
         self._turns = [i for i, name in enumerate(names) if not name.startswith("u")]
 
-    def of_modes(self, V: Array) -> Array:
-        """Return the relative errors of the frequencies of shapes that bend, columns of owned unknowns."""
-        components, function = self._turns or self._moves, fem.Function(self.system.V)
-        out = []
-        for x in V.T:
+    def of_modes(self, shapes: RitzVectors) -> Array:
+        """Return the relative errors of the frequencies of shapes, by what bends or else by what stretches."""
+        function, out = fem.Function(self.system.V), []
+        for x, bends in zip(shapes.V.T, self.bend(shapes), strict=True):
             function.x.array[: len(x)] = x
             function.x.scatter_forward()
+            components = self._turns if bends else self._moves
             out.append(self._estimate(function.x.array.reshape(-1, self._size)[:, components]))
         return np.array(out)
+
+    def bend(self, shapes: RitzVectors) -> npt.NDArray[np.bool_]:
+        """Return of which shapes the most kinetic energy is in a family that bends, shape (r,)."""
+        structure, r = self.system.structure, shapes.V.shape[1]
+        along = [structure.oriented(Y.reshape(-1, self._size, r)) for Y in (shapes.V, shapes.massed)]
+        energy = shapes.sum((along[0] * along[1]).sum(axis=0))
+        families = [list(components) for components, _ in structure.families.values()]
+        leading = np.argmax([energy[components].sum(axis=0) for components in families], axis=0)
+        return np.array([bool(set(families[i]) & set(self._turns)) for i in leading])
 
     def of_shape(self, q: Array, datum: Any = None) -> float:
         """Return the relative error of a deflection (local dof array): twice that of a frequency.

@@ -1,0 +1,151 @@
+"""Errors of a motion from window to window, for the frequencies that its tangents say and others that they may mean.
+
+A tangent in the middle of a window is that of one instant: what vibrates there has changed stress and stiffness. So the
+squares of the frequencies are smoothed over windows, as α + β Ω² near each, and what scatters about that is how far
+they are known. Where a phase would not be known by that, several tracks are followed, with frequencies all over the
+range, and the largest error counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.error_recursion import Propagator, accumulated, interpolated
+from rotfem.analysis.error_window import Window
+
+Array = npt.NDArray[np.float64]
+
+#: Samples of γ a polynomial goes through, beyond the order of the scheme.
+BEYOND = 2
+
+#: Windows over which frequencies are smoothed, the phase (rad) that one may lose before others are tried, the number of
+#: the lowest shapes whose phases count, and the most that squares of frequencies are tried above and below.
+WIDTH, UNSURE, LOWEST, MOST = 1.5, 0.3, 3, 0.3
+
+#: Tracks: in which part of their scatter frequencies are tried, and the relative error below which none is.
+FACTORS, SMALL = (0.0, -1.0, -0.5, 0.5, 1.0), 1e-3
+
+
+def largest_errors(
+    windows: Sequence[Window], scheme: Any, linear: bool, scale: float
+) -> dict[str, tuple[float, float]]:
+    """Return the largest errors of the tip, `time` and `space`: size (m) and when (s).
+
+    Args:
+        windows: the motion.
+        scheme: that made it.
+        linear: whether the tangents are those of a linear theory, known as they are.
+        scale: largest displacement of the tip, m.
+    """
+    if linear:
+        return Track(scheme, linear).errors(windows, [window.K for window in windows])
+    (changes, spreads), phase = smoothed(windows)
+    best: dict[str, tuple[float, float]] = {}
+    for factor in FACTORS:
+        if factor != 0.0 and (phase < UNSURE or best["time"][0] < SMALL * scale):
+            break
+        moved = (change + factor * spread for change, spread in zip(changes, spreads, strict=True))
+        stiffness = [window.K + np.diag(change) for window, change in zip(windows, moved, strict=True)]
+        found = Track(scheme, linear).errors(windows, stiffness)
+        best = {"space": found["space"], **best, "time": max(best.get("time", (0.0, 0.0)), found["time"])}
+    return best
+
+
+def smoothed(windows: Sequence[Window]) -> tuple[tuple[list[Array], list[Array]], float]:
+    """Return changes of the squares of frequencies in each window, and how far they are known; the phase at stake."""
+    r = min(w.shapes.V.shape[1] for w in windows)
+    squares = np.array([w.shapes.squares[:r] for w in windows])
+    speeds = np.array([w.speed**2 for w in windows])
+    number = np.arange(len(windows))
+    scale = speeds.max() or 1.0
+    fitted, spread = squares.copy(), np.zeros_like(squares)
+    for i in number if len(windows) > 2 else ():
+        weights = np.exp(-0.5 * ((number - i) / WIDTH) ** 2)
+        base = np.column_stack([np.ones(len(windows)), (speeds - speeds[i]) / scale])
+        normal = base.T @ (weights[:, None] * base) + np.diag([0.0, 1e-3])
+        fit = np.linalg.solve(normal, base.T @ (weights[:, None] * squares))
+        fitted[i] = fit[0]
+        spread[i] = np.sqrt(weights @ (squares - base @ fit) ** 2 / weights.sum())
+    spread = np.minimum(spread, MOST * np.abs(fitted))
+    lengths = np.array([w.t[-1] - w.t[0] for w in windows])
+    rates = np.sqrt(np.maximum(np.abs(fitted), 1e-300))
+    phase = float(np.max((lengths[:, None] * spread / (2 * rates)).sum(axis=0)[:LOWEST], initial=0.0))
+    around = [_padded(x, w) for x, w in zip(spread, windows, strict=True)]
+    changes = [_padded(x, w) for x, w in zip(fitted - squares, windows, strict=True)]
+    return (changes, around), phase
+
+
+def _padded(x: Array, window: Window) -> Array:
+    """Return changes of all coordinates of a window."""
+    out = np.zeros(len(window.K))
+    out[: len(x)] = x
+    return out
+
+
+class Track:
+    """Errors of time and space that go from window to window.
+
+    Args:
+        scheme: that made the motion.
+        linear: whether what the tangents say may grow.
+    """
+
+    def __init__(self, scheme: Any, linear: bool):
+        self.scheme, self.bounded = scheme, not linear
+        self.carried: Array = np.zeros((2, 2, 0))
+
+    def errors(self, windows: Sequence[Window], stiffness: Sequence[Array]) -> dict[str, tuple[float, float]]:
+        """Return the largest errors of the tip: size (m) and when (s)."""
+        best: dict[str, tuple[float, float]] = {"time": (0.0, 0.0), "space": (0.0, 0.0)}
+        for window, K in zip(windows, stiffness, strict=True):
+            found = self._through(window, K)
+            best = {name: max(best[name], error) for name, error in zip(best, found, strict=True)}
+        return best
+
+    def _through(self, window: Window, K: Array) -> list[tuple[float, float]]:
+        """Go on with the errors through a window; return the largest of the tip and when they are."""
+        (begin, end), h = window.ends, window.lengths
+        exact = Propagator(window.C, K, h, self.bounded)
+        states = exact.modal(*window.motion[:2])
+        defects = states[end] - exact.factors * states[begin] - exact.forced(self._drives(window, K))
+        off = self._mesh_force(window)
+        late = exact.forced(np.stack([off[begin], off[end] - off[begin]], axis=1))
+        c, rate = self._start(window)
+        errors = [
+            accumulated(start, exact.carried, each)
+            for start, each in zip(exact.modal(c, rate), (defects, late), strict=True)
+        ]
+        self.carried = np.array([exact.sampled(e[-1]) for e in errors]).reshape(2, 2, -1)
+        r, tip = window.shapes.V.shape[1], window.shapes.tip
+        self.carried[:, :, :r] *= window.bends  # what stretches has no phase to lose
+        sizes = [np.linalg.norm(exact.displacements(e)[:, :r] @ tip.T, axis=1) for e in errors]
+        return [(float(size.max()), float(window.t[end[int(size.argmax())]])) for size in sizes]
+
+    def _start(self, window: Window) -> tuple[Array, Array]:
+        """Return the errors that a window starts with, c and ċ, shape (2, r) each."""
+        if window.turn is None or not self.carried.size:
+            zero = np.zeros((2, len(window.K)))
+            return zero, zero
+        turned = self.carried @ window.turn.T
+        return turned[:, 0], turned[:, 1]
+
+    def _drives(self, window: Window, K: Array) -> Array:
+        """Return γ over every step as polynomials."""
+        (c, v, a), most = window.motion, self.scheme.order + BEYOND
+        if self.scheme.balanced_at_end:
+            return interpolated(window.t, a + v @ window.C.T + c @ K.T, window.at_ends, most)
+        begin, end = window.ends
+        t, c, v = (0.5 * (x[begin] + x[end]) for x in (window.t, c, v))
+        return interpolated(t, a[end] + v @ window.C.T + c @ K.T, window.in_middles, most)
+
+    @staticmethod
+    def _mesh_force(window: Window) -> Array:
+        """Return 2 ε c̈: the forces of inertia, whose static answer the mesh puts off by 2 ε."""
+        a = window.motion[2]
+        out, r = np.zeros_like(a), len(window.epsilon)
+        out[:, :r] = 2.0 * window.epsilon * a[:, :r]
+        return out

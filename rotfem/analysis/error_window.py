@@ -1,0 +1,181 @@
+"""A stretch of a motion in a few shapes: its samples, and M, C, K of the tangent in its middle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.error_recursion import Index, Spans
+from rotfem.analysis.reduced_tangents import Tangents
+from rotfem.analysis.ritz_vectors import RitzVectors
+from rotfem.analysis.schemes import State
+from rotfem.analysis.shape_error import ShapeError
+
+Array = npt.NDArray[np.float64]
+
+#: Periods on either side over which a vibration is taken out, and how long that may be beside 1/ω of the slowest one.
+PERIODS, SLOW = 2.0, 0.7
+
+#: Part of a turn in a history by which the angle of a free hub is held, so that no eigenvalue is double.
+HELD = 0.01
+
+#: Product of two shapes from which they are one, and a square of a frequency that is none, 1/s².
+SAME, TINY = 0.5, 1e-300
+
+
+@dataclass
+class Samples:
+    """States of a motion, and the steps between them.
+
+    Attributes:
+        states: t (s), q, v, a (local dof arrays), and what rotations are counted from.
+        steps: numbers of the states that a step starts and ends with.
+        pieces: numbers of the states with which what drives the motion starts afresh.
+    """
+
+    states: list[tuple[float, Array, Array, Array, Any]]
+    steps: list[tuple[int, int]]
+    pieces: list[int]
+
+    @property
+    def middle(self) -> tuple[int, float]:
+        """Number of the state in the middle, and the length of the step to it, s."""
+        t = [self.states[end][0] for _, end in self.steps]
+        begin, end = self.steps[int(np.searchsorted(t, 0.5 * (t[0] + t[-1])))]
+        return end, self.states[end][0] - self.states[begin][0]
+
+    def around(self, number: int, most: int) -> Any:
+        """Return so many states on either side of one, and itself, if they are smooth with it; else None."""
+        own = int(np.searchsorted(self.pieces, number, side="right")) - 1
+        first, last = self.pieces[own], [*self.pieces, len(self.states)][own + 1] - 1
+        if number - most < first or number + most > last:
+            return None
+        found = self.states[number - most : number + most + 1]
+        return found if all(state[4] is found[0][4] for state in found) else None
+
+
+class Window:
+    """A motion in the shapes that move the tip, c = Vᵀ M q; of a free hub with its angle as last coordinate.
+
+    Args:
+        system: equations of motion; time and state are set in it.
+        mesh: errors of shapes.
+        samples: the motion.
+        end: length of the whole history, s.
+        before: shapes of the window before; None for the first.
+
+    Attributes:
+        shapes: the shapes.
+        t: times of the samples, s, (N,).
+        motion: c, ċ, c̈ of the samples, (N, r) each.
+        C, K: for c̈ + C ċ + K c, (r, r).
+        speed: of the frame in the middle, rad/s.
+        bends: which shapes bend, (r of the structure,).
+        epsilon: relative errors of their frequencies by the mesh.
+        turn: Vᵀ M V_before, by which errors are handed on; None for the first.
+    """
+
+    def __init__(self, system: Any, mesh: ShapeError, samples: Samples, end: float, before: RitzVectors | None):
+        self.samples, self.free = samples, system.hub is not None
+        self.shapes, tangents = self._tangents(system, mesh)
+        self.speed = tangents.speed
+        M, C, K = tangents.reduced(self.shapes)
+        if self.free:
+            K[-1, -1] += HELD * M[-1, -1] * (2 * np.pi / end) ** 2
+        self.C, self.K = (np.asarray(np.linalg.solve(M, A), dtype=float) for A in (C, K))
+        self.t = np.array([state[0] for state in samples.states])
+        arrays = list(zip(*samples.states, strict=True))[1:4]
+        self.motion = tuple(self._coordinates(x) for x in arrays)
+        self.bends, self.epsilon = mesh.bend(self.shapes), mesh.of_modes(self.shapes)
+        self.turn = None if before is None else self._turned(before)
+        samples.states.clear()
+
+    @cached_property
+    def ends(self) -> tuple[Index, Index]:
+        """Numbers of the samples that steps start and end with."""
+        begin, end = np.array(self.samples.steps).T
+        return begin, end
+
+    @property
+    def lengths(self) -> Array:
+        """Of the steps, s."""
+        begin, end = self.ends
+        return np.asarray(self.t[end] - self.t[begin])
+
+    @property
+    def at_ends(self) -> Spans:
+        """The steps, and the samples around them."""
+        begin, _ = self.ends
+        piece = np.searchsorted(self.samples.pieces, begin, side="right") - 1
+        first = np.array(self.samples.pieces)[piece]
+        last = np.array([*self.samples.pieces[1:], len(self.t)])[piece] - 1
+        return Spans(self.t[begin], self.lengths, begin, first, last)
+
+    @property
+    def in_middles(self) -> Spans:
+        """The steps, and samples that lie in their middles: one fewer in each piece."""
+        spans, begin = self.at_ends, self.ends[0]
+        piece = np.searchsorted(self.samples.pieces, begin, side="right") - 1
+        number = np.arange(len(begin))
+        return Spans(spans.starts, spans.lengths, number, spans.first - piece, spans.last - piece - 1)
+
+    def _coordinates(self, arrays: Any) -> Array:
+        """Return Vᵀ M x of local dof arrays, (n, r); of a free hub with its angle."""
+        n = len(self.shapes.V)
+        out = self.shapes.sum(np.array([x[:n] for x in arrays]) @ self.shapes.massed)
+        return np.column_stack([out, [x[-1] for x in arrays]]) if self.free else out
+
+    def _turned(self, before: RitzVectors) -> Array:
+        """Return Vᵀ M V_before; where shapes have turned, rates of what is quick are none of what is slow."""
+        turn = self.shapes.sum(self.shapes.V.T @ before.massed)
+        octaves = np.subtract.outer(*(np.log2(np.maximum(np.abs(s.squares), TINY)) / 2 for s in (self.shapes, before)))
+        turn[(np.abs(octaves) > 1.0) & (np.abs(turn) < SAME)] = 0.0
+        if self.free:
+            turn = np.block([[turn, np.zeros((len(turn), 1))], [np.zeros((1, turn.shape[1])), np.ones((1, 1))]])
+        return turn
+
+    # --- the tangent -------------------------------------------------------------------------------------------------
+
+    def _tangents(self, system: Any, mesh: ShapeError) -> tuple[RitzVectors, Tangents]:
+        """Return shapes and matrices in the middle of the window."""
+        number, h = self.samples.middle
+        t, q, v, a, datum = self.samples.states[number]
+        tangents = Tangents(system, State(t, q, v, a, datum=datum))
+        shapes = tangents.shapes()
+        if system.held.linear:
+            return shapes, tangents
+        quick = self._vibrating(shapes, mesh.bend(shapes), number, h)
+        q, v, a = (_without(x, moved) for x, moved in zip((q, v, a), quick, strict=True))
+        tangents = Tangents(system, State(t, q, v, a, datum=datum))
+        return tangents.shapes(), tangents
+
+    def _vibrating(self, shapes: RitzVectors, bends: Any, number: int, h: float) -> Array:
+        """Return q, v and a (owned) of quick vibrations in the state of a number, with steps of h (s) around it.
+
+        Axial ones, and those that steps cannot sample, change the stress, and with it the frequencies of all others: in
+        each step another way, and on the average not. They are c̈ = −ω² c about what balances the forces, as far as c̈
+        is not a parabola over some of their periods (Savitzky & Golay 1964).
+        """
+        out, omega = np.zeros((3, shapes.V.shape[1])), np.sqrt(np.abs(shapes.squares))
+        for k in np.flatnonzero(~bends | (omega * h > np.pi)):
+            m = max(2, int(np.ceil(PERIODS * 2 * np.pi / (omega[k] * h))))
+            around = None if m * h > SLOW / omega[0] else self.samples.around(number, m)
+            if around is None:
+                continue
+            smooth = 3 * (3 * m * m + 3 * m - 1 - 5 * np.arange(-m, m + 1) ** 2) / ((4 * m * m - 1) * (2 * m + 3))
+            for i in (1, 2):
+                c = shapes.sum(np.array([state[i + 1][: len(shapes.V)] for state in around]) @ shapes.massed[:, k])
+                out[i, k] = c[m] - smooth @ c
+        out[0] = -out[2] / shapes.squares
+        return np.asarray(out @ shapes.V.T)
+
+
+def _without(x: Array, moved: Array) -> Array:
+    """Return a local dof array less what its owned part has too much."""
+    out = x.copy()
+    out[: len(moved)] -= moved
+    return out
