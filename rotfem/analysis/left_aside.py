@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
-#: Most states that are kept of a motion.
-MOST = 16
+#: Most states that are kept of a motion: each is a factorisation.
+MOST = 8
 
 
 class LeftAside:
@@ -25,11 +25,13 @@ class LeftAside:
         self.system, self.beside = system.held, beside
         self._kept: list[tuple[float, Array, dict[str, Array]]] = []
         self._every, self._count = 1, 0
+        #: Whether the stiffness is the same in all states: of a linear theory without spin.
+        self._once = self.system.linear and not self.system.motion.is_spinning
 
     def __call__(self, q: Array, t: float) -> None:
         """Keep a state (local dof array) of the time that is set, or pass it by."""
         self._count += 1
-        if self._count % self._every:
+        if self._count % self._every or (self._once and self._kept):
             return
         model = self.system.model
         named = {**model.frame.constants, **{n: c for n, (c, _) in self.system.structure.load_constants.items()}}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from math import cos, pi, sin
 from typing import Any
 
 import numpy as np
@@ -169,17 +170,17 @@ def smooth_spin_up(speed: float, duration: float) -> tuple[Scalar, Scalar, Scala
 
     Kane, Ryan & Banerjee 1987; ICCIA 2017 eq. (17).
     """
-    T, k = duration, 2 * np.pi / duration
+    T, k = duration, 2 * pi / duration
 
     def omega(t: float) -> float:
-        return float(speed * (t / T - np.sin(k * t) / (2 * np.pi))) if t < T else speed
+        return float(speed * (t / T - sin(k * t) / (2 * pi))) if t < T else speed
 
     def rate(t: float) -> float:
-        return float(speed / T * (1 - np.cos(k * t))) if t < T else 0.0
+        return float(speed / T * (1 - cos(k * t))) if t < T else 0.0
 
     def angle(t: float) -> float:
         s = min(t, T)
-        return float(speed * (s * s / (2 * T) + (np.cos(k * s) - 1) / (2 * np.pi * k)) + speed * max(t - T, 0.0))
+        return float(speed * (s * s / (2 * T) + (cos(k * s) - 1) / (2 * pi * k)) + speed * max(t - T, 0.0))
 
     return omega, rate, angle
 

@@ -118,8 +118,8 @@ def test_what_may_be_moved_stays_in(case: str) -> None:
 def test_lateral_buckling_is_told() -> None:
     """A blade that is stiff in its plane leaves it above the tip force 4.013 √(EI GJ)/L² (Timoshenko & Gere 1961).
 
-    A ramp of a hundred periods meets it at its time; 16 states are looked at, so it is told within a 16th of the ramp
-    (and within 2 % before, for deflection and inertia in the plane).
+    A ramp of a hundred periods meets it at its time; of 8 states or fewer at least 4 are looked at, so it is told within
+    a quarter of the ramp, and within 2 % before, for deflection and inertia in the plane.
     """
     section = BEAM["section"] | {"EI3": 2.0e7, "EI2": 1.4e4, "GJ": 1e4}
     critical = 4.0126 * np.sqrt(1.4e4 * 1e4) / 100.0
@@ -128,5 +128,5 @@ def test_lateral_buckling_is_told() -> None:
     data |= {"time": {"end": 6.0, "step": 4e-3}, "mesh": {"elements": 4}}
     result = run(data)
     since = result.summary["left_out"]["unstable_since"]
-    assert 0.98 * 3.0 <= since <= 1.02 * 3.0 + 6.0 / 8
+    assert 0.98 * 3.0 <= since <= 1.02 * 3.0 + 6.0 / 4
     assert any("left out" in line for line in result.summary["warnings"])
