@@ -118,7 +118,7 @@ def test_what_may_be_moved_stays_in(case: str) -> None:
 def test_lateral_buckling_is_told() -> None:
     """A blade that is stiff in its plane leaves it above the tip force 4.013 √(EI GJ)/L² (Timoshenko & Gere 1961).
 
-    A ramp of a hundred periods meets it at its time; of 8 states or fewer at least 4 are looked at, so it is told within
+    A ramp of a hundred periods meets it at its time; of the motion 4 to 8 states are looked at, so it is told within
     a quarter of the ramp, and within 2 % before, for deflection and inertia in the plane.
     """
     section = BEAM["section"] | {"EI3": 2.0e7, "EI2": 1.4e4, "GJ": 1e4}
