@@ -111,7 +111,14 @@ def test_plate_mpi() -> None:
 
 @pytest.mark.parametrize("path", sorted(DEMOS.glob("*.toml")), ids=lambda path: path.name)
 def test_scene_is_valid(path: Path) -> None:
-    rotfem.load_scene(path).check_run()
+    """It can be run, a script whose number is asserted uses it, and what it says of itself is the same scene again."""
+    loaded = rotfem.load_scene(path)
+    loaded.check_run()
+    users = [name for name, _, _ in NUMBERS if path.name in (DEMOS / f"{name}.py").read_text(encoding="utf-8")]
+    assert users
+    again = rotfem.Scene.from_dict(loaded.to_dict(), name=loaded.name, directory=loaded.directory)
+    assert again.to_dict() == loaded.to_dict()
+    assert again.effective_effects() == loaded.effective_effects()
 
 
 def test_every_demo_is_covered() -> None:

@@ -129,10 +129,15 @@ def test_elements_that_lock_are_refused(cell: str, degree: int, integration: str
         square(0.01, mesh__degree=2, mesh__integration="full")
 
 
-@pytest.mark.parametrize("mesh", [{}, {"degree": 3}, {"cell": "triangle"}], ids=["Q2", "Q3", "P3"])
+@pytest.mark.parametrize(
+    ("mesh", "accuracy"), [({}, 1.5e-3), ({"degree": 3}, 2e-4), ({"cell": "triangle"}, 5e-4)], ids=["Q2", "Q3", "P3"]
+)
 @pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
-def test_no_modes_that_reduced_integration_does_not_see(theory: str, mesh: dict[str, Any]) -> None:
-    """A wide cantilever 1 × 4 × 0.1 m: (1 − 3ξ²)(1 − 3η²) had 1527 rad/s. Reference: Legendre–Ritz, Mindlin, 1e-3."""
+def test_no_modes_that_reduced_integration_does_not_see(theory: str, mesh: dict[str, Any], accuracy: float) -> None:
+    """A wide cantilever 1 × 4 × 0.1 m: (1 − 3ξ²)(1 − 3η²) had 1527 rad/s. Reference: Legendre–Ritz, Mindlin, 1e-4.
+
+    On the 4 × 16 cells of the default Q2 have 1.3e-3 of error in the sixth mode, Q3 and P3 1.1e-4 and 2.9e-4.
+    """
     scene = square(
         0.1,
         structure__width=4.0,
@@ -142,8 +147,7 @@ def test_no_modes_that_reduced_integration_does_not_see(theory: str, mesh: dict[
         mesh=mesh,
     )
     frequencies = [row["frequency"] for row in rotfem.modes(scene).rows]
-    np.testing.assert_allclose(frequencies, [535.0, 610.1, 824.4, 1169.9, 1668.4, 2335.7], rtol=2e-2)
-    np.testing.assert_allclose(frequencies[:4], [535.0, 610.1, 824.4, 1169.9], rtol=3e-3)
+    np.testing.assert_allclose(frequencies, [535.0, 610.1, 824.4, 1169.9, 1668.4, 2335.7], rtol=accuracy)
 
 
 @pytest.mark.parametrize("theory", ["consistent_linear", "von_karman", "reissner"])
@@ -260,10 +264,23 @@ def test_isotropic_given_as_orthotropic() -> None:
     tables["structure"] |= {"E1": E, "E2": E, "nu12": NU, "G12": G}
     found = transverse(Scene.from_dict(tables))
     np.testing.assert_allclose(found, transverse(square(0.02, motion__speed=50.0)), rtol=1e-8)
-    tables["structure"]["E2"] = E / 10  # softer across: chordwise modes fall, the first bending mode hardly
-    softer = transverse(Scene.from_dict(tables))
-    assert softer[0] == pytest.approx(found[0], rel=0.03)
-    assert softer[3] < 0.9 * found[3]
+
+
+def test_orthotropic_plate_is_an_isotropic_one_of_another_width() -> None:
+    """Without Poisson's ratios and with G = √(E1 E2)/2 a thin plate is isotropic in y (E1/E2)^¼, its edges too.
+
+    D1 w,xxxx + 2 √(D1 D2) w,xxyy + D2 w,yyyy is the isotropic plate's there, and so are M_y = D2 w,yy and
+    V_y = D2 w,yyy + 2 √(D1 D2) w,xxy. Shear, which is not, is of the order (h/a)² times the square of the wave number.
+    """
+    h, soft = 1e-3, E / 10
+    stretch = 10**0.25
+    own = {"length": 1.0, "width": 1.0, "thickness": h, "rho": RHO, "E1": E, "E2": soft, "nu12": 0.0}
+    own |= {"G12": np.sqrt(E * soft) / 2, "type": "plate"}
+    base = {k: v for k, v in square(h).to_dict().items() if k in ("motion", "model", "modes")}
+    found = transverse(Scene.from_dict(base | {"structure": own}))
+    wider = {"type": "plate", "length": 1.0, "width": stretch, "thickness": h, "rho": RHO, "E": E, "nu": 0.0}
+    wanted = transverse(Scene.from_dict(base | {"structure": wider}))
+    np.testing.assert_allclose(found[:6], wanted[:6], rtol=1e-4)
 
 
 def test_point_mass_is_all_there() -> None:
@@ -334,13 +351,18 @@ def test_roll_up() -> None:
 @pytest.mark.parametrize("kind", ["dead", "follower"])
 @pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
 def test_couple_in_the_plane(theory: str, kind: str) -> None:
-    """A strip bent in its plane by a moment at its tip: u2 = M L²/2EI in first order (1 %: Green's strain)."""
-    moment, EI = 100.0, 1.2e6 * 0.1 * 1.0**3 / 12
+    """A strip bent in its plane by a moment at its tip: u2 = M L²/2EI in first order.
+
+    The strains of the linear theory have this solution exactly, and so have its elements. Of an exact one the tip turns
+    by θ = M L/EI = 0.01, and what is of higher order is θ²/2 = 5e-5: the arm of the couple's forces is shorter.
+    """
+    moment, EI = 10.0, 1.2e6 * 0.1 * 1.0**3 / 12
     scene = cantilever(
         loads__tip_moment={"value": [0, 0, moment], "kind": kind}, model__theory=theory, mesh__elements=[16, 2]
     )
     figures = rotfem.run(scene).summary["figures"]
-    assert figures["tip_u2_final"] == pytest.approx(moment * 10.0**2 / (2 * EI), rel=1e-2)
+    accuracy = 1e-9 if theory == "consistent_linear" else 6e-5
+    assert figures["tip_u2_final"] == pytest.approx(moment * 10.0**2 / (2 * EI), rel=accuracy)
     assert abs(figures["tip_u3_final"]) < 1e-9
 
 
@@ -362,8 +384,11 @@ def test_jacobi_integral(theory: str) -> None:
         )
         h = rotfem.run(scene).history
         drift.append(np.max(np.abs(h["jacobi"] - h["jacobi"][0])) / np.max(h["strain"]))
-    assert drift[1] < 2e-2
-    assert drift[1] < 0.5 * drift[0] or drift[0] < 1e-8
+    if theory == "consistent_linear":  # its energy is quadratic: the trapezoidal rule keeps it to round-off
+        assert max(drift) < 1e-10
+        return
+    assert drift[1] < 1e-4
+    assert drift[0] / drift[1] == pytest.approx(4.0, rel=0.1)  # the next term is of relative size h, not yet nothing
 
 
 @pytest.mark.parametrize("theory", ["consistent_linear", "von_karman", "reissner"])
@@ -506,18 +531,25 @@ def annulus(m: int, ratio: float) -> float:
 
 
 def test_annular_disk(tmp_path: Path) -> None:
-    """Frequencies of 0 to 3 nodal diameters against Bessel functions, pairs, and their names; 1e-2 (straight edges)."""
+    """Frequencies of 0 to 3 nodal diameters against Bessel functions, pairs, and their names.
+
+    Straight edges put the radii off by 1/n², n cells around: 1.5 % and 0.33 % of the frequencies, and extrapolated from
+    both less than 1e-3.
+    """
     h, inner, outer = 1e-3, 0.1, 0.3
-    mesh = disk_mesh(tmp_path / "disk.msh", inner, outer, 48, 6)
-    scene = square(h, structure__length=None, structure__width=None, structure__mesh=str(mesh), modes__count=7)
-    rows = rotfem.modes(scene).rows
-    found = defaultdict(list)
-    for row in rows:
-        found[row["label"]].append(row["frequency"] / unit(h) * outer**2)
+    found: list[dict[str, list[float]]] = []
+    for around, across in ((24, 3), (48, 6)):
+        mesh = disk_mesh(tmp_path / f"disk{around}.msh", inner, outer, around, across)
+        scene = square(h, structure__length=None, structure__width=None, structure__mesh=str(mesh), modes__count=7)
+        found.append(defaultdict(list))
+        for row in rotfem.modes(scene).rows:
+            found[-1][row["label"]].append(row["frequency"] / unit(h) * outer**2)
+    coarse, fine = found
     for m in range(4):
-        pair = found[f"diameters {m}.1"]
+        pair = np.array(fine[f"diameters {m}.1"])
         assert len(pair) == (1 if m == 0 else 2)
-        np.testing.assert_allclose(pair, annulus(m, inner / outer) ** 2, rtol=1e-2)
+        extrapolated = pair + (pair - np.array(coarse[f"diameters {m}.1"])) / 3
+        np.testing.assert_allclose(extrapolated, annulus(m, inner / outer) ** 2, rtol=1e-3)
         assert max(pair) / min(pair) - 1 < 1e-6
 
 

@@ -26,12 +26,16 @@ OUTPUTS = ("tip_u1", "tip_u2", "tip_alpha")
 
 @pytest.mark.parametrize(("theory", "viscosity"), [("reissner", 1e-3), ("reissner", 0.0), ("consistent_linear", 1e-3)])
 def test_step_response(spin_up: Any, theory: str, viscosity: float) -> None:
-    """A force of 1 N across the tip at t = 0: six modes against 3000 steps of the full equations."""
+    """A force of 1 N across the tip at t = 0: six modes against 1500 steps of fourth order of the full equations.
+
+    Modes answer a step by at most twice their static part, so what is left out is 2 Σ_{n>6} 4/β_n⁴ of L³/EI, 3e-4 of
+    the peak; steps of 2 ms are a fiftieth of a period of the third mode, and add 1e-3.
+    """
     scene = spin_up(SPINNING | {"model.theory": theory, "structure.damping": {"kelvin_voigt": viscosity}})
     result = modes(scene)
     model = state_space(result.analysis, result.spinning, 6)
     load = {"table": [[0.0, 0.0, 0.0], [1e-9, 0.0, 1.0]]}
-    start = {"initial": {"state": "steady"}, "time": {"end": 6.0, "step": 0.002}}
+    start = {"initial": {"state": "steady"}, "time": {"end": 3.0, "step": 0.002, "scheme": "esdirk4"}}
     history = run(scene.replace({"loads": {"tip_force": load}} | start)).history
     t = history["t"]
     u = np.zeros((len(t), 3))
@@ -40,20 +44,23 @@ def test_step_response(spin_up: Any, theory: str, viscosity: float) -> None:
     expected = history["tip_u2"] - history["tip_u2"][0]
     difference = np.max(np.abs(y[:, model.outputs.index("tip_u2")] - expected)) / np.max(np.abs(expected))
     print(f"G {theory} viscosity={viscosity:g}: {100 * difference:.3f} % of {np.max(np.abs(expected)):.4f} m")
-    assert difference < 0.01
+    assert difference < 1.5e-3
     assert np.max(np.abs(y[0])) < 1e-12 + 0.01 * np.max(np.abs(y))
 
 
 @pytest.mark.parametrize(("given", "seen"), [("tip_force_2", "tip_alpha"), ("tip_moment", "tip_u2")])
 def test_step_response_of_moment_and_rotation(spin_up: Any, given: str, seen: str) -> None:
-    """Force to rotation and moment to deflection: 1 % of the peak too. Moment to rotation needs more modes than six."""
+    """Force to rotation and moment to deflection. Moment to rotation needs more modes than six.
+
+    What is left out is at most 2 Σ_{n>6} 4/β_n³ of L²/EI (see above), 5e-3 of the peak of twice L²/2EI.
+    """
     scene = spin_up(SPINNING | {"structure.damping": {"kelvin_voigt": 1e-3}, "model.theory": "reissner"})
     result = modes(scene)
     model = state_space(result.analysis, result.spinning, 6)
     force = {"tip_force": {"table": [[0.0, 0.0, 0.0], [1e-9, 0.0, 1.0]]}}
     moment = {"tip_moment": {"table": [[0.0, 0.0], [1e-9, 1.0]]}}
     load = moment if given == "tip_moment" else force
-    start = {"initial": {"state": "steady"}, "time": {"end": 3.0, "step": 0.002}}
+    start = {"initial": {"state": "steady"}, "time": {"end": 3.0, "step": 0.002, "scheme": "esdirk4"}}
     history = run(scene.replace({"loads": load} | start)).history
     u = np.zeros((len(history["t"]), 3))
     u[:, model.inputs.index(given)] = 1.0
@@ -61,7 +68,7 @@ def test_step_response_of_moment_and_rotation(spin_up: Any, given: str, seen: st
     expected = history[seen] - history[seen][0]
     difference = np.max(np.abs(y[:, model.outputs.index(seen)] - expected)) / np.max(np.abs(expected))
     print(f"G {given} to {seen}: {100 * difference:.3f} % of {np.max(np.abs(expected)):.3g}")
-    assert difference < 0.01
+    assert difference < 5e-3
 
 
 def test_what_scipy_makes_of_it(unit_beam: Any, tmp_path: Path) -> None:
