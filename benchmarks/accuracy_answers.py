@@ -1,0 +1,162 @@
+"""What an accuracy costs and gives: the true error of what it chose, and its time beside other ways to the same answer.
+
+    ./with-fenicsx python benchmarks/accuracy_answers.py [--cache FOLDER] [--grid] [--accuracy E …] [NAME …]
+
+The scenes are those of accuracy_scenes.py, without the theory that some of them name. Of every scene and accuracy it
+prints the true error over the accuracy, and CPU seconds, those of choosing included: of the answer, of the scene's own
+setting with its error, and, with --grid, of the cheapest fixed settings that are as good as was asked: of all of a grid
+over theory, scheme, step and mesh, and of the exact theory by the scheme of default. Forms are compiled before.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from accuracy_scenes import SCENES, Tables, Truth, finer, tips
+from scipy.interpolate import CubicSpline
+
+import rotfem
+
+Array = npt.NDArray[np.float64]
+
+ACCURACIES = (1e-2, 1e-3, 1e-4)
+
+#: Steps of the truth and of the grid, as parts of a scene's own, and schemes and theories of the grid.
+TRUTH, STEPS = 8, (4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 1 / 16)
+SCHEMES, THEORIES = ("generalised_alpha", "esdirk4"), ("consistent_linear", "reissner")
+
+
+#: CPU seconds from which a run of the full model is a long one.
+LONG = 2.0
+
+
+@dataclass
+class Answer:
+    """One run: its true error, CPU seconds, and summary; an infinite error of one that failed."""
+
+    error: float
+    seconds: float
+    summary: dict[str, Any]
+
+
+class Judge:
+    """Knows the truth of a scene.
+
+    Args:
+        tables: the scene, without its theory.
+        truth: where truths are kept.
+    """
+
+    def __init__(self, tables: Tables, truth: Truth):
+        self.tables = tables
+        fine = finer(tables, mesh=2)
+        if "time" in tables:
+            step = tables["time"].get("step", tables["time"]["end"] / 500)
+            fine["time"] = {"end": tables["time"]["end"], "step": step / TRUTH, "scheme": "esdirk4"}
+        self.t, self.tip = truth(fine)
+
+    def __call__(self, tables: Tables) -> Answer:
+        """Return the answer to a scene, computed after its forms are compiled."""
+        started = process_time()
+        try:
+            run = rotfem.run(tables, hint=None)
+        except rotfem.ComputationError as failure:
+            return Answer(np.inf, process_time() - started, getattr(failure, "result", failure).__dict__)
+        return Answer(self.error(*tips(run)), process_time() - started, run.summary)
+
+    def error(self, t: Array, tip: Array) -> float:
+        """Return the largest distance from the truth, relative to the largest displacement."""
+        exact = CubicSpline(self.t, self.tip)(t) if len(t) > 1 else self.tip
+        return float(np.linalg.norm(tip - exact, axis=1).max() / np.linalg.norm(self.tip, axis=1).max())
+
+
+def grid(tables: Tables) -> list[Tables]:
+    """Return fixed settings of a scene."""
+    out = []
+    for theory, factor in itertools.product(THEORIES, (0.5, 1)):
+        coarse = finer(tables, theory=theory)
+        number = tables["mesh"]["elements"]
+        part = [max(1, int(n * factor)) for n in number] if isinstance(number, list) else max(1, int(number * factor))
+        coarse["mesh"] = {**tables["mesh"], "elements": part}
+        if "time" not in tables:
+            out.append(coarse)
+            continue
+        end = tables["time"]["end"]
+        step = tables["time"].get("step", end / 500)
+        for scheme, share in itertools.product(SCHEMES, STEPS):
+            time = {"end": end, "step": min(step * share, end / 10), "scheme": scheme, "output_step": step}
+            out.append({**coarse, "time": time, "output": {"error": False}})
+    return out
+
+
+def is_full(setting: Tables) -> bool:
+    """Return whether a setting is the exact theory by the scheme of default."""
+    scheme = setting.get("time", {}).get("scheme", "generalised_alpha")
+    return bool(setting["model"]["theory"] == "reissner" and scheme == "generalised_alpha")
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cache", type=Path, default=Path(tempfile.gettempdir()) / "rotfem-accuracy")
+    parser.add_argument("--accuracy", type=float, nargs="*", default=list(ACCURACIES))
+    parser.add_argument("--grid", action="store_true")
+    parser.add_argument("names", nargs="*", default=list(SCENES), metavar="NAME")
+    arguments = parser.parse_args()
+    truth, ratios, own, best, faster = Truth(arguments.cache), [], [], [], []
+    for name in arguments.names:
+        tables = {key: value for key, value in SCENES[name].items() if key != "model"}
+        judge = Judge(tables, truth)
+        judge(tables)  # compiles
+        default = judge(tables)
+        print(f"{name}: its own setting {default.error:.1e} in {default.seconds:.2f} s", flush=True)
+        tried = [(setting, judge(setting)) for setting in grid(tables)] if arguments.grid else []
+        for accuracy in arguments.accuracy:
+            asked = {**tables, "accuracy": accuracy}
+            judge(asked)  # compiles
+            answer = judge(asked)
+            line = f"    {accuracy:.0e}: true/asked {answer.error / accuracy:8.2e} in {answer.seconds:6.2f} s"
+            if np.isfinite(answer.error):
+                ratios.append(answer.error / accuracy)
+                told = answer.summary["accuracy"]
+                chosen = told["chosen"]
+                line += f" ({len(told['attempts'])} tried: {chosen['theory']}"
+                line += ", reduced" if chosen.get("reduced") else ""
+                line += f", {chosen.get('scheme', '')} {chosen.get('step', chosen.get('tolerance', 0)):.2g}"
+                line += f", {chosen.get('elements')} P{chosen['degree']})"
+            else:
+                line += " (not met)"
+            own.append(default.seconds / answer.seconds)
+            good = [(each.seconds, setting) for setting, each in tried if each.error <= accuracy]
+            full = [seconds for seconds, setting in good if is_full(setting)]
+            if good:
+                cheapest = min(seconds for seconds, _ in good)
+                best.append(answer.seconds / cheapest)
+                line += f"; cheapest of the grid {cheapest:.2f} s"
+            if full:
+                faster.append((min(full), answer.seconds))
+                line += f", of the full model {min(full):.2f} s"
+            print(line, flush=True)
+    print(f"true/asked: median {np.median(ratios):.2f}, largest {max(ratios):.2f} of {len(ratios)} that met it")
+    print(f"time of the scenes' own settings / time: median {np.median(own):.2f}")
+    if faster:
+        gains = np.array([full / seconds for full, seconds in faster])
+        long = np.array([full > LONG for full, _ in faster])
+        print(f"time of the full model at that error / time: median {np.median(gains):.2f}", end="")
+        print(
+            f", above 1 in {np.mean(gains[long] > 1):.0%} of {long.sum()} longer than {LONG:g} s" if long.any() else ""
+        )
+    if best:
+        print(f"time / time of the cheapest of the grid: median {np.median(best):.2f}, largest {max(best):.2f}")
+
+
+if __name__ == "__main__":
+    main()
