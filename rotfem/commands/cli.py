@@ -14,9 +14,10 @@ from typing import Annotated, Any
 import typer
 
 from rotfem.commands.console import Session
+from rotfem.commands.options import as_path, folder_name, listed
 from rotfem.commands.printed import campbell_report, explain_report, modes_report, run_report
 from rotfem.commands.result_folder import ResultFolder, Writer
-from rotfem.errors import ComputationError, SceneError, input_of
+from rotfem.errors import ComputationError, input_of
 from rotfem.scene import Scene, load_scene
 
 app = typer.Typer(
@@ -64,17 +65,6 @@ class Job:
         self.session.say(lines(result.summary, self.results.path))
 
 
-def as_path(text: str) -> Path:
-    """Return the path that an option gives.
-
-    Raises:
-        BadParameter: it is empty, which would mean the working directory, or no path.
-    """
-    if not text or "\0" in text:
-        raise typer.BadParameter("must be a path, not an empty text")
-    return Path(text)
-
-
 @contextmanager
 def job(
     command: str,
@@ -105,17 +95,6 @@ def job(
         loaded = load_scene(scene, [*(overrides or ()), *wanted])
         folder = session.folder(output or Path("results") / folder_name(loaded.name), command)
         yield Job(loaded, folder, session, not no_plots, session.hint(no_advice))
-
-
-def folder_name(scene: str) -> str:
-    """Return the name of the folder of a scene's results: the scene's own, if that is the name of one.
-
-    Raises:
-        SceneError: it is not.
-    """
-    if scene in ("", ".", ".."):
-        raise SceneError("command line", "-o", None, f'must be given for a scene of the name "{scene}"')
-    return scene
 
 
 def command(computes: bool = True) -> Callable[[Callable[..., None]], Callable[..., None]]:
@@ -279,21 +258,6 @@ def cost(
     if write is not None and todo.session.first:
         result.write_tuned(write)
         todo.session.say([f"tuned scene in {write}"])
-
-
-def listed(option: str, text: str | None, kind: Callable[[str], Any]) -> list[Any] | None:
-    """Return the values of an option such as "2,3"; None where it is not given.
-
-    Raises:
-        SceneError: they are not of the kind.
-    """
-    if text is None:
-        return None
-    try:
-        return [kind(part.strip()) for part in text.split(",")]
-    except ValueError:
-        what = "integers" if kind is int else "numbers"
-        raise SceneError("command line", option, text, f"must be {what} separated by commas") from None
 
 
 def main() -> None:

@@ -29,7 +29,7 @@ from rotfem.commands import energy_growth
 from rotfem.commands.interrupts import Interrupted
 from rotfem.commands.keeper import Keeper
 from rotfem.commands.known_error import error_of_run, warnings_of_run
-from rotfem.commands.other_models import better_theories, lacking
+from rotfem.commands.other_models import diverged, lacking
 from rotfem.commands.problem import scheme_of
 from rotfem.commands.recorder import Recorder
 from rotfem.commands.reduced_history import by_reduced_model
@@ -247,17 +247,7 @@ class Simulation:
         size = self.system.size(state.q)
         if np.isfinite(size) and size <= LARGEST_LINEAR_DEFLECTION:
             return
-        theory, why = self.problem.theory, "the motion is unstable or its load too large for a linear theory"
-        if self._critical_since is not None:
-            passed = f"passed at t = {self._critical_since:.4g} s"
-            why = f"its stiffness is not definite above {self.critical:.6g} rad/s, {passed}"
-            if not theory.prestress:
-                why += ": first-order strains keep the softening by the centrifugal force but not the stiffening"
-        raise ComputationError(
-            f"the {theory.name} solution diverged (a displacement exceeds the length, or a rotation 1 rad; {why})",
-            time=state.t,
-            advice=better_theories(theory),
-        )
+        raise diverged(self.problem.theory, state.t, self.critical, self._critical_since)
 
     # --- the result --------------------------------------------------------------------------------------------------
 
