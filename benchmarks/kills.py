@@ -25,18 +25,10 @@ import h5py
 import numpy as np
 
 from rotfem.results.files import read_csv
+from tests.beams import BEAM_TABLE, PLATE_TABLES
 
-BEAM = """\
-[structure]
-type = "planar_beam"
-length = 10.0
-[structure.section]
-EA = 2.8e7
-GA = 1.0e7
-EI = 1.4e4
-mass_per_length = 1.2
-rotary_inertia = 6.0e-4
-[motion]
+BEAM = f"""\
+{BEAM_TABLE}[motion]
 type = "spin_up"
 speed = 6.0
 duration = 15.0
@@ -46,20 +38,8 @@ elements = 4
 end = 12.0
 step = 0.01
 """
-PLATE = """\
-[structure]
-type = "plate"
-length = 1.0
-width = 0.5
-thickness = 0.02
-E = 7e10
-nu = 0.3
-rho = 2700.0
-[motion]
-type = "spin_up"
-speed = 60.0
-duration = 2.0
-[mesh]
+PLATE = f"""\
+{PLATE_TABLES}[mesh]
 elements = [5, 3]
 [time]
 end = 0.3

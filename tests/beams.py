@@ -15,6 +15,29 @@ mass_per_length = 1.2
 rotary_inertia = 6.0e-4
 """
 
+#: The table of the beam as a scene file has it, its section included.
+BEAM_TABLE = f"""\
+[structure]
+type = "planar_beam"
+length = 10.0
+{SECTION}"""
+
+#: The same of a plate that is spun up, for what is tried with both.
+PLATE_TABLES = """\
+[structure]
+type = "plate"
+length = 1.0
+width = 0.5
+thickness = 0.02
+E = 7e10
+nu = 0.3
+rho = 2700.0
+[motion]
+type = "spin_up"
+speed = 60.0
+duration = 2.0
+"""
+
 STRUCTURE: dict[str, Any] = {"type": "planar_beam", "length": 10.0, **tomllib.loads(SECTION)["structure"]}
 SPIN_UP: dict[str, Any] = {
     "structure": STRUCTURE,

@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -22,20 +23,17 @@ from rotfem.commands.simulation import Simulation
 from rotfem.results import checkpoint_file
 from rotfem.results.files import read_csv
 from rotfem.scene import as_scene
+from tests.beams import BEAM_TABLE, PLATE_TABLES, STRUCTURE
 from tests.cli.conftest import Done
 from tests.launch import environment
 
 BEAM: dict[str, Any] = {
-    "structure": {
-        "type": "planar_beam",
-        "length": 10.0,
-        "section": {"EA": 2.8e7, "GA": 1e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6e-4},
-    },
+    "structure": STRUCTURE,
     "motion": {"type": "spin_up", "speed": 6.0, "duration": 2.0},
     "mesh": {"elements": 3, "degree": 2},
     "time": {"end": 0.4, "step": 0.01},
 }
-PLATE = {"type": "plate", "length": 1.0, "width": 0.5, "thickness": 0.02, "E": 7e10, "nu": 0.3, "rho": 2700.0}
+PLATE = tomllib.loads(PLATE_TABLES)["structure"]
 HUB = {"type": "torque", "hub_inertia": 50.0, "pulses": [[0.0, 0.17, 30.0]]}
 
 #: Kinds of runs, each with something of its own to be remembered.
@@ -141,17 +139,8 @@ Simulation._check = signalled
 main()
 """
 
-SCENE = """\
-[structure]
-type = "planar_beam"
-length = 10.0
-[structure.section]
-EA = 2.8e7
-GA = 1.0e7
-EI = 1.4e4
-mass_per_length = 1.2
-rotary_inertia = 6.0e-4
-[motion]
+SCENE = f"""\
+{BEAM_TABLE}[motion]
 type = "spin_up"
 speed = 6.0
 duration = 2.0

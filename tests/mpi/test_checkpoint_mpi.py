@@ -14,16 +14,13 @@ import numpy as np
 import pytest
 
 from rotfem.results.files import read_csv
-from tests.beams import SECTION
+from tests.beams import BEAM_TABLE, PLATE_TABLES
 from tests.launch import MPIRUN, environment, rotfem
 
 pytestmark = [pytest.mark.mpi, pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")]
 
 BEAM = f"""\
-[structure]
-type = "planar_beam"
-length = 10.0
-{SECTION}[motion]
+{BEAM_TABLE}[motion]
 type = "torque"
 hub_inertia = 50.0
 pulses = [[0.0, 0.1, 30.0]]
@@ -33,20 +30,8 @@ elements = 6
 end = 0.2
 step = 0.01
 """
-PLATE = """\
-[structure]
-type = "plate"
-length = 1.0
-width = 0.5
-thickness = 0.02
-E = 7e10
-nu = 0.3
-rho = 2700.0
-[motion]
-type = "spin_up"
-speed = 60.0
-duration = 2.0
-[loads]
+PLATE = f"""\
+{PLATE_TABLES}[loads]
 distributed = [0.0, 0.0, 100.0]
 [mesh]
 elements = [4, 3]

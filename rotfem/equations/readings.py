@@ -1,0 +1,118 @@
+"""What is read of a state: sizes in the units of the unknowns, the tip, the shape, energies and outputs."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from mpi4py import MPI
+
+from rotfem.equations.functionals import Functionals
+from rotfem.equations.model import Model
+from rotfem.mechanics.motion import Motion
+from rotfem.numerics import forms
+from rotfem.structures.structure import Structure
+from rotfem.structures.turning_clamp import TurningClamp
+
+Array = npt.NDArray[np.float64]
+
+
+class Readings:
+    """Values of the state of a system, on every rank the same (see `rotfem.equations.system.System`)."""
+
+    model: Model
+    structure: Structure
+    motion: Motion
+    comm: MPI.Comm
+    time: float
+    scale: Array
+    clamp: TurningClamp | None
+    q: Any
+    V: Any
+
+    def size(self, x: Array) -> float:
+        """Return the largest entry of a local dof array in units of `scale`, over all ranks."""
+        here = float(np.max(np.abs(x) / self.scale)) if x.size else 0.0
+        return here if self.comm.size == 1 else self.comm.allreduce(here, op=MPI.MAX)
+
+    def product(self, x: Array, y: Array) -> float:
+        """Return the sum of the products of the entries of two local dof arrays in units of `scale`, over all ranks."""
+        owned = slice(0, self.V.dofmap.index_map.size_local * self.V.dofmap.index_map_bs)
+        here = float((x[owned] / self.scale[owned]) @ (y[owned] / self.scale[owned]))
+        return here if self.comm.size == 1 else self.comm.allreduce(here)
+
+    def deflection(self, q: Array, t: float) -> float:
+        """Return the largest unknown relative to the turning frame in units of `scale`, over all ranks."""
+        if self.clamp is None:
+            return self.size(q)
+        x = self.V.tabulate_dof_coordinates()[:, 0]
+        return self.size(self.clamp.relative(q.reshape(len(x), -1), x, t).ravel())
+
+    def increment_size(self, dq: Array) -> float:
+        """Return the size of a correction by which Newton is judged."""
+        return self.size(dq)
+
+    def sizes(self, x: Array) -> Array:
+        """Return the largest entry of each component in units of `scale`, over all ranks, shape (components,)."""
+        here = (np.abs(x) / self.scale).reshape(-1, self.V.dofmap.index_map_bs).max(axis=0, initial=0.0)
+        here = self.structure.whole_values(here)
+        if self.comm.size > 1:
+            self.comm.Allreduce(MPI.IN_PLACE, here, op=MPI.MAX)
+        return np.asarray(here)
+
+    def tip(self, q: Array, t: float) -> Array:
+        """Return the values of the unknowns at the tip, relative to the turning frame, shape (components,)."""
+        tip = self.structure.whole_values(self.structure.tip_values(self.structure.total(q)))
+        return tip if self.clamp is None else self.clamp.relative(tip[None, :], self.structure.length, t)[0]
+
+    def shape(self) -> dict[str, Array]:
+        """Return the deflected structure at the state: position x (m), u1, u2 (m), alpha, … in the turning frame."""
+        coordinates, q = self.structure.nodes(self.structure.total(self.q.x.array))
+        if self.clamp is not None:
+            q = self.clamp.relative(q, coordinates["x"], self.time)
+        return {**coordinates, **{name: q[:, i] for i, name in enumerate(self.structure.components)}}
+
+    @cached_property
+    def _energies(self) -> Functionals:
+        return Functionals(self.model.energies(), self.structure.mesh)
+
+    @cached_property
+    def _outputs(self) -> dict[str, Any]:
+        return {name: forms.form(form) for name, form in self.model.outputs().items()}
+
+    def compile_readings(self) -> None:
+        """Compile what is read of states, energies and outputs, which is otherwise done when first asked for."""
+        _ = self._energies, self._outputs
+
+    def total(self, form: Any) -> float:
+        """Return the value of a compiled functional over all ranks; 0 of None."""
+        if form is None:
+            return 0.0
+        here = float(fem.assemble_scalar(form))
+        return here if self.comm.size == 1 else float(self.comm.allreduce(here))
+
+    def outputs(self) -> dict[str, float]:
+        """Return the functionals of the problem at the state and time set."""
+        return {name: self.total(form) for name, form in self._outputs.items()}
+
+    def energies(self) -> dict[str, float]:
+        """Return kinetic and strain energy and the Jacobi integral T2 − T0 + W + V, J.
+
+        V is the potential of dead loads, gravity and base acceleration; the integral is constant while these and the
+        spin are constant in the frame and nothing dissipates.
+        """
+        e = self._energies()
+        kinetic = e["T2"] + e.get("T1", 0.0) + e.get("T0", 0.0)
+        if "momentum" in e:
+            spin = self.motion.speed(self.time) * float(self.motion.axis[2])
+            jacobi = kinetic - spin * e["momentum"] + e["strain"]
+        else:
+            jacobi = e["T2"] - e.get("T0", 0.0) + e["strain"]
+        potential = e.get("potential", 0.0)
+        if self.clamp is not None and "tip_moment" in self.structure.load_constants:
+            # A dead moment works on the rotation relative to the hub, alpha − psi.
+            potential += float(self.structure.load_constants["tip_moment"][0].value[0]) * self.clamp.angle(self.time)
+        return {"kinetic": kinetic, "strain": e["strain"], "jacobi": jacobi + potential}
