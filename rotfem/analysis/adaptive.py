@@ -26,7 +26,7 @@ SAFETY, SHRINK, KEEP, FLOOR = 0.9, 0.2, (0.9, 1.25), 1e-6
 MARGIN = 7.0
 
 #: Growth, from step to step, of what errors allow: those of a vibration are small twice in a period, wherever it is.
-STEADY = 1.5
+STEADY = 1.2
 
 #: Steps by which the scale of a motion is found, how alike their results must be, and errors that are noise, in units
 #: of Newton's tolerance.
@@ -73,9 +73,9 @@ class AdaptiveSteps:
         self.cells = Itinerary(stepper.system.courses, cells, CELL * self.end)
         self.landings, self.dense = self.cells.landings()
         self.least = NOISE * stepper.newton.tolerance
-        self.wanted = min(self.longest, FIRST * self.end)
+        self.wanted, self.allowed = min(self.longest, FIRST * self.end), np.inf
         if stepper.pace is not None:
-            self.wanted, self.largest = stepper.pace
+            self.wanted, self.largest, self.allowed = stepper.pace
             return
         self.largest = self.measure.displacement(state)
         if self.largest < FLOOR:
@@ -88,7 +88,7 @@ class AdaptiveSteps:
         Raises:
             ComputationError: a step failed, or would have to be shorter than allowed, or there are too many.
         """
-        state, wanted, stepper, allowed = self.state, self.wanted, self.stepper, np.inf
+        state, wanted, stepper, allowed = self.state, self.wanted, self.stepper, self.allowed
         for _ in range(MOST_STEPS):
             if state.t >= self.end:
                 return
@@ -116,7 +116,7 @@ class AdaptiveSteps:
                 new = stepper.scheme.resized(new, start, following)
             if lands or averaged:
                 new = stepper.restart(new, finish, View(1 if lands else 0))
-            state, stepper.pace = new, (wanted, self.largest)
+            state, stepper.pace = new, (wanted, self.largest, allowed)
             yield state
         raise ComputationError(
             f"{MOST_STEPS} steps have not reached the end",

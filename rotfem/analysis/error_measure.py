@@ -24,8 +24,8 @@ from rotfem.numerics.linear import DirectSolver, Increment
 
 Array = npt.NDArray[np.float64]
 
-#: Filters are made anew where the step has changed by more than this factor.
-COARSE = 1.5
+#: Filters are made for steps in this ratio, and so many at most are kept.
+COARSE, KEPT = 1.5, 4
 
 #: Where filters start, of τ: some in a row turn off less sharply than (1 + (τω)ᵐ)⁻¹ does.
 SHARP = 0.85
@@ -38,7 +38,7 @@ class ErrorMeasure:
     """Size of the error of a whole history that a step stands for.
 
     Args:
-        system: equations of motion; the state of the step is set in it where filters are made.
+        system: equations of motion; state and time of the start are set in it where filters are made.
         scheme: whose local errors are measured.
         end: length of the history, s.
     """
@@ -48,8 +48,8 @@ class ErrorMeasure:
         self._e, self._b = (compat.create_vector(self.inner.V) for _ in range(2))
         self._filtered = Increment(self.inner.V)
         self._displacements = [i for i, name in enumerate(self.inner.structure.components) if name.startswith("u")]
-        self._step = 0.0
-        self._filters: dict[float, DirectSolver] = {}
+        self._kept: dict[int, list[list[DirectSolver]]] = {}
+        self._mass: Any = None
 
     def __call__(self, error: Array, h: float) -> float:
         """Return the largest entry of the error, in units of the unknowns' scale.
@@ -58,11 +58,13 @@ class ErrorMeasure:
             error: local error of q, local dof array; of a free hub with that of its angle last.
             h: length of the step, s.
         """
-        if not self._step / COARSE < h < self._step * COARSE:
-            self._make(h)
-        number = self.end / h
-        adds_up, remains = (self._through(error, times) for times in (self._times, (self.scheme.estimate[2],)))
-        return max(number * self.size(adds_up), ONCE * self.size(remains))
+        length = round(np.log(h) / np.log(COARSE))
+        if length not in self._kept:
+            while len(self._kept) >= KEPT:
+                self._kept.pop(next(iter(self._kept)))
+            self._kept[length] = self._made(COARSE**length)
+        adds_up, remains = (self.size(self._through(error, filters)) for filters in self._kept[length])
+        return max(self.end / h * adds_up, ONCE * remains)
 
     def size(self, x: Array) -> float:
         """Return the largest displacement of a local dof array, in units of their scale."""
@@ -76,22 +78,24 @@ class ErrorMeasure:
             q = clamp.relative(q.reshape(len(x), -1), x, state.t).ravel()
         return self.size(q)
 
-    def _make(self, h: float) -> None:
-        """Make the filters for steps of about h (s)."""
-        number, (constant, order, lost) = self.end / h, self.scheme.estimate
-        slow = SHARP * (0.5 * constant * number) ** (1 / order)
-        self._times = (slow,) * (order // 2) + ((slow**0.5,) if order % 2 else ())
-        self._step, self._mass = h, self.inner.matrix(0.0, 0.0, 1.0, 0.0)
-        self._filters = {
-            tau: DirectSolver(self.inner.matrix((tau * h) ** 2, 0.0, 1.0, 1.0)) for tau in {lost, *self._times}
-        }
+    def _made(self, h: float) -> list[list[DirectSolver]]:
+        """Return the filters of what adds up and of what remains, for steps of h (s), by the matrices at the start."""
+        constant, order, lost = self.scheme.estimate
+        slow = SHARP * (0.5 * constant * self.end / h) ** (1 / order)
+        times = [slow] * (order // 2) + [slow**0.5] * (order % 2)
+        inner = self.inner
+        inner.set_time(0.0)
+        inner.set_state(inner.zeros())
+        self._mass = self._mass or inner.matrix(0.0, 0.0, 1.0, 0.0)
+        made = {tau: DirectSolver(inner.matrix((tau * h) ** 2, 0.0, 1.0, 1.0)) for tau in {lost, *times}}
+        return [[made[tau] for tau in times], [made[lost]]]
 
-    def _through(self, error: Array, times: tuple[float, ...]) -> Array:
+    def _through(self, error: Array, filters: list[DirectSolver]) -> Array:
         """Return an error after filters, a local array of the structure's unknowns (reused)."""
-        x = error[: len(self._e.array)]
-        for tau in times:
+        x = error
+        for solver in filters:
             self._e.array[:] = x[: len(self._e.array)]
             self._mass.mult(self._e, self._b)
             self._b.array[self.inner.clamped] = 0.0
-            x = self._filtered.solve(self._filters[tau], self._b)
-        return x.copy()
+            x = self._filtered.solve(solver, self._b)
+        return x

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -63,13 +64,44 @@ class Before:
 
     Attributes:
         h: length of the step, s.
-        accelerations: at its stages, shape (3, …).
+        accelerations: at its stages, local dof arrays.
         error: its local error of q.
     """
 
     h: float
-    accelerations: Array
+    accelerations: tuple[Array, ...]
     error: Array
+
+
+class Together(list[Stage]):
+    """The stages of a step, which change together.
+
+    Args:
+        stages: predictions that meet the formulas of the method.
+        h: length of the step, s.
+    """
+
+    def __init__(self, stages: Sequence[Stage], h: float):
+        super().__init__(stages)
+        self.rates = (np.eye(len(stages)), W / h, W @ W / h**2)
+        self.arrays = tuple(np.array([getattr(s, name) for s in stages]) for name in "qva")
+        for i, stage in enumerate(self):
+            stage.q, stage.v, stage.a = (x[i] for x in self.arrays)
+        self.start: tuple[Array, ...] = ()
+
+    def correct(self, dq: Array) -> None:
+        """Change q by dq (3, …), and the rates by what follows from it."""
+        for x, rate in zip(self.arrays, self.rates, strict=True):
+            x += rate @ dq
+
+    def begin(self) -> None:
+        """Take note of where iterations start."""
+        self.start = tuple(x.copy() for x in self.arrays)
+
+    def go_back(self) -> None:
+        """Go back to where they started."""
+        for x, start in zip(self.arrays, self.start, strict=True):
+            x[:] = start
 
 
 @dataclass(frozen=True)
@@ -95,23 +127,23 @@ class RadauIIA(Scheme):
         t = end if i == self.stages - 1 else state.t + C[i] * h
         step = C[i] * h
         q, v = state.q + step * state.v + 0.5 * step**2 * state.a, state.v + step * state.a
-        return Stage(t, q, v, state.a.copy(), REAL / h, (REAL / h) ** 2)
+        return Stage(t, q, v, state.a, REAL / h, (REAL / h) ** 2)
 
     def solved(self, state: State, h: float, end: float, equations: Equations) -> list[Stage]:
         """Return the stages, solved together: with the matrices at hand, or with new ones about where that has led."""
-        stages = [self.stage(i, state, h, end, ()) for i in range(self.stages)]
+        stages = Together([self.stage(i, state, h, end, ()) for i in range(self.stages)], h)
         if state.memory is not None:
-            extrapolate(stages, state, h)
+            change = weights(h / state.memory.h) @ np.array(state.memory.accelerations) - state.a
+            stages.correct(h**2 * A @ A @ change)
         else:
-            correct(stages, np.array([equations.predicted(s, state) - s.q for s in stages]), h)
-        start = [(s.q.copy(), s.v.copy(), s.a.copy()) for s in stages]
+            stages.correct(np.array([equations.predicted(s, state) - s.q for s in stages]))
+        stages.begin()
         if (known := equations.linearised(None)) is not None and iterate(stages, h, equations, known, False) is None:
             return stages
+        size: float | None = np.inf
         for fresh in range(1, FRESH + 1):
-            moved = [s.q - q for s, (q, _, _) in zip(stages, start, strict=True)]
-            if not max(map(equations.system.increment_size, moved)) < REACH:
-                for s, (q, v, a) in zip(stages, start, strict=True):
-                    s.q, s.v, s.a = q.copy(), v.copy(), a.copy()
+            if not equations.system.increment_size(np.abs(stages.arrays[0] - stages.start[0]).max(axis=0)) < REACH:
+                stages.go_back()
             size = iterate(stages, h, equations, equations.linearised(stages[1]), fresh == FRESH)
             if size is None:
                 return stages
@@ -119,7 +151,7 @@ class RadauIIA(Scheme):
 
     def finish(self, state: State, h: float, done: Sequence[Stage]) -> State:
         """Return the last stage, with the accelerations of all and the local error."""
-        accelerations, end = np.array([s.a for s in done]), done[-1]
+        accelerations, end = tuple(s.a for s in done), done[-1]
         return State(end.t, end.q, end.v, end.a, Before(h, accelerations, local_error(state, h, accelerations)))
 
     def local_error(self, new: State, old: State) -> Array | None:
@@ -131,7 +163,7 @@ class RadauIIA(Scheme):
         return GeneralisedAlpha()
 
 
-def iterate(stages: list[Stage], h: float, equations: Equations, linearised: Any, last: bool) -> float | None:
+def iterate(stages: Together, h: float, equations: Equations, linearised: Any, last: bool) -> float | None:
     """Correct stages by simplified Newton iterations, until nothing is left; return the increment if that fails.
 
     Args:
@@ -143,15 +175,15 @@ def iterate(stages: list[Stage], h: float, equations: Equations, linearised: Any
     """
     linearised.take((REAL / h, ABOVE / h))
     newton, previous, size = equations.newton, np.inf, np.inf
+    enough = LEFT * newton.tolerance
     for k in range(1, MOST + 1):
         residuals = np.array([equations.imbalance(s) for s in stages])
         real, above = linearised.solve(ROWS[0].real @ residuals, ROWS[1] @ residuals)
         dq = np.outer(COLUMNS[:, 0].real, real) + 2 * np.outer(COLUMNS[:, 1], above).real
-        correct(stages, dq, h)
+        stages.correct(dq)
         newton.iterations += 1
-        size = max(equations.system.increment_size(d) for d in dq)
+        size = float(equations.system.increment_size(np.abs(dq).max(axis=0)))
         rate = size / previous if previous > 0.0 else 0.0
-        enough = LEFT * newton.tolerance
         if k > 1 and (size <= enough or (rate < 1.0 and rate / (1 - rate) * size <= enough)):
             linearised.serves = k < LONG
             return None
@@ -161,37 +193,25 @@ def iterate(stages: list[Stage], h: float, equations: Equations, linearised: Any
     if last and size <= newton.tolerance:
         newton.roundoff = max(newton.roundoff, size)
         return None
-    return float(size)
+    return size
 
 
-def correct(stages: Sequence[Stage], dq: Array, h: float) -> None:
-    """Change all stages by dq (3, …), and their rates by what follows from it."""
-    for stage, d, dv, da in zip(stages, dq, W @ dq / h, W @ W @ dq / h**2, strict=True):
-        stage.q += d
-        stage.v += dv
-        stage.a += da
+@lru_cache(maxsize=8)
+def weights(ratio: float) -> Array:
+    """Return the weights (3, 3) of a step's accelerations at the stages of one that is longer by a ratio."""
+    points = C - 1
+    others = [np.delete(points, j) for j in range(len(C))]
+    return np.array([[np.prod((x - o) / (p - o)) for p, o in zip(points, others, strict=True)] for x in C * ratio])
 
 
-def extrapolate(stages: Sequence[Stage], state: State, h: float) -> None:
-    """Predict the stages by the parabola through the accelerations of the step before."""
-    before: Before = state.memory
-    points = (C - 1) * before.h
-    others = [np.delete(points, j) for j in range(3)]
-    weights = np.array([[np.prod((x - o) / (p - o)) for p, o in zip(points, others, strict=True)] for x in C * h])
-    a = weights @ before.accelerations - np.array([s.a for s in stages])
-    correct(stages, h**2 * A @ A @ a, h)
-
-
-def local_error(state: State, h: float, accelerations: Array) -> Array:
+def local_error(state: State, h: float, accelerations: Sequence[Array]) -> Array:
     """Return the local error of q, of a step with one before it by fourth differences of q̈, of others by third ones."""
     before = state.memory
     points, values = [0.0, *(C * h)], [state.a, *accelerations]
-    if before is not None:
-        points, values = [(C[1] - 1) * before.h, *points], [before.accelerations[1], *values]
-    difference = divided_difference(points, values)
-    if before is not None:
-        return np.asarray(24 * ERROR * h**6 * difference)
-    return np.asarray(6 * FIRST_ERROR * h**5 * difference)
+    if before is None:
+        return np.asarray(6 * FIRST_ERROR * h**5 * divided_difference(points, values))
+    points, values = [(C[1] - 1) * before.h, *points], [before.accelerations[1], *values]
+    return np.asarray(24 * ERROR * h**6 * divided_difference(points, values))
 
 
 register(RadauIIA)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from math import prod
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -128,8 +129,10 @@ class Equations(Protocol):
 
 def divided_difference(points: Sequence[float], values: Sequence[Array]) -> Array:
     """Return the divided difference of values at distinct points: the derivative of order n − 1 over (n − 1)!."""
-    weights = (1 / np.prod([p - other for other in points if other != p]) for p in points)
-    return np.asarray(sum(w * value for w, value in zip(weights, values, strict=True)))
+    total = np.zeros_like(values[0])
+    for i, value in enumerate(values):
+        total += value / prod(points[i] - p for j, p in enumerate(points) if j != i)
+    return total
 
 
 class Scheme(ABC):

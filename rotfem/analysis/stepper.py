@@ -44,7 +44,8 @@ class Stepper(StageSolver):
     Attributes:
         substeps, rejected: steps that were halved (Newton failed, or energy rose), and adaptive ones taken back.
         stood_in: steps that the scheme could not take, and its understudy did.
-        pace: length of the next adaptive step (s), and largest displacement so far (scaled); None before the first.
+        pace: length of the next adaptive step (s), largest displacement so far (scaled), and length that the errors so
+            far allow (s); None before the first.
         watch: told of every step that counts; None tells nobody.
     """
 
@@ -52,7 +53,7 @@ class Stepper(StageSolver):
         super().__init__(system, newton)
         self.scheme = scheme
         self.substeps = self.rejected = self.stood_in = 0
-        self.pace: tuple[float, float] | None = None
+        self.pace: tuple[float, float, float] | None = None
         self.watch: Watch | None = None
         #: Energy at the first step that was hard, and ranges of the energies that were seen since (see `fed`).
         self._exchange: tuple[float, ...] | None = None

@@ -24,7 +24,7 @@ from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
 from rotfem.results import ModesResult
 from rotfem.scene import Scene, Time, as_scene
-from rotfem.scene.stepping import estimates_error
+from rotfem.scene.stepping import estimates_error, usual
 from rotfem.selection.case import Case
 
 
@@ -92,7 +92,7 @@ class Problem(ProblemData):
             end: last time, s.
             step: fixed step, s; None for adaptive ones.
             tolerance: error of all adaptive steps together, relative to the largest displacement.
-            scheme: generalised-α with ρ∞ = 0.9 if None.
+            scheme: generalised-α with ρ∞ = 0.9 if None, with a tolerance `esdirk4`.
             start: shape at t = 0, at rest in the turning frame: that of a moment (`steady`), or a local dof array with
                 rotations counted from the undeformed structure; undeformed if None.
             comm: communicator the structure is distributed over.
@@ -103,7 +103,7 @@ class Problem(ProblemData):
                 with.
             ComputationError: a step failed, however short.
         """
-        scheme = scheme or Scheme.registry["generalised_alpha"]()
+        scheme = scheme or Scheme.registry[usual({"tolerance": tolerance})]()
         check_steps(end, step, tolerance, scheme)
         system = self.system(comm=comm)
         march = March(system, scheme, Steps(end, step, tolerance), Newton(), first_shape(system, start))

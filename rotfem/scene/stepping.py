@@ -27,6 +27,16 @@ def estimates_error(scheme: type) -> bool:
     return own.local_error is not base.local_error
 
 
+def usual(given: Mapping[str, Any]) -> str:
+    """Return the name of the scheme of a [time] table that names none, by what it gives.
+
+    Fixed steps are generalised-α's; to a tolerance one of higher order needs far fewer steps.
+    """
+    fixed = "generalised_alpha"
+    of_fixed = any(key in given for key in parameters_of(registry.schemes[fixed]))
+    return "esdirk4" if given.get("tolerance") is not None and not of_fixed else fixed
+
+
 class Time(SceneModel):
     """The [time] table. Either step or tolerance is given; the parameters of the scheme are keys as well.
 
@@ -36,7 +46,7 @@ class Time(SceneModel):
         tolerance: error of all adaptive steps together, relative to the largest displacement, or None.
         max_step: longest adaptive step (s), or None.
         min_step: shortest adaptive step (s), or None.
-        scheme: name of a registered scheme.
+        scheme: name of a registered scheme; if not given, the usual one of fixed or adaptive steps.
         output_every: number of steps from one output to the next.
         output_step: time (s) from one output to the next, wherever steps end; None where steps are counted.
     """
@@ -91,7 +101,7 @@ class Time(SceneModel):
         wanted = (info.context or {}).get("accuracy")
         if isinstance(wanted, float) and wanted > 0.0 and not {"step", "tolerance"} & given.keys():
             given["tolerance"] = wanted
-        name = as_name(given.get("scheme", cls.model_fields["scheme"].default), registry.schemes, "scheme")
+        name = as_name(given.get("scheme", usual(given)), registry.schemes, "scheme")
         defaults = {}
         for key, field in parameters_of(registry.schemes[name]).items():
             if key in cls.model_fields:
@@ -100,7 +110,7 @@ class Time(SceneModel):
                 defaults[key] = field.default
             elif key not in given:
                 raise problem(key, None, f'required key is missing; scheme = "{name}" needs it')
-        return defaults | given
+        return defaults | {"scheme": name} | given
 
     @model_validator(mode="after")
     def _check_scheme(self) -> Self:
