@@ -99,7 +99,7 @@ def test_an_effect_switched_off_is_one_that_is_not_there(theory: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+@pytest.mark.parametrize("theory", ["consistent_linear", pytest.param("reissner", marks=pytest.mark.nightly)])
 def test_bodies_beside_the_axis_are_switched_too(theory: str) -> None:
     """A spatial beam with a tip mass off its axis; each new form takes ten seconds and more to compile."""
     section = {"EA": 400.0, "GA2": 130.0, "GA3": 130.0, "GJ": 0.8, "EI2": 1.0, "EI3": 2.0, "mass_per_length": 1.0}
@@ -174,7 +174,7 @@ def add() -> Iterator[Callable[[Any], None]]:
 
 @pytest.mark.parametrize(
     "tables",
-    [pytest.param(SPIN_UP, id="thin"), pytest.param(ALL | {"loads": {}}, id="thick", marks=pytest.mark.slow)],
+    [pytest.param(SPIN_UP, id="thin"), pytest.param(ALL | {"loads": {}}, id="thick", marks=pytest.mark.nightly)],
 )
 def test_estimates_are_within_a_factor_three(tables: dict[str, Any]) -> None:
     """Every change above 1e-8 (below it, rounding of the two solutions), and none above 1 % is called negligible."""

@@ -29,6 +29,8 @@ Array = npt.NDArray[np.float64]
 
 #: A kernel of the exact theory with all couplings compiles for ten seconds and more, the first time.
 EXACT_SLOW = pytest.param("reissner", marks=pytest.mark.slow)
+#: Forms of their own, half a minute of compilation; "consistent_linear" holds the same in every run.
+EXACT_NIGHTLY = pytest.param("reissner", marks=pytest.mark.nightly)
 
 AT_REST = {"type": "constant", "speed": 0.0}
 U, THETA = ("tip_u1", "tip_u2", "tip_u3"), ("tip_theta1", "tip_theta2", "tip_theta3")
@@ -489,7 +491,7 @@ def test_planar_modes_as_spatial(theory: str) -> None:
 # --- descriptions that must not matter ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("theory", ["consistent_linear", EXACT_SLOW])
+@pytest.mark.parametrize("theory", ["consistent_linear", EXACT_NIGHTLY])
 def test_precone_is_a_tilted_axis(theory: str) -> None:
     """Coning by β is the same as tilting the spin axis, hub, loads and base motion by −β: all vectors turn, no more."""
     beta, motion = 0.3, {"type": "spin_up", "speed": 2.0, "duration": 1.0}
@@ -514,7 +516,7 @@ def test_precone_is_a_tilted_axis(theory: str) -> None:
     np.testing.assert_allclose(coned["kinetic"], plain["kinetic"], rtol=1e-8)
 
 
-@pytest.mark.parametrize("theory", ["consistent_linear", EXACT_SLOW])
+@pytest.mark.parametrize("theory", ["consistent_linear", EXACT_NIGHTLY])
 def test_base_acceleration_is_minus_gravity(theory: str) -> None:
     """A base that falls freely, described in the turning frame, takes the weight away: ≤ 1e-8."""
     g, axis, speed = np.array([0.2, 0.3, -0.5]), np.array([0.6, 0.0, 0.8]), 2.0
