@@ -27,6 +27,7 @@ class ShapeError:
         self._size = len(names)
         self._moves = [i for i, name in enumerate(names) if name.startswith("u")]
         self._turns = [i for i, name in enumerate(names) if not name.startswith("u")]
+        self._rotations = {i for i, name in enumerate(system.structure.components) if not name.startswith("u")}
 
     def of_modes(self, shapes: RitzVectors) -> Array:
         """Return the relative errors of the frequencies of shapes, by what bends or else by what stretches."""
@@ -41,11 +42,15 @@ class ShapeError:
     def bend(self, shapes: RitzVectors) -> npt.NDArray[np.bool_]:
         """Return of which shapes the most kinetic energy is in a family that bends, shape (r,)."""
         structure, r = self.system.structure, shapes.V.shape[1]
-        along = [structure.oriented(Y.reshape(-1, self._size, r)) for Y in (shapes.V, shapes.massed)]
+        along = [structure.oriented(self._whole(Y.reshape(-1, self._size, r))) for Y in (shapes.V, shapes.massed)]
         energy = shapes.sum((along[0] * along[1]).sum(axis=0))
         families = [list(components) for components, _ in structure.families.values()]
         leading = np.argmax([energy[components].sum(axis=0) for components in families], axis=0)
-        return np.array([bool(set(families[i]) & set(self._turns)) for i in leading])
+        return np.array([bool(set(families[i]) & self._rotations) for i in leading])
+
+    def _whole(self, values: Array) -> Array:
+        """Return all components of nodal values (n, unknowns of a node, r), zeros for those left out."""
+        return np.swapaxes(self.system.structure.whole_values(np.swapaxes(values, 1, 2)), 1, 2)
 
     def of_shape(self, q: Array, datum: Any = None) -> float:
         """Return the relative error of a deflection (local dof array): twice that of a frequency.
@@ -56,5 +61,5 @@ class ShapeError:
         """
         nodal = q.reshape(-1, self._size)
         sizes = self.system.sizes(q)
-        bends = datum is None and self._turns and np.any(sizes[self._turns] > 0.0)
+        bends = datum is None and self._turns and np.any(sizes[list(self._rotations)] > 0.0)
         return min(1.0, 2.0 * self._estimate(nodal[:, self._turns if bends else self._moves]))

@@ -42,7 +42,7 @@ from rotfem.numerics.newton import Newton
 from rotfem.results.run import RunResult
 from rotfem.scene import Scene, Time
 from rotfem.selection.accuracy import Settings
-from rotfem.selection.left_out import leave_out, without, worth_a_look
+from rotfem.selection.left_out import leave_out, with_all, without, worth_a_look
 from rotfem.selection.model_choice import Choice, RangeExceeded
 
 Array = npt.NDArray[np.float64]
@@ -194,7 +194,7 @@ class Simulation:
         """Return q at t = 0 in the turning frame; None where it is undeformed."""
         initial = self.scene.initial
         if initial.state != "steady":
-            self.stability = stability_ahead(self.system, Newton.of(self.scene.solver))
+            self.stability = stability_ahead(with_all(self.system), Newton.of(self.scene.solver))
             if self.stability is not None and (said := self.stability.warning()):
                 self.warnings.append(f"what constant conditions hold in balance: {said}")
         if initial.tip_displacement is not None:

@@ -17,6 +17,7 @@ from mpi4py import MPI
 
 from rotfem.analysis.constant_conditions import are_constant
 from rotfem.equations.beside import Beside
+from rotfem.equations.compiled import compile_system
 from rotfem.mechanics.loads import Load
 from rotfem.mechanics.problem import Problem
 from rotfem.structures import STRUCTURES
@@ -24,8 +25,9 @@ from rotfem.structures import STRUCTURES
 Array = npt.NDArray[np.float64]
 
 
-#: Steps times unknowns from which looking for what can be left out takes less time than it saves.
-WORTH = 5e4
+#: Steps times unknowns from which looking for what can be left out takes less time than it saves; under constant
+#: conditions, whose equilibrium has its stability in all directions said, the forms of all are made too.
+WORTH, WORTH_CONSTANT = 5e4, 3e5
 
 #: Steps that a history of adaptive steps is taken to have.
 ADAPTIVE = 1000
@@ -39,7 +41,8 @@ def worth_a_look(problem: Problem, time: Any) -> bool:
     nodes = float(np.prod(cells * (problem.mesh.degree or 2)))
     structure: Any = STRUCTURES[problem.structure.type]
     unknowns = nodes * len(structure.components)
-    return unknowns * (time.end / time.step if time.step else ADAPTIVE) >= WORTH
+    steps = time.end / time.step if time.step else ADAPTIVE
+    return unknowns * steps >= (WORTH_CONSTANT if are_constant(problem) else WORTH)
 
 
 def without(problem: Problem, names: tuple[str, ...], comm: MPI.Comm) -> tuple[Problem, Any]:
@@ -50,10 +53,16 @@ def without(problem: Problem, names: tuple[str, ...], comm: MPI.Comm) -> tuple[P
     return reduced, Beside(reduced, comm)
 
 
+def with_all(system: Any) -> Any:
+    """Return a system, or under constant conditions, whose equilibrium is looked at, that of all unknowns."""
+    problem = system.model.problem
+    if not (problem.left_out and are_constant(problem)):
+        return system
+    return compile_system(problem.replace(left_out=()), system.comm, moving=False)
+
+
 def leave_out(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, released: bool = False) -> tuple[Problem, Any]:
     """Return (the problem of a history without unknowns that stay zero, the equations of these; None of none).
-
-    Constant conditions have an equilibrium whose stability in all directions is to be said: all stays in there.
 
     Args:
         problem: what is to be computed.
@@ -61,7 +70,7 @@ def leave_out(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, released: bool 
         released: whether it starts from a static shape, bent in direction 2.
     """
     structure: Any = STRUCTURES[problem.structure.type]
-    if problem.terms or problem.frame != "rotating" or are_constant(problem):
+    if problem.terms or problem.frame != "rotating":
         return problem, None
     driven = Driven(problem)
     for kept, constants in driven.candidates(structure):
