@@ -23,6 +23,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.modal import GROWTH
 from rotfem.errors import ComputationError
+from rotfem.numerics.bounds import ROUNDED
 from rotfem.numerics.eigenproblem import SAME, ZERO, Eigenpairs, Pencil
 from rotfem.numerics.inertia import negative_eigenvalues, symmetric
 
@@ -30,6 +31,9 @@ Array = npt.NDArray[np.float64]
 
 #: Eigenvalues that are looked at where none can be counted, and the most that are looked at where they can.
 FIRST, MOST = 8, 64
+
+#: Entries of a row that err together, as the root of their number (see `rotfem.numerics.bounds`).
+ROWS = 10.0
 
 
 @dataclass(frozen=True)
@@ -143,6 +147,9 @@ def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Sta
         target: where to aim, beside the zero eigenvalue of a free hub (1/s).
     """
     count = FIRST if negative is None else max(FIRST, 2 * negative + 2)
+    held = negative is not None and not symmetric(pencil.C)  # by gyroscopic forces, which are all that can
+    if negative and _round_off(pencil.K):
+        return Stability(negative, complete=False, lost=True)
     growth = frequency = 0.0
     while True:
         try:
@@ -162,20 +169,36 @@ def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Sta
             frequency = float(fastest.imag) if fastest.imag > SAME * abs(fastest) else 0.0
         if negative is None:
             return Stability(None, growth, frequency, lost=lost)
-        if _counted(pencil, pairs) >= negative:
+        if _counted(pencil, pairs, held) >= negative:
             return Stability(negative, growth, frequency, lost=lost)
         if count >= MOST or count >= pencil.K.getSize()[0]:
-            return Stability(negative, growth, frequency, complete=False, lost=lost)
+            # A negative eigenvalue that makes nothing grow, and that nothing holds, is one of round-off.
+            return Stability(negative, growth, frequency, complete=False, lost=lost or not held)
         count *= 2
 
 
-def _counted(pencil: Pencil, pairs: Eigenpairs) -> int:
-    """Return for how many negative eigenvalues of K eigenpairs have been found that come of them."""
+def _round_off(K: Any) -> bool:
+    """Return whether a part of its diagonal that rounding may have taken from K makes it positive."""
+    d = K.getDiagonal()
+    d.array[:] *= 1.0 + ROWS * ROUNDED
+    righted = K.copy()
+    righted.setDiagonal(d)
+    return _negative(righted) == 0
+
+
+def _counted(pencil: Pencil, pairs: Eigenpairs, held: bool) -> int:
+    """Return for how many negative eigenvalues of K eigenpairs have been found that come of them.
+
+    Args:
+        pencil: M, C, K.
+        pairs: what was found.
+        held: whether gyroscopic forces can hold what has no minimum of energy.
+    """
     values = pairs.values
     real = values.imag <= SAME * np.abs(values)
     grows = values.real > GROWTH * np.abs(values)
     found = int(np.sum(grows & real)) + 2 * int(np.sum(grows & ~real))
-    if not pencil.conservative:
+    if not (held and pencil.conservative):
         return found
     swings = ~real & (np.abs(values.real) <= GROWTH * np.abs(values))
     return found + 2 * int(np.sum(_energies(pencil, pairs)[swings] < 0.0))

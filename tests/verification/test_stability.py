@@ -159,3 +159,21 @@ def test_history_that_never_leaves_an_unstable_equilibrium(theory: str) -> None:
         assert np.all(np.abs(result.tip["u2"]) < 1e-9)
         assert result.summary["stability"]["stable"] is stable
         assert any("unstable equilibrium" in line for line in result.summary["warnings"]) is not stable
+
+
+def test_round_off_is_no_instability_that_something_holds() -> None:
+    """A strip 1000:1 at rest, whose stiffness has lost the sign of its lowest eigenvalue: nothing turns to hold it."""
+    plate = {"type": "plate", "length": 1000.0, "width": 1.0, "thickness": 0.02, "E": 7e10, "nu": 0.3, "rho": 2700.0}
+    scene = {
+        "structure": plate,
+        "motion": {"type": "constant", "speed": 0.0},
+        "model": {"theory": "linear"},
+        "mesh": {"elements": [64, 2]},
+        "modes": {"count": 2},
+    }
+    result = rotfem.modes(scene)
+    # Euler's beam of the same strip: Poisson's ratio is free to act but for the clamp, of the order width over length.
+    exact = 1.8751040687**2 / 1000.0**2 * np.sqrt(7e10 * 0.02**2 / 12 / 2700.0)
+    assert result.frequencies[0] == pytest.approx(exact, rel=1e-3)
+    assert "held_by_gyroscopic_forces" not in result.summary["stability"]
+    assert not any("gyroscopic" in text for text in result.summary["warnings"])
