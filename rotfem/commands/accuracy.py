@@ -8,7 +8,9 @@ from time import perf_counter
 from typing import Any, TypeVar
 
 import numpy as np
+from mpi4py import MPI
 
+from rotfem.analysis.error_estimate import WORDS
 from rotfem.analysis.schemes import Scheme
 from rotfem.errors import ComputationError, SceneError
 from rotfem.mechanics.theories import theories
@@ -20,8 +22,8 @@ from rotfem.selection.steps_ahead import plan
 
 R = TypeVar("R", bound=Result)
 
-#: Settings that are tried at most.
-MOST_ATTEMPTS = 6
+#: Settings that are tried at most, and what is left of an error that finer settings have not made smaller.
+MOST_ATTEMPTS, STALLED = 6, 0.9
 
 #: Error that a reduced model may add to that of its theory, as a part of the accuracy.
 PROJECTED = 0.05
@@ -75,13 +77,14 @@ def models_of(scene: Scene, moving: bool) -> tuple[dict[str, Any], ...]:
     return (quick, full) if linear else (full,)
 
 
-def pursue(scene: Scene, settings: Settings, attempt: Callable[[Settings], R]) -> R:
+def pursue(scene: Scene, settings: Settings, attempt: Callable[[Settings], R], comm: MPI.Comm) -> R:
     """Return the first result whose estimated error meets the accuracy of a scene.
 
     Args:
         scene: with an accuracy.
         settings: to begin with.
         attempt: settings ↦ their result, with an `error` in its summary.
+        comm: of the processes that compute it, which go on together.
 
     Raises:
         Missed: it was not met; its attribute `result` holds the best that was reached.
@@ -104,11 +107,11 @@ def pursue(scene: Scene, settings: Settings, attempt: Callable[[Settings], R]) -
         error = done.summary["error"]
         tried.append({**settings.summary(), "error": error["total"], "seconds": perf_counter() - began})
         is_met = known(error) and error["total"] <= accuracy
-        following = None if is_met or len(tried) == MOST_ATTEMPTS else settings.better(error, accuracy)
-        if is_met or following is None:
+        is_over = is_met or len(tried) == MOST_ATTEMPTS or stalled(tried)
+        following = comm.bcast(None if is_over else next_of(scene, settings, done))
+        if following is None:
             break
-        is_other = following.models != settings.models
-        settings = stepped(scene, following, done, error) if is_other and isinstance(done, RunResult) else following
+        settings = following
     done.summary["scene"] = scene.digest()
     done.summary["accuracy"] = told(scene, settings, error, is_met, tried)
     timings = done.summary["timings"]
@@ -117,6 +120,27 @@ def pursue(scene: Scene, settings: Settings, attempt: Callable[[Settings], R]) -
     if not is_met:
         raise missed(scene, done)
     return done
+
+
+def next_of(scene: Scene, settings: Settings, done: Result) -> Settings | None:
+    """Return the settings to follow those of a result that has missed; None where none would meet the accuracy."""
+    error = done.summary["error"]
+    assert scene.accuracy is not None
+    following = settings.better(error, scene.accuracy)
+    if following is None or following.models == settings.models or not isinstance(done, RunResult):
+        return following
+    return stepped(scene, following, done, error)
+
+
+def stalled(tried: list[dict[str, Any]]) -> bool:
+    """Return whether finer settings of the same model have not made the error smaller."""
+    if (
+        len(tried) < 2
+        or "error" not in tried[-2]
+        or any(tried[-1][key] != tried[-2][key] for key in ("theory", "reduced"))
+    ):
+        return False
+    return tried[-1]["error"] is not None and not tried[-1]["error"] < STALLED * tried[-2]["error"]
 
 
 def refuse(scene: Scene, wanted: str, command: str) -> None:
@@ -192,14 +216,16 @@ def told(
 def missed(scene: Scene, done: Result) -> Missed:
     """Return the error that says what was reached instead of an accuracy."""
     error, chosen = done.summary["error"], done.summary["accuracy"]["chosen"]
-    worst = max(("time", "space", "model"), key=lambda name: part(error, name))
+    worst = max(WORDS, key=lambda name: part(error, name))
     advice = {
         "time": "a looser accuracy, or fixed steps without one",
         "space": "a looser accuracy" + (", or a finer mesh file" if scene.structure.mesh_file is not None else ""),
         "model": f"a looser accuracy, or a richer model.theory than {chosen['theory']}",
+        "round_off": "a looser accuracy, or a section of less different stiffnesses",
     }[worst]
+    shown = "an unknown error" if error["total"] is None else f"{error['total']:.2g}"
     failure = Missed(
-        f"an accuracy of {scene.accuracy:g} was not met: {error['total']:.2g} was reached, most of it ({worst}) "
+        f"an accuracy of {scene.accuracy:g} was not met: {shown} was reached, most of it ({WORDS[worst]}) "
         f"{part(error, worst):.2g}",
         advice=advice,
     )

@@ -110,7 +110,7 @@ def campbell(
         if scene.accuracy is None:
             return attempt()
         refuse(scene, "frequencies", "campbell")
-        return pursue(scene, settings_of(scene, scene.modes.count), attempt)
+        return pursue(scene, settings_of(scene, scene.modes.count), attempt, comm)
 
 
 class Diagram:

@@ -77,7 +77,7 @@ def modes(
         if scene.accuracy is None:
             return attempt()
         refuse(scene, "frequencies", "modes")
-        return pursue(scene, settings_of(scene, scene.modes.count), attempt)
+        return pursue(scene, settings_of(scene, scene.modes.count), attempt, comm)
 
 
 def _modes(

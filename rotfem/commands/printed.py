@@ -94,11 +94,17 @@ def accuracy_report(summary: dict[str, Any]) -> list[str]:
         return []
     chosen, tries = wanted["chosen"], len(wanted["attempts"])
     model = chosen["theory"] + (" by a reduced model" if chosen.get("reduced") else "")
-    mesh = f"{chosen['elements']} elements" if "elements" in chosen else "the mesh of the file"
+    mesh = f"{by(chosen['elements'])} elements" if "elements" in chosen else "the mesh of the file"
     steps = f", {chosen['scheme']} to {chosen['tolerance']:.2g}" if "tolerance" in chosen else ""
+    steps = f", {chosen['scheme']} with steps of {chosen['step']:.3g} s" if "step" in chosen else steps
     met = "met" if wanted["met"] else "not met"
     attempts = "" if tries == 1 else f" after {tries} attempts"
     return [f"accuracy {wanted['asked']:g} {met}{attempts}: {model}, {mesh} of degree {chosen['degree']}{steps}"]
+
+
+def by(elements: int | list[int] | tuple[int, ...]) -> str:
+    """Return numbers of elements as text."""
+    return "×".join(map(str, elements)) if isinstance(elements, list | tuple) else str(elements)
 
 
 def choice_report(summary: dict[str, Any]) -> list[str]:

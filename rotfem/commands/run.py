@@ -126,7 +126,7 @@ def run_to_accuracy(
         simulation.settings = settings
         return simulation.run(progress)
 
-    return pursue(scene, keeper.settings() or settings_of(scene), attempt)
+    return pursue(scene, keeper.settings() or settings_of(scene), attempt, keeper.comm)
 
 
 def run_chosen(

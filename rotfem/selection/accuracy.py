@@ -72,7 +72,8 @@ class Settings:
 
     def summary(self) -> dict[str, Any]:
         """Return the settings in use, as far as there are any."""
-        known = {key: value for key, value in asdict(self).items() if key != "models" and value is not None}
+        unused = {"models", "scheme", "step", "tolerance"} if self.models[0].get("reduced") else {"models"}
+        known = {key: value for key, value in asdict(self).items() if key not in unused and value is not None}
         return {**{key: value for key, value in self.models[0].items() if value is not None}, **known}
 
     def richer(self) -> Self | None:
