@@ -8,6 +8,7 @@ from time import perf_counter
 from typing import Any, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.error_estimate import WORDS
@@ -19,6 +20,8 @@ from rotfem.results.run import RunResult
 from rotfem.scene import Scene
 from rotfem.selection.accuracy import AIM, SHARES, Settings, part, shares
 from rotfem.selection.steps_ahead import plan
+
+Array = npt.NDArray[np.float64]
 
 R = TypeVar("R", bound=Result)
 
@@ -33,6 +36,10 @@ ADAPTIVE, SCHEMES, ROWS = "esdirk4", ("generalised_alpha", "esdirk4"), 1000
 
 #: Nodes along a structure to start from, and for every mode that is wanted.
 NODES, NODES_A_MODE = 18, 4
+
+
+#: Columns of the displacement of the tip.
+TIPS = ("tip_u1", "tip_u2", "tip_u3")
 
 
 class Missed(ComputationError):
@@ -93,6 +100,7 @@ def pursue(scene: Scene, settings: Settings, attempt: Callable[[Settings], R], c
     accuracy, started, tried = scene.accuracy, perf_counter(), list[dict[str, Any]]()
     assert accuracy is not None
     done: R | None = None
+    last: tuple[Settings, Result] | None = None
     while True:
         began = perf_counter()
         try:
@@ -105,6 +113,9 @@ def pursue(scene: Scene, settings: Settings, attempt: Callable[[Settings], R], c
             settings = richer
             continue
         error = done.summary["error"]
+        if last is not None and isinstance(done, RunResult):
+            compare(done, settings, *last)
+        last = (settings, done)
         tried.append({**settings.summary(), "error": error["total"], "seconds": perf_counter() - began})
         is_met = known(error) and error["total"] <= accuracy
         is_over = is_met or len(tried) == MOST_ATTEMPTS or stalled(tried)
@@ -130,6 +141,36 @@ def next_of(scene: Scene, settings: Settings, done: Result) -> Settings | None:
     if following is None or following.models == settings.models or not isinstance(done, RunResult):
         return following
     return stepped(scene, following, done, error)
+
+
+def compare(done: RunResult, settings: Settings, before: Settings, coarse: Result) -> None:
+    """Write the error of steps that two runs of one model show of the finer one, if it is the smaller estimate.
+
+    Steps of h_1 and h_2 < h_1 differ by e (1 − (h_2/h_1)^p) with e the error of the coarser one; p = 2 is on the safe
+    side for schemes of higher order.
+
+    Args:
+        done: the finer run.
+        settings: of it.
+        before: those of the run before it.
+        coarse: that run.
+    """
+    if settings.models != before.models or settings.step is None or before.step is None:
+        return
+    if not settings.step < before.step or not isinstance(coarse, RunResult) or len(done.t) != len(coarse.t):
+        return
+    fine, rough = tips_of(done), tips_of(coarse)
+    scale = float(np.linalg.norm(fine, axis=1).max())
+    found = float(np.linalg.norm(fine - rough, axis=1).max()) / scale / ((before.step / settings.step) ** 2 - 1)
+    error = done.summary["error"]
+    if error["time"] is None or found < error["time"]:
+        error["total"] += found - part(error, "time")
+        error["time"] = found
+
+
+def tips_of(done: RunResult) -> Array:
+    """Return the displacement of the tip in all rows, (n, components), m."""
+    return np.stack([done.column(name) for name in TIPS if name in done.history], axis=1)
 
 
 def stalled(tried: list[dict[str, Any]]) -> bool:
@@ -173,10 +214,9 @@ def stepped(scene: Scene, settings: Settings, done: RunResult, error: dict[str, 
         done: result of the one before it.
         error: of that.
     """
-    tips = np.stack([done.column(name) for name in ("tip_u1", "tip_u2", "tip_u3") if name in done.history], axis=1)
     assert scene.accuracy is not None
     allowed = AIM * shares({**error, "time": 1.0, "model": 0.0}, scene.accuracy)["time"]
-    found = plan(done.t, tips, allowed, [scheme for scheme in Scheme.registry if scheme.name in SCHEMES])
+    found = plan(done.t, tips_of(done), allowed, [scheme for scheme in Scheme.registry if scheme.name in SCHEMES])
     if found is None:
         return settings
     if found.uneven:

@@ -14,9 +14,10 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from rotfem import campbell, modes, run
-from rotfem.commands.accuracy import Missed
+from rotfem.commands.accuracy import Missed, compare
 from rotfem.results import RunResult
 from rotfem.scene import Scene
+from rotfem.selection.accuracy import Settings
 from tests.beams import STRUCTURE
 
 SPIN_UP = {"type": "spin_up", "speed": 6.0, "duration": 3.0}
@@ -71,6 +72,20 @@ def test_the_cheapest_model_is_taken_that_serves() -> None:
     assert run(scene("small", accuracy=1e-2)).summary["accuracy"]["chosen"]["reduced"]
     chosen = run(scene("spin-up", accuracy=1e-4)).summary["accuracy"]["chosen"]
     assert (chosen["theory"], chosen["reduced"]) == ("reissner", False)
+
+
+def test_two_runs_say_what_their_steps_do() -> None:
+    """An estimate that is far too high gives way to the difference of two runs, which is above the truth, too."""
+    rough, fine = (
+        run(scene("spin-up", **{"accuracy": None, "time.scheme": "esdirk4", "time.step": h, "time.output_step": 0.02}))
+        for h in (0.1, 0.05)
+    )
+    model = ({"theory": "reissner"},)
+    fine.summary["error"] |= {"time": 1.0, "total": 1.0 + fine.summary["error"]["space"]}
+    compare(fine, Settings(model, 6, 3, "esdirk4", 0.05), Settings(model, 6, 3, "esdirk4", 0.1), rough)
+    error = fine.summary["error"]
+    assert true_error(fine, truth("spin-up")) < error["time"] < 1e-2
+    assert error["total"] == pytest.approx(error["time"] + error["space"])
 
 
 def test_rows_are_where_they_were_asked_for() -> None:
