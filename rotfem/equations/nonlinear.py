@@ -53,9 +53,11 @@ class NonlinearSystem(System):
     @cached_property
     def _on_the_way(self) -> Any:
         """The tangent with stresses of their own, compiled: of a system that is not moving K alone at v = a = 0."""
-        change = self._stresses.change(ufl.TrialFunction(self.V))
+        trial = ufl.TrialFunction(self.V)
         if self.moving:
+            change = self._stresses.change(trial, self._shifts[1] / self._shifts[0])
             return forms.form(self._tangent_form + self._shifts[0] * change)
+        change = self._stresses.change(trial)
         return forms.form(self._at_rest["K"] + change, once=True)
 
     @cached_property

@@ -36,7 +36,7 @@ class PointStresses:
 
     def __init__(self, mechanics: Mechanics, V: fem.FunctionSpace):
         self.mechanics = mechanics
-        self._q = mechanics.k.functions[0]
+        self._q, self._v, *_ = mechanics.k.functions
         self._before, self._step = fem.Function(V), fem.Function(V)
         self._now, self._p, self._d = (x.x.array for x in (self._q, self._before, self._step))
 
@@ -45,12 +45,26 @@ class PointStresses:
         self._p[:] = before
         np.subtract(self._now, self._p, out=self._d)
 
-    def change(self, trial: Any) -> Any:
-        """Return ∫ (σ − C Γ(q))·D²Γ[trial, δq], a UFL form: what is to be added to K."""
-        k, out = self.mechanics.k, 0
+    def change(self, trial: Any, c_v: Any = None) -> Any:
+        """Return ∫ (σ − C Γ(q))·D²Γ[trial, δq], a UFL form: what is to be added to K.
+
+        A viscous stress C η Γ̇ = C η DΓ(q)[v] is taken the same way, with DΓ(q_k)[v_{k+1}] + D²Γ(q_k)[v_k, d].
+
+        Args:
+            trial: direction of the derivative.
+            c_v: ∂v/∂q of the step, a constant (1/s); None of a system at rest, where nothing is viscous.
+        """
+        k, out, viscosity = self.mechanics.k, 0, self.mechanics.damping.stiffness
         for s in self.mechanics.strains:
             before = ufl.replace(s.value, {self._q: self._before})
-            linear = before + ufl.derivative(before, self._before, self._step)
+            stressed = before + ufl.derivative(before, self._before, self._step) - s.value
+            if viscosity is not None and c_v is not None:
+                rate, moved = (ufl.derivative(before, self._before, x) for x in (self._v, self._step))
+                # v_k = v_{k+1} − c_v d
+                rate += ufl.derivative(rate, self._before, self._step) - c_v * ufl.derivative(
+                    moved, self._before, self._step
+                )
+                stressed += viscosity * (rate - k.rate(s.value))
             bent = ufl.derivative(k.variation(s.value), self._q, trial)
-            out += ufl.inner(s.force(linear - s.value), bent) * s.measure
+            out += ufl.inner(s.force(stressed), bent) * s.measure
         return out

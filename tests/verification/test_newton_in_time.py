@@ -117,6 +117,13 @@ def test_iterations_do_not_grow_with_slenderness() -> None:
     assert max(counts) < 8
 
 
+@pytest.mark.parametrize("viscosity", [1e-2, 1.0])
+def test_iterations_do_not_grow_with_viscosity(viscosity: float) -> None:
+    """Viscous stresses are those of the last correction too: with those of the state they were 27 and 36 a step."""
+    damped = {"structure.damping.kelvin_voigt": viscosity, "time.end": 0.6}
+    assert run(beam(1e4, 0.3, **damped)).summary["newton_iterations"] / 30 < 18
+
+
 def test_small_release_finds_no_other_root() -> None:
     """A prediction 3 rad off led to a state of 10⁴ times the energy, by increments that shrank all the way."""
     soft = {"structure.section.EI": 2.8e5, "structure.section.EA": 2.8e7, "structure.section.GA": 1e7}
