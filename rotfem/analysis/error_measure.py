@@ -72,7 +72,7 @@ class ErrorMeasure:
 
     def displacement(self, state: State) -> float:
         """Return the largest displacement of a state relative to the turning frame, in units of its scale."""
-        q, clamp = state.q[: len(self._e.array)], self.inner.clamp
+        q, clamp = state.q[: len(self.inner.scale)], self.inner.clamp
         if clamp is not None:
             x = self.inner.V.tabulate_dof_coordinates()[:, 0]
             q = clamp.relative(q.reshape(len(x), -1), x, state.t).ravel()
