@@ -103,7 +103,7 @@ def moments(z: Complex, count: int) -> Complex:
 
 
 def accumulated(start: Complex, factors: Complex, defects: Complex) -> Complex:
-    """Return e_1 … e_n of e_{n+1} = factor e_n + defect, shape (n, m), from e_0 = start."""
+    """Return e_1 … e_n of e_{n+1} = factor e_n + defect, shape (n, k, m), from e_0 = start, shape (k, m)."""
     out = np.empty_like(defects)
     e = start
     for i, (factor, defect) in enumerate(zip(factors, defects, strict=True)):

@@ -20,13 +20,18 @@ import numpy.typing as npt
 
 from rotfem.analysis.error_tracks import largest_errors
 from rotfem.analysis.error_window import Samples, Window
+from rotfem.analysis.refined_mesh import error_by_refinement
+from rotfem.analysis.schemes import State
 from rotfem.analysis.shape_error import ShapeError
 from rotfem.errors import ComputationError
 
 Array = npt.NDArray[np.float64]
 
 #: Windows of a history, fewest steps in one by unknowns, and most bytes of states that are kept.
-WINDOWS, FEWEST, LARGE, MEMORY = 8, (20, 100), 2000, 64_000_000
+WINDOWS, FEWEST, LARGE, MEMORY = 8, (25, 100), 2000, 64_000_000
+
+#: Error of a shape, told from itself, from which it is looked at on a finer mesh.
+DOUBTFUL = 3e-3
 
 
 @dataclass(frozen=True)
@@ -69,7 +74,7 @@ class ErrorWatch:
         self._landed = False
         #: Whether all windows could be solved, and there were equations to solve them by.
         self._sound = system.clamp is None
-        self._farthest: tuple[float, Array, Any] = (0.0, np.zeros(0), None)
+        self._farthest: tuple[float, State | None] = (0.0, None)
 
     def __call__(self, old: Any, new: Any) -> None:
         """Look at a step from an old to a new state."""
@@ -95,14 +100,25 @@ class ErrorWatch:
         """Return the errors so far, the last state given."""
         if self._now.steps:
             self._close(last)
-        size, q, datum = self._farthest
-        if not q.size:
-            size, q, datum = float(self._tip_sizes([last.q])[0]), last.q, last.datum
-        shape = self._mesh.of_shape(q[: len(self.system.held.zeros())], datum)
+        size, state = self._farthest
+        if state is None:
+            size, state = float(self._tip_sizes([last.q])[0]), last
+        shape = self._shape(state, size)
         found: dict[str, tuple[float, float]] = {"time": (0.0, 0.0), "space": (0.0, 0.0)}
         if self._windows and self._sound:
             found = largest_errors(self._windows, self.scheme, self.system.held.linear, size)
         return TipErrors(found["time"] if self._sound else None, found["space"], shape, size)
+
+    def _shape(self, state: State, size: float) -> float:
+        """Return the relative error of a deflection (of so many m at the tip) by the mesh.
+
+        Its own shape says it roughly; where that may matter, a finer mesh does.
+        """
+        rough = self._mesh.of_shape(state.q[: len(self.system.held.zeros())], state.datum)
+        if max(rough, self._mesh.of_turns(state.q)) < DOUBTFUL or not size > 0.0:
+            return rough
+        fine = error_by_refinement(self.system, state)
+        return rough if fine is None else fine / size
 
     def _close(self, last: Any) -> None:
         """End a window with the last state."""
@@ -110,9 +126,9 @@ class ErrorWatch:
         sizes = self._tip_sizes([state[1] for state in now.states])
         i = int(np.argmax(sizes))
         if sizes[i] > self._farthest[0]:
-            self._farthest = (float(sizes[i]), now.states[i][1], now.states[i][4])
+            self._farthest = (float(sizes[i]), State(*now.states[i][:4], datum=now.states[i][4]))
         if self._sound:
-            before = self._windows[-1].shapes if self._windows else None
+            before = self._windows[-1] if self._windows else None
             try:
                 self._windows.append(Window(self.system, self._mesh, now, self.end, before))
             except (ComputationError, np.linalg.LinAlgError):

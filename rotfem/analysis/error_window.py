@@ -66,7 +66,7 @@ class Window:
         mesh: errors of shapes.
         samples: the motion.
         end: length of the whole history, s.
-        before: shapes of the window before; None for the first.
+        before: the window before; None for the first.
 
     Attributes:
         shapes: the shapes.
@@ -79,20 +79,42 @@ class Window:
         turn: Vᵀ M V_before, by which errors are handed on; None for the first.
     """
 
-    def __init__(self, system: Any, mesh: ShapeError, samples: Samples, end: float, before: RitzVectors | None):
+    def __init__(self, system: Any, mesh: ShapeError, samples: Samples, end: float, before: Window | None):
         self.samples, self.free = samples, system.hub is not None
+        self.turn: Array | None = None
+        self.t = np.array([state[0] for state in samples.states])
+        self.shapes: RitzVectors
+        self.speed: float
+        self.C: Array
+        self.K: Array
+        self.bends: npt.NDArray[np.bool_]
+        self.epsilon: Array
+        if before is not None and self._alike(system, before):
+            for name in ("shapes", "speed", "C", "K", "bends", "epsilon"):
+                setattr(self, name, getattr(before, name))
+            self.turn = np.eye(len(self.K))
+        else:
+            self._reduce(system, mesh, end, before)
+        self.motion = tuple(self._coordinates(x) for x in list(zip(*samples.states, strict=True))[1:4])
+        samples.states.clear()
+
+    def _alike(self, system: Any, before: Window) -> bool:
+        """Return whether the matrices are those of the window before: a linear theory at the same constant speed."""
+        motion, t = system.motion, 0.5 * (self.t[0] + self.t[-1])
+        same = system.hub is None and motion.rate(t) == 0.0 and abs(motion.speed(t)) == before.speed
+        return bool(system.held.linear and same)
+
+    def _reduce(self, system: Any, mesh: ShapeError, end: float, before: Window | None) -> None:
+        """Find shapes and matrices."""
         self.shapes, tangents = self._tangents(system, mesh)
         self.speed = tangents.speed
         M, C, K = tangents.reduced(self.shapes)
         if self.free:
             K[-1, -1] += HELD * M[-1, -1] * (2 * np.pi / end) ** 2
         self.C, self.K = (np.asarray(np.linalg.solve(M, A), dtype=float) for A in (C, K))
-        self.t = np.array([state[0] for state in samples.states])
-        arrays = list(zip(*samples.states, strict=True))[1:4]
-        self.motion = tuple(self._coordinates(x) for x in arrays)
         self.bends, self.epsilon = mesh.bend(self.shapes), mesh.of_modes(self.shapes)
-        self.turn = None if before is None else self._turned(before)
-        samples.states.clear()
+        if before is not None:
+            self.turn = self._turned(before.shapes)
 
     @cached_property
     def ends(self) -> tuple[Index, Index]:
@@ -136,7 +158,7 @@ class Window:
         turn[(np.abs(octaves) > 1.0) & (np.abs(turn) < SAME)] = 0.0
         if self.free:
             turn = np.block([[turn, np.zeros((len(turn), 1))], [np.zeros((1, turn.shape[1])), np.ones((1, 1))]])
-        return turn
+        return np.asarray(turn)
 
     # --- the tangent -------------------------------------------------------------------------------------------------
 
@@ -149,6 +171,8 @@ class Window:
         if system.held.linear:
             return shapes, tangents
         quick = self._vibrating(shapes, mesh.bend(shapes), number, h)
+        if not np.any(quick):
+            return shapes, tangents
         q, v, a = (_without(x, moved) for x, moved in zip((q, v, a), quick, strict=True))
         tangents = Tangents(system, State(t, q, v, a, datum=datum))
         return tangents.shapes(), tangents

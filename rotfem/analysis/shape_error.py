@@ -8,10 +8,13 @@ import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
 
-from rotfem.analysis.mesh_estimate import MeshEstimate
+from rotfem.analysis.mesh_estimate import SAFE, MeshEstimate
 from rotfem.analysis.ritz_vectors import RitzVectors
 
 Array = npt.NDArray[np.float64]
+
+#: What of an estimate of a frequency is taken, which is 0.2 to 1 of the true error without its margin.
+LIKELY = 2.0
 
 
 class ShapeError:
@@ -36,7 +39,7 @@ class ShapeError:
             function.x.array[: len(x)] = x
             function.x.scatter_forward()
             components = self._turns if bends else self._moves
-            out.append(self._estimate(function.x.array.reshape(-1, self._size)[:, components]))
+            out.append(LIKELY / SAFE * self._estimate(function.x.array.reshape(-1, self._size)[:, components]))
         return np.array(out)
 
     def bend(self, shapes: RitzVectors) -> npt.NDArray[np.bool_]:
@@ -62,4 +65,11 @@ class ShapeError:
         nodal = q.reshape(-1, self._size)
         sizes = self.system.sizes(q)
         bends = datum is None and self._turns and np.any(sizes[list(self._rotations)] > 0.0)
-        return min(1.0, 2.0 * self._estimate(nodal[:, self._turns if bends else self._moves]))
+        return min(1.0, 2.0 / SAFE * self._estimate(nodal[:, self._turns if bends else self._moves]))
+
+    def of_turns(self, q: Array) -> float:
+        """Return a rough error of elements that turn much, (θ/k)^{2k} for θ in each of degree k."""
+        mesh, degree = self.system.structure.mesh, self._estimate.degree
+        cells = mesh.topology.index_map(mesh.topology.dim).size_global ** (1 / mesh.topology.dim)
+        turn = 2.0 * max(self.system.sizes(q[: len(self.system.zeros())])[list(self._rotations)], default=0.0) / cells
+        return float((turn / degree) ** (2 * degree))

@@ -59,7 +59,7 @@ def test_exact_motion_has_no_error() -> None:
     exact = Propagator(C, K, np.diff(t))
     states = exact.modal(powers, rates)
     defects = states[1:] - exact.factors * states[:-1] - exact.forced(interpolated(t, gamma, spans, 4))
-    errors = accumulated(np.zeros(states.shape[1], complex), exact.factors, defects)
+    errors = accumulated(np.zeros((1, states.shape[1]), complex), exact.factors, defects[:, None])[:, 0]
     assert np.abs(exact.displacements(errors)).max() < 1e-12
 
 
@@ -70,7 +70,8 @@ def test_phase_of_the_trapezoidal_rule() -> None:
     c, rate = np.cos(slow * t)[:, None], -omega * np.sin(slow * t)[:, None]
     exact = Propagator(np.zeros((1, 1)), np.array([[omega**2]]), np.full(n, h))
     states = exact.modal(c, rate)
-    errors = accumulated(np.zeros(1, complex), exact.factors, states[1:] - exact.factors * states[:-1])
+    defects = states[1:] - exact.factors * states[:-1]
+    errors = accumulated(np.zeros((1, 1), complex), exact.factors, defects[:, None])[:, 0]
     np.testing.assert_allclose(exact.displacements(errors)[:, 0], (c[:, 0] - np.cos(omega * t))[1:], atol=1e-12)
 
 
