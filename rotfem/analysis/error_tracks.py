@@ -26,6 +26,9 @@ BEYOND = 2
 #: the lowest shapes whose phases count, and the most that squares of frequencies are tried above and below.
 WIDTH, UNSURE, LOWEST, MOST = 1.5, 0.3, 3, 0.3
 
+#: By what the largest of several tracks is multiplied: the true frequencies lie between them, or vary.
+MARGIN = 1.3
+
 #: Tracks: in which part of their scatter frequencies are tried, and the relative error below which none is.
 FACTORS, SMALL = (0.0, -1.0, 1.0), 1e-3
 
@@ -52,6 +55,8 @@ def largest_errors(
         stiffness = [window.K + np.diag(change) for window, change in zip(windows, moved, strict=True)]
         found = Track(scheme, linear, factor == 0.0).errors(windows, stiffness)
         best = {"space": found["space"], **best, "time": max(best.get("time", (0.0, 0.0)), found["time"])}
+    else:
+        best["time"] = (MARGIN * best["time"][0], best["time"][1])
     return best
 
 

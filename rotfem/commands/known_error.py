@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 #: Share that the steps are to have after the change that a warning advises, and the part of it that is aimed at.
 WANTED, AIM = 0.01, 0.5
 
+#: Tolerances that adaptive steps are taken to hold.
+HELD = 2.0
+
 #: Part of the sum from which a share is told.
 TELLING = 0.1
 
@@ -37,7 +40,7 @@ def error_of_run(run: Simulation) -> ErrorEstimate | None:
     watch = run.watch or ErrorWatch(run.system)
     tip = watch.errors(run.last)
     shares = {
-        "time": None if tip.time is None else _relative(tip.time[0], tip.scale),
+        "time": None if tip.time is None else _of_steps(run.scene, _relative(tip.time[0], tip.scale)),
         "space": min(1.0, tip.shape + _relative(tip.space[0], tip.scale)),
         "model": model,
     }
@@ -47,6 +50,12 @@ def error_of_run(run: Simulation) -> ErrorEstimate | None:
     if watch.since:
         found["since"] = watch.since
     return ErrorEstimate(shares, found)
+
+
+def _of_steps(scene: Scene, share: float) -> float:
+    """Return the share of the steps: of adaptive ones at most HELD tolerances, as they judge every step themselves."""
+    tolerance = None if scene.time is None else scene.time.tolerance
+    return share if tolerance is None else min(share, HELD * tolerance)
 
 
 def _relative(size: float, scale: float) -> float:
