@@ -10,13 +10,16 @@ import numpy.typing as npt
 from rotfem.equations.resultants import Resultants, Saddle
 from rotfem.errors import ComputationError
 from rotfem.numerics.balance import power_of_two
-from rotfem.numerics.bounds import ROUNDED, relative
+from rotfem.numerics.bounds import ROUNDED, RoundOff, relative
 from rotfem.numerics.eigenproblem import Eigenpairs, Pencil
 
 Array = npt.NDArray[Any]
 
 #: Error bound from which digits are lost, so that the modes are computed once more.
 LOST = 1e-5
+
+#: Error bound that viscosity alone would leave, from which nothing is gained.
+WORTH = 0.1
 
 
 class KeptDigits:
@@ -39,7 +42,7 @@ class KeptDigits:
             count: number of pairs wanted.
         """
         worst = float(np.max(pairs.bounds[:count], initial=0.0))
-        if worst <= LOST or not Resultants.possible(self.system):
+        if worst <= LOST or not Resultants.possible(self.system) or self._in_damping(pairs, count) > WORTH:
             return pairs
         if self._resultants is None:
             self._resultants = Resultants(self.system)
@@ -51,15 +54,28 @@ class KeptDigits:
             return pairs
         n = pairs.right.shape[0]
         right, left, bounds = found.right[:n], found.left[:n], found.bounds
+        eta = self.system.model.mechanics.damping.stiffness
+        left_out: Array = np.zeros(len(bounds))
         if saddle.stressed is not None:
-            of_stress = ROUNDED * np.abs(_product(pencil, left, pencil.apply(saddle.stressed, right)))
+            left_out += ROUNDED * np.abs(_product(pencil, left, pencil.apply(saddle.stressed, right)))
+        if eta is not None:  # C = η K + … is summed as K was
+            left_out += np.abs(float(eta.value) * found.values) * RoundOff(pencil).stiffness(left, right)
+        if np.any(left_out):
             MX, CX = (pencil.apply(A, right) for A in (pencil.M, pencil.C))
             slope = np.abs(_product(pencil, left, 2 * found.values * MX + CX) * found.values)
-            bounds = bounds + relative(of_stress / np.maximum(slope, np.finfo(float).tiny))
+            bounds = bounds + relative(left_out / np.maximum(slope, np.finfo(float).tiny))
         if len(bounds) < min(count, len(pairs.bounds)) or _digits(bounds[:count]) <= _digits(pairs.bounds[:count]):
             return pairs
         pencil.spectrum_error = kept.spectrum_error
         return Eigenpairs(found.values, right, left, found.errors, bounds)
+
+    def _in_damping(self, pairs: Eigenpairs, count: int) -> float:
+        """Return what the viscosity of the stiff strains, which is summed as before, would leave of the bounds."""
+        eta = self.system.model.mechanics.damping.stiffness
+        if eta is None:
+            return 0.0
+        bounds = np.maximum(pairs.bounds, pairs.bounds**2)[:count]
+        return float(np.max(float(eta.value) * np.abs(pairs.values[:count]) * bounds, initial=0.0))
 
 
 def _product(pencil: Pencil, Y: Array, X: Array) -> Array:

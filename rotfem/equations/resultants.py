@@ -71,8 +71,8 @@ class Resultants:
 
     @staticmethod
     def possible(system: Any) -> bool:
-        """Whether a system has stiff strains, and no viscosity of them."""
-        return bool(system.structure.stiff) and system.model.mechanics.damping.stiffness is None
+        """Whether a system has stiff strains."""
+        return bool(system.structure.stiff)
 
     def _at_rest(self, form: Any) -> Any:
         k = self.model.mechanics.k
