@@ -31,6 +31,10 @@ from rotfem.selection.model_choice import choose
 NEEDED = {"negligible": "not needed", "noticeable": "needed where {:.1%} matters", "large": "needed"}
 ENOUGH = {"negligible": "good enough", "noticeable": "good to {:.1%}", "large": "not good enough"}
 
+#: The same of steps, and how many times as many there are in a check.
+FINE = {"negligible": "fine enough", "noticeable": "off by {:.1%}", "large": "too coarse: off by {:.1%}"}
+FINER = 4
+
 #: What the notes of a check are marked with.
 FULL = " of the full model"
 
@@ -118,6 +122,8 @@ def why(item: Change, own: Theory) -> str:
         if not item.included:
             reason += ", but it is not in model.effects"
         return f"{reason}; {NEEDED[item.verdict].format(item.worst)}{failed}"
+    if item.kind == "discretisation":
+        return FINE[item.verdict].format(item.worst)
     poorer = Theory.registry[item.name].rank < own.rank
     return (ENOUGH if poorer else NEEDED)[item.verdict].format(item.worst) + failed
 
@@ -146,21 +152,36 @@ def check_changes(
     increment = min(INCREMENT, scene.solver.increment_tolerance)
     exact = {"model.frame": "rotating", "model.tolerance": None, "solver.increment_tolerance": increment}
     scene = scene.replace(exact)
-    own = full_outputs(scene.replace({"model.effects": list(effects)}), trial.wanted, comm)
+    own = full_outputs(scene.replace({"model.effects": list(effects)}), trial, comm)
     for i, item in enumerate(changes, start=1):
-        if item.kind == "effect":
+        if item.kind == "discretisation" and scene.time is not None and scene.time.step is None:
+            continue  # adaptive steps have no common times
+        if item.kind == "discretisation":
+            other = finer_steps(scene).replace({"model.effects": list(effects)})
+        elif item.kind == "effect":
             kept = set(effects) ^ {item.name}
             other = scene.replace({"model.effects": [name for name in trial.effects if name in kept]})
         else:
             other = scene.replace({"model.theory": item.name, "model.effects": list(effects)})
-        there = full_outputs(other, trial.wanted, comm)
+        there = full_outputs(other, trial, comm)
         item.truth = change(own, there, trial.wanted)
         item.notes |= {f"{name}{FULL}": text for name, text in notes(there).items()}
         progress(i / len(changes))
 
 
-def full_outputs(scene: Scene, wanted: tuple[str, ...], comm: MPI.Comm) -> Outputs:
-    """Return the outputs of a scene as `rotfem run` and `rotfem modes` give them."""
+def finer_steps(scene: Scene) -> Scene:
+    """Return a scene with shorter steps, its rows where they were as far as steps are fixed."""
+    time = scene.time
+    assert time is not None
+    if time.step is None:
+        return scene.replace({"time.tolerance": (time.tolerance or 0.0) / FINER**2})
+    return scene.replace({"time.step": time.step / FINER, "time.output_every": time.output_every * FINER})
+
+
+def full_outputs(scene: Scene, trial: Trial, comm: MPI.Comm) -> Outputs:
+    """Return the outputs of a scene as `rotfem run` and `rotfem modes` give them, the latter at the trial's speed."""
+    wanted = trial.wanted
+    turning = scene.replace({"motion.speed": trial.speeds[0]}) if trial.case.problem.motion.hub is not None else scene
     failed: dict[str, str] = {}
     history: Mapping[str, Any] = {}
     rows: list[Mapping[str, Any]] = []
@@ -177,7 +198,7 @@ def full_outputs(scene: Scene, wanted: tuple[str, ...], comm: MPI.Comm) -> Outpu
             done = attempt(name, lambda: run(scene, comm=comm))
             history = done.history if done is not None else {"tip_u": np.zeros(1)}
         else:
-            found = attempt(MODES, lambda: modes(scene, comm=comm))
+            found = attempt(MODES, lambda: modes(turning, comm=comm))
             rows = [row for row in found.rows if row["label"] != "rigid body"] if found is not None else []
     out = outputs_of(wanted, history, rows)
     out.failed = failed

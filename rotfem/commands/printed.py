@@ -129,7 +129,8 @@ def explain_report(summary: dict[str, Any], folder: Path) -> list[str]:
         f"{'relative change of':<26}" + "".join(f"{n:>10}{'true':>10}" if checked else f"{n:>10}" for n in outputs),
     ]
     for row in rows:
-        what = {True: "without ", False: "with "}[row["included"]] if row["kind"] == "effect" else "theory "
+        what = {True: "without ", False: "with "}[row["included"]] if row["kind"] == "effect" else ""
+        what = "theory " if row["kind"] == "theory" else what
         kinds = ("estimate", "truth") if checked else ("estimate",)
         cells = "".join(f"{row[kind][name]:>10.1e}" for name in outputs for kind in kinds)
         lines.append(f"{what + row['name']:<26}{cells}  {row['verdict']}: {row['why']}")

@@ -107,3 +107,16 @@ class FreeHub:
     damping: float = 0.0
     coupled: bool = True
     speed: float = 0.0
+
+    def rigid_speeds(self, times: Array, inertia: float) -> Array:
+        """Return the speed (n,), rad/s, at times (n,), s, as if the structure were rigid.
+
+        Args:
+            times: increasing, the first the start; the torque is taken in the middle between two.
+            inertia: of hub and structure about the axis, kg·m².
+        """
+        h, torque = np.diff(times), self.torque.many(0.5 * (times[:-1] + times[1:]))
+        speeds, decay = np.full(len(times), self.speed), self.damping / inertia
+        for k, M in enumerate(torque):
+            speeds[k + 1] = (speeds[k] + h[k] * M / inertia) / (1 + h[k] * decay)
+        return speeds

@@ -35,6 +35,9 @@ DEAR = 0.5
 #: Share of halved steps from which on steps are too long to be trusted.
 HALVED = 0.01
 
+#: Times at which the speed of a free hub is looked at.
+HUB_LOOKS = 2001
+
 #: Newton stops here: small differences of two solutions are wanted.
 INCREMENT = 1e-12
 
@@ -86,7 +89,8 @@ class Trial:
     Args:
         case: problem, and what is to be computed of it.
         outputs: which of "history", "steady" and "modes" are wanted; by default all the case has.
-        speeds: speeds of the modes (rad/s); by default the final one of the motion.
+        speeds: speeds of the modes (rad/s); by default the final one of the motion, of a free hub the largest that it
+            reaches with a rigid structure.
         comm: MPI communicator.
         thrifty: whether to give up with `Dear` where the histories need about as many steps as the case's own.
 
@@ -126,16 +130,15 @@ class Trial:
         problem = self.case.problem
         self.effects, self.theories = problem.effective_effects(), theories_of(problem)
         self._systems: dict[str, Any] = {}
-        self._done: dict[tuple[str, frozenset[str]], Outputs] = {}
+        self._done: dict[tuple[str, frozenset[str], frozenset[str]], Outputs] = {}
         self._released: dict[str, Array] = {}
-        end = 0.0 if case.steps is None else case.steps.end
-        self.speeds = tuple(speeds) if speeds is not None else (problem.motion.final_speed(end),)
         self.unknown = ""
         self.at_rest: Array = np.empty(0)
         try:
             self.at_rest = self._frequencies_at_rest()
         except ComputationError as error:
             self.unknown = error.what
+        self.speeds = tuple(speeds) if speeds is not None else (self._reached(),)
         self.samples: Sampling | None = None
         if HISTORY in self.wanted and case.steps is not None:
             self.samples = Sampling.of(case.steps, self.at_rest, given(problem))
@@ -146,18 +149,36 @@ class Trial:
         check_steady(self.full.problem.replace(effects=None))
         raise InputError("", None, self.full.unsteady or "there is nothing to compare models by")
 
-    def outputs(self, theory: str, without: Collection[str] = (), bound: Bound | None = None) -> Outputs:
+    def outputs(
+        self,
+        theory: str,
+        without: Collection[str] = (),
+        bound: Bound | None = None,
+        *,
+        known: Collection[str] = (),
+    ) -> Outputs:
         """Return what the case gives in a theory without some effects; computed once.
 
         Args:
             theory: its name.
             without: effects left out.
             bound: what not to go beyond; a history that does is given up and counts as failed.
+            known: outputs that are not computed, since what is asked of them is known.
         """
-        key = theory, frozenset(without)
+        key = theory, frozenset(without), frozenset(known)
         if key not in self._done:
-            self._done[key] = self._compute(*key, bound)
+            self._done[key] = self._compute(theory, key[1], bound, [n for n in self.wanted if n not in known])
         return self._done[key]
+
+    def _reached(self) -> float:
+        """Return the speed of the modes, rad/s."""
+        problem, steps = self.case.problem, self.case.steps
+        hub, end = problem.motion.hub, 0.0 if steps is None else steps.end
+        if hub is None or steps is None:
+            return problem.motion.final_speed(end)
+        inertia = hub.inertia + 2 * self.poorest.held.rest_inertia
+        speeds = hub.rigid_speeds(np.unique([*np.linspace(0.0, end, HUB_LOOKS), *hub.torque.knots]), inertia)
+        return float(speeds[np.argmax(np.abs(speeds))])
 
     # --- systems ------------------------------------------------------------------------------------------------------
 
@@ -187,9 +208,9 @@ class Trial:
 
     # --- computing what a model gives -----------------------------------------------------------------------------
 
-    def _compute(self, theory: str, without: frozenset[str], bound: Bound | None) -> Outputs:
+    def _compute(self, theory: str, without: frozenset[str], bound: Bound | None, names: Collection[str]) -> Outputs:
         candidate, out = self.candidate(theory, without), Outputs()
-        for name in self.wanted:
+        for name in names:
             try:
                 if name == MODES:
                     out.values = candidate.eigenvalues(self.speeds)
@@ -217,7 +238,7 @@ class Trial:
                 raise Dear(f"{count} steps would be needed")
             watch = Watch(bound, np.inf if last else HALVED * count)
             try:
-                candidate.history(samples.steps(finer), self._start(candidate, theory), out, watch)
+                candidate.history(samples.steps(finer), self.start(candidate, theory), out, watch)
                 break
             except Beyond:
                 raise
@@ -228,7 +249,7 @@ class Trial:
             self.finer = finer
             self._done.clear()
 
-    def _start(self, candidate: Candidate, theory: str) -> Array | None:
+    def start(self, candidate: Candidate, theory: str) -> Array | None:
         """Return the shape at t = 0 of a model; None if it is undeformed."""
         case = self.case
         if case.tip_displacement is not None:

@@ -5,12 +5,15 @@ Both models are solved on the same coarse mesh with the same few steps (see `rot
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from rotfem.selection.coarse_model import Trial
-from rotfem.selection.distance import Outputs, change, notes
+from rotfem.selection.distance import HISTORY, Outputs, change, notes
+from rotfem.selection.reduced_effects import reduced_effects
+from rotfem.selection.step_error import step_error
 
 #: Factor by which an estimate may be wrong: estimates below a tolerance are believed only with it.
 SAFETY = 3.0
@@ -24,8 +27,8 @@ class Change:
     """What one step from a model to another changes.
 
     Attributes:
-        kind: "effect" or "theory".
-        name: of the effect, or of the theory that takes the place of the model's.
+        kind: "effect", "theory" or "discretisation".
+        name: of the effect, of the theory that takes the place of the model's, or the key that is too coarse.
         included: whether the model itself has it.
         estimate: output ↦ relative change; infinite where one of the models fails.
         notes: output ↦ why a model fails.
@@ -79,17 +82,43 @@ class Estimates:
     def effect(self, name: str) -> Change:
         """Return what the model loses without an effect, or gains with one that it leaves out."""
         included = name not in self.without
-        return self._change("effect", name, included, self.trial.outputs(self.theory, self.without ^ {name}))
+        known = {HISTORY: self.reduced[name]} if name in self.reduced else {}
+        other = self.trial.outputs(self.theory, self.without ^ {name}, known=known)
+        return self._change("effect", name, included, other, known)
+
+    @cached_property
+    def reduced(self) -> dict[str, float]:
+        """Effect ↦ change of the history without it, as far as a reduced linear model can say it."""
+        if HISTORY not in self.trial.wanted or self.without or HISTORY in self.own.failed:
+            return {}
+        return reduced_effects(self.trial, self.theory, self.trial.effects)
+
+    def steps(self) -> Change | None:
+        """Return what the steps of the case put its history off; None where there is none or it cannot be told."""
+        steps = self.trial.full.steps
+        off = step_error(self.trial, self.theory, self.without) if HISTORY in self.trial.wanted else None
+        if steps is None or off is None:
+            return None
+        key = "time.step" if steps.step is not None else "time.tolerance"
+        estimate = {name: off if name == HISTORY else 0.0 for name in self.trial.wanted}
+        return Change("discretisation", key, True, estimate)
 
     def replaced(self, theory: str) -> Change:
         """Return what another theory makes of the case."""
         return self._change("theory", theory, theory == self.theory, self.trial.outputs(theory, self.without))
 
     def all(self) -> list[Change]:
-        """Return every effect there are data for, then every other theory."""
+        """Return every effect there are data for, then every other theory, and the steps of a history."""
         effects = [self.effect(name) for name in self.trial.effects]
-        return effects + [self.replaced(name) for name in self.trial.theories if name != self.theory]
+        others = [self.replaced(name) for name in self.trial.theories if name != self.theory]
+        steps = self.steps()
+        return [*effects, *others, *([] if steps is None else [steps])]
 
-    def _change(self, kind: str, name: str, included: bool, other: Outputs) -> Change:
-        estimate = change(self.own, other, self.trial.wanted)
+    def _change(
+        self, kind: str, name: str, included: bool, other: Outputs, known: Mapping[str, float] | None = None
+    ) -> Change:
+        """Return the change to another model's outputs; of some outputs it may be known."""
+        known = known or {}
+        found = change(self.own, other, [output for output in self.trial.wanted if output not in known])
+        estimate = {output: known.get(output, found.get(output, 0.0)) for output in self.trial.wanted}
         return Change(kind, name, included, estimate, notes(self.own, other))

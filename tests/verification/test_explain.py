@@ -25,6 +25,9 @@ from rotfem.selection.estimate import NOTICEABLE, Estimates
 from rotfem.selection.model_choice import Choice, choose
 from tests.beams import STRUCTURE
 
+#: Part of the spin-up, with steps that are seen.
+COARSE_STEPS = {"motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0}, "time": {"end": 6.0, "step": 0.04}}
+
 SPIN_UP: dict[str, Any] = {
     "structure": STRUCTURE,
     "motion": {"type": "spin_up", "speed": 4.0, "duration": 4.0},
@@ -234,6 +237,39 @@ def test_changes_of_frequencies_are_those_of_a_spectral_method() -> None:
     for name, other in (("coriolis", without), ("consistent_linear", unstretched)):
         expected = float(np.max(np.abs(other / exact - 1)))
         assert rows[name]["estimate"][MODES] == pytest.approx(expected, rel=5e-3), name
+
+
+def test_row_of_the_steps_is_their_true_error() -> None:
+    """Steps of 0.04 s, against those of a quarter: what is left of the latter is a sixteenth."""
+    scene = Scene.from_dict({"structure": STRUCTURE, **COARSE_STEPS})
+    estimates = Estimates(Trial(case_of(scene)), "reissner", case_of(scene).problem.effective_effects())
+    row = estimates.steps()
+    assert row is not None
+    rough = rotfem.run(scene).history
+    fine = rotfem.run(scene.replace({"time.step": 0.01, "time.output_every": 4})).history
+    tips = [np.column_stack([h["tip_u1"], h["tip_u2"]]) for h in (fine, rough)]
+    assert row.estimate[HISTORY] == pytest.approx(tip_change(*tips), rel=0.5)
+    assert row.name == "time.step"
+
+
+def test_effects_of_a_reduced_model_are_those_of_trials() -> None:
+    scene = Scene.from_dict({"structure": STRUCTURE, **COARSE_STEPS})
+    trial = Trial(case_of(scene))
+    estimates = Estimates(trial, "reissner", trial.effects)
+    assert set(estimates.reduced) == set(trial.effects)
+    for name, size in estimates.reduced.items():
+        tried = tip_change(estimates.own.tip, trial.outputs("reissner", {name}).tip)
+        assert 1 / 3 < size / tried < 3
+    bent = Scene.from_dict({"structure": STRUCTURE, **COARSE_STEPS, "loads": {"tip_force": [0.0, 200.0]}})
+    assert Estimates(Trial(case_of(bent)), "reissner", Trial(case_of(bent)).effects).reduced == {}
+
+
+def test_modes_of_a_free_hub_are_at_the_speed_it_reaches() -> None:
+    """A torque M for T seconds on I_R + ρ L³/3 about the axis."""
+    motion = {"type": "torque", "hub_inertia": 100.0, "pulses": [[0.0, 2.0, 300.0], [2.0, 3.0, -600.0]]}
+    scene = Scene.from_dict({"structure": STRUCTURE, "motion": motion, "time": {"end": 4.0, "step": 0.02}})
+    rigid = 1.2 * 10.0**3 / 3 + 6e-4 * 10.0  # with that of the sections
+    assert Trial(case_of(scene)).speeds[0] == pytest.approx(300.0 * 2.0 / (100.0 + rigid), rel=2e-3)
 
 
 def test_an_estimate_does_not_depend_on_what_was_tried_before() -> None:

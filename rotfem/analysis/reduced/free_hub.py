@@ -46,12 +46,7 @@ class FreeDrive(Drive):
         self.steps: Steps | None = None
         inertia = self.hub.inertia + (2 * self.system.rest_inertia if "w" in self.frame.constants else 0.0)
         fine = np.unique(np.concatenate([self.knots, np.linspace(self.knots[0], self.knots[-1], 2001)]))
-        h = np.diff(fine)
-        torque = self.hub.torque.many(self.within(fine[:-1], fine[1:], np.array([0.5]))[:, 0])
-        speed, decay = np.full(len(fine), self.hub.speed), self.hub.damping / inertia
-        for k, M in enumerate(torque):
-            speed[k + 1] = (speed[k] + h[k] * M / inertia) / (1 + h[k] * decay)
-        self._rigid = fine, speed
+        self._rigid = fine, self.hub.rigid_speeds(fine, inertia)
 
     @property
     def whole(self) -> Any:

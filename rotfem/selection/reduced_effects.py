@@ -1,0 +1,58 @@
+"""How much effects change a history, by a reduced linear model where the motion is one that it holds for.
+
+A basis of few shapes is solved again without each effect (see `rotfem.analysis.reduced.effect_sizes`), which takes a
+small part of the time that marches of a trial take. It serves where the hub's motion is prescribed, nothing is left out
+yet, and bending stays moderate: what second-order forces do beyond that only a trial knows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.reduced.effect_sizes import effect_sizes
+from rotfem.analysis.reduced.response import largest, reduced_response
+from rotfem.errors import ComputationError
+from rotfem.mechanics.theories import Theory
+from rotfem.selection.coarse_model import Trial
+
+Array = npt.NDArray[np.float64]
+
+#: Displacement of the tip over the length from which a trial is asked.
+MODERATE = 0.1
+
+#: Accuracy of the basis: changes of a history are found in one basis, and are much better than it.
+ACCURACY = 1e-4
+
+
+def reduced_effects(trial: Trial, theory: str, effects: Collection[str]) -> dict[str, float]:
+    """Return effect ↦ relative change of the tip's displacement in a history without it; none where a trial is needed.
+
+    Args:
+        trial: the case that is tried out, with a history.
+        theory: of the model, all effects in it.
+        effects: those that are asked for.
+    """
+    linear = linear_of(trial, theory)
+    if linear is None or trial.samples is None or trial.case.problem.motion.hub is not None:
+        return {}
+    candidate = trial.candidate(linear.name)
+    times: Array = np.linspace(0.0, trial.samples.end, len(trial.samples.parts) + 1, dtype=np.float64)
+    try:
+        response = reduced_response(candidate.switched(), times, trial.start(candidate, linear.name), ACCURACY)
+        if not response.met or largest(response.model, response.tips) > MODERATE * candidate.system.structure.length:
+            return {}
+        found = effect_sizes(response, effects)
+    except (ComputationError, np.linalg.LinAlgError):
+        return {}
+    return {name: size for name, size in found.items() if np.isfinite(size)}
+
+
+def linear_of(trial: Trial, theory: str) -> Theory | None:
+    """Return the linear theory with prestress that is the model's, or that its theory has for small motions."""
+    own = trial.theories[theory]
+    names = [own.name, *reversed(own.poorer)]
+    able = (trial.theories[name] for name in names if name in trial.theories)
+    return next((t for t in able if t.linear and t.prestress), None) if not own.linear or own.prestress else None
