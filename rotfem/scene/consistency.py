@@ -7,7 +7,7 @@ from rotfem.errors import show
 from rotfem.scene.beams import PlanarBeamStructure, SpatialBeamStructure
 from rotfem.scene.limits import Limits
 from rotfem.scene.loads import Loads
-from rotfem.scene.motion import Motion
+from rotfem.scene.motion import Motion, TorqueMotion
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh
 from rotfem.scene.stepping import Time
@@ -106,8 +106,8 @@ def check_initial(structure: AnyStructure, motion: Motion, initial: Initial) -> 
         if abs(displacement) >= limit:
             reason = f"must be less than the length {limit:g} in size"
             raise problem("initial.tip_displacement", displacement, reason)
-    if initial.state == "steady" and not motion.is_steady:
-        raise problem("initial.state", initial.state, 'needs motion.type = "constant"')
+    if initial.state == "steady" and isinstance(motion, TorqueMotion):
+        raise problem("initial.state", initial.state, 'needs a speed that is prescribed, not motion.type = "torque"')
 
 
 def check_accuracy(model: Model, accuracy: float | None) -> None:

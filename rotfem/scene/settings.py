@@ -90,7 +90,7 @@ class Initial(SceneModel):
 
     Attributes:
         tip_displacement: u₂ of the tip (m) of the static shape from which a planar beam is released, or None.
-        state: "undeformed", or "steady" to start from the equilibrium at the (constant) speed.
+        state: "undeformed", or "steady" to start from the equilibrium at the initial speed.
     """
 
     tip_displacement: Number | None = None

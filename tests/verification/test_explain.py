@@ -264,6 +264,17 @@ def test_effects_of_a_reduced_model_are_those_of_trials() -> None:
     assert Estimates(Trial(case_of(bent)), "reissner", Trial(case_of(bent)).effects).reduced == {}
 
 
+def test_a_spin_down_starts_from_the_steady_state_of_its_speed() -> None:
+    """While the speed is still constant nothing moves; u₁(L) = tan(kL)/k − L with k = Ω √(A_ρ/EA), the linear rod."""
+    motion = {"type": "table", "table": [[0.0, 6.0], [1.0, 6.0], [5.0, 1.0]]}
+    tables = {"structure": STRUCTURE, "motion": motion, "initial": {"state": "steady"}}
+    scene = Scene.from_dict({**tables, "model": {"theory": "consistent_linear"}, "time": {"end": 1.0, "step": 0.05}})
+    history = rotfem.run(scene).history
+    k = 6.0 * np.sqrt(1.2 / 2.8e7)
+    np.testing.assert_allclose(history["tip_u1"], np.tan(10 * k) / k - 10, rtol=1e-6)
+    assert np.abs(history["tip_u2"]).max() < 1e-12
+
+
 def test_modes_of_a_free_hub_are_at_the_speed_it_reaches() -> None:
     """A torque M for T seconds on I_R + ρ L³/3 about the axis."""
     motion = {"type": "torque", "hub_inertia": 100.0, "pulses": [[0.0, 2.0, 300.0], [2.0, 3.0, -600.0]]}
