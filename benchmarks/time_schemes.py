@@ -38,12 +38,14 @@ PLATE: dict[str, Any] = {
     "length": 1.0,
     "width": 0.5,
     "thickness": 0.01,
-    "material": {"E": 7.0e10, "nu": 0.3, "rho": 2700.0},
+    "E": 7.0e10,
+    "nu": 0.3,
+    "rho": 2700.0,
 }
-PLATE_MESH = {"elements_x": 4, "elements_y": 2}
+PLATE_MESH = {"elements": [4, 2]}
 PULSE = [[0.0, 0.0], [0.4, 0.0], [0.5, 200.0], [0.7, 200.0], [0.8, 0.0]]
 KINKS = [[0.0, 0.0], [1.0, 2.0], [2.0, 1.0], [3.0, 4.0], [5.0, 4.0]]
-GUST = [[0.5 * i, 0.0, 3.0 * np.sin(1.7 * i * i)] for i in range(41)]
+GUST = [[0.5 * i, 0.0, 0.3 * np.sin(1.7 * i * i)] for i in range(41)]
 STILL = {"type": "constant", "speed": 0.0}
 SPIN_UP = {"type": "spin_up", "speed": 6.0, "duration": 15.0}
 HUB = {"type": "torque", "hub_inertia": 100.0, "table": [[0.0, 0.0], [1.0, 80.0], [2.0, -80.0], [3.0, 0.0], [4.0, 0.0]]}
