@@ -135,6 +135,22 @@ def test_steady_state_has_no_error_of_steps() -> None:
     assert error["total"] == pytest.approx(error["space"] + error["model"])
 
 
+@pytest.mark.parametrize(
+    ("load", "mesh"),
+    [
+        ({"tip_moment": 4000.0}, {"elements": 2, "degree": 2}),
+        ({"tip_force": [0.0, 600.0]}, {"elements": 1, "degree": 3}),
+        ({"tip_force": [0.0, 20.0]}, {"elements": 8, "degree": 1}),
+    ],
+)
+def test_mesh_of_a_beam_is_judged(load: dict[str, Any], mesh: dict[str, int]) -> None:
+    """Estimated over true error of the mesh lies within ½ … 2, on coarse meshes and in large deflections."""
+    run, exact = (rotfem.run(scene(None, loads=load, mesh=m)) for m in (mesh, {"elements": 24, "degree": 4}))
+    tip, true_tip = (np.array([r.tip[name][-1] for name in ("u1", "u2")]) for r in (run, exact))
+    true = np.linalg.norm(tip - true_tip) / np.linalg.norm(true_tip)
+    assert 0.5 * true < run.summary["error"]["space"] < 2.0 * true
+
+
 def test_modes_say_theirs() -> None:
     """The largest estimates of the rows, and their sum."""
     modes = rotfem.modes(scene(None))
