@@ -285,7 +285,8 @@ def finer_meshes(base: Setting) -> list[Setting]:
         return [replace(base, degree=degree) for degree in range(base.degree, HIGHEST_DEGREE + 1)]
     down = 0
     counts = base.elements if isinstance(base.elements, tuple) else (base.elements,)
-    while down < 2 and all(n % 2 ** (down + 1) == 0 for n in counts):
+    # One element cannot be shared among processes.
+    while down < 2 and all(n % 2 ** (down + 1) == 0 and n > 2 ** (down + 1) for n in counts):
         down += 1
     start = scaled(base.elements, 0.5**down)
     return [replace(base, elements=scaled(start, 2.0**i)) for i in range(MOST_LEVELS)]
