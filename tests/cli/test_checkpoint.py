@@ -78,6 +78,11 @@ def scene_of(changes: dict[str, Any]) -> rotfem.Scene:
     return as_scene(BEAM).replace(changes)
 
 
+def without_estimates(warnings: list[str]) -> list[str]:
+    """Return warnings but for that of the error, which after a resume is judged from there on (`error.since`)."""
+    return [line for line in warnings if not line.startswith("the tip may be off")]
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_history_is_that_of_an_unbroken_run(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """To the last bit: state, memory of the scheme, numbers learnt and kept factor are those there were."""
@@ -97,7 +102,7 @@ def test_the_history_is_that_of_an_unbroken_run(kind: str, tmp_path: Path, monke
     assert result.summary["steps"] == whole.summary["steps"]
     assert result.summary["newton_iterations"] == whole.summary["newton_iterations"]
     assert 0.0 < result.summary["resumed"][0]["time"] < whole.t[-1]
-    assert result.summary["warnings"] == whole.summary["warnings"]
+    assert without_estimates(result.summary["warnings"]) == without_estimates(whole.summary["warnings"])
     np.testing.assert_array_equal(read_csv(tmp_path / "history.csv")["tip_u2"], whole.history["tip_u2"])
 
 
@@ -289,5 +294,5 @@ def test_numbers_learnt_are_all_in_the_checkpoint(tmp_path: Path) -> None:
     from rotfem.commands.checkpoint import plain
 
     stepper = result[0].stepper
-    assert set(vars(stepper)) - set(plain(stepper)) == {"system", "scheme", "newton"}
+    assert set(vars(stepper)) - set(plain(stepper)) == {"system", "scheme", "newton", "watch"}
     assert set(vars(stepper.newton)) == set(plain(stepper.newton))
