@@ -22,10 +22,9 @@ from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms.analysis import extract_constants
 
 from rotfem.equations.model import Model
-from rotfem.equations.system import KEPT_FROM
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
-from rotfem.numerics.linear import DirectSolver, without_zeros
+from rotfem.numerics.linear import DirectSolver
 
 Array = npt.NDArray[np.float64]
 
@@ -89,15 +88,6 @@ class Pieces:
         self._set_switches(None)
         if model.theory.prestress:
             self._prestress()
-        if self.pattern.getSize()[0] > KEPT_FROM[self.structure.mesh.topology.dim]:
-            self._leave_out_zeros()
-
-    def _leave_out_zeros(self) -> None:
-        """Take entries that are zero in all matrices out of the pattern of all, where products and factors are dear."""
-        matrices = [piece for piece in self.all if piece.kind != "f"]
-        for piece, slim in zip(matrices, without_zeros([piece.operator for piece in matrices]), strict=True):
-            piece.operator = slim
-        self.pattern = matrices[0].operator.duplicate()
 
     def _forms_at_rest(self) -> dict[str, Any]:
         """Return f, K, C and M at q = v = a = 0 as UFL forms; those that vanish are left out."""

@@ -26,27 +26,6 @@ def combine(target: Any, matrices: list[Any], weights: Array) -> None:
             target.axpy(weight, A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
 
 
-def without_zeros(matrices: list[Any]) -> list[Any]:
-    """Return matrices of one pattern without the entries that are zero in all of them; diagonals stay.
-
-    Products, sums and factors are cheaper by what is left out: the in-plane unknowns of a plate, say, and those of its
-    bending have nothing between them.
-    """
-    if not matrices:
-        return []
-    first = matrices[0]
-    indptr, indices, _ = first.getValuesCSR()
-    data = [A.getValuesCSR()[2] for A in matrices]
-    begin, _ = first.getOwnershipRange()
-    rows = np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))
-    kept = indices == rows + begin
-    for values in data:
-        kept |= values != 0.0
-    pointers = np.concatenate([[0], np.cumsum(np.bincount(rows[kept], minlength=len(indptr) - 1))]).astype(indptr.dtype)
-    columns, sizes = indices[kept], first.getSizes()
-    return [PETSc.Mat().createAIJ(sizes, csr=(pointers, columns, values[kept]), comm=first.comm) for values in data]
-
-
 def transposed(A: Any) -> Any:
     """Return Aᵀ as a new matrix (without an argument PETSc would transpose A itself)."""
     return A.transpose(PETSc.Mat())
