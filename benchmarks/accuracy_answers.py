@@ -30,7 +30,7 @@ Array = npt.NDArray[np.float64]
 ACCURACIES = (1e-2, 1e-3, 1e-4)
 
 #: Steps of the truth and of the grid, as parts of a scene's own, and schemes and theories of the grid.
-TRUTH, STEPS = 8, (4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 1 / 16)
+TRUTH, STEPS = 32, (4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 1 / 16)
 SCHEMES, THEORIES = ("generalised_alpha", "esdirk4"), ("consistent_linear", "reissner")
 
 

@@ -28,7 +28,7 @@ LONGEST, HALVINGS = 1 / 20, 40
 WINDOWS, UNEVEN = 8, 3.0
 
 #: Fewest instants from which steps are planned.
-FEWEST = 40 * WINDOWS
+FEWEST = 10 * WINDOWS
 
 
 @dataclass(frozen=True)
