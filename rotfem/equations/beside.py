@@ -22,6 +22,7 @@ from dolfinx import fem, la
 from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 
+from rotfem.equations.geometric import geometric_stiffness
 from rotfem.equations.model import Model
 from rotfem.errors import ComputationError
 from rotfem.mechanics.problem import Problem
@@ -77,23 +78,11 @@ class Beside:
 
     @cached_property
     def _K(self) -> Any:
-        u, w = ufl.TestFunction(self.V), ufl.TrialFunction(self.V)
-        return forms.form(ufl.derivative(self.model.residual, self._b, w) + self._prestress(u, w), once=True)
-
-    def _prestress(self, u: Any, w: Any) -> Any:
-        """Return ∫ N⁰ D²Γ₁[u, w] of a prestressed theory, N⁰ of the displacement in `_base`; 0 of others."""
-        s, theory, a = self.structure, self.model.theory, self._state[0]
-        if not theory.prestress:
-            return 0
-        out: Any = 0
-        second = s.strains(theory.prestress_measures(s.type))
-        for first, higher in zip(self.model.mechanics.strains, second, strict=True):
-            if first.name in s.prestressing:
-                force = forms.without(first.force(first.value), self._b)
-                curved = ufl.derivative(ufl.derivative(higher.value, self._b, u), self._b, w)
-                force = ufl.replace(force, {a: self._base})
-                out += ufl.inner(force, forms.without(curved, a, self._b)) * higher.measure
-        return out
+        u, w, theory = ufl.TestFunction(self.V), ufl.TrialFunction(self.V), self.model.theory
+        K = ufl.derivative(self.model.residual, self._b, w)
+        if theory.prestress:
+            K += geometric_stiffness(self.model, (self._state[0], self._base), u, w, theory, self._b)
+        return forms.form(K, once=True)
 
     def stays_zero(self, driven: dict[str, Array]) -> bool:
         """Return whether what is left out stays zero while what is kept moves at will.

@@ -21,6 +21,7 @@ from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms.analysis import extract_constants
 
+from rotfem.equations.geometric import geometric_stiffness
 from rotfem.equations.model import Model
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
@@ -221,17 +222,8 @@ class Pieces:
             base: what N⁰ is of, likewise.
             theory: whose second-order strains Γ₁ are taken; those of the model if None.
         """
-        s, theory = self.structure, theory or self.model.theory
-        if not theory.prestress:
-            return 0
-        out: Any = 0
-        second = s.strains(theory.prestress_measures(s.type))
-        for first, higher in zip(self.model.mechanics.strains, second, strict=True):
-            if first.name in s.prestressing:
-                force = first.force(ufl.replace(first.value, {self.q: base}))
-                curvature = ufl.derivative(ufl.derivative(higher.value, self.q, u), self.q, w)
-                out += ufl.inner(force, forms.without(curvature, self.q)) * higher.measure
-        return out
+        theory = theory or self.model.theory
+        return geometric_stiffness(self.model, (self.q, base), u, w, theory) if theory.prestress else 0
 
     def _prestress(self) -> None:
         """Add the geometric stiffness of the axial force that each load piece causes in the linear structure."""
