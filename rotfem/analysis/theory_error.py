@@ -17,7 +17,6 @@ structure buckles and the theory does not see it. Of a mode x it changes ω² by
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -29,6 +28,7 @@ from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms import expand_derivatives
 
+from rotfem.equations.geometric import geometric_stiffness
 from rotfem.equations.pieces import set_diagonal
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.theories import richest, theories
@@ -242,17 +242,11 @@ class TheoryCheck:
 
     def _stress_stiffness(self, q: Array) -> Any:
         """Return G = ∫ N D²Γ_1 at a state as a PETSc matrix, zero at clamped unknowns."""
-        system, s, model = self.system, self.structure, self.system.model
-        measures: Callable[..., Any] = stiffened().prestress_measures(s.type)
+        system, model = self.system, self.system.model
         system.set_state(q)
-        u, w, out = ufl.TestFunction(system.V), ufl.TrialFunction(system.V), 0
-        base = fem.Function(system.V)
+        u, w, base = ufl.TestFunction(system.V), ufl.TrialFunction(system.V), fem.Function(system.V)
         base.x.array[:] = q
-        for first, higher in zip(model.mechanics.strains, s.strains(measures), strict=True):
-            if first.name in s.prestressing:
-                force = first.force(ufl.replace(first.value, {system.q: base}))
-                second = ufl.derivative(ufl.derivative(higher.value, system.q, u), system.q, w)
-                out += ufl.inner(force, forms.without(second, system.q)) * higher.measure
+        out = geometric_stiffness(model, (system.q, base), u, w, stiffened())
         if model.problem.left_out and expand_derivatives(out).empty():  # what is left has none of these strains
             G = system.matrix(1.0, 0.0, 0.0, 0.0)
             G.zeroEntries()

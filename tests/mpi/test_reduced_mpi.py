@@ -9,21 +9,13 @@ import numpy as np
 import pytest
 
 from rotfem.results.files import read_csv
+from tests.beams import BEAM_TABLE
 from tests.launch import MPIRUN, rotfem
 
 pytestmark = [pytest.mark.mpi, pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")]
 
-BEAM = """\
-[structure]
-type = "planar_beam"
-length = 10.0
-[structure.section]
-EA = 2.8e7
-GA = 1.0e7
-EI = 1.4e4
-mass_per_length = 1.2
-rotary_inertia = 6.0e-4
-[model]
+BEAM = f"""\
+{BEAM_TABLE}[model]
 theory = "consistent_linear"
 reduced = 1e-5
 foreshortening = true
