@@ -106,7 +106,10 @@ class ErrorWatch:
         shape = self._shape(state, size)
         found: dict[str, tuple[float, float]] = {"time": (0.0, 0.0), "space": (0.0, 0.0)}
         if self._windows and self._sound:
-            found = largest_errors(self._windows, self.scheme, self.system.held.linear, size)
+            with np.errstate(all="ignore"):  # where damping or growth is beyond numbers nothing is known
+                found = largest_errors(self._windows, self.scheme, self.system.held.linear, size)
+            self._sound = bool(np.isfinite([found["time"], found["space"]]).all())
+            found = found if self._sound else {"time": (0.0, 0.0), "space": (0.0, 0.0)}
         return TipErrors(found["time"] if self._sound else None, found["space"], shape, size)
 
     def _shape(self, state: State, size: float) -> float:
@@ -130,7 +133,8 @@ class ErrorWatch:
         if self._sound:
             before = self._windows[-1] if self._windows else None
             try:
-                self._windows.append(Window(self.system, self._mesh, now, self.end, before))
+                with np.errstate(all="ignore"):
+                    self._windows.append(Window(self.system, self._mesh, now, self.end, before))
             except (ComputationError, np.linalg.LinAlgError):
                 self._sound = False
             self.system.count_rotations_from(last.datum)
