@@ -29,7 +29,7 @@ def matched(values: Array, others: Array, vectors: Array) -> Array:
 
 def mirror_error(values: Array) -> float:
     """Return the largest relative distance of −λ̄ from the spectrum, over the inner half of the computed λ."""
-    inner = values[np.abs(values) <= np.median(np.abs(values))]
+    inner = values[(np.abs(values) <= np.median(np.abs(values))) & (values != 0.0)]  # 0 mirrors itself
     distance = np.abs(values[None, :] + inner.conj()[:, None]).min(axis=1)
     return float(np.max(distance / np.abs(inner), initial=0.0))
 

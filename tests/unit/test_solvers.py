@@ -9,6 +9,7 @@ import pytest
 from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
+from rotfem.numerics.left_vectors import mirror_error
 from rotfem.numerics.linear import DirectSolver, combine
 from rotfem.numerics.newton import Newton
 
@@ -131,3 +132,10 @@ def test_combine() -> None:
     target = A.duplicate()
     combine(target, [A, B], np.array([2.0, -1.0]))
     np.testing.assert_array_equal(target.convert("dense").getDenseArray(), [[1, 3], [5, 7]])
+
+
+def test_a_zero_eigenvalue_is_its_own_mirror() -> None:
+    """Of a hub that turns freely, say; the others are judged as without it."""
+    assert mirror_error(np.array([0.0, 1j, -1j, 2j, -2j])) == 0.0
+    lopsided = np.array([0.0, 0.1 + 1j, -0.11 + 1j, 9j, -9j])
+    assert mirror_error(lopsided) == pytest.approx(0.01 / abs(0.1 + 1j), rel=1e-9)
