@@ -152,7 +152,7 @@ class AdaptiveSteps:
                 return start, FAILED
         local = stepper.scheme.local_error(new, start)
         self.largest = max(self.largest, self.measure.displacement(new))
-        if local is None:  # an understudy has taken it
+        if local is None:  # a fallback has taken it
             return new, 1.0
         return new, MARGIN * self.measure(local, h) / max(self.tolerance * self.largest, self.least)
 

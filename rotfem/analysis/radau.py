@@ -158,7 +158,7 @@ class RadauIIA(Scheme):
         """Return the leading term of the error, by the fourth divided difference of accelerations."""
         return new.memory.error if new.memory is not None else None
 
-    def understudy(self) -> Scheme:
+    def fallback(self) -> Scheme:
         """Return generalised-α, whose one stage Newton's method solves from farther away."""
         return GeneralisedAlpha()
 

@@ -208,7 +208,7 @@ class Scheme(ABC):
         """Return an estimate of the error of q that the step from old to new made; None if there is none."""
         return None
 
-    def understudy(self) -> Scheme | None:
+    def fallback(self) -> Scheme | None:
         """Return a more robust scheme that takes the steps that this one cannot; None if there is none."""
         return None
 

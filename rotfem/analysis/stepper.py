@@ -16,7 +16,7 @@ from rotfem.errors import ComputationError
 from rotfem.mechanics.courses import View
 from rotfem.numerics.newton import Newton
 
-#: Halvings left with which a step is taken though it feeds the motion, or by an understudy; parts that one takes it in.
+#: Halvings left with which a step is taken though it feeds the motion, or by a fallback; parts that one takes it in.
 STUBBORN, PARTS = 3, 4
 
 #: Relative jump of what is prescribed that is none.
@@ -43,7 +43,7 @@ class Stepper(StageSolver):
 
     Attributes:
         substeps, rejected: steps that were halved (Newton failed, or energy rose), and adaptive ones taken back.
-        stood_in: steps that the scheme could not take, and its understudy did.
+        stood_in: steps that the scheme could not take, and its fallback did.
         pace: length of the next adaptive step (s), largest displacement so far (scaled), and length that the errors so
             far allow (s); None before the first.
         watch: told of every step that counts; None tells nobody.
@@ -143,10 +143,10 @@ class Stepper(StageSolver):
             if halvings <= STUBBORN or not self._feeds(new, state):
                 return new
         except ComputationError as error:
-            understudy = self.scheme.understudy()
-            if understudy is not None and 0 < halvings <= STUBBORN:
-                return self._stood_in(understudy, state, h, end)
-            if self.system.solved_at_once and understudy is None:
+            fallback = self.scheme.fallback()
+            if fallback is not None and 0 < halvings <= STUBBORN:
+                return self._stood_in(fallback, state, h, end)
+            if self.system.solved_at_once and fallback is None:
                 raise
             if halvings == 0:
                 raise ComputationError(
@@ -158,14 +158,14 @@ class Stepper(StageSolver):
         middle = self.advance(state, h / 2, None, halvings - 1)
         return self.advance(middle, h / 2, state.t + h if end is None else end, halvings - 1)
 
-    def _stood_in(self, understudy: Scheme, state: State, h: float, end: float | None) -> State:
+    def _stood_in(self, fallback: Scheme, state: State, h: float, end: float | None) -> State:
         """Return the state at the end of a step that another scheme takes, in parts.
 
         Raises:
             ComputationError: it fails, too.
         """
-        other = Stepper(self.system, understudy, self.newton)
-        now, last = understudy.start(state), state.t + h if end is None else end
+        other = Stepper(self.system, fallback, self.newton)
+        now, last = fallback.start(state), state.t + h if end is None else end
         for part in range(1, PARTS + 1):
             now = other.advance(now, h / PARTS, last if part == PARTS else None)
         self.stood_in += 1
@@ -183,7 +183,7 @@ class Stepper(StageSolver):
         """Return what a run says of its steps."""
         out = [f"{self.substeps} steps were halved where Newton failed or energy rose"] if self.substeps else []
         if self.stood_in:
-            other = self.scheme.understudy()
+            other = self.scheme.fallback()
             assert other is not None
             taken = f"{self.stood_in} steps that {self.scheme.name} could not solve were taken by {other.name}"
             out.append(f"{taken}: their errors are those of that scheme")

@@ -37,7 +37,6 @@ ADAPTIVE, SCHEMES, ROWS = "esdirk4", ("generalised_alpha", "esdirk4"), 1000
 #: Nodes along a structure to start from, and for every mode that is wanted.
 NODES, NODES_A_MODE = 18, 4
 
-
 #: Columns of the displacement of the tip.
 TIPS = ("tip_u1", "tip_u2", "tip_u3")
 
@@ -161,6 +160,8 @@ def compare(done: RunResult, settings: Settings, before: Settings, coarse: Resul
         return
     fine, rough = tips_of(done), tips_of(coarse)
     scale = float(np.linalg.norm(fine, axis=1).max())
+    if scale == 0.0:
+        return
     found = float(np.linalg.norm(fine - rough, axis=1).max()) / scale / ((before.step / settings.step) ** 2 - 1)
     error = done.summary["error"]
     if error["time"] is None or found < error["time"]:
@@ -175,13 +176,11 @@ def tips_of(done: RunResult) -> Array:
 
 def stalled(tried: list[dict[str, Any]]) -> bool:
     """Return whether finer settings of the same model have not made the error smaller."""
-    if (
-        len(tried) < 2
-        or "error" not in tried[-2]
-        or any(tried[-1][key] != tried[-2][key] for key in ("theory", "reduced"))
-    ):
+    if len(tried) < 2 or "error" not in tried[-2]:
         return False
-    return tried[-1]["error"] is not None and not tried[-1]["error"] < STALLED * tried[-2]["error"]
+    before, now = tried[-2:]
+    is_same = all(now[key] == before[key] for key in ("theory", "reduced"))
+    return is_same and None not in (now["error"], before["error"]) and now["error"] >= STALLED * before["error"]
 
 
 def refuse(scene: Scene, wanted: str, command: str) -> None:

@@ -79,7 +79,7 @@ def test_a_stiff_vibration_is_damped(scheme: str, left: float) -> None:
     assert off("generalised_alpha") > 0.1
 
 
-def test_steps_that_cannot_be_solved_are_taken_by_the_understudy() -> None:
+def test_steps_that_cannot_be_solved_are_taken_by_the_fallback() -> None:
     """A beam let go from a tenth of its length, in steps of a quarter of its period; the summary says so."""
     tables = {"structure": STRUCTURE, "motion": STILL, "initial": {"tip_displacement": 1.0}, "mesh": {"elements": 4}}
     result = run({**tables, "time": {"end": 2.0, "step": 0.4, "scheme": "radau5"}})
