@@ -58,12 +58,12 @@ def quadratic(m: Array, c: Array, k: Array, target: float) -> tuple[Array, Array
     shifted = [k + target * c + target**2 * m, unit * (c + 2 * target * m), unit**2 * m]
     try:
         right_side = np.linalg.solve(shifted[0], np.hstack(shifted[1:]))
-    except np.linalg.LinAlgError:
+        nu, left, right = sl.eig(np.vstack([-right_side, np.eye(n, 2 * n)]), left=True)
+        order = np.argsort(-np.abs(nu), kind="stable")
+        order = order[np.abs(nu[order]) > 0.0]
+        x, y = right[n:, order], np.linalg.solve(shifted[0].conj().T, left[:n, order])
+    except np.linalg.LinAlgError:  # of a matrix or of its transpose: round-off may tell them apart
         raise ComputationError("the stiffness matrix is singular", advice="a slightly different speed") from None
-    nu, left, right = sl.eig(np.vstack([-right_side, np.eye(n, 2 * n)]), left=True)
-    order = np.argsort(-np.abs(nu), kind="stable")
-    order = order[np.abs(nu[order]) > 0.0]
-    x, y = right[n:, order], np.linalg.solve(shifted[0].conj().T, left[:n, order])
     return target + unit / nu[order], x / np.linalg.norm(x, axis=0), y / np.linalg.norm(y, axis=0)
 
 
