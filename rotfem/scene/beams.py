@@ -6,9 +6,10 @@ from collections import Counter
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, PlainValidator, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
+from rotfem.scene.beam_files import with_tables
 from rotfem.scene.clamp_and_damping import Damping, check_one_hub
 from rotfem.scene.magnitudes import check_magnitudes
 from rotfem.scene.plates import PlateStructure
@@ -97,6 +98,12 @@ class PlanarBeamStructure(StructureTable):
         mass = s["mass_per_length"] + self.tip_mass / self.length
         return MeanBeam(self.length, self.hub_radius, s["EA"], mass, {"lag": (s["EI"], 0.0)})
 
+    @model_validator(mode="before")
+    @classmethod
+    def _read_files(cls, data: Any, info: ValidationInfo) -> Any:
+        """Read the files of the section."""
+        return with_tables(data, info, ())
+
     @model_validator(mode="after")
     def _check_tapers(self) -> Self:
         _check_section(self.section, self.length)
@@ -168,8 +175,9 @@ class SpatialBeamStructure(StructureTable):
 
     @model_validator(mode="before")
     @classmethod
-    def _lift_from_section(cls, data: Any) -> Any:
-        """Move pretwist and precone, which describe the beam, out of a section table that holds them."""
+    def _lift_from_section(cls, data: Any, info: ValidationInfo) -> Any:
+        """Read files, and move pretwist and precone, which describe the beam, out of a section that holds them."""
+        data = with_tables(data, info, ("pretwist", "sweep"))
         section = data.get("section") if isinstance(data, dict) else None
         if not isinstance(section, dict):
             return data

@@ -35,6 +35,6 @@ def _entry(value: Any, given: Any) -> Any:
         return abridged(value, given)
     if not isinstance(value, list) or len(value) <= LONGEST or not isinstance(value[0], list):
         return value
-    table = np.array(value, dtype="<f8")
+    table = np.array([np.concatenate([np.ravel(entry) for entry in row]) for row in value], dtype="<f8")
     note = {"rows": len(table), "columns": table.shape[1], "sha256": hashlib.sha256(table.tobytes()).hexdigest()}
     return {"file": str(given), **note} if isinstance(given, str) else note

@@ -146,6 +146,12 @@ def read_rows(text: str, path: Path) -> dict[int, tuple[float, ...]]:
     return rows
 
 
+def read_header(text: str) -> list[str]:
+    """Return the cells of the first row, if none of them is a number; else nothing."""
+    first = next((cells for line in text.split("\n") if (cells := _cells(line))), [])
+    return first if all(_number(cell) is None for cell in first) else []
+
+
 def _cells(line: str) -> list[str]:
     """Return the cells of a line, none of one that is empty but for a comment."""
     content = line.split("#", 1)[0].strip()

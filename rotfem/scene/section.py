@@ -18,6 +18,7 @@ from rotfem import registry
 from rotfem.scene.alternatives import Way, choose_way, shape_ways
 from rotfem.scene.names import as_name
 from rotfem.scene.section_shapes import MATERIAL_AND_SHAPE, Geometry
+from rotfem.scene.span_tables import is_table
 from rotfem.scene.values import (
     Array,
     Bounds,
@@ -25,7 +26,6 @@ from rotfem.scene.values import (
     PositiveProfile,
     Profile,
     SceneModel,
-    Taper,
     evaluate,
     problem,
 )
@@ -94,13 +94,9 @@ class Section(SceneModel):
         return all(len({value for _, value in taper}) == 1 for taper in self.tapers.values())
 
     @property
-    def tapers(self) -> dict[str, Taper]:
-        """The properties given as tapers, by name."""
-        return {
-            name: value
-            for name, value in self.given.items()
-            if isinstance(value, tuple) and isinstance(value[0], tuple) and len(value[0]) == 2
-        }
+    def tapers(self) -> dict[str, tuple[tuple[float, Any], ...]]:
+        """The properties given as tables over the span, by name: rows (x, value), values may be points or matrices."""
+        return {name: value for name, value in self.given.items() if isinstance(value, tuple) and is_table(value)}
 
     def _at(self, name: str, x: Array) -> Array:
         """Return the profile of that name at x; the caller knows from `way` that it is set."""

@@ -7,7 +7,7 @@ axial strain Γ₁ + z K₂ − y K₃; bending about axis 2 is therefore flap i
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -15,30 +15,42 @@ from pydantic import PlainValidator
 
 from rotfem.scene.alternatives import Way
 from rotfem.scene.section import DEFAULT_SHEAR_CORRECTION, Section
-from rotfem.scene.values import (
-    Array,
-    Matrix,
-    NonNegativeProfile,
-    PositiveProfile,
-    as_symmetric_matrix,
-    as_vector,
+from rotfem.scene.span_tables import (
+    MatrixTable,
+    Point,
+    PointTable,
+    as_matrix_or_table,
+    as_point_or_table,
+    evaluate_table,
+    is_table,
 )
+from rotfem.scene.values import Array, Matrix, NonNegativeProfile, PositiveProfile, problem
+
+#: Part of the largest entry of a mass matrix by which it may differ from one that rigid mass has.
+MASS_SLACK = 1e-9
 
 
-def _as_point(value: Any) -> tuple[float, float]:
-    y, z = as_vector(value, (2,))
-    return y, z
+def _as_stiffness(value: Any) -> Matrix | MatrixTable:
+    return as_matrix_or_table(value, definite=True)
 
 
-def _as_stiffness(value: Any) -> Matrix:
-    return as_symmetric_matrix(value, 6, definite=True)
+def _as_mass(value: Any) -> Matrix | MatrixTable:
+    """Return a mass matrix or a table of them; raise on any that no rigid mass has."""
+    read = as_matrix_or_table(value, definite=False)
+    for x, M in [(row[0], row[1]) for row in read] if is_table(read) else [(None, read)]:
+        rows = np.array(M)
+        m, coupling, size = rows[0, 0], rows[:3, 3:], MASS_SLACK * np.max(np.abs(rows))
+        rigid = np.allclose(rows[:3, :3], m * np.eye(3), rtol=0, atol=MASS_SLACK * abs(m))
+        if m <= 0.0 or not rigid or not np.allclose(coupling, -coupling.T, rtol=0, atol=size):
+            where = "" if x is None else f"at x = {x:g} it "
+            reason = (
+                f"{where}must be that of rigid mass: m 1 with m > 0 for velocities, m times a skew matrix beside it"
+            )
+            raise problem("", rows.tolist(), reason)
+    return read
 
 
-def _as_mass(value: Any) -> Matrix:
-    return as_symmetric_matrix(value, 6, definite=False)
-
-
-Point = Annotated[tuple[float, float], PlainValidator(_as_point)]
+Center: TypeAlias = Annotated[Point | PointTable, PlainValidator(as_point_or_table)]
 
 _CENTERS = ("mass_center", "shear_center", "tension_center")
 _STIFFNESSES = ("EA", "GA2", "GA3", "GJ", "EI2", "EI3")
@@ -63,11 +75,11 @@ class SpatialSection(Section):
         second_moment2: ∫z² dA (m⁴).
         second_moment3: ∫y² dA (m⁴).
         torsion_constant: Saint-Venant's J (m⁴).
-        mass_center: position (y, z) in the section (m).
-        shear_center: position (y, z) in the section (m).
-        tension_center: position (y, z) in the section (m).
-        stiffness: full 6×6 stiffness matrix.
-        mass: full 6×6 mass matrix of (velocity, angular velocity) in section axes.
+        mass_center: position (y, z) in the section (m), or a table of them.
+        shear_center: position (y, z) in the section (m), or a table of them.
+        tension_center: position (y, z) in the section (m), or a table of them.
+        stiffness: full 6×6 stiffness matrix, or a table of them.
+        mass: full 6×6 mass matrix of (velocity, angular velocity) in section axes, or a table of them.
     """
 
     WAYS: ClassVar[tuple[Way, ...]] = (
@@ -93,11 +105,11 @@ class SpatialSection(Section):
     second_moment2: PositiveProfile | None = None
     second_moment3: PositiveProfile | None = None
     torsion_constant: PositiveProfile | None = None
-    mass_center: Point | None = None
-    shear_center: Point | None = None
-    tension_center: Point | None = None
-    stiffness: Annotated[Matrix, PlainValidator(_as_stiffness)] | None = None
-    mass: Annotated[Matrix, PlainValidator(_as_mass)] | None = None
+    mass_center: Center | None = None
+    shear_center: Center | None = None
+    tension_center: Center | None = None
+    stiffness: Annotated[Matrix | MatrixTable, PlainValidator(_as_stiffness)] | None = None
+    mass: Annotated[Matrix | MatrixTable, PlainValidator(_as_mass)] | None = None
 
     @property
     def has_rotary_inertia(self) -> bool:
@@ -115,21 +127,22 @@ class SpatialSection(Section):
         """
         x = np.asarray(x, dtype=np.float64)
         if self.stiffness is not None and self.mass is not None:
-            shape = (*x.shape, 6, 6)
-            return {
-                "stiffness": np.broadcast_to(np.array(self.stiffness), shape).copy(),
-                "mass": np.broadcast_to(np.array(self.mass), shape).copy(),
-            }
+            return {"stiffness": evaluate_table(self.stiffness, x), "mass": evaluate_table(self.mass, x)}
         central = self.central(x)
         stiffnesses = np.stack([central[key] for key in _STIFFNESSES], axis=-1)
         m, J2, J3 = (central[key] for key in _INERTIAS)
-        B = _offset(axial=self.tension_center, transverse=self.shear_center)
-        B_mass = _offset(axial=self.mass_center, transverse=self.mass_center)
+        mass_center = self.center("mass_center", x)
+        B = _offset(axial=self.center("tension_center", x), transverse=self.center("shear_center", x))
+        B_mass = _offset(axial=mass_center, transverse=mass_center)
         masses = np.stack([m, m, m, J2 + J3, J2, J3], axis=-1)
         return {
-            "stiffness": B.T @ (stiffnesses[..., None] * B),
-            "mass": B_mass.T @ (masses[..., None] * B_mass),
+            "stiffness": np.swapaxes(B, -1, -2) @ (stiffnesses[..., None] * B),
+            "mass": np.swapaxes(B_mass, -1, -2) @ (masses[..., None] * B_mass),
         }
+
+    def center(self, name: str, x: npt.ArrayLike) -> Array:
+        """Return a centre, `mass_center`, `shear_center` or `tension_center`, at positions x (m): (…, 2) in m."""
+        return evaluate_table(getattr(self, name) or (0.0, 0.0), x)
 
     def central(self, x: npt.ArrayLike) -> dict[str, Array]:
         """Return the section properties about their own centers, each of the shape of x; not for full matrices.
@@ -163,14 +176,16 @@ class SpatialSection(Section):
         return E * area, k * G * area, k * G * area, G * J, E * I2, E * I3, rho * area, rho * I2, rho * I3
 
 
-def _offset(axial: tuple[float, float] | None, transverse: tuple[float, float] | None) -> Array:
-    """Return B (6, 6): motion (v, ω) of the reference axis ↦ axial motion at one center, transverse at another.
+def _offset(axial: Array, transverse: Array) -> Array:
+    """Return B (…, 6, 6): motion (v, ω) of the reference axis ↦ axial motion at one centre, transverse at another.
 
     It is v + ω×(0, y, z) row by row; the same map holds for strains, with (Γ, K) for (v, ω).
+
+    Args:
+        axial: (y, z) of the one, (…, 2) in m.
+        transverse: (y, z) of the other.
     """
-    B = np.eye(6)
-    y, z = axial or (0.0, 0.0)
-    B[0, 4], B[0, 5] = z, -y
-    y, z = transverse or (0.0, 0.0)
-    B[1, 3], B[2, 3] = -z, y
+    B = np.broadcast_to(np.eye(6), (*axial.shape[:-1], 6, 6)).copy()
+    B[..., 0, 4], B[..., 0, 5] = axial[..., 1], -axial[..., 0]
+    B[..., 1, 3], B[..., 2, 3] = -transverse[..., 1], transverse[..., 0]
     return B

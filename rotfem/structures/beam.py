@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import ufl
+from basix.ufl import element
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
@@ -75,6 +76,13 @@ class Beam(Structure):
             return self.constant(at(np.zeros(1))[0])
         f = fem.Function(fem.functionspace(self.mesh, ("DG", TAPER_DEGREE)), name=name)
         f.interpolate(lambda x: at(x[0]))
+        return f
+
+    def linear_field(self, name: str, at: Callable[[Array], Array], size: int) -> fem.Function:
+        """Return the field of vectors at(X), (n, size), that is linear in each element, as a table between its rows."""
+        space = fem.functionspace(self.mesh, element("DG", self.mesh.basix_cell(), 1, shape=(size,)))
+        f = fem.Function(space, name=name)
+        f.interpolate(lambda x: at(x[0]).T)
         return f
 
     # --- values -------------------------------------------------------------------------------------------------

@@ -14,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 
-from rotfem.errors import InputError
 from rotfem.mechanics.bodies import Strain
 from rotfem.structures.beam import Beam
 from rotfem.structures.structure import Array
@@ -31,6 +30,24 @@ STRAINS = {
 
 #: Part of the largest entry below which an entry of a mass matrix or an inertia tensor counts as zero.
 NEGLIGIBLE = 1e-12
+
+
+def moving_moments(masses: Array) -> tuple[list[tuple[int, int]], bool]:
+    """Return (pairs (i, j) of entries of ∫ x xᵀ dm about the mass centre, whether this lies beside the section).
+
+    An entry is left out where it vanishes in all mass matrices (n, 6, 6). Those on the diagonal come first.
+    """
+    m = masses[:, 0, 0]
+    c = np.stack([masses[:, 1, 5], masses[:, 2, 3], masses[:, 0, 4]], axis=-1) / m[:, None]
+    J = masses[:, 3:, 3:] - m[:, None, None] * (
+        np.einsum("nk,nk->n", c, c)[:, None, None] * np.eye(3) - np.einsum("ni,nj->nij", c, c)
+    )
+    E = 0.5 * np.trace(J, axis1=1, axis2=2)[:, None, None] * np.eye(3) - J
+    size = np.max(np.abs(masses[:, 3:, 3:]))
+    off = [(i, j) for i, j in ((0, 1), (0, 2), (1, 2)) if np.any(np.abs(E[:, i, j]) > NEGLIGIBLE * size)]
+    touched = {i for pair in off for i in pair}
+    diagonal = [(i, i) for i in range(3) if i in touched or np.any(np.abs(E[:, i, i]) > NEGLIGIBLE * size)]
+    return diagonal + off, bool(np.any(np.abs(c[:, 0]) > NEGLIGIBLE * np.max(np.abs(c), initial=0.0)))
 
 
 def euler_tensor(inertia: npt.ArrayLike) -> list[tuple[float, Array]]:
@@ -51,30 +68,32 @@ def euler_tensor(inertia: npt.ArrayLike) -> list[tuple[float, Array]]:
 class SectionForms:
     """Section properties in the forms of a beam, by name in `beam.section` and `beam.scalars`.
 
+    What is a table over the span is a field, one for each table, so that beams whose tables differ share their forms.
+
     Args:
         beam: the beam; receives the constants.
-        section: its section; `central(x)` or full matrices `stiffness` and `mass` (see `rotfem.scene`).
+        section: its section; `central(x)` and `center(name, x)`, or full matrices `at(x)` (see `rotfem.scene`).
 
     Attributes:
         mass: mass per length (kg/m).
         mass_center: its components along t_i⁰ (m), numbers 0 where it lies on the axis.
         directors: (components along t_i⁰, second moment of mass in kg·m) of each director.
-
-    Raises:
-        InputError: a mass matrix that no section has.
     """
 
     def __init__(self, beam: Beam, section: Any):
         self._beam, self._data = beam, section
-        matrix = section.stiffness is not None
-        self._read_full() if matrix else self._read_central()
+        if section.stiffness is None:
+            self._read_central()
+            return
+        self._stiffness = self._matrix("stiffness")
+        self._read_mass_table() if "mass" in section.tapers else self._read_mass(np.array(section.mass))
 
     def _read_central(self) -> None:
         beam, data = self._beam, self._data
         for name in data.central(np.zeros(1)):
             beam.section[name] = beam.profile(name, partial(self._central, name))
         self.mass = beam.section["mass_per_length"]
-        self.mass_center = self._point("mass_center", (0.0, *(data.mass_center or (0.0, 0.0))))
+        self.mass_center = (0, *self._center("mass_center"))
         self.directors = [
             ((0, 1, 0), beam.section["rotary_inertia3"]),
             ((0, 0, 1), beam.section["rotary_inertia2"]),
@@ -84,19 +103,36 @@ class SectionForms:
         central: dict[str, Array] = self._data.central(x)
         return central[name]
 
-    def _read_full(self) -> None:
-        beam, data = self._beam, self._data
-        for i, j in zip(*np.triu_indices(6), strict=True):
-            if (value := np.array(data.stiffness)[i, j]) != 0.0:
-                beam.section[f"stiffness_{i + 1}{j + 1}"] = beam.constant(value)
-        M = np.array(data.mass)
+    def _center(self, name: str) -> tuple[Any, Any]:
+        """Return the components (y, z) of a centre: fields of a table, else constants, or 0 where they vanish."""
+        if name not in self._data.tapers:
+            y, z = getattr(self._data, name) or (0.0, 0.0)
+            return self._point(name, (0.0, y, z))[1:]
+        if name not in self._beam.section:
+            self._beam.section[name] = self._beam.linear_field(name, partial(self._data.center, name), 2)
+        f = self._beam.section[name]
+        return f[0], f[1]
+
+    def _matrix(self, name: str) -> list[list[Any]]:
+        """Return the entries (6, 6) of a matrix: components of one field of a table, else constants and zeros."""
+        beam, upper = self._beam, list(zip(*np.triu_indices(6), strict=True))
+        entries: dict[tuple[int, int], Any] = {}
+        if name in self._data.tapers:
+            rows, columns = np.triu_indices(6)
+            f = beam.linear_field(name, lambda x: self._data.at(x)[name][:, rows, columns], len(upper))
+            beam.section[name] = f
+            entries = {ij: f[n] for n, ij in enumerate(upper)}
+        else:
+            for (i, j), value in zip(upper, np.array(getattr(self._data, name))[np.triu_indices(6)], strict=True):
+                if value != 0.0:
+                    entries[i, j] = beam.section[f"{name}_{i + 1}{j + 1}"] = beam.constant(value)
+        return [[entries.get((min(i, j), max(i, j)), 0) for j in range(6)] for i in range(6)]
+
+    def _read_mass(self, M: Array) -> None:
+        """Take a mass matrix that holds along the whole beam."""
+        beam = self._beam
         m, coupling = M[0, 0], M[:3, 3:]
-        rigid = np.allclose(M[:3, :3], m * np.eye(3), rtol=0, atol=NEGLIGIBLE * m)
-        if m <= 0.0 or not rigid or not np.allclose(coupling, -coupling.T, rtol=0, atol=1e-9 * np.max(np.abs(M))):
-            reason = "must be that of rigid mass: m 1 with m > 0 for velocities, m times a skew matrix beside it"
-            raise InputError("structure.section.mass", [list(row) for row in M], reason)
-        y, z = coupling[2, 0] / m, coupling[0, 1] / m
-        c = np.array([coupling[1, 2] / m, y, z])
+        c = np.array([coupling[1, 2] / m, coupling[2, 0] / m, coupling[0, 1] / m])
         self.mass = beam.section["mass_per_length"] = beam.constant(m)
         self.mass_center = self._point("mass_center", tuple(c))
         central = M[3:, 3:] - m * (c @ c * np.eye(3) - np.outer(c, c))
@@ -104,6 +140,27 @@ class SectionForms:
         for n, (moment, axis) in enumerate(euler_tensor(central), start=1):
             density = beam.section[f"director_inertia_{n}"] = beam.constant(moment)
             self.directors.append((tuple(axis), density))
+
+    def _read_mass_table(self) -> None:
+        """Take a table of mass matrices, whose entries are linear between its rows; centres and moments are not.
+
+        ∫ x xᵀ dm = E has the directors t_i with E_ii − Σ_j E_ij and (t_i + t_j)/√2 with 2 E_ij: they do not turn along
+        the beam as principal axes do. Those of sections without any thickness along the axis have none in direction 1.
+        """
+        M = self._matrix("mass")
+        self.mass = M[0][0]
+        c = [M[1][5] / self.mass, M[2][3] / self.mass, M[0][4] / self.mass]
+        size = ufl.dot(ufl.as_vector(c), ufl.as_vector(c))
+        J = [[M[3 + i][3 + j] - self.mass * (size * (i == j) - c[i] * c[j]) for j in range(3)] for i in range(3)]
+        half = (J[0][0] + J[1][1] + J[2][2]) / 2
+        E = [[half * (i == j) - J[i][j] for j in range(3)] for i in range(3)]
+        pairs, along = moving_moments(self._data.at(sorted({x for x, _ in self._data.mass}))["mass"])
+        self.mass_center = tuple(c) if along else (0, c[1], c[2])
+        self.directors = []
+        for i, j in pairs:
+            axis = np.eye(3)[i] if i == j else (np.eye(3)[i] + np.eye(3)[j]) / np.sqrt(2)
+            others = [E[i][k] for k in range(3) if k != i and (min(i, k), max(i, k)) in pairs]
+            self.directors.append((tuple(axis), E[i][i] - sum(others) if i == j else 2 * E[i][j]))
 
     def _point(self, name: str, components: tuple[float, ...]) -> tuple[Any, ...]:
         """Return named constants for the components of a point along t_i⁰, the number 0 for those that vanish."""
@@ -115,10 +172,9 @@ class SectionForms:
         epsilon = [*(Gamma[i] for i in range(3)), *(K[i] for i in range(3))]
         if self._data.stiffness is not None:
             return self._full_strains(epsilon, measure)
-        data = self._data
-        _, y, z = self._point("tension_center", (0.0, *(data.tension_center or (0.0, 0.0))))
+        y, z = self._center("tension_center")
         epsilon[0] += z * epsilon[4] - y * epsilon[5]
-        _, y, z = self._point("shear_center", (0.0, *(data.shear_center or (0.0, 0.0))))
+        y, z = self._center("shear_center")
         epsilon[1] -= z * epsilon[3]
         epsilon[2] += y * epsilon[3]
         stiffness = (self._beam.section[name] for name in STRAINS.values())
@@ -129,7 +185,7 @@ class SectionForms:
 
         The first strain is the axial one of the section's own tension centre: the axial force is C_11 times it.
         """
-        C = [[self._beam.section.get(f"stiffness_{min(i, j)}{max(i, j)}", 0) for j in range(1, 7)] for i in range(1, 7)]
+        C = self._stiffness
         shares = [c / C[0][0] if c != 0 else 0 for c in C[0]]
         axial = epsilon[0] + sum(shares[j] * epsilon[j] for j in range(1, 6))
         rest = [[C[i][j] - C[0][i] * shares[j] for j in range(1, 6)] for i in range(1, 6)]

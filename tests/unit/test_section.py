@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -268,3 +269,80 @@ def test_spatial_taper() -> None:
     section = spatial(**{**SPATIAL, "EI2": [[0, 8], [1, 4], [2, 2]]})
     assert section.breakpoints == (1.0,)
     np.testing.assert_allclose(section.at(X)["stiffness"][:, 4, 4], [8, 6, 2])
+
+
+# --- files ----------------------------------------------------------------------------------------------------------
+
+BLADE_CSV = """\
+# a blade
+x, EA, GA2, GA3, GJ, EI2, EI3, mass_per_length, mass_center_y, pretwist
+0, 3, 1, 2, 5, 7, 11, 13, 0.1, 0.5
+2, 1.5, 1, 2, 5, 7, 11, 13, 0.3, -0.5
+"""
+
+
+def of_files(folder: Path, section: dict[str, Any], **structure: Any) -> Any:
+    structure = {"type": "spatial_beam", "length": 2.0, "section": section, **structure}
+    tables = {"structure": structure, "motion": {"type": "constant", "speed": 1.0}}
+    return Scene.from_dict(tables, directory=folder).structure
+
+
+def test_file_with_a_column_for_each_property(tmp_path: Path) -> None:
+    (tmp_path / "blade.csv").write_text(BLADE_CSV)
+    beam = of_files(tmp_path, {"file": "blade.csv", "shear_center": [0.2, 0.0]})
+    assert beam.section.EA == ((0.0, 3.0), (2.0, 1.5))
+    assert beam.section.mass_center == ((0.0, (0.1, 0.0)), (2.0, (0.3, 0.0)))
+    assert beam.pretwist == ((0.0, 0.5), (2.0, -0.5))
+    np.testing.assert_allclose(beam.section.center("mass_center", 1.0), [0.2, 0.0])
+    np.testing.assert_allclose(beam.section.center("shear_center", 1.0), [0.2, 0.0])
+
+
+def test_matrices_in_columns_and_in_files_of_their_own(tmp_path: Path) -> None:
+    K = np.diag([6.0, 5.0, 4.0, 3.0, 2.0, 1.0]) + 0.1
+    upper = K[np.triu_indices(6)]
+    names = [f"stiffness_{i + 1}{j + 1}" for i, j in zip(*np.triu_indices(6), strict=True)]
+    rows = [",".join(map(str, [x, *upper])) for x in (0.0, 2.0)]
+    (tmp_path / "blade.csv").write_text("\n".join([",".join(["x", *names]), *rows]))
+    (tmp_path / "upper.csv").write_text("\n".join(rows))
+    (tmp_path / "full.csv").write_text("\n".join(",".join(map(str, [x, *K.ravel()])) for x in (0.0, 2.0)))
+    mass = np.eye(6).tolist()
+    for section in ({"file": "blade.csv"}, {"stiffness": "upper.csv"}, {"stiffness": "full.csv"}):
+        beam = of_files(tmp_path, {**section, "mass": mass})
+        np.testing.assert_allclose(beam.section.at(0.7)["stiffness"], K, rtol=1e-14)
+
+
+def test_profile_in_a_file_of_its_own(tmp_path: Path) -> None:
+    (tmp_path / "EI.csv").write_text("x, EI\n0, 2\n1, 1\n2, 1")
+    structure = {
+        "type": "planar_beam",
+        "length": 2.0,
+        "section": {"EA": 1, "GA": 1, "EI": "EI.csv", "mass_per_length": 1},
+    }
+    tables = {"structure": structure, "motion": {"type": "constant", "speed": 1.0}}
+    assert Scene.from_dict(tables, directory=tmp_path).structure.section.EI == ((0.0, 2.0), (1.0, 1.0), (2.0, 1.0))
+    (tmp_path / "twist.csv").write_text("0, 0.1\n2, 0")
+    assert of_files(tmp_path, SPATIAL, pretwist="twist.csv").pretwist == ((0.0, 0.1), (2.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "section", "message"),
+    [
+        (BLADE_CSV, {"file": "blade.csv", "EA": 1.0}, r"section\.EA: given twice"),
+        (BLADE_CSV.replace("x,", "r,"), {"file": "blade.csv"}, 'x first, not "r"'),
+        (BLADE_CSV.replace("EI2", "EI3"), {"file": "blade.csv"}, 'column "EI3" stands twice'),
+        (BLADE_CSV.replace("EI2", "EIy"), {"file": "blade.csv"}, r"section\.EIy: unknown key"),
+        (BLADE_CSV.replace("mass_center_y", "mass_center_2"), {"file": "blade.csv"}, 'unknown column "mass_center_2"'),
+        (BLADE_CSV.replace("1.5, 1", "1.5, one"), {"file": "blade.csv"}, 'line 4, column 3: "one"'),
+        (BLADE_CSV.replace(", -0.5", ""), {"file": "blade.csv"}, "line 4 has 9 columns; must be 10"),
+        (BLADE_CSV.replace("\n2,", "\n1,"), {"file": "blade.csv"}, "it ends at 1"),
+        ("0, 3\n2, 1", {"file": "blade.csv"}, "its first row must name the columns"),
+        (BLADE_CSV, {"EA": "blade.csv"}, r"section\.EA.*line 3 has 10 columns; must be x, value"),
+        (BLADE_CSV, {"stiffness": "blade.csv"}, r"section\.stiffness.*must be x and 36 entries"),
+        (BLADE_CSV, {"file": "none.csv"}, r"section\.file.*file not found"),
+        (BLADE_CSV, {"file": 1}, r"section\.file.*must be the path of a file"),
+    ],
+)
+def test_bad_files(tmp_path: Path, text: str, section: dict[str, Any], message: str) -> None:
+    (tmp_path / "blade.csv").write_text(text)
+    with pytest.raises(SceneError, match=message):
+        of_files(tmp_path, section)
