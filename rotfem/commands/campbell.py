@@ -34,12 +34,13 @@ from rotfem.scene.values import LARGEST
 from rotfem.selection.accuracy import Settings
 from rotfem.selection.distance import MODES
 from rotfem.selection.model_choice import choose
+from rotfem.units import split_unit
 
 Array = npt.NDArray[Any]
 
 
 def parse_speeds(text: str, limits: Limits | None = None) -> list[float]:
-    """Return speeds (rad/s) from "first:last:number" or "s1,s2,…".
+    """Return speeds (rad/s) from "first:last:number" or "s1,s2,…", with the unit of all of them at the end.
 
     Args:
         text: what was asked for.
@@ -50,17 +51,19 @@ def parse_speeds(text: str, limits: Limits | None = None) -> list[float]:
     """
     limits = limits or Limits()
     allowed = (
-        "must be first:last:number (number at least 2) or a list s1,s2,… of at least two increasing speeds (rad/s)"
+        "must be first:last:number (number at least 2) or a list s1,s2,… of at least two increasing speeds (rad/s), "
+        "with a unit such as rpm at the end if they are in another one"
     )
     try:
-        if ":" in text:
-            first, last, number = text.split(":")
-            ends, count = (float(first), float(last)), int(number)
+        numbers, unit = split_unit(text)
+        if ":" in numbers:
+            first, last, number = numbers.split(":")
+            ends, count = (float(first) * unit, float(last) * unit), int(number)
             if (why := limits.refusal("speeds", count)) is not None:
                 raise SceneError("command line", "--speeds", text, why)
             speeds = [float(s) for s in np.linspace(*ends, count)] if max(map(abs, ends)) <= LARGEST else []
         else:
-            speeds = [float(s) for s in text.split(",")]
+            speeds = [float(s) * unit for s in numbers.split(",")]
     except SceneError:
         raise
     except ValueError:

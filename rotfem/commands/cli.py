@@ -190,7 +190,9 @@ def modes(
 @command()
 def campbell(
     todo: Job,
-    speeds: Annotated[str, typer.Option("--speeds", metavar="RANGE", help="first:last:number or s1,s2,… in rad/s")],
+    speeds: Annotated[
+        str, typer.Option("--speeds", metavar="RANGE", help="first:last:number or s1,s2,… in rad/s, or as 0:15:31rpm")
+    ],
     per_rev: Annotated[int | None, typer.Option("--per-rev", min=0, help="per-rev lines 1Ω … NΩ to cross")] = None,
 ) -> None:
     """Follow the modes of SCENE over a range of speeds."""

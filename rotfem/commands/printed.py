@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from rotfem.analysis.error_estimate import error_line
+from rotfem.results.units import ShownUnits, in_unit
 
 
 def run_report(summary: dict[str, Any], folder: Path) -> list[str]:
@@ -56,16 +57,19 @@ def reduced_report(summary: dict[str, Any]) -> str:
 
 def modes_report(summary: dict[str, Any], folder: Path) -> list[str]:
     """Return the lines `modes` prints: a table."""
+    units = ShownUnits.of(summary)
+    first = units.frequency if units.frequency != "Hz" else "rad/s"  # there is a column of Hz in any case
     lines = [
-        f"{summary['name']}: {summary['theory']} about the {summary['about']} state at {summary['speed']:g} rad/s, "
+        f"{summary['name']}: {summary['theory']} about the {summary['about']} state at "
+        f"{units.speeds(summary['speed']):g} {units.speed}, "
         f"{summary['dofs']} dofs, in {summary['timings']['total']:.2f} s",
         f"effects: {', '.join(summary['effects']) or 'none'}",
         *choice_report(summary),
-        f"{'mode':>4}  {'label':<16}{'rad/s':>14}{'Hz':>12}{'damping':>12}{'error':>10}",
+        f"{'mode':>4}  {'label':<16}{first:>14}{'Hz':>12}{'damping':>12}{'error':>10}",
     ]
     for row in summary["modes"]:
         lines.append(
-            f"{row['mode']:>4}  {row['label']:<16}{row['frequency']:>14.6f}{row['frequency_hz']:>12.6f}"
+            f"{row['mode']:>4}  {row['label']:<16}{in_unit(row['frequency'], first):>14.6f}{row['frequency_hz']:>12.6f}"
             f"{row['damping']:>12.3e}{row['error_bound']:>10.1e}"
         )
     return [*lines, *error_report(summary), f"results in {folder}"]
@@ -73,17 +77,22 @@ def modes_report(summary: dict[str, Any], folder: Path) -> list[str]:
 
 def campbell_report(summary: dict[str, Any], folder: Path) -> list[str]:
     """Return the lines `campbell` prints: branches and critical speeds."""
+    units = ShownUnits.of(summary)
+    ends = "".join(f"{f'{end} {units.frequency}':>14}" for end in ("first", "last"))
     lines = [
         f"{summary['name']}: {summary['theory']}, {summary['speeds']} speeds ({summary['speeds_solved']} solved), "
         f"{summary['dofs']} dofs, in {summary['timings']['total']:.2f} s",
         *choice_report(summary),
-        f"{'branch':>6}  {'label':<16}{'first rad/s':>14}{'last rad/s':>14}{'confidence':>12}",
+        f"{'branch':>6}  {'label':<16}{ends}{'confidence':>12}",
     ]
     for b in summary["branches"]:
-        first, last = ("lost" if b[k] is None else f"{b[k]:.6f}" for k in ("frequency_first", "frequency_last"))
+        first, last = (
+            "lost" if b[k] is None else f"{units.frequencies(b[k]):.6f}" for k in ("frequency_first", "frequency_last")
+        )
         lines.append(f"{b['branch']:>6}  {b['label']:<16}{first:>14}{last:>14}{b['confidence']:>12.3f}")
     for c in summary["critical_speeds"]:
-        lines.append(f"critical speed {c['speed']:.6f} rad/s: {c['label']} meets {c['per_rev']}Ω")
+        at = f"{units.speeds(c['speed']):.6f} {units.speed}"
+        lines.append(f"critical speed {at}: {c['label']} meets {c['per_rev']}Ω")
     return [*lines, *error_report(summary), f"results in {folder}"]
 
 

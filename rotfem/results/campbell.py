@@ -13,6 +13,7 @@ import numpy.typing as npt
 from rotfem.results.files import json_text, rows_text
 from rotfem.results.frames import Variable, dataset, frame_of_rows
 from rotfem.results.result import Result
+from rotfem.results.units import ShownUnits
 
 if TYPE_CHECKING:
     import pandas
@@ -175,7 +176,7 @@ class CampbellResult(Result):
         """Return campbell.csv, campbell.json and summary.json."""
         keys = ("branches", "critical_speeds", "instabilities", "ambiguous", "per_rev")
         return {
-            "campbell.csv": rows_text(self.rows),
+            "campbell.csv": rows_text(ShownUnits.of(self.summary).rows(self.rows)),
             "campbell.json": json_text({**{k: self.summary[k] for k in keys}, "rows": self.rows}),
             "summary.json": json_text(self.summary),
         }

@@ -70,7 +70,8 @@ def described(column: str) -> tuple[str, str]:
     return column, ""
 
 
-def label(column: str) -> str:
-    """Return the axis label of a column, with its unit."""
+def label(column: str, shown: str = "") -> str:
+    """Return the axis label of a column, with its unit, or with the one that it is shown in."""
     what, unit = described(column)
+    unit = shown or unit
     return f"{what} ({'–' if unit == '1' else unit})" if unit else what

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from rotfem.results.files import csv_text, json_text, rows_text
 from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows, nodes_of
 from rotfem.results.result import Result
+from rotfem.results.units import ShownUnits
 
 if TYPE_CHECKING:
     import pandas
@@ -108,7 +109,7 @@ class ModesResult(Result):
             shapes |= {name if name in ("x", "y") else f"{name}_{i}": values for name, values in columns.items()}
         return {
             **({"sensitivities.csv": rows_text(self.sensitivities)} if self.sensitivities else {}),
-            "modes.csv": rows_text(self.rows),
+            "modes.csv": rows_text(ShownUnits.of(self.summary).rows(self.rows)),
             "mode_shapes.csv": csv_text(shapes),
             "modes.json": json_text({"speed": self.summary["speed"], "modes": self.rows}),
             "summary.json": json_text(self.summary),

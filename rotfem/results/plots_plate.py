@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
 from rotfem.errors import OutputError, SceneError
+from rotfem.results.units import ShownUnits
 
 if TYPE_CHECKING:
     from rotfem.results.modes import ModesResult
@@ -67,11 +68,12 @@ def modes_figure(result: ModesResult) -> Figure:
     mesh = Triangulation(first["x"], first["y"], triangles)
     aspect = float(np.ptp(first["y"]) / np.ptp(first["x"]))
     figure, axes = panels(len(shapes), aspect)
+    units = ShownUnits.of(result.summary)
     for axis, (title, columns), row in zip(axes, shapes.items(), rows, strict=True):
         name = leading(columns)
         turning = row.get("turning", 0.0)
         wave = "" if abs(turning) < 0.5 else (", forward wave" if turning > 0 else ", backward wave")
-        caption = f"{title}{wave}\n{row['frequency']:.5g} rad/s"
+        caption = f"{title}{wave}\n{units.frequencies(row['frequency']):.5g} {units.frequency}"
         map_of(axis, mesh, columns[name], caption, f"{name} (–)")
     return figure
 

@@ -1,7 +1,7 @@
 """The scene: everything a computation needs to know, validated once.
 
-A scene is a TOML file or the same nested tables in Python, in SI units. What passes here is complete and
-consistent; what does not raises one `SceneError` that names the key, its value and what is allowed.
+A scene is a TOML file or the same nested tables in Python, in SI units or with units in quotes. What passes here is
+complete and consistent; what does not raises one `SceneError` that names the key, its value and what is allowed.
 """
 
 from __future__ import annotations
@@ -45,6 +45,7 @@ from rotfem.scene.problems import scene_error
 from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver
 from rotfem.scene.stepping import Time
 from rotfem.scene.toml import apply_overrides, read_toml, set_key, to_builtin
+from rotfem.scene.units import in_si
 from rotfem.scene.values import Bounds, SceneModel
 
 #: A relative error that may be asked for.
@@ -114,6 +115,7 @@ class Scene(SceneModel):
 
     @classmethod
     def _validate(cls, tables: dict[str, Any], name: str, file: str, directory: str) -> Self:
+        tables = in_si(tables, file)
         try:
             scene = cls.model_validate(
                 tables,
@@ -161,7 +163,7 @@ class Scene(SceneModel):
     def to_dict(self) -> dict[str, Any]:
         """Return tables of what was set and of all defaults, fit for JSON and TOML; functions become their names."""
         tables: dict[str, Any] = _plain(self)
-        if not self.output.quantities:
+        if self.output == OutputTable():
             del tables["output"]
         if self.limits == Limits():
             del tables["limits"]

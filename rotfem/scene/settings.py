@@ -43,6 +43,7 @@ def _as_reduced(value: Any) -> bool | float:
 
 Degree = Annotated[int, PlainValidator(Bounds(ge=1, le=6).integer)]
 Integration = Literal["reduced", "full"]
+AngularUnit = Literal["rad/s", "rpm", "Hz", "deg/s"]
 
 
 class Model(SceneModel):
@@ -237,7 +238,11 @@ class OutputTable(SceneModel):
     Attributes:
         quantities: names of registered outputs, to be computed beside what is always recorded.
         error: whether the error of what is computed is estimated.
+        speed: unit in which speeds are printed and drawn.
+        frequency: unit in which frequencies of modes are printed and drawn.
     """
 
     quantities: Annotated[tuple[str, ...], PlainValidator(_as_outputs)] = ()
     error: bool = True
+    speed: AngularUnit = "rad/s"
+    frequency: AngularUnit = "rad/s"

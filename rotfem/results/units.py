@@ -1,0 +1,61 @@
+"""The units in which speeds and frequencies are printed and drawn; files have SI units, those of modes these too."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.units import quantity
+
+SI = "rad/s"
+
+
+@dataclass(frozen=True)
+class ShownUnits:
+    """Units of speeds and frequencies, as `[output]` of a scene names them.
+
+    Attributes:
+        speed: of the hub.
+        frequency: of modes.
+    """
+
+    speed: str = SI
+    frequency: str = SI
+
+    @classmethod
+    def of(cls, summary: Mapping[str, Any]) -> Self:
+        """Return the units that the scene of a summary asks for."""
+        scene = summary.get("scene", {})
+        output = scene.get("output", {}) if isinstance(scene, Mapping) else {}
+        return cls(output.get("speed", SI), output.get("frequency", SI))
+
+    def speeds(self, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Return speeds (rad/s) of any shape in the unit of speeds."""
+        return in_unit(values, self.speed)
+
+    def frequencies(self, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Return frequencies (rad/s) of any shape in the unit of frequencies."""
+        return in_unit(values, self.frequency)
+
+    def rows(self, rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+        """Return rows of modes with columns more, such as `speed_rpm`, where another unit than SI is asked for."""
+        return [dict(row) | {name: float(value) for name, value in self._beside(row).items()} for row in rows]
+
+    def _beside(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        named = {"speed": self.speed, "frequency": self.frequency}
+        wanted = {
+            f"{name}_{unit.lower().replace('/', '_')}": in_unit(values[name], unit)
+            for name, unit in named.items()
+            if unit != SI and name in values
+        }
+        return {column: value for column, value in wanted.items() if column not in values}  # frequency_hz always is
+
+
+def in_unit(values: npt.ArrayLike, unit: str) -> npt.NDArray[np.float64]:
+    """Return angular speeds or frequencies (rad/s) of any shape in another unit."""
+    found = np.asarray(values, dtype=np.float64)
+    return found if unit == SI else np.divide(found, quantity(f"1 {unit}", SI), dtype=np.float64)

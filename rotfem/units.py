@@ -1,0 +1,90 @@
+"""Texts such as "12.1 rpm" as numbers in a unit that is wanted; the units are those of pint."""
+
+from __future__ import annotations
+
+import re
+from functools import cache, lru_cache
+from typing import Any
+
+_NUMBER = r"(?>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+#: A name with a power of one digit: what a user writes is given to pint, which would compute 9**9**9 as well.
+_NAMED = r"(?:[^\W\d]\w*|°|%)(?:(?:\*\*|\^)-?\d|⁻?[¹²³⁴])?"
+_QUANTITY = re.compile(rf"\s*({_NUMBER})\s*((?:1\s*/\s*)?{_NAMED}(?:\s*[*/·\s]\s*{_NAMED})*)\s*")
+_POWERS = str.maketrans({"²": "**2", "³": "**3", "⁴": "**4", "·": "*", "^": "**"})
+
+
+def is_quantity(text: str) -> bool:
+    """Return whether a text is written as a number with a unit, known or not."""
+    return _QUANTITY.fullmatch(text) is not None
+
+
+def quantity(text: str, unit: str) -> float:
+    """Return the number of a text such as "12.1 rpm", in a unit.
+
+    Args:
+        text: a number with a unit.
+        unit: the unit that is wanted, in the words of pint.
+
+    Raises:
+        ValueError: says why it is none.
+    """
+    found = _QUANTITY.fullmatch(text)
+    if found is None:
+        raise ValueError(f"must be a number ({shown(unit)}), or one with a unit in quotes")
+    return float(found[1]) * _factor(found[2].strip(), unit)
+
+
+def split_unit(text: str, unit: str = "rad/s") -> tuple[str, float]:
+    """Return the numbers of a text without the unit that ends it, and how many of the wanted unit that is; 1 of none.
+
+    Args:
+        text: numbers with signs between them that are no letters, such as "0:15:31rpm".
+        unit: the unit that is wanted.
+
+    Raises:
+        ValueError: says why it is no such text.
+    """
+    found = re.fullmatch(r"\s*([-+0-9.eE:,\s]*[\d.])\s*([^\W\d].*)?", text)
+    if found is None:
+        raise ValueError("must be numbers, with a unit at the end of them all or without")
+    return found[1], quantity(f"1 {found[2]}", unit) if found[2] else 1.0
+
+
+def shown(unit: str) -> str:
+    """Return a unit as it is printed: kg·m², N·m."""
+    return re.sub(r"\*\*([234])", lambda power: "²³⁴"[int(power[1]) - 2], unit).replace("*", "·")
+
+
+@cache
+def _registry() -> Any:
+    """Return pint's units, in which a hertz is a turn a second, as it is of everything that has a frequency here."""
+    import pint  # takes a fifth of a second: only where there is a unit
+
+    registry: Any = pint.UnitRegistry(cache_folder=None)
+    for definition in ("hertz = turn / second = Hz", "@alias turn = rev", "newton_meter = newton * meter = Nm"):
+        registry.define(definition)
+    return registry
+
+
+@lru_cache(maxsize=256)
+def _factor(name: str, unit: str) -> float:
+    """Return how many of a unit another one is.
+
+    Raises:
+        ValueError: it is not known, or of another kind.
+    """
+    import pint
+
+    registry = _registry()
+    try:
+        given = registry.parse_units(_superscripts(name).translate(_POWERS))
+        return float(registry.Quantity(1.0, given).m_as(unit))
+    except pint.DimensionalityError:
+        raise ValueError(f"{name!r} is no unit of the kind of {shown(unit)}") from None
+    except Exception:  # pint has errors of its own, Python's tokenizer and parser theirs
+        raise ValueError(f"{name!r} is no unit that is known; must be one of the kind of {shown(unit)}") from None
+
+
+def _superscripts(name: str) -> str:
+    """Return a unit with negative powers as pint reads them: m⁻¹ ↦ m**-1."""
+    return re.sub("⁻([¹²³⁴])", lambda power: f"**-{'¹²³⁴'.index(power[1]) + 1}", name)
