@@ -162,12 +162,22 @@ def modes(
     ] = False,
     state_space: Annotated[bool, typer.Option("--state-space", help="write the modal model state_space.npz")] = False,
     matrices: Annotated[bool, typer.Option("--matrices", help="write M, C, K as Matrix Market and npz")] = False,
+    blade_tables: Annotated[
+        bool, typer.Option("--blade-tables", help="mode polynomials for ElastoDyn and a table of modes over the span")
+    ] = False,
+    participation: Annotated[bool, typer.Option("--participation", help="modal masses and effective masses")] = False,
     animate: Annotated[int | None, typer.Option("--animate", metavar="MODE", help="animate a mode of a plate")] = None,
 ) -> None:
     """Compute the gyroscopic eigenmodes of SCENE at its speed."""
     from rotfem.commands.modes import modes as analyse
 
-    result = analyse(todo.scene, sensitivities=sensitivities, hint=todo.hint)
+    result = analyse(
+        todo.scene,
+        sensitivities=sensitivities,
+        blade_tables=blade_tables,
+        participation=participation,
+        hint=todo.hint,
+    )
     further: list[Writer] = []
     if state_space or matrices:
         from rotfem.analysis.state_space import serial, write_matrices

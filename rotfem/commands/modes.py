@@ -19,6 +19,7 @@ from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.equilibrium import check_steady
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.mode_checks import self_checks
+from rotfem.analysis.participation import participation as masses_of
 from rotfem.analysis.stability import stability_of_pencil
 from rotfem.analysis.theory_error import TheoryCheck, TheoryError
 from rotfem.commands.accuracy import changes_of, pursue, refuse, settings_of
@@ -27,7 +28,7 @@ from rotfem.commands.known_error import error_of_modes
 from rotfem.commands.mode_tables import advice, mode_tables, scaled
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.summary import modal_summary
-from rotfem.errors import ComputationError, input_of
+from rotfem.errors import ComputationError, SceneError, input_of
 from rotfem.listeners import Hint, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Problem as ProblemData
@@ -51,6 +52,8 @@ def modes(
     *,
     comm: MPI.Comm = MPI.COMM_WORLD,
     sensitivities: bool = False,
+    blade_tables: bool = False,
+    participation: bool = False,
     hint: Hint | None = silent,
     terms: Mapping[str, Work] | None = None,
 ) -> ModesResult:
@@ -60,6 +63,8 @@ def modes(
         scene: scene, path of a scene file, or nested tables.
         comm: MPI communicator; every rank gets the whole result.
         sensitivities: also compute the derivatives of all eigenvalues to the scene's parameters.
+        blade_tables: also write polynomials and tables of the modes of a beam over its span.
+        participation: also say modal and effective masses (see `rotfem.analysis.participation`).
         hint: called with every line of advice before the computation starts; None asks for none.
         terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form (see `rotfem.Effect`).
 
@@ -68,10 +73,16 @@ def modes(
         ComputationError: no equilibrium, or eigenpairs that fail the check of their backward error.
     """
     scene = as_scene(scene)
+    if blade_tables and scene.structure.type == "plate":
+        raise SceneError(scene.file, "structure.type", "plate", "mode polynomials and tables are those of beams")
 
     def attempt(settings: Settings | None = None) -> ModesResult:
         started, variant = perf_counter(), scene if settings is None else scene.replace(changes_of(scene, settings))
-        return _modes(variant, Problem.of(variant, terms=terms), comm, sensitivities, (hint, started))
+        found = _modes(variant, Problem.of(variant, terms=terms), comm, sensitivities, (hint, started))
+        found.blade_tables = blade_tables
+        if participation:
+            add_participation(found)
+        return found
 
     with input_of(scene.file):
         if scene.accuracy is None:
@@ -133,6 +144,14 @@ def _modes(
 
         done.sensitivities = derivatives(analysis, spinning)
     return done
+
+
+def add_participation(found: ModesResult) -> None:
+    """Add modal and effective masses to the rows of a result, and the mass that there is to its summary."""
+    masses, found.summary["mass"] = masses_of(found.analysis, found.spinning)
+    first = len(found.rows) - len(masses)
+    for row, mass in zip(found.rows[first:], masses, strict=True):
+        row |= mass
 
 
 def theory_error(analysis: ModalAnalysis, spinning: Spinning) -> TheoryError:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.results.blade_tables import elastodyn_lines, mode_polynomials, mode_table
 from rotfem.results.files import csv_text, json_text, rows_text
 from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows, nodes_of
 from rotfem.results.result import Result
@@ -38,6 +39,7 @@ class ModesResult(Result):
             largest entry 1.
         sensitivities: one dictionary a mode and parameter: `mode`, `parameter`, `value`, `dfrequency` (rad/s per unit),
             `dgrowth` (1/s per unit), `relative` (p/ω dω/dp); empty if not asked for.
+        blade_tables: whether files of the modes for programs of wind turbines are wanted (see `blade_tables`).
         triangles: of a plate, triangles between the nodes of `shapes`, (m, 3).
         fields: writes the modes for ParaView into a folder, on all ranks together; None of a beam.
         analysis, spinning: the compiled scene and its eigenpairs, for further work in Python.
@@ -46,6 +48,7 @@ class ModesResult(Result):
     rows: list[dict[str, Any]]
     shapes: dict[str, dict[str, Array]] = field(default_factory=dict)
     sensitivities: list[dict[str, Any]] = field(default_factory=list)
+    blade_tables: bool = False
     triangles: Any = field(default=None, repr=False)
     fields: Callable[[Path], list[Path]] | None = field(default=None, repr=False)
     analysis: Any = field(default=None, repr=False)
@@ -103,17 +106,46 @@ class ModesResult(Result):
         return np.array([row[name] for row in self.rows], dtype=np.float64)
 
     def files(self) -> dict[str, str]:
-        """Return modes.csv, mode_shapes.csv, modes.json, summary.json, and sensitivities.csv where they are wanted."""
+        """Return modes.csv, mode_shapes.csv, modes.json, summary.json, and what else is wanted.
+
+        Raises:
+            InputError: tables over the span are wanted of a plate.
+        """
         shapes: dict[str, Array] = {}
         for i, columns in enumerate(self.shapes.values(), start=1):
             shapes |= {name if name in ("x", "y") else f"{name}_{i}": values for name, values in columns.items()}
         return {
             **({"sensitivities.csv": rows_text(self.sensitivities)} if self.sensitivities else {}),
+            **(self._blade_files() if self.blade_tables else {}),
             "modes.csv": rows_text(ShownUnits.of(self.summary).rows(self.rows)),
             "mode_shapes.csv": csv_text(shapes),
             "modes.json": json_text({"speed": self.summary["speed"], "modes": self.rows}),
             "summary.json": json_text(self.summary),
         }
+
+    def _blade_files(self) -> dict[str, str]:
+        fitted = self.mode_polynomials()
+        return {
+            "mode_table.csv": rows_text(self.mode_table()),
+            "mode_polynomials.csv": rows_text(fitted),
+            "elastodyn_modes.dat": elastodyn_lines(fitted),
+        }
+
+    def mode_table(self) -> list[dict[str, Any]]:
+        """Return the modes of a beam over its span (see `rotfem.results.blade_tables.mode_table`).
+
+        Raises:
+            InputError: the structure is no beam.
+        """
+        return mode_table(self)
+
+    def mode_polynomials(self) -> list[dict[str, Any]]:
+        """Return polynomials of the bending modes (see `rotfem.results.blade_tables.mode_polynomials`).
+
+        Raises:
+            InputError: the structure is no beam.
+        """
+        return mode_polynomials(self)
 
     def drawings(self) -> dict[str, Callable[[], Figure]]:
         """Return modes.png, the shapes of all modes."""
