@@ -68,7 +68,7 @@ def advise(
         return []
     end = None if scene.time is None else scene.time.end
     speed = scene.motion.top_speed(end) if speed is None else abs(speed)
-    out = []
+    out = _rows(scene)
     if command == "run":
         out += _step(scene, speed)
     if command != "run" or scene.modes.model_fields_set:
@@ -129,6 +129,17 @@ def _elements(scene: Scene, speed: float) -> list[str]:
         f"mesh.elements = {elements} of degree {scene.mesh.degree} has {nodes} nodes for the {shortest.half_waves:g} "
         f"half waves of {shortest.family} {shortest.half_waves + 0.5:g}, among the {scene.modes.count} modes wanted: "
         f"{enough} elements would do"
+    ]
+
+
+def _rows(scene: Scene) -> list[str]:
+    """Return a hint where tables over the span have more rows than the mesh has elements: it gets one for each."""
+    rows, elements = len(scene.structure.knots), getattr(scene.mesh, "elements", None)
+    if not isinstance(elements, int) or rows < elements:
+        return []
+    return [
+        f"tables over the span have rows at {rows} places between the ends, all of which are nodes: there are "
+        f"{rows + 1} elements, not mesh.elements = {elements}"
     ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,9 @@ MATRICES, POINTS = ("stiffness", "mass"), ("mass_center", "shear_center", "tensi
 
 #: Keys of a section that are texts, or numbers that cannot vary.
 NO_TABLES = ("shape", "from", "format", "precone")
+
+#: What the name of a file ends with.
+_ENDING = re.compile(r"\.[A-Za-z]\w*$")
 
 #: Bytes of a row with a 6×6 matrix in it, at most, for each row that a table may have.
 MATRIX_ROW_BYTES = 4 * ROW_BYTES
@@ -42,7 +46,7 @@ def with_tables(data: Any, info: ValidationInfo, keys: Sequence[str]) -> Any:
         return data
     out = dict(data)
     for key in keys:
-        if isinstance(out.get(key), str | Path):
+        if _is_path(out.get(key)):
             out[key] = _named(key, lambda key=key: _rows(key, out[key], info))
     section = out.get("section")
     if isinstance(section, Mapping):
@@ -53,7 +57,7 @@ def with_tables(data: Any, info: ValidationInfo, keys: Sequence[str]) -> Any:
 def _section_tables(section: Mapping[str, Any], info: ValidationInfo) -> dict[str, Any]:
     out = {key: value for key, value in section.items() if key != "file"}
     for key, value in out.items():
-        if isinstance(value, str | Path) and key not in NO_TABLES:
+        if key not in NO_TABLES and _is_path(value):
             out[key] = _named(f"section.{key}", lambda key=key, value=value: _rows(key, value, info))
     if "file" not in section:
         return out
@@ -62,6 +66,11 @@ def _section_tables(section: Mapping[str, Any], info: ValidationInfo) -> dict[st
         if key in out:
             raise problem(f"section.{key}", None, "given twice; section.file has a column of it too")
     return columns | out
+
+
+def _is_path(value: Any) -> bool:
+    """Return whether a value names a file: any text that is no name of a file is left to who wants a number."""
+    return isinstance(value, Path) or (isinstance(value, str) and _ENDING.search(value) is not None)
 
 
 def _named(key: str, read: Any) -> Any:

@@ -13,9 +13,10 @@ from rotfem.scene.beam_files import with_tables
 from rotfem.scene.clamp_and_damping import Damping, check_one_hub
 from rotfem.scene.magnitudes import check_magnitudes
 from rotfem.scene.plates import PlateStructure
+from rotfem.scene.reference_line import ReferenceLine, as_line, line_through
 from rotfem.scene.section import PlanarSection
 from rotfem.scene.section_spatial import SpatialSection
-from rotfem.scene.structure import MeanBeam, StructureTable, means
+from rotfem.scene.structure import MeanBeam, StructureTable, apart, means
 from rotfem.scene.values import (
     AnyProfile,
     Array,
@@ -51,6 +52,10 @@ def _as_sweep(value: Any) -> Profile:
     return tuple((row[0], row[1]) for row in rows)
 
 
+#: Part of the length by which the end of a table may miss it, where that is given, and where it is an arc length.
+EXACT, AGREE = 1e-9, 1e-6
+
+
 class PlanarBeamStructure(StructureTable):
     """A beam that moves in the plane (1, 2) of the rotating frame, clamped at X = 0.
 
@@ -76,6 +81,11 @@ class PlanarBeamStructure(StructureTable):
     def is_planar(self) -> bool:
         """Whether it moves in the plane (1, 2) of the frame only: it does."""
         return True
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Places (m) of the rows of tapers between the ends."""
+        return self.section.breakpoints
 
     @property
     def release_limit(self) -> float:
@@ -126,6 +136,9 @@ class SpatialBeamStructure(StructureTable):
             section table.
         sweep: angle of the axis in the plane (1, 2), towards direction 2 (rad), over the length of arc: a number, or
             rows (x, angle), which are arcs between, and a kink where one x stands twice.
+        line: points (x, y, z) of the axis from the clamp (m), before the precone, instead of sweep: cubic splines, a
+            kink where one point stands twice. x of all tables is the arc length along it, and so is the length, which
+            need not be given then.
         precone: angle of the beam axis out of the plane (1, 2), towards direction 3 (rad). May also stand in the
             section table.
         damping: damping coefficients.
@@ -141,8 +154,23 @@ class SpatialBeamStructure(StructureTable):
     section: SpatialSection = Field(description="a table of section properties")
     pretwist: AnyProfile = 0.0
     sweep: Annotated[Profile, PlainValidator(_as_sweep)] = 0.0
+    line: Annotated[Matrix, PlainValidator(as_line)] | None = None
     precone: Number = 0.0
     damping: Damping = Damping()
+
+    @property
+    def reference_line(self) -> ReferenceLine | None:
+        """The curved axis; None where it is straight, or swept by an angle."""
+        return None if self.line is None else line_through(self.line)
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Places (m) of all rows of tables over the span, increasing; a mesh should have a node at each."""
+        places = set(self.section.breakpoints)
+        for profile in (self.pretwist, self.sweep):
+            places |= {x for x, _ in profile[1:-1]} if isinstance(profile, tuple) else set()
+        line = self.reference_line
+        return apart(places | set(line.knots if line is not None else ()), self.length)
 
     @property
     def tip_inertia_matrix(self) -> Array:
@@ -177,7 +205,7 @@ class SpatialBeamStructure(StructureTable):
     @classmethod
     def _lift_from_section(cls, data: Any, info: ValidationInfo) -> Any:
         """Read files, and move pretwist and precone, which describe the beam, out of a section that holds them."""
-        data = with_tables(data, info, ("pretwist", "sweep"))
+        data = _with_length(with_tables(data, info, ("pretwist", "sweep", "line")))
         section = data.get("section") if isinstance(data, dict) else None
         if not isinstance(section, dict):
             return data
@@ -195,9 +223,12 @@ class SpatialBeamStructure(StructureTable):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _check_section(self.section, self.length)
-        check_profile_length("pretwist", self.pretwist, self.length)
+        slack = EXACT if self.line is None else AGREE
+        _check_section(self.section, self.length, slack)
+        check_profile_length("pretwist", self.pretwist, self.length, slack)
         check_profile_length("sweep", self.sweep, self.length)
+        if self.line is not None and self.sweep != 0.0:
+            raise problem("sweep", None, "cannot be combined with line, which holds it")
         check_one_hub(self.hub_radius, self.hub_offset)
         return self
 
@@ -205,9 +236,28 @@ class SpatialBeamStructure(StructureTable):
 Structure = Annotated[PlanarBeamStructure | SpatialBeamStructure | PlateStructure, Field(discriminator="type")]
 
 
-def _check_section(section: PlanarSection | SpatialSection, length: float) -> None:
+def _with_length(data: Any) -> Any:
+    """Return the table with the arc length of its line as its length.
+
+    Raises:
+        PydanticCustomError: another length is given.
+    """
+    if not isinstance(data, dict) or data.get("line") is None:
+        return data
+    try:
+        arc = line_through(as_line(data["line"])).length
+    except PydanticCustomError as error:
+        context = error.context or {}
+        raise problem("line", context.get("value"), error.message()) from None
+    given = data.get("length", arc)
+    if isinstance(given, int | float) and not isinstance(given, bool) and abs(given - arc) > AGREE * arc:
+        raise problem("length", given, f"is not the arc length of the line, {arc:.9g}; it may be left out")
+    return data | {"length": arc}
+
+
+def _check_section(section: PlanarSection | SpatialSection, length: float, slack: float = EXACT) -> None:
     for name, taper in section.tapers.items():
-        check_profile_length(f"section.{name}", taper, length)
+        check_profile_length(f"section.{name}", taper, length, slack)
     knots = sorted({0.0, *(x for taper in section.tapers.values() for x, _ in taper)})
     if section.way.name != "matrix":
         properties = section.central if isinstance(section, SpatialSection) else section.at

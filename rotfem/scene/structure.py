@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +12,9 @@ from rotfem.scene.values import Array, SceneModel
 
 #: Places along a beam that a mean of its section is taken over.
 PLACES = 33
+
+#: Part of the length within which two places along a beam are one.
+SAME_PLACE = 1e-7
 
 
 class MeanBeam(NamedTuple):
@@ -37,6 +40,15 @@ def means(properties: Callable[[npt.ArrayLike], dict[str, Array]], length: float
     return {name: float(np.mean(values)) for name, values in properties(np.linspace(0.0, length, PLACES)).items()}
 
 
+def apart(places: Collection[float], length: float) -> tuple[float, ...]:
+    """Return places along a beam (m) in order, but one of those that only round-off keeps apart, and no end."""
+    out = [0.0]
+    for x in sorted(places):
+        if x - out[-1] > SAME_PLACE * length and length - x > SAME_PLACE * length:
+            out.append(x)
+    return tuple(out[1:])
+
+
 class StructureTable(SceneModel):
     """The [structure] table."""
 
@@ -44,6 +56,11 @@ class StructureTable(SceneModel):
     def is_planar(self) -> bool:
         """Whether it moves in the plane (1, 2) of the frame only, and has rotations about axis 3 only."""
         return False
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Places (m) along a beam, increasing, at which tables have rows: nodes of its mesh."""
+        return ()
 
     @property
     def mesh_file(self) -> str | None:

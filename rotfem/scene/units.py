@@ -24,6 +24,7 @@ _MOMENTS_OF_AREA = dict.fromkeys(("second_moment", "second_moment2", "second_mom
 #: Dotted key ↦ its unit. Of a table [[x, value], …] it is that of the values; x is in m, t of motion and loads in s.
 UNITS: dict[str, Unit] = {
     **{f"structure.{key}": "m" for key in ("length", "width", "thickness", "hub_radius", "hub_offset", "tip_offset")},
+    "structure.line": ("m",),
     "structure.tip_mass": "kg",
     "structure.tip_inertia": ("kg*m**2",),
     **{f"structure.{key}": "rad" for key in ("pretwist", "sweep", "precone")},

@@ -278,10 +278,10 @@ def evaluate(profile: Profile, x: npt.ArrayLike) -> Array:
     return np.asarray(np.interp(positions, knots, values), dtype=np.float64)
 
 
-def check_profile_length(key: str, profile: Profile, length: float) -> None:
-    """Refuse a taper that does not end at the length (m), to a relative 1e-9; the problem is at `key`."""
-    if isinstance(profile, tuple) and not math.isclose(profile[-1][0], length, rel_tol=1e-9):
-        reason = f"the taper must run from x = 0 to the length {length:g}; it ends at {profile[-1][0]:g}"
+def check_profile_length(key: str, profile: Profile, length: float, slack: float = 1e-9) -> None:
+    """Refuse a taper that does not end at the length (m), to a relative slack; the problem is at `key`."""
+    if isinstance(profile, tuple) and not math.isclose(profile[-1][0], length, rel_tol=slack):
+        reason = f"the taper must run from x = 0 to the length {length:.9g}; it ends at {profile[-1][0]:.9g}"
         raise problem(key, [list(row) for row in profile], reason)
 
 

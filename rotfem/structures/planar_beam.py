@@ -35,7 +35,7 @@ class PlanarBeam(Beam):
 
     def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):
         s = problem.structure
-        super().__init__(problem, comm, s.section.breakpoints)
+        super().__init__(problem, comm, s.knots)
         for name in s.section.at(np.zeros(1)):
             self.section[name] = self.profile(name, partial(self._property, name))
         self.scalar("hub_radius", s.hub_radius)

@@ -8,7 +8,8 @@ along t_i⁰ of
     Γ = Λᵀ (e + u') − e,        K = T(θ) θ' = axial(Λᵀ Λ'),
 
 since t⁰ᵀ Λᵀ (Λ t⁰)' = t⁰ᵀ (Λᵀ Λ') t⁰ + t⁰ᵀ t⁰', whose last part, the initial twist and curvature K⁰, drops out. So it
-does not matter whether the axis is straight: sweep turns e about t_3⁰ by an angle that may vary, or jump, along X.
+does not matter whether the axis is straight: sweep turns e about t_3⁰ by an angle that may vary, or jump, along X, and
+a reference line in space turns it by two.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from rotfem.mechanics.bodies import AppliedLoad, Body, Kinematics, Strain
 from rotfem.mechanics.loads import Load
 from rotfem.mechanics.problem import Problem
 from rotfem.structures.beam import Beam
+from rotfem.structures.curved_axis import curved_axis
 from rotfem.structures.datum import SectionTurns
 from rotfem.structures.moderate_turns import check_sections
 from rotfem.structures.spatial_section import SectionForms, euler_tensor
@@ -65,9 +67,7 @@ class SpatialBeam(Beam):
 
     def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):
         s = problem.structure
-        knots = {x for x, _ in s.pretwist[1:-1]} if isinstance(s.pretwist, tuple) else set()
-        bends = {x for x, _ in s.sweep[1:-1]} if isinstance(s.sweep, tuple) else set()
-        super().__init__(problem, comm, tuple(sorted(knots | bends | set(s.section.breakpoints))))
+        super().__init__(problem, comm, s.knots)
         self._forms = SectionForms(self, s.section)
         if s.hub_offset is None:
             self._root = ufl.as_vector((self.scalar("hub_radius", s.hub_radius), 0, 0))
@@ -92,8 +92,13 @@ class SpatialBeam(Beam):
         e_1, e_2, e_3 = ufl.as_vector((c, 0, s)), ufl.as_vector((0, 1, 0)), ufl.as_vector((-s, 0, c))
         X = ufl.SpatialCoordinate(self.mesh)[0]
         self._axis = X * e_1
-        sweep = self.data.sweep
-        if sweep != 0.0:
+        sweep, line = self.data.sweep, self.data.reference_line
+        if line is not None:
+            chi, zeta, r = curved_axis(self, line)
+            self._axis = r[0] * e_1 + r[1] * e_2 + r[2] * e_3
+            e_1, e_2 = ufl.cos(chi) * e_1 + ufl.sin(chi) * e_2, ufl.cos(chi) * e_2 - ufl.sin(chi) * e_1
+            e_1, e_3 = ufl.cos(zeta) * e_1 + ufl.sin(zeta) * e_3, ufl.cos(zeta) * e_3 - ufl.sin(zeta) * e_1
+        elif sweep != 0.0:
             chi, along, across = swept_axis(self, sweep)
             self._axis = along * e_1 + across * e_2
             e_1, e_2 = ufl.cos(chi) * e_1 + ufl.sin(chi) * e_2, ufl.cos(chi) * e_2 - ufl.sin(chi) * e_1

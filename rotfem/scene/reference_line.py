@@ -1,0 +1,145 @@
+"""The reference line of a beam through points in space: where it runs, and its direction, over its arc length."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.scene.values import Array, Matrix, as_rows, problem
+
+#: Gauss points for the arc length between two points: the speed along a cubic is smooth there.
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
+
+#: Steps of Newton's method for the place of an arc length, which doubles its digits with each.
+STEPS = 8
+
+#: Cosine of the smallest angle to direction 3 that the line may have: section axis 2 is across both.
+STEEPEST = 1 - 1e-6
+
+
+def as_line(value: Any) -> Matrix:
+    """Return points (x, y, z) in m, the first of them the clamp (0, 0, 0); raise on anything else.
+
+    Two equal rows are a kink; three are refused, and so are rows that leave nothing between two kinks.
+    """
+    rows = as_rows(value, (3,), "points [[x, y, z], …]")
+    if rows[0] != (0.0, 0.0, 0.0):
+        raise problem("", list(rows[0]), "the line must start at the clamp, [0, 0, 0]; hub_offset says where that is")
+    if len(set(rows)) < 2 or rows[0] == rows[1] or rows[-1] == rows[-2]:
+        raise problem("", None, "must be points [[x, y, z], …], at least two, and no kink at an end")
+    for number, (a, b, c) in enumerate(zip(rows, rows[1:], rows[2:], strict=False), start=1):
+        if a == b == c:
+            raise problem("", list(a), f"rows {number} to {number + 2} are the same; two equal rows are a kink")
+    steep = ReferenceLine(rows).steepest
+    if steep > STEEPEST:
+        reason = "runs along direction 3 somewhere, which leaves section axis 2 no direction; choose other axes"
+        raise problem("", None, f"the line {reason}")
+    return rows
+
+
+@lru_cache(maxsize=16)
+def line_through(rows: Matrix) -> ReferenceLine:
+    """Return the line through points, which `as_line` has read."""
+    return ReferenceLine(rows)
+
+
+@dataclass(frozen=True)
+class ReferenceLine:
+    """Cubic splines (not-a-knot) through points, one from kink to kink.
+
+    Attributes:
+        rows: the points (m); two equal rows are a kink.
+    """
+
+    rows: Matrix
+
+    @cached_property
+    def _pieces(self) -> list[tuple[float, Any]]:
+        """Arc length at which each spline starts (m), and the spline over the lengths of the chords."""
+        from scipy.interpolate import CubicSpline
+
+        cuts = [0, *(i + 1 for i, (a, b) in enumerate(pairwise(self.rows)) if a == b), len(self.rows)]
+        out, start = [], 0.0
+        for first, last in pairwise(cuts):
+            points = np.array(self.rows[first:last])
+            chords = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+            spline = CubicSpline(chords, points)
+            out.append((start, spline))
+            start += float(np.sum(_lengths(spline)))
+        return out
+
+    @cached_property
+    def length(self) -> float:
+        """Arc length (m)."""
+        start, spline = self._pieces[-1]
+        return start + float(np.sum(_lengths(spline)))
+
+    @cached_property
+    def kinks(self) -> tuple[float, ...]:
+        """Arc lengths of the kinks (m)."""
+        return tuple(start for start, _ in self._pieces[1:])
+
+    @cached_property
+    def knots(self) -> tuple[float, ...]:
+        """Arc lengths of all points between the ends (m)."""
+        places = [start + np.cumsum(np.concatenate([[0.0], _lengths(spline)])) for start, spline in self._pieces]
+        inner = np.unique(np.concatenate([p[:-1] for p in places]))
+        return tuple(inner[1:].tolist())
+
+    @property
+    def steepest(self) -> float:
+        """Largest |t·e₃| of the unit tangent t, by looks at all points and between."""
+        x = np.linspace(0.0, self.length, 8 * len(self.rows) + 1)
+        return float(np.max(np.abs(self.at(x)[1][:, 2])))
+
+    def at(self, x: npt.ArrayLike, near: npt.ArrayLike | None = None) -> tuple[Array, Array]:
+        """Return (position in m, unit tangent), each (n, 3), at arc lengths x (n,) in m.
+
+        Args:
+            x: arc lengths.
+            near: of each an arc length on the same side of a kink, which decides at the kink itself; x where None.
+        """
+        x = np.clip(np.atleast_1d(np.asarray(x, dtype=np.float64)), 0.0, self.length)
+        side = x if near is None else np.atleast_1d(np.asarray(near, dtype=np.float64))
+        piece = np.searchsorted(self.kinks, side, side="right")
+        position, tangent = np.empty((len(x), 3)), np.empty((len(x), 3))
+        for number, (start, spline) in enumerate(self._pieces):
+            here = piece == number
+            u = _places(spline, x[here] - start)
+            rate = spline(u, 1)
+            position[here], tangent[here] = spline(u), rate / np.linalg.norm(rate, axis=1)[:, None]
+        return position, tangent
+
+    def angles(self, x: npt.ArrayLike, near: npt.ArrayLike | None = None) -> tuple[Array, Array]:
+        """Return (sweep χ, bend ζ), each (n,) in rad: t₁ = cos ζ (cos χ e₁ + sin χ e₂) + sin ζ e₃."""
+        t = self.at(x, near)[1]
+        return np.arctan2(t[:, 1], t[:, 0]), np.arcsin(np.clip(t[:, 2], -1.0, 1.0))
+
+
+def _lengths(spline: Any) -> Array:
+    """Return the arc length of each part between two points (m)."""
+    a, b = spline.x[:-1], spline.x[1:]
+    return _arcs(spline, a, b)
+
+
+def _arcs(spline: Any, a: Array, b: Array) -> Array:
+    """Return ∫ |r'| from a to b, arrays (n,) with no point strictly between."""
+    half = (b - a) / 2
+    speeds = np.linalg.norm(spline(((a + b) / 2)[:, None] + half[:, None] * POINTS, 1), axis=-1)
+    return np.asarray(half * (speeds @ WEIGHTS))
+
+
+def _places(spline: Any, s: Array) -> Array:
+    """Return the parameters of a spline at arc lengths s (n,) from its start, by Newton's method."""
+    knots = np.concatenate([[0.0], np.cumsum(_lengths(spline))])
+    part = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(knots) - 2)
+    a, b = spline.x[part], spline.x[part + 1]
+    u = a + (b - a) * (s - knots[part]) / (knots[part + 1] - knots[part])
+    for _ in range(STEPS):
+        u = np.clip(u - (_arcs(spline, a, u) - (s - knots[part])) / np.linalg.norm(spline(u, 1), axis=-1), a, b)
+    return np.asarray(u)
