@@ -58,6 +58,13 @@ class Moment:
         """
         return hub_values(self._set(), self.state)
 
+    def root(self) -> dict[str, float]:
+        """Return force f1, f2, f3 (N) and moment m1, m2, m3 (N·m) of the hub on the structure, in axes of the frame.
+
+        The moment is about the root: the clamped end, or the middle of a plate's clamped edges, not the axis of spin.
+        """
+        return dict(self._set().root_reaction())
+
     def outputs(self) -> dict[str, float]:
         """Return the output functionals of the problem."""
         return dict(self._set().outputs())

@@ -31,8 +31,8 @@ class Recorder:
         self.system = system
         names = tuple(f"tip_{c}" for c in system.structure.components)
         free = ("torque", "hub_kinetic", "angular_momentum", "impulse", "work") if system.hub is not None else ()
-        further = tuple(system.model.problem.outputs)
-        self.history = Table(("t", "psi", "psi_dot", *names, "kinetic", "strain", "jacobi", *free, *further))
+        root, further = (f"root_{name}" for name in system.root.names), tuple(system.model.problem.outputs)
+        self.history = Table(("t", "psi", "psi_dot", *names, "kinetic", "strain", "jacobi", *root, *free, *further))
         self._last: State | None = None
         self.snapshots = Snapshots() if system.structure.mesh.topology.dim == 2 else None
 
@@ -48,6 +48,7 @@ class Recorder:
         energy, motion = system.energies(), system.motion
         row = [t, motion.angle(t), motion.speed(t), *system.tip(state.q, t)]
         row += [energy[name] for name in ("kinetic", "strain", "jacobi")]
+        row += system.root_reaction().values()
         row += hub_values(system, state).values()
         row += system.outputs().values()
         self.add(row, state)

@@ -12,9 +12,11 @@ from rotfem.analysis.fixed_steps import Steps, grid
 from rotfem.analysis.reduced.energies import ReducedEnergies
 from rotfem.analysis.reduced.manifold import recover
 from rotfem.analysis.reduced.response import ACCURACY, Response, reduced_response
+from rotfem.analysis.reduced.root_forces import root_forces
 from rotfem.analysis.schemes import State
 from rotfem.listeners import Progress
 from rotfem.structures.paraview import MOST
+from rotfem.structures.root_reaction import along_axis
 
 if TYPE_CHECKING:
     from rotfem.commands.simulation import Simulation
@@ -98,7 +100,8 @@ class Rows:
         kept = set(range(0, len(times), stride(len(times)))) | {len(times) - 1}
         tips = response.tips if self.foreshortened is None else self.foreshortened.tips
         turn, a = self._turn(), response.accelerations()
-        columns = np.column_stack([times, *turn[:2], tips, *self._energies(turn[1])])
+        root, energies = self._root(a, turn[1], turn[2]), self._energies(turn[1])
+        columns = np.column_stack([times, *turn[:2], tips, *energies[:3], root, *energies[3:]])
         for i, values in enumerate(columns):
             row = [float(value) for value in values]
             state = self._state(i, a, turn) if i in kept or system.model.problem.outputs else None
@@ -114,6 +117,18 @@ class Rows:
             return drive.angle(t), drive.speed(t), drive.rate(t)
         motion = self.system.motion
         return np.array([motion.angle(float(x)) for x in t]), drive.speed(t), drive.rate(t)
+
+    def _root(self, a: Array, speed: Array, rate: Array) -> Array:
+        """Return the columns of force and moment at the root; the moment about a free hub's axis by its equation."""
+        response, hub, root = self.response, self.system.hub, self.system.root
+        states = {"K": response.q, "C": response.v, "M": a}
+        out = root_forces(response.model, response.factors(), states)
+        if hub is None or not self.system.row.coupled:
+            return out
+        arms, turn = along_axis(root.names, root.place, self.system.motion.axis)
+        torque = hub.torque.many(response.times, after=True)
+        moment = torque - hub.damping * speed - hub.inertia * rate
+        return np.asarray(out + (moment - out @ arms)[:, None] * turn)
 
     def _energies(self, speed: Array) -> list[Array]:
         """Return the columns of energies, and of a free hub those of its own."""

@@ -98,6 +98,9 @@ def run_summary(run: Simulation, status: str, history: dict[str, npt.NDArray[np.
         "warnings": run.warnings,
         "advice": run.advice,
     }
+    out["root"] = {"place": [float(c) for c in system.root.place]}
+    if run.scene.time is None and len(history["t"]):
+        out["root"] |= {name: float(x[-1]) for name, x in history.items() if name.startswith("root_")}
     if run.resumed:
         out["resumed"] = run.resumed
     if stepper is not None and stepper.rejected:

@@ -33,7 +33,7 @@ class AffineSystem(System):
     solved_at_once = True
 
     def _compile(self) -> Any:
-        self._decomposed = Pieces(self.model, self.bcs, self.clamped)
+        self._decomposed = Pieces(self.model, self.bcs, self.clamped, self.root.weights)
         self.pieces, self._constants = self._decomposed.all, self._decomposed.constants
         self.assembled = self._decomposed.assembled
         pattern = self._decomposed.pattern
@@ -141,6 +141,30 @@ class AffineSystem(System):
         self.b.scale(-1.0)
         self.b.array[self.clamped] = 0.0
         return self.b
+
+    @cached_property
+    def _at_root(self) -> dict[str, tuple[npt.NDArray[np.int64], Array]]:
+        """For M, C, K the unknowns that act on the clamp, and what each piece makes of them; for f its numbers."""
+        out: dict[str, tuple[npt.NDArray[np.int64], Array]] = {}
+        for kind, (index, _) in self._by_kind.items():
+            parts = [self.pieces[i].at_root for i in index]
+            if kind == "f":
+                out[kind] = np.zeros(0, dtype=np.int64), np.array(parts).reshape(len(parts), len(self.root.names))
+                continue
+            whole = np.array(parts).reshape(len(parts), *self.root.weights.shape)
+            near = np.flatnonzero(np.any(whole != 0.0, axis=(0, 2)))
+            out[kind] = near, whole[:, near].reshape(len(parts), len(near) * len(self.root.names))
+        return out
+
+    def clamp_forces(self) -> Array:
+        """Return the part of this process in what the clamp does in its unit motions (see `System`)."""
+        assert self._coefficients is not None
+        c, motions = self._coefficients, len(self.root.names)
+        out: Array = c[self._by_kind["f"][0]] @ self._at_root["f"][1]
+        for kind, x in zip("KCM", self._state, strict=True):
+            near, products = self._at_root[kind]
+            out = out + x[near] @ (c[self._by_kind[kind][0]] @ products).reshape(len(near), motions)
+        return out
 
     @property
     def current(self) -> bool:

@@ -23,6 +23,7 @@ from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.motion import Motion
 from rotfem.numerics.linear import Increment
+from rotfem.structures.root_reaction import along_axis
 
 Array = npt.NDArray[np.float64]
 
@@ -194,6 +195,20 @@ class BorderedSystem:
     def sizes(self, x: Array) -> Array:
         """Return the largest entry of each component of the structure's unknowns (see `System.sizes`)."""
         return self.inner.sizes(x[: len(self.inner.q.x.array)])
+
+    def root_reaction(self) -> dict[str, float]:
+        """Return force and moment of the hub on the structure (see `Readings`), in balance with the hub's equation.
+
+        That takes the work in a turn of the displaced structure, which the residual in a turn of the clamp is to the
+        order of the theory, or of the mesh where the theory is exact. The moment about the axis is the former.
+        """
+        found = self.inner.root_reaction()
+        if not self.row.coupled:
+            return found
+        root = self.inner.root
+        arms, turn = along_axis(root.names, root.place, self.inner.motion.axis)
+        values = np.array(list(found.values()))
+        return dict(zip(root.names, map(float, values + (self.row.work() - arms @ values) * turn), strict=True))
 
     def given(self, new: Any, old: Any = None) -> Array:
         """Return (work, impulse, moment) at the end of a step, by the trapezoidal rule over it, or of a first state.

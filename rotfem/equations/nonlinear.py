@@ -88,14 +88,27 @@ class NonlinearSystem(System):
         return self._F if self.moving else forms.form(self.model.residual, once=True)
 
     def _negative(self, form: Any) -> Any:
-        b = self._b_array
+        b = self._assembled(form)
+        np.negative(b, out=b)
+        b[self.clamped] = 0.0
+        return self.b
+
+    def _assembled(self, form: Any) -> Array:
+        b: Array = self._b_array
         b[:] = 0.0
         fem.assemble_vector(b, form)
         if self.comm.size > 1:
             self._b.scatter_reverse(la.InsertMode.add)
-        np.negative(b, out=b)
-        b[self.clamped] = 0.0
-        return self.b
+        return b
+
+    @cached_property
+    def _motions(self) -> Array:
+        weights: Array = self.root.weights[self.clamped]
+        return weights
+
+    def clamp_forces(self) -> Array:
+        """Return the part of this process in what the clamp does in its unit motions (see `System`)."""
+        return np.asarray(self._assembled(self._F)[self.clamped] @ self._motions)
 
     def tangent(self, c_k: float, c_v: float, c_m: float, before: Array | None = None) -> tuple[Any, bool]:
         """Return (c_k K + c_v C + c_m M at the state, True); clamped rows are identity rows.

@@ -19,6 +19,7 @@ import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
+from petsc4py import PETSc
 from ufl.algorithms.analysis import extract_constants
 
 from rotfem.equations.geometric import geometric_stiffness
@@ -42,12 +43,15 @@ class Piece:
 
     Attributes:
         of: names of the switches that must be on: the term, the bodies' effect, PRESTRESS.
+        at_root: what it does in the unit motions of the clamp (see `RootReaction`), of this process: a row for each
+            owned unknown, of "f" one number for each motion.
     """
 
     kind: str
     key: Key
     operator: Any
     of: frozenset[str]
+    at_root: Array
 
 
 class Pieces:
@@ -61,6 +65,7 @@ class Pieces:
         model: the terms, of a linear theory.
         bcs: the clamp.
         clamped: local numbers of the clamped unknowns.
+        rigid: change of the owned unknowns in the unit motions of the clamp, (unknowns, motions).
 
     Attributes:
         at_rest: "f", "K", "C", "M" ↦ UFL form at q = v = a = 0; those that vanish are left out.
@@ -71,9 +76,13 @@ class Pieces:
         assembled: time spent on assembly, s.
     """
 
-    def __init__(self, model: Model, bcs: list[Any], clamped: npt.NDArray[Any]):
+    def __init__(self, model: Model, bcs: list[Any], clamped: npt.NDArray[Any], rigid: Array):
         self.model, self.structure, self.bcs, self.clamped = model, model.structure, bcs, clamped
         self.q, self.V = model.structure.k.functions[0], model.structure.V
+        self._motions = [compat.create_vector(self.V) for _ in rigid.T]
+        for motion, column in zip(self._motions, rigid.T, strict=True):
+            motion.array[:] = column
+        self._work = compat.create_vector(self.V)
         self.assembled = 0.0
         loads = {name: constant for name, (constant, _) in self.structure.load_constants.items()}
         self.at_rest = self._forms_at_rest()
@@ -137,8 +146,9 @@ class Pieces:
         return [(term, tuple(sorted(found[term]))) for term in self.model.terms if term in found]
 
     def _decompose(self, kind: str) -> None:
-        """Assemble one form for every term, part of the bodies and product of constants."""
+        """Assemble one form for every term, part of the bodies and product of constants; clamped rows come last."""
         started = perf_counter()
+        found: list[tuple[Key, Any, frozenset[str]]] = []
         for name, parts in self._parts(kind):
             bodiless: dict[Key, Any] = {}
             for part in parts:
@@ -150,10 +160,30 @@ class Pieces:
                     elif not part:
                         bodiless[key] = operator
                     if operator.norm() > 0.0:
-                        if kind == "K" and name == "internal":
-                            set_diagonal(self.clamped, operator, 1.0)
-                        self.all.append(Piece(kind, key, operator, frozenset((name, part))))
+                        found.append((key, operator, frozenset((name, part))))
+        for key, operator, of in found:
+            self._keep(kind, key, operator, of)
         self.assembled += perf_counter() - started
+
+    def _keep(self, kind: str, key: Key, operator: Any, of: frozenset[str]) -> None:
+        """Add a piece: what it does at the clamp apart, clamped rows and columns zero, or 1 in those of the strains."""
+        if kind == "f":
+            at_root = np.array([operator.array @ motion.array for motion in self._motions])
+            operator.array[self.clamped] = 0.0
+        else:
+            at_root = self._at_root(operator)
+            first = operator.getOwnershipRange()[0]
+            whole = np.asarray(self.clamped + first, dtype=PETSc.IntType)
+            operator.zeroRowsColumns(whole, 1.0 if kind == "K" and "internal" in of and PRESTRESS not in of else 0.0)
+        self.all.append(Piece(kind, key, operator, of, at_root))
+
+    def _at_root(self, operator: Any) -> Array:
+        """Return Aᵀ times the unit motions of the clamp, owned rows."""
+        out, product = np.zeros((len(self._work.array), len(self._motions))), self._work
+        for column, motion in zip(out.T, self._motions, strict=True):
+            operator.multTranspose(motion, product)
+            column[:] = product.array
+        return out
 
     def _polarised(self, kind: str, key: Key, declared: bool) -> Any:
         """Assemble what belongs to the product `key` of constants.
@@ -196,10 +226,9 @@ class Pieces:
             b = compat.create_vector(self.V)
             fem_petsc.assemble_vector(b, form)
             b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
-            b.array[self.clamped] = 0.0
             return b
         A = self.pattern.duplicate()
-        fem_petsc.assemble_matrix(A, form, self.bcs, 0.0)
+        fem_petsc.assemble_matrix(A, form)
         A.assemble()
         return A
 
@@ -237,7 +266,7 @@ class Pieces:
             q0.x.scatter_forward()
             K = self._assemble(compiled, "K")
             if K.norm() > 0.0:
-                self.all.append(Piece("K", piece.key, K, piece.of | {PRESTRESS}))
+                self._keep("K", piece.key, K, piece.of | {PRESTRESS})
         self.assembled += perf_counter() - started
 
 

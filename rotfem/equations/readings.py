@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from functools import cached_property
 from typing import Any
 
@@ -14,6 +15,7 @@ from rotfem.equations.functionals import Functionals
 from rotfem.equations.model import Model
 from rotfem.mechanics.motion import Motion
 from rotfem.numerics import forms
+from rotfem.structures.root_reaction import RootReaction
 from rotfem.structures.structure import Structure
 from rotfem.structures.turning_clamp import TurningClamp
 
@@ -30,8 +32,13 @@ class Readings:
     time: float
     scale: Array
     clamp: TurningClamp | None
+    root: RootReaction
     q: Any
     V: Any
+
+    @abstractmethod
+    def clamp_forces(self) -> Array:
+        """Return the part of this process in what the clamp does in its unit motions at the state and time set."""
 
     def size(self, x: Array) -> float:
         """Return the largest entry of a local dof array in units of `scale`, over all ranks."""
@@ -67,6 +74,19 @@ class Readings:
         """Return the values of the unknowns at the tip, relative to the turning frame, shape (components,)."""
         tip = self.structure.whole_values(self.structure.tip_values(self.structure.total(q)))
         return tip if self.clamp is None else self.clamp.relative(tip[None, :], self.structure.length, t)[0]
+
+    def root_reaction(self) -> dict[str, float]:
+        """Return force (N) and moment (N·m) of the hub on the structure at the state and time set, axes of the hub.
+
+        The moment is about the root, `root.place`; keys f1, f2, … m3, as far as the structure has them.
+        """
+        here = self.clamp_forces()
+        values = here if self.comm.size == 1 else self.comm.allreduce(here)
+        found = dict(zip(self.root.names, map(float, values), strict=True))
+        if self.clamp is not None:
+            c, s = np.cos(self.clamp.angle(self.time)), np.sin(self.clamp.angle(self.time))
+            found |= {"f1": c * found["f1"] + s * found["f2"], "f2": c * found["f2"] - s * found["f1"]}
+        return found
 
     def shape(self) -> dict[str, Array]:
         """Return the deflected structure at the state: position x (m), u1, u2 (m), alpha, … in the turning frame."""

@@ -23,6 +23,7 @@ from rotfem.mechanics.motion import IDENTITY, Motion
 from rotfem.numerics import compat
 from rotfem.numerics.caching import forget
 from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.structures.root_reaction import RootReaction
 from rotfem.structures.turning_clamp import TurningClamp
 
 Array = npt.NDArray[np.float64]
@@ -46,6 +47,7 @@ class System(Readings, Solutions, ABC):
         settled: whether M, C and K are those of the time before; a linear theory may know they are.
         scale: size of each local unknown (m or 1), by which increments are judged.
         clamp: motion of the clamp, where the frame does not rotate with it.
+        root: rigid motions of what is clamped, which forces and moments at the root work on.
         courses: what is prescribed and changes with time.
         view: how these are seen.
         seconds: time spent on assembly and solution of steps.
@@ -76,6 +78,7 @@ class System(Readings, Solutions, ABC):
         bs = self.V.dofmap.index_map_bs
         self.clamped = (nodes[:, None] * bs + np.arange(bs)).ravel()
         self.clamp = TurningClamp(self.structure, self.motion) if model.fixed else None
+        self.root = RootReaction(self.structure)
         self._b = la.vector(self.V.dofmap.index_map, self.V.dofmap.index_map_bs)
         self._b_array = self._b.array
         self.b = compat.wrap(self._b)

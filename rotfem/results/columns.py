@@ -20,6 +20,8 @@ COLUMNS = {
     "kinetic": ("kinetic energy", "J"),
     "strain": ("strain energy", "J"),
     "jacobi": ("Jacobi integral", "J"),
+    **{f"root_f{i}": (f"force of the hub on the root, f{sub}", "N") for i, sub in _SUB.items()},
+    **{f"root_m{i}": (f"moment of the hub about the root, m{sub}", "N·m") for i, sub in _SUB.items()},
     "torque": ("torque on the hub", "N·m"),
     "hub_kinetic": ("kinetic energy of the hub", "J"),
     "angular_momentum": ("angular momentum", "N·m·s"),

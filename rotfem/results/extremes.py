@@ -9,7 +9,7 @@ Array = npt.NDArray[np.float64]
 
 
 def figures(history: dict[str, Array]) -> dict[str, float]:
-    """Return the figures of merit of a history: extremes of the tip with their times, final values, Jacobi drift.
+    """Return the figures of merit of a history: extremes of tip and root, with times, final values, Jacobi drift.
 
     Extremes inside the history are those of the parabola through three neighbouring samples.
     """
@@ -17,7 +17,7 @@ def figures(history: dict[str, Array]) -> dict[str, float]:
     t = history["t"]
     if len(t) == 0:
         return out
-    for name in [n for n in history if n.startswith("tip_")]:
+    for name in [n for n in history if n.startswith(("tip_", "root_"))]:
         out[f"{name}_final"] = history[name][-1]
         if len(t) > 1:
             out[f"{name}_min_time"], out[f"{name}_min"] = extreme(t, history[name], -1)

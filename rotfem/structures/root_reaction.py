@@ -1,0 +1,115 @@
+"""Force and moment that the hub exerts on a structure, of the forces that hold its clamped unknowns.
+
+The residual F(q, v, a; δq) of the equations of motion is zero for all unknowns but the clamped ones. For those it is
+the work of the clamp, so with the rigid motions of the clamp, δu = δs + δφ×(x − x_root), δφ of its sections and
+directors, force and moment are
+
+    f_i = F(q, v, a; δs = e_i),        m_i = F(q, v, a; δφ = e_i).
+
+Both are of the theory that is computed, in balance with its inertia and loads: exactly about the displaced structure in
+the exact theory, whose strains feel no rigid turn, to the order of the theory in the others. The moment is about the
+root, the clamped end of the beam or the middle of the clamped edges of the plate, not about the axis of spin. What is
+clamped does not turn relative to the hub, so its rotation unknowns change by δφ itself.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import mesh as dolfinx_mesh
+
+if TYPE_CHECKING:
+    from rotfem.structures.structure import Structure
+
+Array = npt.NDArray[np.float64]
+
+#: Rotation unknown ↦ its change in a unit turn δφ; the director of a plate, t = a_3 − alpha_γ a_γ, changes by δφ×t.
+TURNS = {
+    "alpha": (0.0, 0.0, 1.0),
+    **{f"theta{i + 1}": tuple(float(i == j) for j in range(3)) for i in range(3)},
+    "alpha1": (0.0, -1.0, 0.0),
+    "alpha2": (1.0, 0.0, 0.0),
+}
+
+
+def along_axis(names: tuple[str, ...], place: Array, axis: Array) -> tuple[Array, Array]:
+    """Return the moment about the axis of spin that unit components make, and the moment that is one about it.
+
+    Args:
+        names: of the components, f1, f2, … m3.
+        place: of the root, from the axis (3,), m.
+        axis: direction of the axis, (3,).
+
+    Returns:
+        e·(place×f + m) of every component, and the components of m = e.
+    """
+    units = {name: np.eye(3)[int(name[1]) - 1] for name in names}
+    arms = [axis @ (np.cross(place, unit) if name[0] == "f" else unit) for name, unit in units.items()]
+    turn = [axis @ unit if name[0] == "m" else 0.0 for name, unit in units.items()]
+    return np.array(arms), np.array(turn)
+
+
+class RootReaction:
+    """The rigid motions of a clamp, in its unknowns.
+
+    Args:
+        structure: it is discretised already.
+
+    Attributes:
+        names: of the components that the structure has: f1, f2, f3 (N), m1, m2, m3 (N·m).
+        point: what moments are about, a place of the undeformed structure on its mesh, (3,) in m.
+        place: the same in the frame, from the axis of spin, (3,) in m.
+        weights: change of every owned unknown in a unit motion of the clamp, shape (unknowns, components of names).
+    """
+
+    def __init__(self, structure: Structure):
+        self._structure = structure
+        self.point, data = self._middle(), structure.data
+        self.place = self.point + np.asarray(getattr(data, "root_position", (data.hub_radius, 0.0, 0.0)))
+        space = structure.V.dofmap
+        owned = space.index_map.size_local
+        nodes = structure.clamped[structure.clamped < owned]
+        arms = structure.V.tabulate_dof_coordinates()[nodes] - self.point
+        components = structure.components
+        turns: tuple[int, ...] = (2,) if structure.planar else (0, 1, 2)
+        if not any(name in TURNS for name in components):
+            turns = ()
+        columns = {f"f{i + 1}": self._moved(arms, np.eye(3)[i]) for i in range(3) if f"u{i + 1}" in components}
+        columns |= {f"m{i + 1}": self._turned(arms, np.eye(3)[i]) for i in turns}
+        self.names = tuple(columns)
+        self.weights: Array = np.zeros((owned * structure.size, len(columns)))
+        rows = nodes[:, None] * structure.size + np.arange(structure.size)
+        for out, values in zip(self.weights.T, columns.values(), strict=True):
+            out[rows] = values
+
+    def _middle(self) -> Array:
+        """Return the middle of what is clamped, of edges weighed by their length, (3,) in m."""
+        s, grid = self._structure, getattr(self._structure, "grid", None)
+        if grid is None:
+            return np.zeros(3)
+        edges, owned = grid.edges("clamped"), s.mesh.topology.index_map(1).size_local
+        s.mesh.topology.create_connectivity(1, 0)
+        edges = edges[edges < owned]
+        ends = s.mesh.geometry.x[dolfinx_mesh.entities_to_geometry(s.mesh, 1, edges)].reshape(-1, 2, 3)
+        lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        here = np.append(lengths @ ends.mean(axis=1), lengths.sum())
+        whole = s.comm.allreduce(here) if s.comm.size > 1 else here
+        return np.asarray(whole[:3] / whole[3])
+
+    def _moved(self, arms: Array, direction: Array) -> Array:
+        """Return what the unknowns of the clamped nodes change by in a unit displacement, (nodes, unknowns)."""
+        parts = {f"u{i + 1}": direction[i] for i in range(3)}
+        return np.tile([parts.get(name, 0.0) for name in self._structure.unknowns], (len(arms), 1))
+
+    def _turned(self, arms: Array, axis: Array) -> Array:
+        """Return what they change by in a unit turn about an axis through the point, (nodes, unknowns)."""
+        moved = np.cross(axis, arms)
+        columns: list[Array] = []
+        for name in self._structure.unknowns:
+            if name in TURNS:
+                columns.append(np.full(len(arms), np.dot(TURNS[name], axis)))
+            else:
+                columns.append(moved[:, int(name[1:]) - 1] if name in ("u1", "u2", "u3") else np.zeros(len(arms)))
+        return np.column_stack(columns).reshape(len(arms), -1)

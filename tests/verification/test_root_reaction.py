@@ -1,0 +1,157 @@
+"""Force and moment of the hub on the structure: closed forms, and the balance of momentum and of its moment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+
+import rotfem
+from rotfem.mechanics import work
+from rotfem.mechanics.sums import added
+from tests.beams import STRUCTURE
+
+RADIUS = 0.5
+BEAM = {**STRUCTURE, "hub_radius": RADIUS, "tip_mass": 0.3}
+SCENE: dict[str, Any] = {
+    "structure": BEAM,
+    "motion": {"type": "spin_up", "speed": 3.0, "duration": 1.5},
+    "mesh": {"elements": 4, "degree": 3},
+    "output": {"error": False},
+}
+#: What acts on the beam from outside, beside its own inertia.
+ACTING = {"tip_force": {"value": [1.0, 3.0], "kind": "follower"}, "gravity": [0.0, -9.81, 0.0]}
+AXES = [ufl.as_vector([float(i == j) for j in range(3)]) for i in range(3)]
+
+
+class Rigid:
+    """The variation of a rigid motion of the displaced structure: δx = s + φ×(x − x_root)."""
+
+    def __init__(self, shift: Any = None, turn: Any = None):
+        none = ufl.as_vector([0.0, 0.0, 0.0])
+        self.turn = none if turn is None else turn
+        self.at_root = (none if shift is None else shift) - ufl.cross(self.turn, RADIUS * AXES[0])
+
+    def of(self, moving: Any) -> Any:
+        """Return δx of a body or a load; directors only turn."""
+        return moving.rigid_turn(self.turn) + (self.at_root if getattr(moving, "is_position", True) else 0 * AXES[0])
+
+
+def balance(delta: Rigid) -> Callable[[Any], Any]:
+    """Return the work of inertia, gravity and loads in a rigid motion: the rate of (angular) momentum less the rest."""
+    terms = (work.inertia, work.coriolis, work.centrifugal, work.euler, work.gravity, work.loads)
+    return lambda m: added(term(m, delta) for term in terms)
+
+
+BALANCES = {
+    "root_f1": balance(Rigid(shift=AXES[0])),
+    "root_f2": balance(Rigid(shift=AXES[1])),
+    "root_m3": balance(Rigid(turn=AXES[2])),
+}
+
+
+@pytest.mark.parametrize(
+    ("scheme", "digits"), [("generalised_alpha", 1e-10), ("newmark", 1e-10), ("esdirk4", 1e-5), ("radau5", 1e-6)]
+)
+def test_balance_of_momentum_and_its_moment(scheme: str, digits: float) -> None:
+    # F(q, v, a) = 0 in a rigid motion of the whole beam, which strains of the exact theory do not feel. What is left is
+    # Newton's last increment, 1e-9 times EA; stages of the last two schemes end in it, times 1/h.
+    time = {"end": 1.6, "step": 0.02, "scheme": scheme}
+    result = rotfem.run({**SCENE, "loads": ACTING, "time": time}, outputs={f"b_{n}": b for n, b in BALANCES.items()})
+    for name in BALANCES:
+        root, whole = result.history[name], result.history[f"b_{name}"]
+        assert np.max(np.abs(root - whole)) < digits * np.max(np.abs(root)), name
+
+
+@pytest.mark.parametrize("theory", ["linear", "consistent_linear", "second_order", "reissner"])
+def test_statics(theory: str) -> None:
+    # The forces balance at the displaced tip; in the theory `linear` at the undeformed one. Of loads without
+    # acceleration gravity has the weight 1.2 · 10 + 0.3 kg in it; round-off of EA/EI · L² = 2e5 is left.
+    loads = {"tip_force": [0.0, 3.0], "distributed": [0.0, -0.2], "tip_moment": [4.0]}
+    scene = {**SCENE, "motion": {"type": "constant", "speed": 0.0}, "loads": loads, "model": {"theory": theory}}
+    result = rotfem.run(scene)
+    root = result.summary["root"]
+    assert root["place"] == [RADIUS, 0.0, 0.0]
+    assert root["root_f2"] == pytest.approx(-(3.0 - 0.2 * 10.0), rel=1e-8)
+    x, u = result.shape["x"], result.shape["u1"] if theory == "reissner" else 0.0 * result.shape["u1"]
+    arm = float(np.trapezoid(x + u, x))  # of the distributed load; u1 is 1e-4 of x and known at 13 nodes
+    moment = -(3.0 * (10.0 + u[-1]) - 0.2 * arm + 4.0)
+    assert root["root_m3"] == pytest.approx(moment, rel=1e-6 if theory in ("linear", "reissner") else 1e-3)
+    assert result.history["root_m3"][0] == root["root_m3"]
+
+
+def test_spinning_rod() -> None:
+    # EA u'' + ρA Ω² (R + X + u) = 0 in the linear theory, u(0) = 0, EA u'(L) = m Ω² (R + L + u(L)): w = R + X + u is
+    # R cos kX + B sin kX, and N(0) = EA (w'(0) − 1) = −root_f1. Nodal forces are exact to the sixth order of the mesh.
+    omega, EA, line, mass, length = 40.0, 2.8e7, 1.2, 0.3, 10.0
+    k, c = omega * np.sqrt(line / EA), mass * omega**2 / EA
+    cos, sin = np.cos(k * length), np.sin(k * length)
+    B = (1 + RADIUS * (k * sin + c * cos)) / (k * cos - c * sin)
+    scene = {**SCENE, "motion": {"type": "constant", "speed": omega}, "model": {"theory": "consistent_linear"}}
+    root = rotfem.run(scene).summary["root"]
+    assert root["root_f1"] == pytest.approx(-EA * (B * k - 1), rel=1e-9)
+    assert root["root_f2"] == pytest.approx(0.0, abs=1e-9 * abs(root["root_f1"]))
+
+
+@pytest.mark.parametrize("theory", ["linear", "consistent_linear", "second_order", "reissner"])
+def test_the_equation_of_a_free_hub(theory: str) -> None:
+    # I ψ'' + c ψ' + (moment about the axis) = M(t) at every step, to Newton's last increment; over a torque pulse.
+    hub = {"type": "torque", "hub_inertia": 100.0, "hub_damping": 0.3, "pulses": [[0.0, 0.2, 150.0]]}
+    time = {"end": 0.4, "step": 0.01}
+    problem = rotfem.Problem.of({**SCENE, "motion": hub, "model": {"theory": theory}, "time": time})
+    for moment in problem.march(end=0.4, step=0.01):
+        root, state = moment.root(), moment.state
+        about_axis = root["m3"] + RADIUS * root["f2"]
+        torque = moment.hub()["torque"] if moment.t < 0.195 or moment.t > 0.205 else None
+        if torque is not None:  # at its jump the state is that before, the torque that after it
+            assert 100.0 * state.a[-1] + 0.3 * state.v[-1] + about_axis == pytest.approx(torque, abs=1e-6 * 150.0)
+        assert moment.t < 0.2 or abs(about_axis) > 0.0
+
+
+def test_axes_are_those_of_the_hub() -> None:
+    # The same motion seen from the inertial frame: where the beam turns at constant speed in equilibrium, force and
+    # moment of the clamp are constant in the axes of the hub, and those of the steady state in the rotating frame.
+    steady = {"initial": {"state": "steady"}, "motion": {"type": "constant", "speed": 3.0}}
+    load = {"tip_force": {"value": [0.0, 3.0], "kind": "follower"}}
+    time = {"end": 0.1, "step": 5e-4}  # quarter of a turn: errors of the steps, of second order, are left
+    scene = {**SCENE, **steady, "loads": load}
+    turning = rotfem.run({**SCENE, "motion": steady["motion"], "loads": load}).summary["root"]
+    h = rotfem.run({**scene, "model": {"frame": "inertial"}, "time": time}).history
+    for name in BALANCES:
+        scale = 100.0 if name == "root_m3" else 500.0
+        np.testing.assert_allclose(h[name], turning[name], atol=1e-4 * scale)
+
+
+def test_a_reduced_model_has_the_forces_of_the_full_one() -> None:
+    # A smooth spin-up; the error of the full run's steps, of second order, is 1.5e-4 here, that of the basis 1e-5.
+    scene = {**SCENE, "time": {"end": 2.0, "step": 0.005}, "motion": {"type": "spin_up", "speed": 2.0, "duration": 4.0}}
+    linear = {"theory": "consistent_linear"}
+    full = rotfem.run({**scene, "model": linear}).history
+    small = rotfem.run({**scene, "model": {**linear, "reduced": True}}).history
+    for name in BALANCES:
+        assert np.max(np.abs(full[name] - small[name])) < 1e-3 * np.max(np.abs(full[name])), name
+
+
+def test_spatial_beam_and_plate_at_rest() -> None:
+    # Statics at the undeformed structure in the linear theory: f = −F, m = −(x − x_root)×F, whatever lies between.
+    beam = {
+        "type": "spatial_beam",
+        "length": 2.0,
+        "hub_offset": [0.3, 0.1, -0.2],
+        "precone": 0.2,
+        "section": {"shape": "rectangle", "width": 0.05, "height": 0.02, "E": 7e10, "nu": 0.3, "rho": 2700.0},
+    }
+    plate = {"type": "plate", "length": 1.0, "width": 0.4, "thickness": 0.01, "E": 7e10, "nu": 0.3, "rho": 2700.0}
+    F = np.array([2.0, -3.0, 5.0])
+    arms = {"spatial_beam": 2.0 * np.array([np.cos(0.2), 0.0, np.sin(0.2)]), "plate": np.array([1.0, 0.0, 0.0])}
+    for structure in (beam, plate):
+        still = {"motion": {"type": "constant", "speed": 0.0}, "model": {"theory": "linear"}}
+        still["loads"] = {"tip_force": list(F)}
+        mesh = {"elements": 2 if structure is beam else [2, 2]}
+        root = rotfem.run({"structure": structure, "mesh": mesh, **still}).summary["root"]
+        moment = -np.cross(arms[structure["type"]], F)
+        assert [root[f"root_f{i}"] for i in (1, 2, 3)] == pytest.approx(list(-F), rel=1e-7)
+        assert [root[f"root_m{i}"] for i in (1, 2, 3)] == pytest.approx(list(moment), rel=1e-7, abs=1e-9)
