@@ -19,7 +19,6 @@ import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
-from petsc4py import PETSc
 from ufl.algorithms.analysis import extract_constants
 
 from rotfem.equations.geometric import geometric_stiffness
@@ -82,7 +81,9 @@ class Pieces:
         self._motions = [compat.create_vector(self.V) for _ in rigid.T]
         for motion, column in zip(self._motions, rigid.T, strict=True):
             motion.array[:] = column
-        self._work = compat.create_vector(self.V)
+        self._work, self._free = compat.create_vector(self.V), compat.create_vector(self.V)
+        self._free.array[:] = 1.0
+        self._free.array[clamped] = 0.0
         self.assembled = 0.0
         loads = {name: constant for name, (constant, _) in self.structure.load_constants.items()}
         self.at_rest = self._forms_at_rest()
@@ -172,9 +173,9 @@ class Pieces:
             operator.array[self.clamped] = 0.0
         else:
             at_root = self._at_root(operator)
-            first = operator.getOwnershipRange()[0]
-            whole = np.asarray(self.clamped + first, dtype=PETSc.IntType)
-            operator.zeroRowsColumns(whole, 1.0 if kind == "K" and "internal" in of and PRESTRESS not in of else 0.0)
+            operator.diagonalScale(self._free, self._free)
+            if kind == "K" and "internal" in of and PRESTRESS not in of:
+                set_diagonal(self.clamped, operator, 1.0)
         self.all.append(Piece(kind, key, operator, of, at_root))
 
     def _at_root(self, operator: Any) -> Array:

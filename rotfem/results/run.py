@@ -58,7 +58,7 @@ class RunResult(Result):
     Attributes:
         summary: scene, versions, effects, timings, sizes, figures of merit; JSON-able.
         history: column ↦ values over time (`t` s, `psi` rad, `psi_dot` rad/s, `tip_u1` m, `tip_u2` m, `tip_alpha` rad,
-            `kinetic`, `strain`, `jacobi` J, `root_f1` N, `root_m3` N·m, …), frame components; one row for a steady state.
+            `kinetic`, `strain`, `jacobi` J, `root_f1` N, `root_m3` N·m, …), in the frame; one row of a steady state.
         shape: column ↦ values along the structure at the end (`x` m, of a plate `y` m too, `u1` m, …).
         triangles: of a plate, triangles between the nodes of `shape`, (m, 3).
         fields: writes the fields for ParaView into a folder, on all ranks together; None of a beam.

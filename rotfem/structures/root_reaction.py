@@ -92,7 +92,9 @@ class RootReaction:
         edges, owned = grid.edges("clamped"), s.mesh.topology.index_map(1).size_local
         s.mesh.topology.create_connectivity(1, 0)
         edges = edges[edges < owned]
-        ends = s.mesh.geometry.x[dolfinx_mesh.entities_to_geometry(s.mesh, 1, edges)].reshape(-1, 2, 3)
+        ends = np.zeros((0, 2, 3))
+        if len(edges):  # dolfinx divides by their number
+            ends = s.mesh.geometry.x[dolfinx_mesh.entities_to_geometry(s.mesh, 1, edges)].reshape(-1, 2, 3)
         lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         here = np.append(lengths @ ends.mean(axis=1), lengths.sum())
         whole = s.comm.allreduce(here) if s.comm.size > 1 else here
@@ -106,10 +108,10 @@ class RootReaction:
     def _turned(self, arms: Array, axis: Array) -> Array:
         """Return what they change by in a unit turn about an axis through the point, (nodes, unknowns)."""
         moved = np.cross(axis, arms)
-        columns: list[Array] = []
-        for name in self._structure.unknowns:
+        out: Array = np.zeros((len(arms), self._structure.size))
+        for column, name in zip(out.T, self._structure.unknowns, strict=True):
             if name in TURNS:
-                columns.append(np.full(len(arms), np.dot(TURNS[name], axis)))
-            else:
-                columns.append(moved[:, int(name[1:]) - 1] if name in ("u1", "u2", "u3") else np.zeros(len(arms)))
-        return np.column_stack(columns).reshape(len(arms), -1)
+                column[:] = np.dot(TURNS[name], axis)
+            elif name in ("u1", "u2", "u3"):
+                column[:] = moved[:, int(name[1]) - 1]
+        return out

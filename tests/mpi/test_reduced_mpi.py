@@ -49,4 +49,5 @@ def test_reduced_history_is_that_of_one_process(tmp_path: Path, kind: str) -> No
     assert list(serial) == list(parallel)
     for column, values in serial.items():  # sums in another order make another basis of the same span
         scale = float(np.max(np.abs(values)))
-        np.testing.assert_allclose(parallel[column], values, rtol=0, atol=1e-6 * scale, err_msg=column)
+        digits = 2e-5 if column.startswith("root_") else 1e-6  # of forces the least vectors of the basis count
+        np.testing.assert_allclose(parallel[column], values, rtol=0, atol=digits * scale, err_msg=column)

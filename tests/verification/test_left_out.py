@@ -88,7 +88,8 @@ def test_the_motion_is_that_with_all_unknowns(case: str) -> None:
     length = structure["length"]
     for name, values in full.history.items():
         size = length if name.startswith("tip_u") else max(1.0, np.max(np.abs(values)))
-        np.testing.assert_allclose(less.history[name], values, rtol=0.0, atol=1e-9 * size, err_msg=name)
+        digits = 1e-7 if name.startswith("root_") else 1e-9  # the last increments times the stiffness EA/h
+        np.testing.assert_allclose(less.history[name], values, rtol=0.0, atol=digits * size, err_msg=name)
     for name in less.summary["left_out"]["unknowns"]:
         assert np.all(less.history[f"tip_{name}"] == 0.0)
 
