@@ -11,14 +11,14 @@ from rotfem.analysis.equilibrium import check_steady
 from rotfem.analysis.load_steps import balance
 from rotfem.analysis.stability import Stability, stability_of
 from rotfem.errors import ComputationError, InputError
+from rotfem.mechanics.loads import named
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.newton import Newton
 
 
 def are_constant(problem: Problem) -> bool:
     """Return whether speed, base acceleration and loads are constant in a frame that turns with the hub."""
-    motion, loads = problem.motion, problem.loads
-    applied = (load for load in (loads.tip_force, loads.tip_moment, loads.distributed) if load is not None)
+    motion, applied = problem.motion, named(problem.loads).values()
     turning = problem.frame == "rotating" and motion.hub is None
     return turning and motion.constant and all(load.constant for load in applied)
 

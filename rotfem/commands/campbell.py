@@ -19,6 +19,7 @@ from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
 from rotfem.commands.accuracy import changes_of, pursue, refuse, settings_of
 from rotfem.commands.finite import check_rows
 from rotfem.commands.known_error import error_of_modes
+from rotfem.commands.loads import held
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows, unstiffened
 from rotfem.commands.modes import analysis_of, hints_of, theory_error
 from rotfem.commands.problem import Problem, case_of
@@ -109,6 +110,7 @@ def campbell(
         sweep = Diagram(variant, Problem.of(variant, terms=terms), values, comm, hint)
         return sweep.result(orders, progress or (lambda share: None), started)
 
+    scene.check_steady("what modes are about")
     with input_of(scene.file):
         if scene.accuracy is None:
             return attempt()
@@ -164,7 +166,11 @@ class Diagram:
             crossing["label"] = labels[crossing["branch"] - 1]
         ends = mode_rows(analysis, sweep.nodes[-1].spinning)[:count]
         warnings = [] if self.choice is not None else advice(analysis, fastest)
-        warnings += [*unstiffened(analysis, fastest, ends), *told(sweep, labels, onsets, ends)]
+        warnings += [
+            *held(self.analysis.problem.loads),
+            *unstiffened(analysis, fastest, ends),
+            *told(sweep, labels, onsets, ends),
+        ]
         off = theory_error(analysis, sweep.nodes[-1].spinning)
         warnings += [off.warning()] if off.warning() else []
         summary = {

@@ -25,6 +25,7 @@ from rotfem.analysis.theory_error import TheoryCheck, TheoryError
 from rotfem.commands.accuracy import changes_of, pursue, refuse, settings_of
 from rotfem.commands.finite import check_rows
 from rotfem.commands.known_error import error_of_modes
+from rotfem.commands.loads import held
 from rotfem.commands.mode_tables import advice, mode_tables, scaled
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.summary import modal_summary
@@ -84,6 +85,7 @@ def modes(
             add_participation(found)
         return found
 
+    scene.check_steady("what modes are about")
     with input_of(scene.file):
         if scene.accuracy is None:
             return attempt()
@@ -108,7 +110,7 @@ def _modes(
     spinning, warnings = found.spinning, found.warnings
     if choice is not None:  # a choice knows what it left out
         warnings = [line for line in warnings if line not in advice(analysis, speed)]
-    warnings = [*analysis.notes, *warnings]
+    warnings = [*held(problem.loads), *analysis.notes, *warnings]
     stability = stability_of_pencil(spinning.pencil, spinning.clamped)
     known = GROWS_AS_SAID * max(row["growth"] for row in found.rows if row["stability"] != "neutral")
     if stability.stable is None or stability.held_by_spin or stability.growth > max(known, 0.0):

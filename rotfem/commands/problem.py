@@ -12,6 +12,7 @@ from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import Array, Scheme, State
 from rotfem.analysis.time_loop import March, Steps
+from rotfem.commands.loads import loads_of
 from rotfem.commands.mode_tables import mode_tables
 from rotfem.commands.moment import Moment, first_shape
 from rotfem.equations.compiled import compile_system
@@ -52,13 +53,14 @@ class Problem(ProblemData):
         scene = as_scene(scene)
         wanted = {name: Output.registry[name].form for name in scene.output.quantities}
         with input_of(scene.file):
+            motion = motion_of(scene)
             return cls(
                 structure=scene.structure,
-                motion=motion_of(scene),
+                motion=motion,
                 mesh=scene.mesh,
                 theory=scene.model.theory,
                 effects=None if scene.model.effects == "auto" else tuple(scene.model.effects),
-                loads=scene.loads,
+                loads=loads_of(scene, motion),
                 frame=scene.model.frame,
                 terms=terms or {},
                 outputs=wanted | dict(outputs or {}),

@@ -29,6 +29,7 @@ from rotfem.commands import energy_growth
 from rotfem.commands.interrupts import Interrupted
 from rotfem.commands.keeper import Keeper
 from rotfem.commands.known_error import error_of_run, warnings_of_run
+from rotfem.commands.loads import held
 from rotfem.commands.other_models import diverged, lacking
 from rotfem.commands.problem import scheme_of
 from rotfem.commands.recorder import Recorder
@@ -137,6 +138,7 @@ class Simulation:
     def _steady(self) -> None:
         omega = self.problem.motion.speed(0.0)
         past = self.scene.solver.past_limits
+        self.warnings += held(self.problem.loads)
         q = steady_state(self.system, omega, self.newton, past_limits=past, notes=self.warnings)
         self.stability = stability_of(self.system, q, omega)
         q, v = self.system.start(q)

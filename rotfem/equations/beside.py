@@ -92,9 +92,12 @@ class Beside:
         """
         random, s = np.random.default_rng(7), self.structure
         constants = {**self.model.frame.constants, **{n: c for n, (c, _) in s.load_constants.items()}}
+        spread = {n for n, (amplitude, _) in s.load_constants.items() if amplitude.spread}
         for name, constant in constants.items():
-            which = np.broadcast_to(driven.get(name, np.ones(1)), constant.value.shape)
+            each = driven.get(name, np.ones(1)) if name not in spread else np.ones(1)
+            which = np.broadcast_to(each, constant.value.shape)
             constant.value[...] = which * random.uniform(0.5, 1.5, constant.value.shape)
+        s.update_loads()
         size = SMALL if self.linear else LARGE
         for x, rate in zip(self._state, (1.0, 3.0, 10.0), strict=True):
             x.x.array[:] = size * rate * s.scales() * random.uniform(-1.0, 1.0, x.x.array.size)
@@ -148,6 +151,7 @@ class Beside:
         known = {**self.model.frame.constants, **{n: c for n, (c, _) in self.structure.load_constants.items()}}
         for name, constant in known.items():
             constant.value[...] = constants[name]
+        self.structure.update_loads()
         if self.linear:  # K is that at q = 0, and what loads displace makes forces there
             self._base.x.array[:] = q
             self._state[0].x.array[:] = 0.0

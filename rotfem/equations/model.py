@@ -15,6 +15,7 @@ from rotfem.equations.hub_angle import HubAngle
 from rotfem.mechanics import work
 from rotfem.mechanics.effects import INERTIA, INTERNAL, LOADS, Effect
 from rotfem.mechanics.frame import Frame
+from rotfem.mechanics.loads import named
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.sums import added
@@ -163,8 +164,7 @@ class Model:
         """Whether nothing gives energy to the structure, so that its Jacobi integral stays, or falls by damping."""
         motion, gravity = self.motion, np.asarray(self.problem.loads.gravity)
         turning = motion.is_spinning and bool(np.any(np.cross(gravity, motion.axis)))
-        given = (self.problem.loads.tip_force, self.problem.loads.tip_moment, self.problem.loads.distributed)
-        steady = all(load is None or load.is_zero or load.constant for load in given)
+        steady = all(load.is_zero or load.constant for load in named(self.problem.loads).values())
         dead = all(load.dead and load.conservative for load in self.mechanics.loads)
         known = all(
             effect.work is None or effect.momentum or effect.passive or effect.potential is not None
@@ -176,8 +176,7 @@ class Model:
     def driven_by_hub(self) -> bool:
         """Whether nothing but torque and brake of a free hub gives energy to it and the structure, which feels it."""
         loads, motion = self.problem.loads, self.motion
-        given = (loads.tip_force, loads.tip_moment, loads.distributed)
-        none = all(load is None or load.is_zero for load in given) and not np.any(loads.gravity)
+        none = all(load.is_zero for load in named(loads).values()) and not np.any(loads.gravity)
         known = all(
             effect.work is None or effect.momentum or effect.passive or (effect.potential and not effect.internal)
             for effect in self.acting.values()

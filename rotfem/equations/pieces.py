@@ -87,7 +87,7 @@ class Pieces:
         self.assembled = 0.0
         loads = {name: constant for name, (constant, _) in self.structure.load_constants.items()}
         self.at_rest = self._forms_at_rest()
-        self.constants: dict[str, fem.Constant] = {**model.frame.constants, **loads}
+        self.constants: dict[str, Any] = {**model.frame.constants, **loads}
         self.axis: Array = model.motion.axis[2:] if self.structure.planar else model.motion.axis
         self._forms = {kind: forms.form(form, once=True) for kind, form in self.at_rest.items()}
         self.pattern = fem_petsc.create_matrix(self._forms["K"])
@@ -218,6 +218,7 @@ class Pieces:
         self._zero_constants()
         for (name, i), value in values.items():
             constants[name].value.flat[i] = value
+        self.structure.update_loads()
         operator = self._assemble(self._forms[kind], kind)
         self._zero_constants()
         return operator

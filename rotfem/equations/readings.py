@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 from rotfem.equations.functionals import Functionals
 from rotfem.equations.model import Model
+from rotfem.mechanics.loads import is_moment
 from rotfem.mechanics.motion import Motion
 from rotfem.numerics import forms
 from rotfem.structures.root_reaction import RootReaction
@@ -132,7 +133,8 @@ class Readings:
         else:
             jacobi = e["T2"] - e.get("T0", 0.0) + e["strain"]
         potential = e.get("potential", 0.0)
-        if self.clamp is not None and "tip_moment" in self.structure.load_constants:
-            # A dead moment works on the rotation relative to the hub, alpha − psi.
-            potential += float(self.structure.load_constants["tip_moment"][0].value[0]) * self.clamp.angle(self.time)
+        if self.clamp is not None:  # a dead moment works on the rotation relative to the hub, alpha − psi
+            given = self.structure.load_constants.items()
+            moments = sum(float(m.value[0]) for name, (m, _) in given if is_moment(name))
+            potential += moments * self.clamp.angle(self.time)
         return {"kinetic": kinetic, "strain": e["strain"], "jacobi": jacobi + potential}

@@ -181,6 +181,7 @@ class System(Readings, Solutions, ABC):
         self.model.frame.set(values)
         for name, value in self.load_values(t, motion).items():
             self.structure.load_constants[name][0].value[...] = load_factor * value
+        self.structure.update_loads(motion.rotation(t) if self.model.fixed else None)
 
     def load_values(self, t: float, motion: Motion) -> dict[str, Array]:
         """Return the amplitude of every load constant at time t (s); in a fixed frame dead loads turn with the hub."""
@@ -189,10 +190,9 @@ class System(Readings, Solutions, ABC):
         Q = motion.rotation(t) if self.model.fixed else IDENTITY
         turning = {load.name for load in self.model.mechanics.loads if load.dead and self.model.fixed}
         values = {}
-        for name, (_, at) in self.structure.load_constants.items():
+        for name, (amplitude, at) in self.structure.load_constants.items():
             value = np.atleast_1d(np.asarray(at(t), dtype=float))
-            n = value.size
-            values[name] = Q[:n, :n] @ value if name in turning and n > 1 else value
+            values[name] = amplitude.turned(value, Q) if name in turning else value
         return values
 
     def driven(self, t: float) -> Array:

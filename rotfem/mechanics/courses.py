@@ -19,9 +19,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.mechanics.free_hub import FreeHub, Torque
-from rotfem.mechanics.loads import Load, Loads
+from rotfem.mechanics.loads import Load, named, replaced
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
+from rotfem.mechanics.span import Span
 
 Array = npt.NDArray[np.float64]
 
@@ -105,9 +106,34 @@ class SeenLoad:
 
     load: Load
     at: Callable[[float], Array]
+    course: Course
+    view: View
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.load, name)
+
+    @property
+    def span(self) -> Any:
+        """How it is spread; of a function of place this, as the view shows it."""
+        span = self.load.span
+        return span if span is None or span.shapes is not None else SeenSpan(span, self.course, self.view)
+
+
+@dataclass(frozen=True)
+class SeenSpan:
+    """A function of place and time as a view shows it (see `Span`), with the knots of its course."""
+
+    span: Span
+    course: Course
+    view: View
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.span, name)
+
+    def over(self, points: Array) -> Callable[[float], Array]:
+        """Return t (s) ↦ components at points (n, 3) in m, one after the other."""
+        at, course = self.span.over(points), self.course
+        return lambda t: np.asarray(Course(course.name, at, course.knots, course.marks).seen(self.view)(t))
 
 
 @dataclass(frozen=True)
@@ -130,14 +156,12 @@ def watched(problem: Problem, view: View) -> tuple[Problem, list[Course]]:
         return course.seen(view)
 
     motion = _watched_motion(problem.motion, see)
-    names = ("tip_force", "tip_moment", "distributed")
-    changing = {n: load for n in names if (load := getattr(problem.loads, n)) is not None and not load.constant}
-    loads = problem.loads
-    if changing:
-        kept = {n: getattr(loads, n) for n in names} | {
-            n: SeenLoad(load, see(_load_course(f"loads.{n}", load))) for n, load in changing.items()
-        }
-        loads = Loads(gravity=loads.gravity, **kept)
+    changing: dict[str, Load] = {}
+    for name, load in named(problem.loads).items():
+        if not load.constant:
+            course = _load_course(f"loads.{name}", load)
+            changing[name] = SeenLoad(load, see(course), course, view)
+    loads = replaced(problem.loads, changing) if changing else problem.loads
     return problem.replace(motion=motion, loads=loads), courses
 
 
@@ -169,14 +193,7 @@ def _watched_hub(hub: FreeHub, see: Callable[[Course], Callable[[float], Any]]) 
 
 
 def _load_course(name: str, load: Load) -> Course:
-    if load.table is None:
-        return Course(name, load.at, np.empty(0), np.empty(0), known=False)
-    t, *columns = np.array(load.table).T
-
-    def many(s: Array) -> Array:
-        return np.stack([np.interp(s, t, column) for column in columns], axis=1)
-
-    return Course(name, load.at, t, np.empty(0), many)
+    return Course(name, load.at, _times(load.knots), np.empty(0), load.many, known=load.linear)
 
 
 def _times(knots: Iterable[float] | None) -> Array:

@@ -10,6 +10,7 @@ from rotfem.scene.loads import Loads
 from rotfem.scene.motion import Motion, TorqueMotion
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh
+from rotfem.scene.signals import Signal
 from rotfem.scene.stepping import Time
 from rotfem.scene.values import problem
 
@@ -20,10 +21,11 @@ def check_planar(motion: Motion, loads: Loads) -> None:
     """Refuse what would move a planar beam out of its plane."""
     if motion.axis[0] != 0.0 or motion.axis[1] != 0.0:
         raise problem("motion.axis", list(motion.axis), "must be [0, 0, 1] or [0, 0, -1] for a planar_beam")
-    vectors = {
+    vectors: dict[str, Signal | None] = {
         "motion.base_acceleration": motion.base_acceleration,
         "loads.tip_force": loads.tip_force,
         "loads.distributed": loads.distributed,
+        **{f"loads.at.{i}.force": point.force for i, point in enumerate(loads.at)},
     }
     for key, signal in vectors.items():
         if signal is not None and not signal.is_planar:
@@ -31,17 +33,6 @@ def check_planar(motion: Motion, loads: Loads) -> None:
             raise problem(key, value, "the third component must be 0 for a planar_beam")
     if loads.gravity[2] != 0.0:
         raise problem("loads.gravity", list(loads.gravity), "the third component must be 0 for a planar_beam")
-
-
-def check_loads(structure: AnyStructure, loads: Loads) -> None:
-    """Refuse a moment at the tip that the structure cannot bear."""
-    moment = loads.tip_moment
-    if moment is None:
-        return
-    if structure.is_planar and moment.components != 1 and moment.function is None:
-        raise problem("loads.tip_moment", None, "must have one component, about axis 3, for a planar_beam")
-    if not structure.is_planar and moment.components != 3:
-        raise problem("loads.tip_moment", None, f"must have three components for a {structure.type}")
 
 
 def check_mesh(structure: AnyStructure, mesh: BeamMesh | PlateMesh) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from pydantic import ValidationInfo
@@ -46,6 +46,13 @@ def existing_file(value: Any, info: ValidationInfo) -> Path:
     return path
 
 
+class Reader(Protocol):
+    """What makes a table of rows and refuses those that are none, as `as_increasing_rows` does."""
+
+    def __call__(self, value: Any, columns: Sequence[int], shape: str, row_name: Callable[[int], str] = ...) -> Matrix:
+        """Return the rows."""
+
+
 def as_time_table(value: Any, info: ValidationInfo, columns: Sequence[int], shape: str) -> Matrix:
     """Return rows (t, …) with t (s) strictly increasing, at least two.
 
@@ -58,20 +65,25 @@ def as_time_table(value: Any, info: ValidationInfo, columns: Sequence[int], shap
     Raises:
         PydanticCustomError: it is not such a table, or the file cannot be read; of a file it names the line.
     """
+    return as_table(value, info, columns, shape, as_increasing_rows)
+
+
+def as_table(value: Any, info: ValidationInfo, columns: Sequence[int], shape: str, read: Reader) -> Matrix:
+    """Return the rows of a table that a reader accepts (see `as_time_table`)."""
     limits = limits_in(info)
     if not isinstance(value, str | Path):
         if isinstance(value, list | tuple):
             limits.check("rows", len(value), value=value)
-        return as_increasing_rows(value, columns, shape)
+        return read(value, columns, shape)
     path = existing_file(value, info)
     text = read_text(path, ROW_BYTES * limits.rows)
     limits.check("rows", text.count("\n"), value=str(path))
-    table = quick_rows(text)
+    table = quick_rows(text) if read is as_increasing_rows else None
     if table is not None and table.shape[1] in columns and len(table) > 1 and np.all(table[1:, 0] > table[:-1, 0]):
         return rows_of(table)
     by_line = read_rows(text, path)
     lines = tuple(by_line)
-    return as_increasing_rows(tuple(by_line.values()), columns, shape, lambda row: f"line {lines[row - 1]}")
+    return read(tuple(by_line.values()), columns, shape, lambda row: f"line {lines[row - 1]}")
 
 
 def read_text(path: Path, most: int) -> str:

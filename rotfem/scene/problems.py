@@ -75,6 +75,8 @@ def _problem(details: dict[str, Any]) -> Problem:
         value, reason = None, f"required key is missing; allowed: {', '.join(map(show, sorted(_TAGS[str(path[0])])))}"
     elif kind in ("model_type", "model_attributes_type", "dict_type"):
         reason = "must be a table of key = value pairs"
+    elif kind == "tuple_type":
+        reason = "must be a list of tables"
     elif kind == "bool_type":
         reason = "must be true or false"
     else:

@@ -29,13 +29,13 @@ from rotfem.scene.consistency import (
     check_frame,
     check_initial,
     check_limits,
-    check_loads,
     check_mesh,
     check_planar,
     check_theory,
 )
 from rotfem.scene.digest import abridged
 from rotfem.scene.limits import Limits, limits_of
+from rotfem.scene.load_checks import KEYS, check_loads
 from rotfem.scene.loads import Load, Loads
 from rotfem.scene.motion import (
     AnyMotion,
@@ -219,6 +219,22 @@ class Scene(SceneModel):
                 f'missing; with motion.type = "{self.motion.type}" a run is a time history: give [time] with end and '
                 "step (or tolerance). Only constant motion has a steady state to run without it",
             )
+        if self.time is None:
+            self.check_steady("a steady state")
+
+    def check_steady(self, what: str) -> None:
+        """Check that no load along the structure is given by a table that may be one over the span.
+
+        Args:
+            what: is to be computed, at one time.
+
+        Raises:
+            SceneError: there is one, which over time has no meaning there.
+        """
+        for name, load in self.loads.spread.items():
+            if load.table is not None:
+                why = f"is a table [[t, …], …] over time, which {what} does not have; {KEYS}"
+                raise SceneError(self._file, f"loads.{name}", None, why)
 
     @model_validator(mode="before")
     @classmethod
@@ -234,7 +250,7 @@ class Scene(SceneModel):
         vars(self)["mesh"] = self.mesh.suited(self.structure)
         if self.structure.is_planar:
             check_planar(self.motion, self.loads)
-        check_loads(self.structure, self.loads)
+        check_loads(self.structure, self.motion, self.loads, self.time)
         check_mesh(self.structure, self.mesh)
         check_theory(self.structure, self.model)
         check_frame(self.structure, self.motion, self.model)

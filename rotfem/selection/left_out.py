@@ -18,7 +18,7 @@ from mpi4py import MPI
 from rotfem.analysis.constant_conditions import are_constant
 from rotfem.equations.beside import Beside
 from rotfem.equations.compiled import compile_system
-from rotfem.mechanics.loads import Load
+from rotfem.mechanics.loads import Load, is_moment, named
 from rotfem.mechanics.problem import Problem
 from rotfem.structures import STRUCTURES
 
@@ -104,10 +104,11 @@ class Driven:
         motion, loads = problem.motion, problem.loads
         self.problem, self.linear = problem, problem.theory.linear
         self.moved = motion.is_spinning or motion.hub is not None
-        forces = {"tip_force": loads.tip_force, "distributed": loads.distributed}
-        values: dict[str, Array | None] = {name: of_load(load) for name, load in forces.items()}
+        values: dict[str, Array | None] = {}
+        turning: dict[str, Array | None] = {}
+        for name, load in named(loads).items():
+            (turning if is_moment(name) else values)[name] = of_load(load)
         values |= {"a_o": of_base(motion), "gravity": _padded(np.abs(np.array(loads.gravity, dtype=float)))}
-        turning: dict[str, Array | None] = {"tip_moment": of_load(loads.tip_moment, moment=True)}
         turning |= dict.fromkeys(("w", "dw"), np.abs(motion.axis) if self.moved else np.zeros(3))
         self.known = all(value is not None for value in (*values.values(), *turning.values()))
         self.polar = {n: np.sign(v) for n, v in values.items() if v is not None}
@@ -137,19 +138,12 @@ def _padded(values: Array) -> Array:
     return np.concatenate([values, np.zeros(3 - len(values))])
 
 
-def of_load(load: Load | None, moment: bool = False) -> Array | None:
+def of_load(load: Load) -> Array | None:
     """Return the largest size of each component of a load over all times, shape (3,); None where that is not known."""
-    if load is None or load.is_zero:
-        return np.zeros(3)
-    if load.table is not None:
-        values = np.abs(np.array(load.table)[:, 1:]).max(axis=0)
-    elif load.constant:
-        values = np.abs(np.ravel(load.at(0.0)))
-    else:
-        return None
-    if moment and len(values) == 1:
+    values = np.zeros(3) if load.is_zero else load.sizes()
+    if values is not None and len(values) == 1:  # about axis 3, or along it
         return np.array([0.0, 0.0, values[0]])
-    return _padded(values)
+    return None if values is None else _padded(values)
 
 
 def of_base(motion: Any) -> Array | None:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.mechanics.loads import Load
+from rotfem.mechanics.loads import Load, named
 from rotfem.mechanics.problem import Problem
 
 Array = npt.NDArray[Any]
@@ -55,8 +55,7 @@ class Given:
 def given(problem: Problem) -> list[Given]:
     """Return all that a problem prescribes and that changes with time."""
     motion, loads = problem.motion, problem.loads
-    applied = (loads.tip_force, loads.tip_moment, loads.distributed)
-    out = [_load(load) for load in applied if load is not None and not load.constant]
+    out = [_load(load) for load in named(loads).values() if not load.constant]
     if motion.is_accelerated and not motion.constant:
         linear = motion.base_knots is not None
         out.append(Given(_each(motion.base_acceleration), np.array(motion.base_knots or ()), linear))
@@ -137,7 +136,7 @@ def _looks(signal: Given, times: Array, number: int) -> Array:
 
 
 def _load(load: Load) -> Given:
-    return Given(_each(load.at), np.empty(0)) if load.table is None else _table(load.table)
+    return Given(load.many, np.array(load.knots or ()), linear=load.linear)
 
 
 def _table(rows: Sequence[Sequence[float]]) -> Given:

@@ -12,10 +12,12 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 from rotfem.mechanics.bodies import Strain
+from rotfem.mechanics.loads import stations
 from rotfem.mechanics.problem import Problem
 from rotfem.structures.memory import check_memory
-from rotfem.structures.meshes.line import END, beam_nodes
+from rotfem.structures.meshes.line import END, apart, beam_nodes
 from rotfem.structures.mode_names import in_phase, sign_changes
+from rotfem.structures.points import Points
 from rotfem.structures.structure import Array, Structure
 from rotfem.structures.tip_values import TipValues
 
@@ -45,15 +47,16 @@ class Beam(Structure):
         grid, s = problem.mesh, self.data
         self.length, self.hub_radius, self._section = s.length, s.hub_radius, s.section
         check_memory("mesh.elements", grid.elements, grid.elements * grid.degree + 1, self.size, 1, comm)
-        nodes = beam_nodes(self.length, grid.elements, knots)
+        nodes = beam_nodes(self.length, grid.elements, apart((*knots, *stations(problem.loads)), self.length))
         interval = mesh.create_interval(comm, len(nodes) - 1, [0.0, 1.0])  # which dolfinx refuses below 2e-16 m
         x = interval.geometry.x
         x[:, 0] = np.interp(x[:, 0], np.linspace(0.0, 1.0, len(nodes)), nodes)
         k = grid.degree
         self.discretise(interval, k)
         reduced = 2 * k - 2 if grid.integration == "reduced" else 2 * k
-        self.dx_elastic = ufl.dx(self.mesh, metadata={"quadrature_degree": reduced})
-        self.dx = ufl.dx(self.mesh, metadata={"quadrature_degree": 2 * k})
+        self.points = Points(self.mesh, [point.x for point in self.point_loads])
+        dx = ufl.Measure("dx", self.mesh, subdomain_data=self.points.subdomains)
+        self.dx_elastic, self.dx = (dx(metadata={"quadrature_degree": degree}) for degree in (reduced, 2 * k))
         near = self.length * END
         ends = [
             mesh.locate_entities_boundary(self.mesh, 0, lambda p, x=x: np.abs(p[0] - x) < near)

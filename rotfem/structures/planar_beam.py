@@ -11,6 +11,7 @@ import ufl
 from mpi4py import MPI
 
 from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
+from rotfem.mechanics.loads import Load
 from rotfem.mechanics.problem import Problem
 from rotfem.structures.beam import Beam
 from rotfem.structures.structure import Array
@@ -83,8 +84,12 @@ class PlanarBeam(Beam):
 
     def loads(self) -> list[AppliedLoad]:
         """Return the problem's non-zero loads; dead ones keep their direction in the frame, followers turn with t_i."""
-        moment, out = self.problem.loads.tip_moment, self.forces()
-        if moment is not None and not moment.is_zero:
-            m = self.add_load("tip_moment", 1, lambda t: np.ravel(moment.at(t))[-1:])
-            out.append(AppliedLoad("tip_moment", m[0], self.k.q[2], self.tip))
+        out = self.forces()
+        for name, moment, measure in self.moments():
+            m = self.add_load(name, 1, partial(_about_3, moment))
+            out.append(AppliedLoad(name, m[0], self.k.q[2], measure))
         return out
+
+
+def _about_3(moment: Load, t: float) -> Array:
+    return np.ravel(moment.at(t))[-1:]

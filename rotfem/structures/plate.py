@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -20,7 +20,6 @@ from scipy.spatial import Delaunay
 
 from rotfem.errors import InputError
 from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
-from rotfem.mechanics.loads import Load
 from rotfem.mechanics.mindlin import PlateGradients, director, triad
 from rotfem.mechanics.problem import Problem
 from rotfem.structures.datum import DirectorTurns
@@ -28,7 +27,7 @@ from rotfem.structures.memory import check_memory
 from rotfem.structures.meshes.plate_mesh import PlateGrid, plate_grid
 from rotfem.structures.mode_names import plate_mode_name, turning
 from rotfem.structures.moderate_turns import check_directors
-from rotfem.structures.plate_loads import PointPlace, TipEdge, locate, point_measure
+from rotfem.structures.plate_loads import TipEdge, plate_points, pressure
 from rotfem.structures.plate_section import constants, plane_stress, shear_moduli, thickness_field
 from rotfem.structures.structure import Array, Structure
 from rotfem.structures.tip_values import TipValues
@@ -38,10 +37,6 @@ SEEN = 0.1
 
 #: Nodes closer than this part of the plate's size share a coordinate when they are put in order.
 SAME_PLACE = 1e-7
-
-
-def _moment(load: Load, t: float) -> Array:
-    return np.ravel(load.at(t))
 
 
 def _voigt(tensor: Any) -> Any:
@@ -86,11 +81,11 @@ class Plate(Structure):
             raise InputError("mesh.degree", k, why)
         self.discretise(self.grid.mesh, k)
         self.check_shared()
-        self._places = [self._place(row) for row in s.point_masses]
-        self._subdomains = [(i, place.cells) for i, place in enumerate(self._places, start=1)] or None
-        self.dx = ufl.dx(self.mesh, subdomain_data=self._subdomains, metadata={"quadrature_degree": 2 * k})
+        self.points = plate_points(self)
+        subdomains = self.points.subdomains
+        self.dx = ufl.dx(self.mesh, subdomain_data=subdomains, metadata={"quadrature_degree": 2 * k})
         reduced = (2 * k - 1 if cell == "quadrilateral" else 2 * k - 2) if settings.integration == "reduced" else 2 * k
-        self.dx_elastic = ufl.dx(self.mesh, subdomain_data=self._subdomains, metadata={"quadrature_degree": reduced})
+        self.dx_elastic = ufl.dx(self.mesh, subdomain_data=subdomains, metadata={"quadrature_degree": reduced})
         self.clamped = fem.locate_dofs_topological(self.V, 1, self.grid.edges("clamped"))
         low, high = self._box()
         self.length = float(np.max(high - low))
@@ -197,19 +192,12 @@ class Plate(Structure):
             bodies.append(Body(self.director(self.k.q), rho * h**3 / 12, self.dx, False, "rotary_inertia"))
         if "tip_mass" not in effects:
             return bodies
-        for i, ((_, _, mass), place) in enumerate(zip(self.data.point_masses, self._places, strict=True), start=1):
-            at = point_measure(self.mesh, self._subdomains, i, place)
+        for i, (x, y, mass) in enumerate(self.data.point_masses, start=1):
+            at = self.points.measure((x, y))
             bodies.append(Body(r, self.scalar(f"point_mass_{i}", mass), at, True, "tip_mass"))
         for name, mass in self.data.line_masses.items():
             bodies.append(Body(r, self.scalar(f"line_mass_{name}", mass), self._on_curve(name), True, "tip_mass"))
         return bodies
-
-    def _place(self, row: tuple[float, ...]) -> PointPlace:
-        place = locate(self.mesh, (row[0], row[1]))
-        if place is None:
-            why = f"({row[0]:g}, {row[1]:g}) is not on the plate"
-            raise InputError("structure.point_masses", list(row), why)
-        return place
 
     def _on_curve(self, name: str) -> Any:
         key, known = "structure.line_masses", self.grid.curve_names
@@ -242,14 +230,19 @@ class Plate(Structure):
                     'needs a physical curve "tip" in the mesh, which it works on',
                 )
         moment, out = loads.tip_moment, self.forces()
+        out += pressure(self)
         if moment is not None and not moment.is_zero:
-            m = self.add_load("tip_moment", 3, partial(_moment, moment))
+            m = self.add_load("tip_moment", 3, moment.at)
             out += TipEdge(self).moment(m, moment.kind == "dead", self.director(self.k.q))
         return out
 
+    def cells_of(self, region: str) -> npt.NDArray[np.int32]:
+        """Return the local cells of a region of the mesh."""
+        return np.asarray(self.grid.regions.find(self.grid.region_names[region]), dtype=np.int32)
+
     def spread(self, name: str, load: Any) -> Any:
         """Return a load of the tip over the length of its edge."""
-        return load if name == "distributed" else TipEdge(self).spread(load)
+        return TipEdge(self).spread(load) if name == "tip_force" else load
 
     # --- values -----------------------------------------------------------------------------------------------------
 

@@ -196,13 +196,13 @@ class SpatialBeam(Beam):
 
     def loads(self) -> list[AppliedLoad]:
         """Return the problem's non-zero loads; dead ones keep their direction in the frame, followers turn with Λ."""
-        moment, out = self.problem.loads.tip_moment, self.forces()
-        if moment is not None and not moment.is_zero:
-            m, dead = self.add_load("tip_moment", 3, partial(_moment, moment)), moment.kind == "dead"
-            M, theta = m if dead else self.turned(self.k.q, m), self._turn.theta
-            if self.turns is not None and self.turns.before is not None:
-                theta = theta + rotation_part(self.turns.before)
-            out.append(AppliedMoment("tip_moment", M, theta, self.tip, dead, section=self._turn))
+        out, theta = self.forces(), self._turn.theta
+        if self.turns is not None and self.turns.before is not None:
+            theta = theta + rotation_part(self.turns.before)
+        for name, moment, measure in self.moments():
+            m, dead = self.add_load(name, 3, partial(_moment, moment)), moment.kind == "dead"
+            M = m if dead else self.turned(self.k.q, m)
+            out.append(AppliedMoment(name, M, theta, measure, dead, section=self._turn))
         return out
 
     def check_range(self, q: Array, time: float | None = None) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,20 +13,16 @@ from dolfinx import default_scalar_type, fem
 from mpi4py import MPI
 
 from rotfem.errors import InputError, shown
-from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, Strain
-from rotfem.mechanics.loads import Load
+from rotfem.mechanics.bodies import Body, Damping, Kinematics, Strain
 from rotfem.mechanics.problem import Problem
+from rotfem.structures.applied_loads import LoadsOfStructure
 from rotfem.structures.datum import Turns
 from rotfem.structures.tip_values import TipValues
 
 Array = npt.NDArray[np.float64]
 
 
-def _first(load: Load, n: int, t: float) -> Array:
-    return load.at(t)[:n]
-
-
-class Structure:
+class Structure(LoadsOfStructure):
     """A discretised structure: blocked Lagrange functions on a mesh, clamped somewhere.
 
     A subclass makes the mesh, calls `discretise`, and gives positions, strains, bodies and loads.
@@ -43,6 +38,7 @@ class Structure:
         root: measure of the clamped end.
         clamped: local numbers of the clamped nodes.
         tip_values: reads the values at the tip.
+        points: where loads or masses are at a point.
     """
 
     type: ClassVar[str]
@@ -53,8 +49,6 @@ class Structure:
     planes: ClassVar[dict[int, tuple[int, ...]]] = {}
     #: Direction of forces ↦ the components that, in a linear theory, may be moved by them alone.
     across: ClassVar[dict[int, tuple[int, ...]]] = {}
-    #: Components of a force.
-    dimension: ClassVar[int] = 3
     #: Strains whose force makes geometric stiffness in the prestressed linear theories.
     prestressing: ClassVar[tuple[str, ...]]
     #: Strains whose stiffness may outweigh that of the others by so much that round-off of it spoils them.
@@ -63,12 +57,8 @@ class Structure:
     #: Mode families that the force of the spinning structure stiffens in the exact theory only.
     unstiffened: ClassVar[tuple[str, ...]] = ()
 
-    mesh: Any
-    V: fem.FunctionSpace
-    k: Kinematics
     dx: Any
     dx_elastic: Any
-    tip: Any
     root: Any
     clamped: npt.NDArray[np.int32]
     tip_values: TipValues
@@ -83,7 +73,7 @@ class Structure:
         self.section: dict[str, Any] = {}
         #: Single numbers that the forms contain, by name.
         self.scalars: dict[str, fem.Constant] = {}
-        self.load_constants: dict[str, tuple[fem.Constant, Callable[[float], Array]]] = {}
+        self.load_constants = {}
         #: What finite rotations are counted from; None where they have no limit, or the theory none of large size.
         self.turns: Turns | None = None
 
@@ -157,14 +147,6 @@ class Structure:
         clamped = int(np.count_nonzero(self.clamped < owned))
         return self.size * int(self.V.dofmap.index_map.size_global - self.comm.allreduce(clamped))
 
-    def position(self, q: Any) -> Any:
-        """Return the axis or mid-surface r(q), frame components (m)."""
-        raise NotImplementedError
-
-    def turned(self, q: Any, v: Any) -> Any:
-        """Return a vector that turns with the section, frame components; v is what it is at q = 0."""
-        raise NotImplementedError
-
     def stretch(self, strains: list[Strain]) -> Any:
         """Return an expression that is 1 where the structure is undeformed and at most 0 where it is inside out."""
         raise NotImplementedError
@@ -177,10 +159,6 @@ class Structure:
         """Return all mass that is always there or that one of these effects brings, which it then names."""
         raise NotImplementedError
 
-    def loads(self) -> list[AppliedLoad]:
-        """Return the problem's non-zero loads."""
-        raise NotImplementedError
-
     # --- constants and fields -----------------------------------------------------------------------------------
 
     def constant(self, value: npt.ArrayLike) -> fem.Constant:
@@ -191,40 +169,13 @@ class Structure:
         """Return the constant of a named number, one and the same at every call."""
         return self.scalars.setdefault(name, self.constant(value))
 
-    # --- damping and loads --------------------------------------------------------------------------------------
+    # --- damping ------------------------------------------------------------------------------------------------
 
     def damping(self) -> Damping:
         """Return Kelvin–Voigt plus stiffness-proportional viscosity, and the mass-proportional rate."""
         d = self.data.damping
         eta, a0 = d.kelvin_voigt + d.rayleigh[1], d.rayleigh[0]
         return Damping(self.constant(eta) if eta > 0 else None, self.constant(a0) if a0 > 0 else None)
-
-    def forces(self) -> list[AppliedLoad]:
-        """Return the problem's non-zero forces; dead ones keep their direction in the frame, followers turn."""
-        loads, q = self.problem.loads, self.k.q
-        out = []
-        for name, load, measure in (
-            ("tip_force", loads.tip_force, self.tip),
-            ("distributed", loads.distributed, self.dx),
-        ):
-            if load is None or load.is_zero:
-                continue
-            f = self.add_load(name, self.dimension, partial(_first, load, self.dimension))
-            dead = load.kind == "dead"
-            vector = ufl.as_vector([f[i] if i < self.dimension else 0 for i in range(3)])
-            force = vector if dead else self.turned(q, vector)
-            out.append(AppliedLoad(name, self.spread(name, force), self.position(q), measure, dead))
-        return out
-
-    def spread(self, name: str, load: Any) -> Any:
-        """Return the density of a load on its measure: the load itself at a point and where it is a density already."""
-        return load
-
-    def add_load(self, name: str, size: int, at: Callable[[float], Array]) -> fem.Constant:
-        """Return the amplitude constant (size,) of a load and remember at(t), its value at time t (s)."""
-        constant = self.constant(np.zeros(size))
-        self.load_constants[name] = (constant, at)
-        return constant
 
     # --- values -------------------------------------------------------------------------------------------------
 

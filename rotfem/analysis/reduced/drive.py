@@ -82,6 +82,9 @@ class Drive:
             else:
                 values[name] = self._gravity(angle)[:, plane]
         for name, (constant, at) in self.system.structure.load_constants.items():
+            if constant.follows_nodes:
+                values[name] = np.array([at(float(s)) for s in t])
+                continue
             values[name] = self._course(f"loads.{name}", at, t)[:, : constant.value.size]
         return values
 

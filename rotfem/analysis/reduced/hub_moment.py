@@ -74,6 +74,7 @@ class HubMoment:
         self.parts = self._parts()
         for name, value in kept.items():
             self.constants[name].value[...] = value
+        self.system.structure.update_loads()
 
     def _parts(self) -> dict[tuple[str, int], Polynomial]:
         base = self._at("", 0, 0.0)
@@ -101,6 +102,7 @@ class HubMoment:
             constant.value[...] = value * self._axis[-constant.value.size :]
         elif name:
             self.constants[name].value.flat[component] = value
+        self.system.structure.update_loads()
         system, m = self.system, self.model.size
         zero = system.zeros()
         system.set_state(zero)

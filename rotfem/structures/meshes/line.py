@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import numpy.typing as npt
 
@@ -9,6 +11,15 @@ Array = npt.NDArray[np.float64]
 
 #: Part of the length within which a node is an end of the line.
 END = 1e-9
+
+
+def apart(places: Iterable[float], length: float) -> tuple[float, ...]:
+    """Return places along a line (m) in order, those apart that are its ends or one that is there already."""
+    out: list[float] = []
+    for x in sorted(places):
+        if min(x - (out[-1] if out else 0.0), length - x) > END * length:
+            out.append(x)
+    return tuple(out)
 
 
 def beam_nodes(length: float, elements: int, knots: tuple[float, ...]) -> Array:

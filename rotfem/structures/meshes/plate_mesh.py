@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,12 @@ from dolfinx import mesh
 from mpi4py import MPI
 
 from rotfem.errors import InputError, shown
+from rotfem.mechanics.loads import stations
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import compat
 from rotfem.structures.meshes.checks import BadMesh
 from rotfem.structures.meshes.gmsh_file import read
-from rotfem.structures.meshes.line import END, beam_nodes
+from rotfem.structures.meshes.line import END, apart, beam_nodes
 
 Array = npt.NDArray[np.float64]
 
@@ -59,22 +60,25 @@ def plate_grid(problem: Problem, comm: MPI.Comm) -> PlateGrid:
     """
     data = problem.structure
     if data.mesh is None:
-        return rectangle(data, problem.mesh, comm)
+        return rectangle(data, problem.mesh, comm, stations(problem.loads))
     wanted = tuple(data.thickness) if isinstance(data.thickness, dict) else ()
     return from_file(Path(data.mesh), wanted, comm)
 
 
-def rectangle(data: Any, grid: Any, comm: MPI.Comm) -> PlateGrid:
-    """Return 0 ≤ x ≤ length, |y| ≤ width/2 with even cells; the knots of a tapered thickness are mesh lines."""
+def rectangle(data: Any, grid: Any, comm: MPI.Comm, stations: Collection[float] = ()) -> PlateGrid:
+    """Return 0 ≤ x ≤ length, |y| ≤ width/2 with even cells.
+
+    The knots of a tapered thickness and stations of the loads (m) are mesh lines.
+    """
     cell = mesh.CellType.quadrilateral if grid.cell == "quadrilateral" else mesh.CellType.triangle
     knots = tuple(x for x, _ in data.thickness[1:-1]) if isinstance(data.thickness, tuple) else ()
-    stations = beam_nodes(data.length, grid.elements[0], knots)
+    lines = beam_nodes(data.length, grid.elements[0], apart((*knots, *stations), data.length))
     half = data.width / 2
     corners = [np.array([0.0, -half]), np.array([data.length, half])]
-    cells = (len(stations) - 1, grid.elements[1])
+    cells = (len(lines) - 1, grid.elements[1])
     out = mesh.create_rectangle(comm, corners, cells, cell, diagonal=mesh.DiagonalType.left_right)
     x = out.geometry.x
-    x[:, 0] = np.interp(x[:, 0], np.linspace(0.0, data.length, len(stations)), stations)
+    x[:, 0] = np.interp(x[:, 0], np.linspace(0.0, data.length, len(lines)), lines)
     out.topology.create_connectivity(1, 2)
     names = {name: i for i, name in enumerate(EDGES, start=1)}
     edges, tags = [], []

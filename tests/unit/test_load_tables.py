@@ -1,0 +1,119 @@
+"""Loads over span and time in a scene: how they are written, and what is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rotfem
+from rotfem import Scene, SceneError
+
+BEAM = {"type": "planar_beam", "length": 10.0, "section": {"EA": 1e6, "GA": 1e6, "EI": 1e3, "mass_per_length": 1.0}}
+TIME = {"time": {"end": 0.1, "step": 0.05}}
+STILL = {"type": "constant", "speed": 0.0}
+RAMP = [[0, 0, 0], [5, 0, 1]]
+
+
+def scene(loads: Any, **more: Any) -> Scene:
+    """Return a scene of a beam with these loads."""
+    return Scene.from_dict({"structure": BEAM, "motion": STILL, "mesh": {"elements": 2}, "loads": loads, **more})
+
+
+#: loads, further tables, and words of the one error they make when the scene is read.
+REFUSED: dict[str, tuple[Any, dict[str, Any], str]] = {
+    "from 0 to the length": ({"distributed": [[0, 0, 0], [10, 0, 1]]}, TIME, "over_span"),
+    "beyond the span": ({"distributed": {"over_span": [[0, 0, 0], [11, 0, 1]]}}, {}, "x = 11"),
+    "columns": ({"distributed": {"over_span": [[0, 0], [10, 1]]}}, {}, "row 1 has 2 entries"),
+    "two ways": ({"distributed": {"over_span": RAMP, "value": [0, 1]}}, {}, "exactly one of"),
+    "x falls": ({"distributed": {"over_span": [[0, 0, 0], [5, 0, 1], [4, 0, 1]]}}, {}, "row 3: 4 < 5"),
+    "x three times": ({"distributed": {"over_span": [[0, 0, 0], *3 * [[5, 0, 1]]]}}, {}, "3 rows"),
+    "no grid": (
+        {"distributed": {"over_span_and_time": [[0, 0, 0, 1], [5, 0, 0, 1], [0, 1, 0, 1]]}},
+        {},
+        "no row for x = 5, t = 1",
+    ),
+    "out of the plane": ({"distributed": {"over_span": [[0, 0, 0, 1], [5, 0, 0, 1]]}}, {}, "third component"),
+    "tip over the span": ({"tip_force": {"over_span": RAMP}}, {}, "unknown key"),
+    "wrong function": ({"distributed": {"over_span": lambda x, t: (0, 1)}}, {}, "f(x)"),
+    "pressure on a beam": ({"pressure": 1.0}, {}, "needs a plate"),
+    "point beside the beam": ({"at": [{"x": 10.1, "force": [0, 1]}]}, {}, "from 0 to the length"),
+    "point of a plate": ({"at": [{"x": [1, 2], "force": [0, 1]}]}, {}, "must be a number"),
+    "nothing at a point": ({"at": [{"x": 1.0}]}, {}, "force, moment, or both"),
+    "three moments": ({"at": [{"x": 1.0, "moment": [0, 0, 1]}]}, {}, "one component"),
+    "no list": ({"at": {"x": 1.0, "force": [0, 1]}}, {}, "list of tables"),
+    "no frequency": ({"tip_force": {"harmonic": {"amplitude": [0, 1]}}}, {}, "frequency and per_rev"),
+    "no amplitude": ({"tip_force": {"harmonic": {"frequency": 1.0}}}, {}, "amplitude"),
+    "per rev of a free hub": (
+        {"tip_moment": {"harmonic": {"amplitude": 1.0, "per_rev": 2}}},
+        {"motion": {"type": "torque", "hub_inertia": 1.0}, **TIME},
+        "prescribed",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_refused_with_the_key(case: str) -> None:
+    loads, more, words = REFUSED[case]
+    with pytest.raises(SceneError) as caught:
+        scene(loads, **more)
+    assert caught.value.key.startswith("loads.")
+    assert words in str(caught.value)
+
+
+def test_a_bare_table_is_over_time_in_a_history_and_refused_elsewhere() -> None:
+    """What is computed at one time has no table over time: it would be its first row, silently."""
+    assert scene({"distributed": RAMP}, **TIME).loads.distributed is not None
+    for command, more in ((rotfem.run, {}), (rotfem.modes, TIME), (rotfem.modes, {})):
+        with pytest.raises(SceneError, match=r"over_time .* over_span .* over_span_and_time"):
+            command(scene({"distributed": RAMP}, **more))
+    with pytest.raises(SceneError, match="over_span"):
+        rotfem.campbell(scene({"distributed": RAMP}), "1:2:2")
+
+
+def test_a_bare_function_is_of_time_or_of_place_and_time() -> None:
+    assert scene({"distributed": lambda t: (0, t)}).loads.distributed.place_function is None  # type: ignore[union-attr]
+    both = scene({"distributed": lambda x, t: (0, x * t)}).loads.distributed
+    assert both is not None
+    assert both.place_function is not None
+    assert not both.constant
+
+
+def test_tables_from_files(tmp_path: Any) -> None:
+    (tmp_path / "span.csv").write_text("x, f1, f2\n0, 0, 1\n5, 0, 2\n5, 0, 3\n10, 0, 4\n")
+    tables = {"structure": BEAM, "motion": STILL, "loads": {"distributed": {"over_span": "span.csv"}}}
+    read = Scene.from_dict(tables, directory=tmp_path).loads.distributed
+    assert read is not None
+    assert read.over_span == ((0, 0, 1, 0), (5, 0, 2, 0), (5, 0, 3, 0), (10, 0, 4, 0))
+    (tmp_path / "span.csv").write_text("0, 0, 1\n5, 0, 2\n4, 0, 3\n")
+    with pytest.raises(SceneError, match="line 3: 4 < 5"):
+        Scene.from_dict(tables, directory=tmp_path)
+
+
+def raises(x: float, t: float) -> tuple[float, float]:
+    """Fail as a user's function may."""
+    raise RuntimeError("no data")
+
+
+@pytest.mark.parametrize(
+    ("function", "words"),
+    [
+        (raises, "raised RuntimeError: no data"),
+        (lambda x, t: (1, 2, 3, 4), "so many numbers: 4; must be 3"),
+        (lambda x, t: (0.0, np.nan), "finite"),
+        (lambda x, t: "much", "must return 3 numbers"),
+        (lambda x, t: (0.0, 1.0, 1.0), "third component"),
+        (lambda t: 1 / 0, "raised ZeroDivisionError"),
+    ],
+)
+def test_a_function_that_fails_is_bad_input(function: Any, words: str) -> None:
+    with pytest.raises(SceneError, match="loads.distributed") as caught:
+        rotfem.run(scene({"distributed": function}, **TIME))
+    assert words in str(caught.value)
+
+
+def test_what_changes_with_time_is_said_where_there_is_one_time_only() -> None:
+    done = rotfem.run(scene({"tip_force": {"over_time": [[0, 0, 1], [1, 0, 2]]}}, model={"theory": "linear"}))
+    assert any("loads.tip_force changes with time" in line for line in done.summary["warnings"])
+    assert done.tip["u2"][-1] == pytest.approx(1e3 / (3 * 1e3) + 10 / 1e6, rel=1e-9)  # F = 1: L³/3EI + L/GA

@@ -1,0 +1,165 @@
+"""Loads over the span and at points of it: closed forms, and every way to say one load against the others."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_bvp
+
+import rotfem
+
+L, EI, GA, EA, RHO = 10.0, 1.4e4, 1.0e7, 2.8e7, 1.2
+SECTION = {"EA": EA, "GA": GA, "EI": EI, "mass_per_length": RHO}
+BEAM = {"type": "planar_beam", "length": L, "section": SECTION}
+STILL, SPIN = {"type": "constant", "speed": 0.0}, {"type": "constant", "speed": 3.0}
+Q = 3.0
+TRIANGLE = [[0, 0, 0], [L, 0, Q]]
+TIME = {"end": 0.4, "step": 0.01}
+
+
+def computed(loads: Any, theory: str = "reissner", motion: Any = STILL, **more: Any) -> Any:
+    """Return the result of the beam under loads."""
+    tables = {"structure": BEAM, "motion": motion, "mesh": {"elements": 4}, "model": {"theory": theory}}
+    return rotfem.run({**tables, "output": {"error": False}, "loads": loads, **more})
+
+
+@pytest.mark.parametrize("theory", ["linear", "consistent_linear"])
+def test_triangle_at_rest(theory: str) -> None:
+    """u₂(L) = 11 q L⁴/120 EI + q L²/3 GA, exact in elements of degree 3 but for round-off."""
+    exact = 11 * Q * L**4 / (120 * EI) + Q * L**2 / (3 * GA)
+    assert computed({"distributed": {"over_span": TRIANGLE}}, theory).tip["u2"][0] == pytest.approx(exact, rel=1e-9)
+
+
+def test_triangle_spinning() -> None:
+    """The equations of the consistent linear theory (docs/theory.md, the second-order family), solved to 1e-10.
+
+    With N⁰ = ½ ρ Ω² (L² − x²): (GA (u' − α) + N⁰ α)' + ρ Ω² u + q x/L = 0, EI α'' + (GA − N⁰) (u' − α) = 0.
+    """
+    omega = SPIN["speed"]
+
+    def axial(x: Any) -> Any:  # of the linear rod on its undeformed places
+        return 0.5 * RHO * omega**2 * (L**2 - x**2)
+
+    def slope(x: Any, y: Any) -> Any:
+        u, force, alpha, moment = y
+        N = axial(x)
+        du = alpha + (force - N * alpha) / GA
+        return np.array([du, -RHO * omega**2 * u - Q * x / L, moment / EI, (N - GA) * (du - alpha)])
+
+    def ends(a: Any, b: Any) -> Any:
+        return np.array([a[0], a[2], b[1], b[3]])
+
+    x = np.linspace(0.0, L, 41)
+    found = solve_bvp(slope, ends, x, np.zeros((4, len(x))), tol=1e-10, max_nodes=20000)
+    assert found.success
+    steady = computed({"distributed": {"over_span": TRIANGLE}}, "consistent_linear", SPIN)
+    # 4 elements of degree 3: error of the mesh 1e-7 here
+    assert steady.tip["u2"][0] == pytest.approx(found.y[0, -1], rel=1e-6)
+
+
+def test_force_and_moment_inside() -> None:
+    """u₂(L) = F a² (3L − a)/6EI + F a/GA + M a (2L − a)/2EI: the place becomes a node, so it is exact."""
+    a, F, M = 3.7, 5.0, 2.0
+    exact = F * a**2 * (3 * L - a) / (6 * EI) + F * a / GA + M * a * (2 * L - a) / (2 * EI)
+    done = computed({"at": [{"x": a, "force": [0, F], "moment": M}]}, "linear")
+    assert done.tip["u2"][0] == pytest.approx(exact, rel=1e-9)
+
+
+def test_load_at_the_tip_is_the_load_at_the_end_of_the_span() -> None:
+    tip = computed({"tip_force": {"value": [1.0, 30.0], "kind": "follower"}, "tip_moment": 20.0}, motion=SPIN)
+    at = computed({"at": [{"x": L, "force": [1.0, 30.0], "moment": 20.0, "kind": "follower"}]}, motion=SPIN)
+    assert at.tip["u2"][0] == pytest.approx(tip.tip["u2"][0], rel=1e-12)
+
+
+def test_a_jump_is_two_loads() -> None:
+    """A load on a part of the span is the difference of two; linear, so exactly."""
+
+    def tip(rows: Any) -> float:
+        return float(computed({"distributed": {"over_span": rows}}, "linear").tip["u2"][0])
+
+    part = tip([[2.0, 0, 1.0], [6.0, 0, 2.0]])
+    rest = tip([[0, 0, 0], [2.0, 0, 0], [2.0, 0, 1.0], [6.0, 0, 2.0], [6.0, 0, 0], [L, 0, 0]])
+    exact = sum(w * (1 + (x - 2) / 4) * x**2 * (3 * L - x) / (6 * EI) for x, w in gauss(2.0, 6.0))
+    exact += sum(w * (1 + (x - 2) / 4) * x / GA for x, w in gauss(2.0, 6.0))
+    assert part == pytest.approx(rest, rel=1e-10)
+    assert part == pytest.approx(exact, rel=1e-9)
+
+
+def gauss(a: float, b: float) -> Any:
+    """Return Gauss points and weights on [a, b], exact to the seventh degree."""
+    x, w = np.polynomial.legendre.leggauss(4)
+    return zip(0.5 * (a + b) + 0.5 * (b - a) * x, 0.5 * (b - a) * w, strict=True)
+
+
+#: Loads that are the same, said in different ways.
+SAME: dict[str, list[Any]] = {
+    "over the span": [
+        {"over_span": TRIANGLE},
+        {"over_span": [[0, 0, 0], [5, 0, Q / 2], [L, 0, Q]]},
+        {"over_span": lambda x: (0.0, Q * x / L)},
+        {"over_span_and_time": [[x, t, 0, Q * x / L] for x in (0, L) for t in (0, 1)]},
+        lambda x, t: (0.0, Q * x / L),
+    ],
+    "harmonic": [
+        {"harmonic": {"amplitude": TRIANGLE, "frequency": 6.0, "phase": 0.3}, "value": [0.0, 1.0]},
+        {"harmonic": {"amplitude": TRIANGLE, "per_rev": 2, "phase": 0.3}, "value": [0.0, 1.0]},
+        lambda x, t: (0.0, 1.0 + Q * x / L * np.cos(6.0 * t + 0.3)),
+    ],
+    "ramp": [
+        {"over_span_and_time": [[x, t, 0, Q * x / L * min(t, 0.123)] for x in (0, L) for t in (0, 0.123, 1)]},
+        lambda x, t: (0.0, Q * x / L * min(t, 0.123)),
+    ],
+}
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+@pytest.mark.parametrize("case", SAME)
+def test_one_load_in_many_ways(case: str, theory: str) -> None:
+    """Meshes and shapes differ, not what is computed, to the convergence of Newton and the error of the mesh.
+
+    A function has no knots that are known, so its kinks are met to the order of the step.
+    """
+    tips = [computed({"distributed": load}, theory, SPIN, time=TIME).history["tip_u2"] for load in SAME[case]]
+    size = np.abs(tips[0]).max()
+    allowed = 1e-3 if case == "ramp" else 1e-7
+    for tip in tips[1:]:
+        np.testing.assert_allclose(tip, tips[0], rtol=0, atol=allowed * size)
+
+
+def test_reduced_model_knows_all_loads() -> None:
+    """The reduced model is exact in time to 1e-5, and the march of 2 ms to 1e-3 of the tip."""
+    loads = {
+        "distributed": SAME["harmonic"][0],
+        "at": [{"x": 4.0, "force": {"over_time": [[0, 0, 0], [0.1, 0, 5.0], [0.2, 0, 0.0]]}}],
+    }
+    tips = {}
+    for name, model in (("march", {}), ("reduced", {"reduced": True})):
+        tables = {"theory": "consistent_linear", **model}
+        tips[name] = computed(loads, motion=SPIN, time={"end": 0.4, "step": 2e-3}, model=tables).history["tip_u2"]
+    size = np.abs(tips["march"]).max()
+    np.testing.assert_allclose(tips["reduced"], tips["march"], rtol=0, atol=2e-3 * size)
+
+
+def test_dead_loads_turn_with_the_hub_in_the_inertial_frame() -> None:
+    """Both frames, generalised-α of 2.5 ms: the difference is that of their second-order errors, 5e-4 here."""
+    loads = {
+        "distributed": {"over_span": [[0, 0.5, 0], [L, 0, Q]]},
+        "at": [{"x": 5.0, "force": [0.5, 2.0], "moment": 1.0}],
+    }
+    last = []
+    for frame in ("rotating", "inertial"):
+        model = {"theory": "reissner", "frame": frame}
+        last.append(computed(loads, motion=SPIN, model=model, time={"end": 1.0, "step": 2.5e-3}).history["tip_u2"][-1])
+    assert last[1] == pytest.approx(last[0], rel=1e-3)
+
+
+def test_steps_land_on_the_knots_of_loads_over_span_and_time() -> None:
+    """A blow of 1 ms within a step of 10 ms gives its impulse: what a tenth of the step computes, to 2 %."""
+    rows = [[x, t, 0, f * x / L] for x in (0, L) for t, f in ((0, 0), (0.0123, 0), (0.0128, 1e3), (0.0133, 0), (1, 0))]
+    last = []
+    for step in (0.01, 0.001):
+        time = {"end": 0.2, "step": step, "output_step": 0.01}
+        last.append(computed({"distributed": {"over_span_and_time": rows}}, motion=SPIN, time=time).history["tip_u2"])
+    assert np.abs(last[0] - last[1]).max() < 0.02 * np.abs(last[1]).max()
