@@ -110,7 +110,7 @@ def campbell(
         sweep = Diagram(variant, Problem.of(variant, terms=terms), values, comm, hint)
         return sweep.result(orders, progress or (lambda share: None), started)
 
-    scene.check_steady("what modes are about")
+    scene.check_tables("what modes are about")
     with input_of(scene.file):
         if scene.accuracy is None:
             return attempt()

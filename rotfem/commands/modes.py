@@ -85,7 +85,7 @@ def modes(
             add_participation(found)
         return found
 
-    scene.check_steady("what modes are about")
+    scene.check_tables("what modes are about")
     with input_of(scene.file):
         if scene.accuracy is None:
             return attempt()

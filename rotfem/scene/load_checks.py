@@ -6,7 +6,6 @@ from typing import Any
 
 from rotfem.scene.loads import Loads, MomentLoad, Pressure
 from rotfem.scene.motion import Motion
-from rotfem.scene.stepping import Time
 from rotfem.scene.values import problem
 
 #: Part of the length by which a place may be beside the structure.
@@ -16,8 +15,8 @@ NEAR = 1e-9
 KEYS = "write over_time = [[t, …], …], over_span = [[x, …], …] or over_span_and_time = [[x, t, …], …]"
 
 
-def check_loads(structure: Any, motion: Motion, loads: Loads, time: Time | None) -> None:
-    """Refuse loads that the structure cannot bear, and tables that may be of two kinds."""
+def check_loads(structure: Any, motion: Motion, loads: Loads) -> None:
+    """Refuse loads that the structure cannot bear."""
     _check_moment("loads.tip_moment", structure, loads.tip_moment)
     for i, point in enumerate(loads.at):
         check_place(f"loads.at.{i}.x", structure, point.x)
@@ -29,12 +28,28 @@ def check_loads(structure: Any, motion: Motion, loads: Loads, time: Time | None)
         raise problem("loads.pressure", None, f"needs a plate; on a {structure.type} give loads.distributed")
     for name, load in loads.spread.items():
         _check_span(f"loads.{name}", structure, load.span_rows)
-        length = structure.length
-        if time is not None and load.table is not None and load.table[0][0] == 0.0 and load.table[-1][0] == length:
-            what = f"is a table from 0 to {length:g}, the length: it may be one over time or over the span"
-            raise problem(f"loads.{name}", None, f"{what}; {KEYS}")
     _check_regions(structure, loads.pressure)
     _check_harmonics(motion, loads)
+
+
+def doubtful_table(structure: Any, loads: Loads, when: str) -> tuple[str, str] | None:
+    """Return (key, what is wrong) of a table without a key that may be over the span; None if there is none.
+
+    Args:
+        structure: of the scene.
+        loads: on it.
+        when: what is computed at one time, as "a steady state"; "" for a history, where such a table is over time
+            unless it runs from 0 to the length.
+    """
+    for name, load in loads.spread.items():
+        if load.table is None:
+            continue
+        if when:
+            return f"loads.{name}", f"is a table [[t, …], …] over time, which {when} does not have; {KEYS}"
+        if load.table[0][0] == 0.0 and load.table[-1][0] == structure.length:
+            what = f"is a table from 0 to {structure.length:g}, the length: it may be one over time or over the span"
+            return f"loads.{name}", f"{what}; {KEYS}"
+    return None
 
 
 def check_place(key: str, structure: Any, x: tuple[float, ...]) -> None:

@@ -35,7 +35,7 @@ from rotfem.scene.consistency import (
 )
 from rotfem.scene.digest import abridged
 from rotfem.scene.limits import Limits, limits_of
-from rotfem.scene.load_checks import KEYS, check_loads
+from rotfem.scene.load_checks import check_loads, doubtful_table
 from rotfem.scene.loads import Load, Loads
 from rotfem.scene.motion import (
     AnyMotion,
@@ -219,22 +219,19 @@ class Scene(SceneModel):
                 f'missing; with motion.type = "{self.motion.type}" a run is a time history: give [time] with end and '
                 "step (or tolerance). Only constant motion has a steady state to run without it",
             )
-        if self.time is None:
-            self.check_steady("a steady state")
+        self.check_tables("a steady state" if self.time is None else "")
 
-    def check_steady(self, what: str) -> None:
-        """Check that no load along the structure is given by a table that may be one over the span.
+    def check_tables(self, when: str) -> None:
+        """Check that no table of a load along the structure may be of two kinds.
 
         Args:
-            what: is to be computed, at one time.
+            when: what is computed at one time, where loads have no course over it; "" for a history.
 
         Raises:
-            SceneError: there is one, which over time has no meaning there.
+            SceneError: there is one.
         """
-        for name, load in self.loads.spread.items():
-            if load.table is not None:
-                why = f"is a table [[t, …], …] over time, which {what} does not have; {KEYS}"
-                raise SceneError(self._file, f"loads.{name}", None, why)
+        if (found := doubtful_table(self.structure, self.loads, when)) is not None:
+            raise SceneError(self._file, found[0], None, found[1])
 
     @model_validator(mode="before")
     @classmethod
@@ -250,7 +247,7 @@ class Scene(SceneModel):
         vars(self)["mesh"] = self.mesh.suited(self.structure)
         if self.structure.is_planar:
             check_planar(self.motion, self.loads)
-        check_loads(self.structure, self.motion, self.loads, self.time)
+        check_loads(self.structure, self.motion, self.loads)
         check_mesh(self.structure, self.mesh)
         check_theory(self.structure, self.model)
         check_frame(self.structure, self.motion, self.model)

@@ -23,7 +23,6 @@ def scene(loads: Any, **more: Any) -> Scene:
 
 #: loads, further tables, and words of the one error they make when the scene is read.
 REFUSED: dict[str, tuple[Any, dict[str, Any], str]] = {
-    "from 0 to the length": ({"distributed": [[0, 0, 0], [10, 0, 1]]}, TIME, "over_span"),
     "beyond the span": ({"distributed": {"over_span": [[0, 0, 0], [11, 0, 1]]}}, {}, "x = 11"),
     "columns": ({"distributed": {"over_span": [[0, 0], [10, 1]]}}, {}, "row 1 has 2 entries"),
     "two ways": ({"distributed": {"over_span": RAMP, "value": [0, 1]}}, {}, "exactly one of"),
@@ -68,6 +67,8 @@ def test_a_bare_table_is_over_time_in_a_history_and_refused_elsewhere() -> None:
     for command, more in ((rotfem.run, {}), (rotfem.modes, TIME), (rotfem.modes, {})):
         with pytest.raises(SceneError, match=r"over_time .* over_span .* over_span_and_time"):
             command(scene({"distributed": RAMP}, **more))
+    with pytest.raises(SceneError, match=r"from 0 to 10, the length.* over_span"):
+        rotfem.run(scene({"distributed": [[0, 0, 0], [10, 0, 1]]}, **TIME))
     with pytest.raises(SceneError, match="over_span"):
         rotfem.campbell(scene({"distributed": RAMP}), "1:2:2")
 
