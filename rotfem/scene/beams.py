@@ -13,6 +13,7 @@ from rotfem.scene.beam_files import with_tables
 from rotfem.scene.clamp_and_damping import Damping, check_one_hub
 from rotfem.scene.magnitudes import check_magnitudes
 from rotfem.scene.plates import PlateStructure
+from rotfem.scene.point_masses import PointMass, as_inertia, check_masses
 from rotfem.scene.reference_line import ReferenceLine, as_line, line_through
 from rotfem.scene.section import PlanarSection
 from rotfem.scene.section_spatial import SpatialSection
@@ -28,16 +29,9 @@ from rotfem.scene.values import (
     Profile,
     Vector,
     as_rows,
-    as_symmetric_matrix,
     check_profile_length,
     problem,
 )
-
-
-def _as_inertia(value: Any) -> float | Matrix:
-    if isinstance(value, list | tuple):
-        return as_symmetric_matrix(value, 3, definite=False)
-    return Bounds(ge=0.0).number(value)
 
 
 def _as_sweep(value: Any) -> Profile:
@@ -65,6 +59,7 @@ class PlanarBeamStructure(StructureTable):
         hub_radius: distance of the clamp from the axis of rotation (m).
         tip_mass: mass at the free end (kg).
         tip_inertia: its moment of inertia about axis 3 (kg·m²).
+        masses: further masses along the beam.
         section: cross-section.
         damping: damping coefficients.
     """
@@ -74,6 +69,7 @@ class PlanarBeamStructure(StructureTable):
     hub_radius: NonNegative = 0.0
     tip_mass: NonNegative = 0.0
     tip_inertia: NonNegative = 0.0
+    masses: tuple[PointMass, ...] = ()
     section: PlanarSection = Field(description="a table of section properties")
     damping: Damping = Damping()
 
@@ -84,8 +80,8 @@ class PlanarBeamStructure(StructureTable):
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Places (m) of the rows of tapers between the ends."""
-        return self.section.breakpoints
+        """Places (m) of the rows of tapers between the ends, and of masses."""
+        return apart({*self.section.breakpoints, *(body.x for body in self.masses)}, self.length)
 
     @property
     def release_limit(self) -> float:
@@ -94,8 +90,8 @@ class PlanarBeamStructure(StructureTable):
 
     @property
     def has_tip_mass(self) -> bool:
-        """Whether there is anything at the tip that has inertia."""
-        return self.tip_mass > 0.0 or self.tip_inertia > 0.0
+        """Whether there is anything at the tip, or at another point, that has inertia."""
+        return self.tip_mass > 0.0 or self.tip_inertia > 0.0 or bool(self.masses)
 
     @property
     def has_rotary_inertia(self) -> bool:
@@ -105,7 +101,7 @@ class PlanarBeamStructure(StructureTable):
     def mean_beam(self) -> MeanBeam:
         """Return the uniform beam with the mean of its section."""
         s = means(self.section.at, self.length)
-        mass = s["mass_per_length"] + self.tip_mass / self.length
+        mass = s["mass_per_length"] + (self.tip_mass + sum(body.mass for body in self.masses)) / self.length
         return MeanBeam(self.length, self.hub_radius, s["EA"], mass, {"lag": (s["EI"], 0.0)})
 
     @model_validator(mode="before")
@@ -117,6 +113,7 @@ class PlanarBeamStructure(StructureTable):
     @model_validator(mode="after")
     def _check_tapers(self) -> Self:
         _check_section(self.section, self.length)
+        check_masses(self.masses, self.length, planar=True)
         return self
 
 
@@ -131,6 +128,7 @@ class SpatialBeamStructure(StructureTable):
         tip_mass: mass at the free end (kg).
         tip_inertia: its inertia tensor (kg·m²) as 3×3 rows, or a number for an isotropic one.
         tip_offset: position of its center relative to the end of the axis, in section axes (m).
+        masses: further masses along the beam.
         section: cross-section.
         pretwist: angle of the section axes about the beam axis (rad), a number or a taper. May also stand in the
             section table.
@@ -149,8 +147,9 @@ class SpatialBeamStructure(StructureTable):
     hub_radius: NonNegative = 0.0
     hub_offset: Vector | None = None
     tip_mass: NonNegative = 0.0
-    tip_inertia: Annotated[float | Matrix, PlainValidator(_as_inertia)] = 0.0
+    tip_inertia: Annotated[float | Matrix, PlainValidator(as_inertia)] = 0.0
     tip_offset: Vector = (0.0, 0.0, 0.0)
+    masses: tuple[PointMass, ...] = ()
     section: SpatialSection = Field(description="a table of section properties")
     pretwist: AnyProfile = 0.0
     sweep: Annotated[Profile, PlainValidator(_as_sweep)] = 0.0
@@ -166,7 +165,7 @@ class SpatialBeamStructure(StructureTable):
     @property
     def knots(self) -> tuple[float, ...]:
         """Places (m) of all rows of tables over the span, increasing; a mesh should have a node at each."""
-        places = set(self.section.breakpoints)
+        places = {*self.section.breakpoints, *(body.x for body in self.masses)}
         for profile in (self.pretwist, self.sweep):
             places |= {x for x, _ in profile[1:-1]} if isinstance(profile, tuple) else set()
         line = self.reference_line
@@ -184,8 +183,8 @@ class SpatialBeamStructure(StructureTable):
 
     @property
     def has_tip_mass(self) -> bool:
-        """Whether there is anything at the tip that has inertia."""
-        return self.tip_mass > 0.0 or bool(np.any(self.tip_inertia_matrix != 0.0))
+        """Whether there is anything at the tip, or at another point, that has inertia."""
+        return self.tip_mass > 0.0 or bool(np.any(self.tip_inertia_matrix != 0.0)) or bool(self.masses)
 
     @property
     def has_rotary_inertia(self) -> bool:
@@ -197,7 +196,7 @@ class SpatialBeamStructure(StructureTable):
         if self.section.given.keys() & {"stiffness", "mass"}:
             return None
         s = means(self.section.central, self.length)
-        mass = s["mass_per_length"] + self.tip_mass / self.length
+        mass = s["mass_per_length"] + (self.tip_mass + sum(body.mass for body in self.masses)) / self.length
         bending = {"flap": (s["EI2"], 1.0), "lag": (s["EI3"], 0.0)}
         return MeanBeam(self.length, self.hub_radius, s["EA"], mass, bending)
 
@@ -230,6 +229,7 @@ class SpatialBeamStructure(StructureTable):
         if self.line is not None and self.sweep != 0.0:
             raise problem("sweep", None, "cannot be combined with line, which holds it")
         check_one_hub(self.hub_radius, self.hub_offset)
+        check_masses(self.masses, self.length, planar=False)
         return self
 
 

@@ -51,6 +51,14 @@ UNITS: dict[str, Unit] = {
     "loads.gravity": "m/s**2",
     "loads.tip_force": "N",
     "loads.tip_moment": "N*m",
+    "loads.pressure": "Pa",
+    "loads.at.x": "m",
+    "loads.at.force": "N",
+    "loads.at.moment": "N*m",
+    "structure.masses.x": "m",
+    "structure.masses.mass": "kg",
+    "structure.masses.offset": "m",
+    "structure.masses.inertia": ("kg*m**2",),
     **{f"time.{key}": "s" for key in ("end", "step", "max_step", "min_step", "output_step")},
 }
 
@@ -62,6 +70,12 @@ DEPENDING: dict[str, tuple[str, dict[str, Unit]]] = {
         {"planar_beam": "N/m", "spatial_beam": "N/m", "plate": "N/m**2"},
     ),
 }
+
+#: What any load may have below it ↦ its unit; the unit of what is not here is that of the load.
+HARMONIC: dict[str, Unit] = {"harmonic.frequency": "rad/s", "harmonic.per_rev": "", "harmonic.phase": "rad"}
+
+#: Tables of loads whose first columns are no times ↦ units of these.
+OVER: dict[str, tuple[str, ...]] = {"over_span": ("m",), "amplitude": ("m",), "over_span_and_time": ("m", "s")}
 
 #: Part of a scene ↦ unit of the first column of its tables.
 _ABSCISSAE = {"structure": "m", "motion": "s", "loads": "s"}
@@ -97,7 +111,8 @@ def _converted(value: Any, path: tuple[str, ...], unit_of: Callable[[str], Unit 
     if unit is None or (isinstance(value, str) and not is_quantity(value)):
         return value
     try:
-        return _in_units(value, unit, _ABSCISSAE.get(path[0], ""))
+        first = OVER.get(path[-1], (_ABSCISSAE.get(path[0], ""),))
+        return _in_units(value, unit, first)
     except ValueError as error:
         raise SceneError(file, ".".join(path), value, str(error)) from None
 
@@ -110,6 +125,8 @@ def _has_text(value: Any) -> bool:
 
 def _unit_of(key: str, tables: Mapping[str, Any]) -> Unit | None:
     """Return the unit of a dotted key, or of the nearest table above that has one; None if there is none."""
+    if key.startswith("loads.") and (own := HARMONIC.get(".".join(key.split(".")[-2:]))) is not None:
+        return own
     while key:
         if key in UNITS:
             return UNITS[key]
@@ -122,20 +139,20 @@ def _unit_of(key: str, tables: Mapping[str, Any]) -> Unit | None:
     return None
 
 
-def _in_units(value: Any, unit: Unit, abscissa: str) -> Any:
+def _in_units(value: Any, unit: Unit, first: tuple[str, ...]) -> Any:
     """Return a value, a vector or a table as numbers.
 
     Args:
         value: a text, a number, or lists of them.
         unit: of the numbers, or of the columns of the rows.
-        abscissa: unit of the first column of a table whose columns have no units of their own.
+        first: units of the first columns of a table whose columns have no units of their own.
     """
     if isinstance(value, str):
         return quantity(value, unit if isinstance(unit, str) else unit[0])
     if not isinstance(value, list | tuple):
         return value
     if any(isinstance(entry, list | tuple) for entry in value):
-        columns = unit if isinstance(unit, tuple) else (abscissa, unit)
+        columns = unit if isinstance(unit, tuple) else (*first, unit)
         return [_row(entry, columns) if isinstance(entry, list | tuple) else entry for entry in value]
     return _row(value, unit if isinstance(unit, tuple) else (unit,))
 

@@ -54,7 +54,9 @@ class Beam(Structure):
         k = grid.degree
         self.discretise(interval, k)
         reduced = 2 * k - 2 if grid.integration == "reduced" else 2 * k
-        self.points = Points(self.mesh, [point.x for point in self.point_loads])
+        self.masses = getattr(self.data, "masses", ())
+        places = [*(point.x for point in self.point_loads), *((body.x,) for body in self.masses)]
+        self.points = Points(self.mesh, places)
         dx = ufl.Measure("dx", self.mesh, subdomain_data=self.points.subdomains)
         self.dx_elastic, self.dx = (dx(metadata={"quadrature_degree": degree}) for degree in (reduced, 2 * k))
         near = self.length * END

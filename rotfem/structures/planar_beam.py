@@ -80,7 +80,22 @@ class PlanarBeam(Beam):
             bodies.append(Body(r, self.scalar("tip_mass", s.tip_mass), self.tip, True, "tip_mass"))
         if "tip_mass" in effects and s.tip_inertia > 0:
             bodies.append(Body(director, self.scalar("tip_inertia", s.tip_inertia), self.tip, False, "tip_mass"))
-        return bodies
+        return bodies + self._point_masses() if "tip_mass" in effects else bodies
+
+    def _point_masses(self) -> list[Body]:
+        """Return the masses along the beam and their directors."""
+        out, q = [], self.k.q
+        for i, body in enumerate(self.masses):
+            at, name = self.points.measure((body.x,)), f"masses_{i}"
+            arm = [self.scalar(f"{name}_offset_{j}", c) for j, c in enumerate(body.offset[:2], start=1)]
+            r = self.position(q)
+            x = r + self.turned(q, arm) if any(body.offset) else r
+            if body.mass > 0:
+                out.append(Body(x, self.scalar(name, body.mass), at, True, "tip_mass"))
+            if body.inertia > 0:
+                inertia = self.scalar(f"{name}_inertia", body.inertia)
+                out.append(Body(self.triad(q)[1], inertia, at, False, "tip_mass"))
+        return out
 
     def loads(self) -> list[AppliedLoad]:
         """Return the problem's non-zero loads; dead ones keep their direction in the frame, followers turn with t_i."""

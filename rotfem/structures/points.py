@@ -46,7 +46,7 @@ def locate(domain: Any, point: Sequence[float]) -> PointPlace | None:
         corners = domain.geometry.x[domain.geometry.dofmap[cells[0]]]
         where = domain.geometry.cmap.pull_back(x[:, :tdim], corners[:, :tdim])
         if tdim == 1:  # a node, and all nodes are to have one form
-            where = np.round(where, NODE)
+            where = np.round(where, NODE) + 0.0
     where = comm.bcast(where, root=first[1])
     return PointPlace(cells, where)
 
@@ -64,9 +64,8 @@ def point_measure(domain: Any, subdomains: Any, tag: int, place: PointPlace) -> 
     """
     rule = {
         "quadrature_rule": "custom",
-        "quadrature_points": place.reference,
-        "quadrature_weights": np.ones(1),
-        "digits": repr(place.reference.tolist()),  # forms are told apart by text, which cuts an array short
+        "quadrature_points": place.reference.view(_Digits),
+        "quadrature_weights": np.ones(1).view(_Digits),
     }
     measure = ufl.Measure("dx", domain=domain, subdomain_data=subdomains, subdomain_id=tag, metadata=rule)
     return _AtPoint(measure, 1 / abs(ufl.JacobianDeterminant(domain)))
@@ -107,6 +106,15 @@ class Points:
         """Return the measure of one of the points."""
         tag = self._tags[tuple(point)]
         return point_measure(self._domain, self.subdomains, tag, self._places[tag - 1])
+
+
+class _Digits(np.ndarray):  # type: ignore[type-arg]
+    """An array by all digits of which UFL tells forms apart; the text of one that is long is cut short."""
+
+    @property
+    def ufl_signature(self) -> str:
+        """All digits."""
+        return repr(self.tolist())
 
 
 @dataclass(frozen=True)

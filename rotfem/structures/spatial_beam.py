@@ -181,17 +181,37 @@ class SpatialBeam(Beam):
         return Director(self._from_triad(axis), density, measure, effect=effect, turn=self._turn)
 
     def _tip_bodies(self) -> list[Body]:
-        s, out = self.data, []
-        if s.tip_mass > 0:
-            pairs = enumerate(s.tip_offset, start=1)
-            center = tuple(self.scalar(f"tip_offset_{i}", c) if c != 0.0 else 0 for i, c in pairs)
-            out.append(self._mass(self.scalar("tip_mass", s.tip_mass), center, self.tip, "tip_mass"))
-        for i, (moment, axis) in enumerate(euler_tensor(s.tip_inertia_matrix), start=1):
-            if isinstance(s.tip_inertia, float):  # isotropic: each director has half of it
-                density = self.scalar("tip_inertia", s.tip_inertia) / 2
+        """Return the mass at the tip and those along the beam, and their directors."""
+        s = self.data
+        out = self._rigid_body("tip", self.tip, s.tip_mass, s.tip_offset, (s.tip_inertia, s.tip_inertia_matrix))
+        for i, body in enumerate(self.masses):
+            at, inertia = self.points.measure((body.x,)), (body.inertia, body.inertia_matrix)
+            out += self._rigid_body(f"masses_{i}", at, body.mass, body.offset, inertia)
+        return out
+
+    def _rigid_body(self, name: str, at: Any, mass: float, offset: Any, inertia: tuple[Any, Any]) -> list[Body]:
+        """Return a mass that is fixed to a section, and its directors.
+
+        Args:
+            name: of its constants.
+            at: measure of its place.
+            mass: kg.
+            offset: of its center from the axis, section axes, m.
+            inertia: about the center, kg·m²: as it is given, and its tensor.
+        """
+        given, tensor = inertia
+        out = []
+        if mass > 0:
+            center = tuple(
+                self.scalar(f"{name}_offset_{i}", c) if c != 0.0 else 0 for i, c in enumerate(offset, start=1)
+            )
+            out.append(self._mass(self.scalar(f"{name}_mass", mass), center, at, "tip_mass"))
+        for i, (moment, axis) in enumerate(euler_tensor(tensor), start=1):
+            if isinstance(given, float):  # isotropic: each director has half of it
+                density = self.scalar(f"{name}_inertia", given) / 2
             else:
-                density = self.scalar(f"tip_director_inertia_{i}", moment)
-            out.append(self._director(tuple(axis), density, self.tip, "tip_mass"))
+                density = self.scalar(f"{name}_director_inertia_{i}", moment)
+            out.append(self._director(tuple(axis), density, at, "tip_mass"))
         return out
 
     def loads(self) -> list[AppliedLoad]:
