@@ -1,8 +1,8 @@
 """rotfem: rotating beams and plates with FEniCSx.
 
-One noun, the scene (`Scene`, `load_scene`), and verbs on it (`run`, `modes`, `campbell`, `explain`, `cost`); between
-scene and equations stands the `Problem`, which a script can build too. `register` adds a `Theory`, `Effect`, `Scheme`,
-`Shape` or `Output` of a user's own. What computes loads FEniCSx when first used.
+One noun, the scene (`Scene`, `load_scene`), and verbs on it (`check`, `run`, `modes`, `campbell`, `explain`, `cost`);
+between scene and equations stands the `Problem`, which a script can build too. `register` adds a `Theory`, `Effect`,
+`Scheme`, `Shape` or `Output` of a user's own. What computes loads FEniCSx when first used.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rotfem.analysis.esdirk import ESDIRK4
     from rotfem.analysis.schemes import Scheme, Stage, State
     from rotfem.commands.campbell import campbell
+    from rotfem.commands.check import check
     from rotfem.commands.cost.result import CostResult
     from rotfem.commands.cost.study import cost
     from rotfem.commands.explain import explain
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from rotfem.mechanics.motion import Motion
     from rotfem.mechanics.outputs import Output
     from rotfem.mechanics.theories import Theory
-    from rotfem.results import CampbellResult, ExplainResult, ModesResult, RunResult
+    from rotfem.results import CampbellResult, CheckResult, ExplainResult, ModesResult, RunResult
     from rotfem.scene import BeamMesh, PlateMesh
     from rotfem.scene.beams import PlanarBeamStructure as PlanarBeam
     from rotfem.scene.beams import SpatialBeamStructure as SpatialBeam
@@ -45,6 +46,7 @@ _HOMES = {
     "analysis.esdirk": ("ESDIRK4",),
     "analysis.schemes": ("Scheme", "Stage", "State"),
     "commands.campbell": ("campbell",),
+    "commands.check": ("check",),
     "commands.cost.study": ("cost",),
     "commands.explain": ("explain",),
     "commands.modes": ("modes",),
@@ -57,7 +59,7 @@ _HOMES = {
     "mechanics.outputs": ("Output",),
     "mechanics.theories": ("Theory",),
     "commands.cost.result": ("CostResult",),
-    "results": ("CampbellResult", "ExplainResult", "ModesResult", "RunResult"),
+    "results": ("CampbellResult", "CheckResult", "ExplainResult", "ModesResult", "RunResult"),
     "scene": ("BeamMesh", "PlateMesh"),
     "scene.section_shapes": ("Geometry", "Shape"),
 }
@@ -72,6 +74,7 @@ __all__ = [
     "ESDIRK4",
     "BeamMesh",
     "CampbellResult",
+    "CheckResult",
     "ComputationError",
     "ConstantLoad",
     "CostResult",
@@ -103,6 +106,7 @@ __all__ = [
     "Torque",
     "__version__",
     "campbell",
+    "check",
     "cost",
     "explain",
     "load_scene",

@@ -15,7 +15,7 @@ import typer
 
 from rotfem.commands.console import Session
 from rotfem.commands.options import as_path, folder_name, listed
-from rotfem.commands.printed import campbell_report, explain_report, modes_report, run_report
+from rotfem.commands.printed import campbell_report, check_report, explain_report, modes_report, run_report
 from rotfem.commands.result_folder import ResultFolder, Writer
 from rotfem.errors import ComputationError, input_of
 from rotfem.scene import Scene, load_scene
@@ -211,6 +211,14 @@ def campbell(
     with todo.progress() as progress:
         result = sweep(todo.scene, speeds, orders=per_rev, progress=progress, hint=todo.hint)
     todo.finish(result, campbell_report)
+
+
+@command(computes=False)
+def check(todo: Job) -> None:
+    """Say what the structure of SCENE is, mass, moments, inertias, and draw it, before anything is computed."""
+    from rotfem.commands.check import check as look
+
+    todo.finish(look(todo.scene), check_report)
 
 
 @command(computes=False)

@@ -55,6 +55,26 @@ def reduced_report(summary: dict[str, Any]) -> str:
     )
 
 
+def check_report(summary: dict[str, Any], folder: Path) -> list[str]:
+    """Return the lines `check` prints."""
+
+    def vector(name: str) -> str:
+        return ", ".join(f"{value:.6g}" for value in summary[name])
+
+    lines = [
+        f"{summary['name']}: {summary['type']}, length {summary['length']:.9g} m, {summary['elements']} elements",
+        f"mass                    {summary['mass']:.9g} kg",
+        f"centre of mass          ({vector('center_of_mass')}) m from the origin of the frame",
+        f"first moments           ({vector('first_moment_root')}) kg·m about the clamp at ({vector('root')}) m",
+        f"inertia about the axis  {summary['inertia_axis']:.9g} kg·m² of rotation",
+    ]
+    for where in ("root", "center"):
+        name = {"root": "the clamp", "center": "its centre of mass"}[where]
+        rows = ["  ".join(f"{value:13.6g}" for value in row) for row in summary[f"inertia_{where}"]]
+        lines += [f"inertia about {name}, kg·m²", *(f"  {row}" for row in rows)]
+    return [*lines, f"results in {folder}"]
+
+
 def modes_report(summary: dict[str, Any], folder: Path) -> list[str]:
     """Return the lines `modes` prints: a table."""
     units = ShownUnits.of(summary)

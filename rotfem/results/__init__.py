@@ -1,6 +1,7 @@
 """What a computation returns, and how it is written, drawn and read: plain arrays, no dolfinx."""
 
 from rotfem.results.campbell import CampbellResult, CriticalSpeed, Instability
+from rotfem.results.check import CheckResult
 from rotfem.results.explain import ExplainResult
 from rotfem.results.modes import ModesResult
 from rotfem.results.result import Result
@@ -8,6 +9,7 @@ from rotfem.results.run import RunResult
 
 __all__ = [
     "CampbellResult",
+    "CheckResult",
     "CriticalSpeed",
     "ExplainResult",
     "Instability",

@@ -14,7 +14,7 @@ from rotfem.scene.clamp_and_damping import Damping, check_one_hub
 from rotfem.scene.magnitudes import check_magnitudes
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.point_masses import PointMass, as_inertia, check_masses
-from rotfem.scene.reference_line import ReferenceLine, as_line, line_through
+from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_through
 from rotfem.scene.section import PlanarSection
 from rotfem.scene.section_spatial import SpatialSection
 from rotfem.scene.structure import MeanBeam, StructureTable, apart, means
@@ -158,16 +158,19 @@ class SpatialBeamStructure(StructureTable):
     damping: Damping = Damping()
 
     @property
-    def reference_line(self) -> ReferenceLine | None:
-        """The curved axis; None where it is straight, or swept by an angle."""
-        return None if self.line is None else line_through(self.line)
+    def reference_line(self) -> ReferenceLine | SweptLine | None:
+        """The axis before precone, through points or by its angle; None where it is straight, along direction 1."""
+        if self.line is not None:
+            return line_through(self.line)
+        if isinstance(self.sweep, tuple):
+            return SweptLine(self.sweep)
+        return SweptLine(((0.0, self.sweep), (self.length, self.sweep))) if self.sweep != 0.0 else None
 
     @property
     def knots(self) -> tuple[float, ...]:
         """Places (m) of all rows of tables over the span, increasing; a mesh should have a node at each."""
         places = {*self.section.breakpoints, *(body.x for body in self.masses)}
-        for profile in (self.pretwist, self.sweep):
-            places |= {x for x, _ in profile[1:-1]} if isinstance(profile, tuple) else set()
+        places |= {x for x, _ in self.pretwist[1:-1]} if isinstance(self.pretwist, tuple) else set()
         line = self.reference_line
         return apart(places | set(line.knots if line is not None else ()), self.length)
 

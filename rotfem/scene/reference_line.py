@@ -121,6 +121,51 @@ class ReferenceLine:
         return np.arctan2(t[:, 1], t[:, 0]), np.arcsin(np.clip(t[:, 2], -1.0, 1.0))
 
 
+@dataclass(frozen=True)
+class SweptLine:
+    """A line in the plane (1, 2) by its angle: arcs between rows (x, angle), kinks where one x stands in two.
+
+    Attributes:
+        rows: arc length (m) and angle (rad).
+    """
+
+    rows: Matrix
+
+    @cached_property
+    def knots(self) -> tuple[float, ...]:
+        """Arc lengths of all rows between the ends (m)."""
+        return tuple(sorted({x for x, _ in self.rows[1:-1]}))
+
+    def at(self, x: npt.ArrayLike, near: npt.ArrayLike | None = None) -> tuple[Array, Array]:
+        """Return (position in m, unit tangent), each (n, 3), at arc lengths x (n,) (see `ReferenceLine.at`).
+
+        The position is (∫ cos χ, ∫ sin χ, 0), exact, arc by arc.
+        """
+        places = np.atleast_1d(np.asarray(x, dtype=np.float64))
+        position = np.zeros((len(places), 3))
+        for (a, first), (b, last) in pairwise(self.rows):
+            if b == a:
+                continue
+            s = np.clip(places, a, b) - a
+            curvature = (last - first) / (b - a)
+            half = 0.5 * curvature * s
+            chord = s * np.sinc(half / np.pi)  # 2 sin(κs/2)/κ
+            position[:, 0] += chord * np.cos(first + half)
+            position[:, 1] += chord * np.sin(first + half)
+        chi = self.angles(places, near)[0]
+        return position, np.stack([np.cos(chi), np.sin(chi), np.zeros(len(places))], axis=-1)
+
+    def angles(self, x: npt.ArrayLike, near: npt.ArrayLike | None = None) -> tuple[Array, Array]:
+        """Return (sweep χ, bend ζ = 0), each (n,) in rad."""
+        places = np.atleast_1d(np.asarray(x, dtype=np.float64))
+        side = places if near is None else np.atleast_1d(np.asarray(near, dtype=np.float64))
+        rows = np.array(self.rows)
+        row = np.clip(np.searchsorted(rows[:, 0], side) - 1, 0, len(rows) - 2)
+        (a, first), (b, last) = rows[row].T, rows[row + 1].T
+        span = np.where(b > a, b - a, 1.0)
+        return first + (last - first) * (places - a) / span, np.zeros(len(places))
+
+
 def _lengths(spline: Any) -> Array:
     """Return the arc length of each part between two points (m)."""
     a, b = spline.x[:-1], spline.x[1:]

@@ -93,13 +93,13 @@ class SpatialBeam(Beam):
         X = ufl.SpatialCoordinate(self.mesh)[0]
         self._axis = X * e_1
         sweep, line = self.data.sweep, self.data.reference_line
-        if line is not None:
+        if self.data.line is not None:
             chi, zeta, r = curved_axis(self, line)
             self._axis = r[0] * e_1 + r[1] * e_2 + r[2] * e_3
             e_1, e_2 = ufl.cos(chi) * e_1 + ufl.sin(chi) * e_2, ufl.cos(chi) * e_2 - ufl.sin(chi) * e_1
             e_1, e_3 = ufl.cos(zeta) * e_1 + ufl.sin(zeta) * e_3, ufl.cos(zeta) * e_3 - ufl.sin(zeta) * e_1
         elif sweep != 0.0:
-            chi, along, across = swept_axis(self, sweep)
+            chi, along, across = swept_axis(self, sweep, line)
             self._axis = along * e_1 + across * e_2
             e_1, e_2 = ufl.cos(chi) * e_1 + ufl.sin(chi) * e_2, ufl.cos(chi) * e_2 - ufl.sin(chi) * e_1
         if isinstance(twist, tuple) and any(angle != 0.0 for _, angle in twist):

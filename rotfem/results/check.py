@@ -1,0 +1,87 @@
+"""What a check returns: what a structure is before it is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.results.files import csv_text, json_text
+from rotfem.results.frames import Variable, dataset, frame
+from rotfem.results.result import Result
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.figure import Figure
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass
+class CheckResult(Result):
+    """Outcome of `rotfem check`. Vectors and tensors are in frame axes.
+
+    Attributes:
+        summary: `length` (m), `mass` (kg), `center_of_mass` (m, from the origin of the frame), `root` (position of the
+            clamp, m), `first_moment_root` (kg·m), `inertia_root` and `inertia_center` (kg·m², 3×3, about the clamp and
+            the centre of mass), `inertia_axis` (kg·m², about the axis of rotation), `elements`, warnings; JSON-able.
+        columns: of a beam, properties along it over `x` (m).
+        nodes: coordinates of the nodes by name (m).
+        triangles: between the nodes, of a plate; None of a beam.
+    """
+
+    summary: dict[str, Any]
+    columns: dict[str, Array]
+    nodes: dict[str, Array]
+    triangles: npt.NDArray[np.int64] | None = None
+
+    @property
+    def mass(self) -> float:
+        """All mass, of the tip too, kg."""
+        return float(self.summary["mass"])
+
+    @property
+    def center_of_mass(self) -> Array:
+        """Centre of mass from the origin of the frame, m, shape (3,)."""
+        return np.array(self.summary["center_of_mass"])
+
+    @property
+    def inertia(self) -> Array:
+        """Inertia tensor about the clamp, kg·m², shape (3, 3)."""
+        return np.array(self.summary["inertia_root"])
+
+    def files(self) -> dict[str, str]:
+        """Return check.csv, of a beam, and summary.json."""
+        table = {"check.csv": csv_text(self.columns)} if self.columns else {}
+        return {**table, "summary.json": json_text(self.summary)}
+
+    def drawings(self) -> dict[str, Callable[[], Figure]]:
+        """Return check.png."""
+        from rotfem.results.plots_check import check_figure
+
+        return {"check.png": partial(check_figure, self)}
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the properties along a beam, indexed by `x`; of a plate the coordinates of its nodes.
+
+        Raises:
+            ImportError: pandas is not installed.
+        """
+        columns = self.columns or self.nodes
+        return frame(columns, next(iter(columns)))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the properties along a beam over `x`; of a plate the coordinates over `node`.
+
+        Raises:
+            ImportError: xarray is not installed.
+        """
+        columns = self.columns or {"node": np.arange(len(next(iter(self.nodes.values()))), dtype=float), **self.nodes}
+        name, *others = columns
+        over: dict[str, Variable] = {other: ((name,), columns[other]) for other in others}
+        return dataset(over, {name: ((name,), columns[name])}, self._attributes())
