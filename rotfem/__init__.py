@@ -1,8 +1,8 @@
 """rotfem: rotating beams and plates with FEniCSx.
 
-One noun, the scene (`Scene`, `load_scene`), and verbs on it (`check`, `run`, `modes`, `campbell`, `explain`, `cost`);
-between scene and equations stands the `Problem`, which a script can build too. `register` adds a `Theory`, `Effect`,
-`Scheme`, `Shape` or `Output` of a user's own. What computes loads FEniCSx when first used.
+One noun, the scene (`Scene`, `load_scene`), and verbs on it (`check`, `run`, `modes`, `campbell`, `response`, `explain`,
+`cost`); between scene and equations stands the `Problem`, which a script can build too. `register` adds a `Theory`,
+`Effect`, `Scheme`, `Shape` or `Output` of a user's own. What computes loads FEniCSx when first used.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rotfem.commands.explain import explain
     from rotfem.commands.modes import modes
     from rotfem.commands.problem import Problem
+    from rotfem.commands.response import response
     from rotfem.commands.run import run
     from rotfem.mechanics.effects import Effect
     from rotfem.mechanics.free_hub import FreeHub, Torque
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from rotfem.mechanics.motion import Motion
     from rotfem.mechanics.outputs import Output
     from rotfem.mechanics.theories import Theory
-    from rotfem.results import CampbellResult, CheckResult, ExplainResult, ModesResult, RunResult
+    from rotfem.results import CampbellResult, CheckResult, ExplainResult, ModesResult, ResponseResult, RunResult
     from rotfem.scene import BeamMesh, PlateMesh
     from rotfem.scene.beams import PlanarBeamStructure as PlanarBeam
     from rotfem.scene.beams import SpatialBeamStructure as SpatialBeam
@@ -51,6 +52,7 @@ _HOMES = {
     "commands.explain": ("explain",),
     "commands.modes": ("modes",),
     "commands.problem": ("Problem",),
+    "commands.response": ("response",),
     "commands.run": ("run",),
     "mechanics.effects": ("Effect",),
     "mechanics.free_hub": ("FreeHub", "Torque"),
@@ -59,7 +61,7 @@ _HOMES = {
     "mechanics.outputs": ("Output",),
     "mechanics.theories": ("Theory",),
     "commands.cost.result": ("CostResult",),
-    "results": ("CampbellResult", "CheckResult", "ExplainResult", "ModesResult", "RunResult"),
+    "results": ("CampbellResult", "CheckResult", "ExplainResult", "ModesResult", "ResponseResult", "RunResult"),
     "scene": ("BeamMesh", "PlateMesh"),
     "scene.section_shapes": ("Geometry", "Shape"),
 }
@@ -94,6 +96,7 @@ __all__ = [
     "Plate",
     "PlateMesh",
     "Problem",
+    "ResponseResult",
     "RunResult",
     "Scene",
     "SceneError",
@@ -112,6 +115,7 @@ __all__ = [
     "load_scene",
     "modes",
     "register",
+    "response",
     "run",
 ]
 

@@ -15,7 +15,14 @@ import typer
 
 from rotfem.commands.console import Session
 from rotfem.commands.options import as_path, folder_name, listed
-from rotfem.commands.printed import campbell_report, check_report, explain_report, modes_report, run_report
+from rotfem.commands.printed import (
+    campbell_report,
+    check_report,
+    explain_report,
+    modes_report,
+    response_report,
+    run_report,
+)
 from rotfem.commands.result_folder import ResultFolder, Writer
 from rotfem.errors import ComputationError, input_of
 from rotfem.scene import Scene, load_scene
@@ -211,6 +218,25 @@ def campbell(
     with todo.progress() as progress:
         result = sweep(todo.scene, speeds, orders=per_rev, progress=progress, hint=todo.hint)
     todo.finish(result, campbell_report)
+
+
+@command(computes=False)
+def response(
+    todo: Job,
+    low: Annotated[
+        str | None, typer.Option("--from", metavar="FREQUENCY", help="lowest, rad/s or with a unit: 0.1Hz [0]")
+    ] = None,
+    high: Annotated[
+        str | None, typer.Option("--to", metavar="FREQUENCY", help="highest [beyond the highest of modes.count]")
+    ] = None,
+    number: Annotated[int, typer.Option("--number", help="frequencies, those that show peaks on top")] = 200,
+    per_rev: Annotated[str | None, typer.Option("--per-rev", metavar="K,…", help="multiples of the speed")] = None,
+) -> None:
+    """Compute amplitude and phase of the tip of SCENE under its harmonic loads, over their frequency."""
+    from rotfem.commands.response import response as answers
+
+    result = answers(todo.scene, low, high, number=number, per_rev=listed("--per-rev", per_rev, float) or ())
+    todo.finish(result, response_report)
 
 
 @command(computes=False)

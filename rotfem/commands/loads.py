@@ -22,10 +22,10 @@ Array = npt.NDArray[np.float64]
 PROBES = 9
 
 
-def loads_of(scene: Scene, motion: Motion) -> Loads:
-    """Return the loads of a scene, under a motion that says how its hub turns."""
+def loads_of(scene: Scene, motion: Motion, maker: type[LoadsMaker] | None = None) -> Loads:
+    """Return the loads of a scene, under a motion that says how its hub turns, by another maker than the usual one."""
     given = scene.loads
-    made = LoadsMaker(scene.structure, motion)
+    made = (maker or LoadsMaker)(scene.structure, motion)
     points = []
     for i, point in enumerate(given.at):
         pair = {name: getattr(point, name) for name in ("force", "moment")}
@@ -43,6 +43,31 @@ def held(loads: Applied) -> list[str]:
     if not names:
         return []
     return [f"{', '.join(names)} {'change' if len(names) > 1 else 'changes'} with time: taken as at t = 0"]
+
+
+#: Times at which swept loads are without what is harmonic, with its part in phase, and with that ahead by a quarter.
+SWEPT = (0.0, 1.0, 2.0)
+
+
+def swept_loads(scene: Scene, motion: Motion) -> Loads:
+    """Return the loads of a scene whose harmonic parts at the times SWEPT are 0, cos φ and sin φ times their amplitude.
+
+    So a load Re(f̂ e^{iωt}) of any frequency, f̂ = amplitude e^{iφ}, can be put together.
+
+    Raises:
+        InputError: there is no harmonic load, or one that changes with time in another way.
+    """
+    made = loads_of(scene, motion, SweptLoadsMaker)
+    swept = named(made)
+    if not any(isinstance(part, SweptPart) for load in swept.values() for part in getattr(load, "parts", ())):
+        why = "a frequency response needs a harmonic load, such as loads.tip_force.harmonic = "
+        raise InputError("loads", None, why + "{ amplitude = [0, 1], frequency = 1 }; its frequency is swept")
+    for name, load in swept.items():
+        parts = getattr(load, "parts", None)
+        still = load.constant if parts is None else all(p.amplitudes is None or isinstance(p, SweptPart) for p in parts)
+        if not still:
+            raise InputError(f"loads.{name}", None, "must be constant or harmonic in a frequency response")
+    return made
 
 
 class LoadsMaker:
@@ -102,8 +127,7 @@ class LoadsMaker:
         return parts
 
     def _harmonic(self, harmonic: Any) -> Part:
-        amplitude, phase, per_rev = harmonic.amplitude, harmonic.phase, harmonic.per_rev
-        shapes = along(amplitude) if isinstance(amplitude[0], tuple) else uniform([amplitude])
+        shapes, phase, per_rev = shapes_of(harmonic), harmonic.phase, harmonic.per_rev
         if per_rev is None:
             return Part.harmonic(shapes, lambda t: harmonic.frequency * t + phase)
         angle = self.motion.angle
@@ -114,6 +138,29 @@ class LoadsMaker:
         length = self.structure.length
         x = np.linspace(0.0, length, PROBES) if length is not None else np.zeros(1)
         return np.column_stack([x, np.zeros((len(x), 2))])
+
+
+class SweptPart(Part):
+    """A harmonic part whose frequency is swept."""
+
+
+class SweptLoadsMaker(LoadsMaker):
+    """Makes loads whose harmonic parts are swept (see `swept_loads`)."""
+
+    def _harmonic(self, harmonic: Any) -> Part:
+        shapes, phase = shapes_of(harmonic), harmonic.phase
+        factors = np.array([0.0, np.cos(phase), np.sin(phase)])
+
+        def amplitudes(t: Array) -> Array:
+            return np.asarray(factors[np.searchsorted(SWEPT, t)][:, None])
+
+        return SweptPart(shapes, amplitudes, linear=False, largest=np.ones(1))
+
+
+def shapes_of(harmonic: Any) -> Shapes:
+    """Return how the amplitude of a harmonic load is spread."""
+    amplitude = harmonic.amplitude
+    return along(amplitude) if isinstance(amplitude[0], tuple) else uniform([amplitude])
 
 
 def uniform(vectors: Any) -> Shapes:

@@ -116,6 +116,21 @@ def campbell_report(summary: dict[str, Any], folder: Path) -> list[str]:
     return [*lines, *error_report(summary), f"results in {folder}"]
 
 
+def response_report(summary: dict[str, Any], folder: Path) -> list[str]:
+    """Return the lines `response` prints: where outputs are largest."""
+    units = ShownUnits.of(summary)
+    lines = [
+        f"{summary['name']}: {summary['theory']} about the {summary['about']} state at "
+        f"{units.speeds(summary['speed']):g} {units.speed}, {summary['frequencies']} frequencies, "
+        f"{summary['dofs']} dofs, in {summary['timings']['total']:.2f} s",
+        f"{'output':<14}{'amplitude':>14}{'at ' + units.frequency:>14}",
+    ]
+    for name, peak in summary["peaks"].items():
+        lines.append(f"{name:<14}{peak['amplitude']:>14.6g}{units.frequencies(peak['frequency']):>14.6f}")
+    modes = f"difference of the response by {len(summary['modes'])} modes: {summary['difference']:.1e}"
+    return [*lines, modes, f"results in {folder}"]
+
+
 def accuracy_report(summary: dict[str, Any]) -> list[str]:
     """Return the line that says what an accuracy has led to, if one was asked for."""
     wanted = summary.get("accuracy")

@@ -4,6 +4,7 @@ from rotfem.results.campbell import CampbellResult, CriticalSpeed, Instability
 from rotfem.results.check import CheckResult
 from rotfem.results.explain import ExplainResult
 from rotfem.results.modes import ModesResult
+from rotfem.results.response import ResponseResult
 from rotfem.results.result import Result
 from rotfem.results.run import RunResult
 
@@ -14,6 +15,7 @@ __all__ = [
     "ExplainResult",
     "Instability",
     "ModesResult",
+    "ResponseResult",
     "Result",
     "RunResult",
 ]

@@ -1,0 +1,109 @@
+"""What a harmonic load makes of a structure that spins steadily: amplitudes of small motions about its equilibrium.
+
+A load Re(f̂ e^{iωt}) on (M, C, K) leaves, once everything else has died out, the motion Re(q̂ e^{iωt}) with
+
+    (K + iω C − ω² M) q̂ = f̂
+
+solved at every frequency (the direct response), or from the pairs of the pencil with their left vectors,
+
+    q̂ = Σ_j x_j y_j^H f̂ / (n_j (iω − λ_j)),   n_j = y_j^H (2 λ_j M + C) x_j,
+
+over some λ_j and their conjugates, with the static answer of all others beside (the modal response).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.modal import ModalAnalysis, Spinning
+from rotfem.numerics.complex_solver import ComplexSolver
+
+Array = npt.NDArray[Any]
+
+#: Points about a peak, in half its width at 1/√2 of its height.
+ABOUT_PEAK = np.array([-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0])
+
+#: Damping ratio below which a mode has none, and the distance from its frequency at which its peak is then looked at.
+UNDAMPED = 1e-8
+BESIDE = 1e-3
+
+
+class FrequencyResponse:
+    """Answers of the tip to a harmonic load.
+
+    Args:
+        analysis: compiled scene, of a hub that is held.
+        spinning: equilibrium, pencil and pairs at one speed.
+        force: f̂, complex amplitude of the load's generalised forces on the owned unknowns, shape (n_local,).
+    """
+
+    def __init__(self, analysis: ModalAnalysis, spinning: Spinning, force: Array):
+        self.analysis, self.spinning = analysis, spinning
+        self.force = np.array(force, dtype=np.complex128)
+        self.force[analysis.system.held.clamped] = 0.0
+        pencil = spinning.pencil
+        self._values = [A.getValuesCSR()[2] for A in (pencil.K, pencil.C, pencil.M)]
+        self._solver = ComplexSolver(pencil.K)
+        self._tip = analysis.structure.tip_values
+
+    def direct(self, omega: float) -> Array:
+        """Return the complex amplitudes of the tip's components (m, rad) at a frequency (rad/s), from one solution.
+
+        Raises:
+            ComputationError: there is no answer, at the frequency of a mode that has no damping.
+        """
+        K, C, M = self._values
+        self._solver.factor(K + 1j * omega * C - omega**2 * M)
+        return self._at_tip(self._solver.solve(self.force))
+
+    def modal(self, frequencies: Array, count: int) -> Array:
+        """Return the amplitudes of the tip's components at frequencies (n,), rad/s, by modes; shape (n, components).
+
+        Args:
+            frequencies: rad/s.
+            count: modes taken; what all others answer statically is added.
+        """
+        pairs = self.spinning.pairs.select(np.arange(min(count, len(self.spinning.pairs.values))))
+        n = np.diag(self.spinning.pencil.gram(pairs.left, pairs.values, pairs.right, pairs.values))
+        tips = np.array([self._at_tip(x) for x in pairs.right.T]).T
+        gains = self._summed(pairs.left.conj().T @ self.force) / n
+        others = self._summed(pairs.left.T @ self.force) / n.conj()  # of the conjugate pairs
+        twice = pairs.values.imag > 0.0
+
+        def at(omega: float) -> Array:
+            plain = tips @ (gains / (1j * omega - pairs.values))
+            mirrored = tips.conj() @ np.where(twice, others / (1j * omega - pairs.values.conj()), 0.0)
+            return np.asarray(plain + mirrored)
+
+        left_out = self.direct(0.0) - at(0.0)
+        return np.array([at(omega) + left_out for omega in frequencies])
+
+    def peaks(self, low: float, high: float) -> tuple[Array, list[int]]:
+        """Return frequencies (rad/s) by which the peaks between two are seen, and which modes there have no damping."""
+        found, undamped = [], []
+        for j, lam in enumerate(self.spinning.pairs.values):
+            omega, width = abs(lam.imag), abs(lam.real)
+            if not low <= omega <= high or omega == 0.0:
+                continue
+            if width <= UNDAMPED * abs(lam):
+                undamped.append(j)
+                width = BESIDE * omega
+                found.append(omega + width * ABOUT_PEAK[ABOUT_PEAK != 0.0])
+            else:
+                found.append(omega + width * ABOUT_PEAK)
+        points = np.concatenate([*found, np.empty(0)])
+        return points[(points >= low) & (points <= high)], undamped
+
+    def _at_tip(self, x: Array) -> Array:
+        """Return the complex components at the tip of owned unknowns."""
+        read = self._tip
+        full = np.zeros(len(self.analysis.system.zeros()), dtype=np.complex128)
+        full[: len(x)] = x
+        return np.asarray(read(full.real) + 1j * read(full.imag))
+
+    def _summed(self, local: Array) -> Array:
+        comm = self.analysis.comm
+        return np.asarray(comm.allreduce(local) if comm.size > 1 else local)

@@ -1,0 +1,211 @@
+"""`rotfem response`: what harmonic loads make of a structure that spins steadily, over their frequency.
+
+The motion is small and about the equilibrium under the loads that are constant; all harmonic loads of the scene work
+together, with their amplitudes and phases, at one frequency that is swept (see `rotfem.analysis.frequency_response`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from rotfem.analysis.equilibrium import check_steady
+from rotfem.analysis.frequency_response import FrequencyResponse
+from rotfem.analysis.modal import ModalAnalysis, Spinning
+from rotfem.analysis.stability import stability_of_pencil
+from rotfem.commands.loads import SWEPT, swept_loads
+from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
+from rotfem.commands.modes import analysis_of, theory_error
+from rotfem.commands.problem import Problem
+from rotfem.commands.summary import modal_summary
+from rotfem.errors import SceneError, input_of
+from rotfem.results.response import ResponseResult
+from rotfem.scene import Scene, as_scene
+from rotfem.units import quantity
+
+Array = npt.NDArray[Any]
+
+#: Frequencies of a response if nothing is said, and the part beyond the highest mode asked for that they reach to.
+NUMBER, BEYOND = 200, 1.2
+
+#: Difference of the direct response and that by modes above which it is said that more modes are needed.
+NOTABLE = 1e-2
+
+
+def response(
+    scene: Scene | str | Path | Mapping[str, Any],
+    low: float | str | None = None,
+    high: float | str | None = None,
+    *,
+    number: int = NUMBER,
+    per_rev: Sequence[float] = (),
+    comm: MPI.Comm = MPI.COMM_WORLD,
+) -> ResponseResult:
+    """Return amplitude and phase of the tip under the harmonic loads of a scene, over their frequency.
+
+    Args:
+        scene: scene, path of a scene file, or nested tables; `modes.count` is that of the response by modes.
+        low: lowest frequency, rad/s, or a text with a unit such as "0.1 Hz"; 0 if None.
+        high: highest frequency; beyond the highest of the modes if None.
+        number: frequencies between them, at equal distances; those by which peaks are seen come on top.
+        per_rev: orders k; with them the frequencies are kΩ alone, as far as low and high are None.
+        comm: MPI communicator; every rank gets the whole result.
+
+    Raises:
+        SceneError: the scene is not valid, or has no harmonic load, no steady state or a free hub.
+        ComputationError: no equilibrium, eigenpairs that fail their check, or a frequency of a mode without damping.
+    """
+    scene, started = as_scene(scene), perf_counter()
+    with input_of(scene.file):
+        if scene.modes.about == "steady":
+            check_steady(Problem.of(scene))
+        problem = Problem.of(scene)
+        problem = problem.replace(loads=swept_loads(scene, problem.motion))
+        analysis = analysis_of(scene, problem, comm)
+        analysis.needs_fixed_hub("the frequency response")
+        speed = problem.motion.final_speed(scene.time.end if scene.time is not None else 0.0)
+        spinning = analysis.at(speed, scene.modes.count)
+        answers = FrequencyResponse(analysis, spinning, force_of(analysis, spinning))
+        asked, peaks, undamped = frequencies_of(answers, spinning, (low, high, number, per_rev))
+        direct = np.array([answers.direct(omega) for omega in asked])
+        modal = answers.modal(asked, scene.modes.count)
+        return result_of(scene, analysis, spinning, (asked, peaks, undamped), (direct, modal), started)
+
+
+def force_of(analysis: ModalAnalysis, spinning: Spinning) -> Array:
+    """Return f̂ of the harmonic loads at an equilibrium: what they add to the forces on the owned unknowns."""
+    system = analysis.system.held
+    parts = []
+    for t in SWEPT:
+        system.set_time(t, system.motion.at_speed(spinning.speed))
+        system.set_state(spinning.q)
+        parts.append(system.residual().array.copy())  # −F: loads push with their sign
+    mean, cosine, sine = parts
+    return np.asarray((cosine - mean) + 1j * (sine - mean))
+
+
+def frequencies_of(
+    answers: FrequencyResponse, spinning: Spinning, wanted: tuple[Any, Any, int, Sequence[float]]
+) -> tuple[Array, Array, list[int]]:
+    """Return the frequencies (rad/s, increasing), which of them were added to see peaks, and modes without damping."""
+    low, high, number, per_rev = wanted
+    lines = abs(spinning.speed) * np.array([k for k in per_rev if k > 0.0])
+    if len(per_rev) and (spinning.speed == 0.0 or len(lines) < len(per_rev)):
+        raise SceneError("command line", "--per-rev", list(per_rev), "orders must be above 0, of a hub that spins")
+    if len(lines) and low is None and high is None:
+        return np.unique(lines), np.zeros(len(np.unique(lines)), dtype=bool), []
+    first = angular(low, "--from", 0.0)
+    last = angular(high, "--to", BEYOND * float(np.max(spinning.pairs.values.imag)))
+    if not 0.0 <= first < last or number < 2:
+        reason = "frequencies must increase from at least 0 (rad/s, or with a unit), and their number be at least 2"
+        raise SceneError("command line", "--from, --to, --number", [first, last, number], reason)
+    grid = np.concatenate([np.linspace(first, last, number), lines])
+    more, undamped = answers.peaks(first, last)
+    asked = np.unique(np.concatenate([grid, more]))
+    return asked, ~np.isin(asked, grid), undamped
+
+
+def angular(value: float | str | None, option: str, default: float) -> float:
+    """Return a frequency in rad/s, of a number or a text that may have a unit.
+
+    Raises:
+        SceneError: it is none.
+    """
+    if value is None:
+        return default
+    try:
+        found = float(value)
+    except ValueError:
+        try:
+            found = quantity(str(value), "rad/s")
+        except ValueError as error:
+            raise SceneError("command line", option, value, str(error)) from None
+    if not np.isfinite(found):
+        raise SceneError("command line", option, value, "must be a finite frequency")
+    return found
+
+
+def result_of(
+    scene: Scene,
+    analysis: ModalAnalysis,
+    spinning: Spinning,
+    asked: tuple[Array, Array, list[int]],
+    answers: tuple[Array, Array],
+    started: float,
+) -> ResponseResult:
+    """Return the result of all answers (direct, by modes) at frequencies, those of peaks marked."""
+    (omegas, peaks, undamped), (direct, modal) = asked, answers
+    outputs = [f"tip_{name}" for name in analysis.structure.components]
+    off = differences(outputs, direct, modal)
+    rows = [
+        row_of(omega, spinning.speed, dict(zip(outputs, zip(d, m, strict=True), strict=True)))
+        | {"difference": float(o), "peak": int(peak)}
+        for omega, d, m, o, peak in zip(omegas, direct, modal, off, peaks, strict=True)
+    ]
+    modes = mode_rows(analysis, spinning)
+    stability, theory = stability_of_pencil(spinning.pencil, spinning.clamped), theory_error(analysis, spinning)
+    warnings = [*analysis.notes, *advice(analysis, spinning.speed), *instabilities(modes), *doubtful(modes)]
+    warnings += [stability.warning()] if not stability.stable else []
+    warnings += [said] if (said := theory.warning()) else []
+    warnings += told(modes, undamped, float(np.max(off)), scene.modes.count)
+    summary = {
+        **modal_summary("response", analysis, scene, None, started),
+        "speed": spinning.speed,
+        "stability": stability.summary(),
+        "outputs": outputs,
+        "frequencies": len(omegas),
+        "peaks": {name: peak_of(omegas, np.abs(direct[:, i])) for i, name in enumerate(outputs)},
+        "difference": float(np.max(off)),
+        "modes": modes[: scene.modes.count],
+        "theory_error": theory.summary(),
+        "warnings": list(dict.fromkeys(warnings)),
+        "advice": [],
+    }
+    return ResponseResult(summary, rows, direct, modal)
+
+
+def row_of(omega: float, speed: float, outputs: Mapping[str, tuple[complex, complex]]) -> dict[str, Any]:
+    """Return the row of a frequency (rad/s), of name ↦ answers (direct, by modes)."""
+    row: dict[str, Any] = {"frequency": float(omega), "frequency_hz": float(omega / (2 * np.pi))}
+    if speed != 0.0:
+        row["per_rev"] = float(omega / abs(speed))
+    for name, (direct, modal) in outputs.items():
+        row |= {name: float(abs(direct)), f"{name}_phase": float(np.angle(direct)), f"{name}_modal": float(abs(modal))}
+    return row
+
+
+def differences(outputs: Sequence[str], direct: Array, modal: Array) -> Array:
+    """Return for every frequency how far the answers by modes are off, of displacements and rotations the worse."""
+    moves = np.array([name.startswith("tip_u") for name in outputs])
+    out = np.zeros(len(direct))
+    for kind in (moves, ~moves):
+        size = np.linalg.norm(direct[:, kind], axis=1)
+        off = np.linalg.norm((modal - direct)[:, kind], axis=1)
+        out = np.maximum(out, np.divide(off, size, out=np.zeros_like(off), where=size > 0.0))
+    return out
+
+
+def peak_of(omegas: Array, amplitude: Array) -> dict[str, float]:
+    """Return largest amplitude and where it is (rad/s)."""
+    i = int(np.argmax(amplitude))
+    return {"frequency": float(omegas[i]), "amplitude": float(amplitude[i])}
+
+
+def told(modes: Sequence[Mapping[str, Any]], undamped: Sequence[int], off: float, count: int) -> list[str]:
+    """Return warnings of modes without damping, and of a response by too few modes."""
+    out = []
+    if undamped:
+        named = ", ".join(f"{modes[j]['label']} at {modes[j]['frequency']:.6g} rad/s" for j in undamped)
+        out.append(
+            f"no damping: the response has no height at {named}; what is seen there is how near a frequency came"
+        )
+    if off > NOTABLE:
+        why = f"{count} modes leave up to {100 * off:.2g} % of the direct response out; more modes.count"
+        out.append(f"the response by modes is not that of all modes: {why}")
+    return out

@@ -1,0 +1,140 @@
+"""Frequency response: against the exported matrices, a long time history, statics and the modes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.io import mmread
+
+import rotfem
+from rotfem import SceneError, modes
+from rotfem.analysis.state_space import write_matrices
+from rotfem.commands.response import response
+from tests.beams import STRUCTURE
+
+#: Damping ratios of some per cent at the first modes, so that what a start leaves dies away soon.
+LENGTH, SECTION = STRUCTURE["length"], STRUCTURE["section"]
+LOAD = {"harmonic": {"amplitude": [0.0, 2.0], "frequency": 1.0, "phase": 0.3}}
+
+
+def scene(theory: str = "consistent_linear", speed: float = 4.0, **changes: Any) -> dict[str, Any]:
+    """Return the beam of all tests with damping and a harmonic force at its tip."""
+    tables: dict[str, Any] = {
+        "structure": {**STRUCTURE, "damping": {"rayleigh": [0.4, 1e-3]}},
+        "motion": {"type": "constant", "speed": speed},
+        "model": {"theory": theory},
+        "loads": {"tip_force": LOAD},
+        "mesh": {"elements": 4},
+        "modes": {"count": 4},
+    }
+    return tables | changes
+
+
+@pytest.fixture(scope="module")
+def swept():
+    return response(scene(), 0.0, 40.0, number=21)
+
+
+def by_scipy(tables: dict[str, Any], omega: float, folder: Any) -> np.ndarray:
+    """Return the answer of the tip (u1, u2, alpha) from the exported M, C and K."""
+    found = modes(tables)
+    write_matrices(found.analysis, found.spinning, folder)
+    M, C, K = (mmread(folder / f"{name}.mtx").toarray() for name in "MCK")
+    unknowns = (folder / "unknowns.csv").read_text().splitlines()[1:]
+    tip = [i for i, line in enumerate(unknowns) if float(line.split(",")[1]) == LENGTH]
+    force = np.zeros(len(M), dtype=complex)
+    force[next(i for i in tip if unknowns[i].endswith("u2"))] = 2.0 * np.exp(0.3j)
+    return np.linalg.solve(K + 1j * omega * C - omega**2 * M, force)[tip]
+
+
+def test_direct_response_is_that_of_the_exported_matrices(swept, tmp_path):
+    """To the digits of the matrices: 1e-8 of the largest component."""
+    for i in (3, 12, 20):
+        wanted = by_scipy(scene(loads={}), float(swept.frequencies[i]), tmp_path)
+        assert swept.direct[i] == pytest.approx(wanted, abs=1e-8 * np.max(np.abs(wanted)))
+
+
+def test_statics():
+    """At rest and at frequency 0 it is F L³/3EI + F L/GA, in phase with the load."""
+    still = response(scene(speed=0.0), 0.0, 1.0, number=2)
+    u2 = still.direct[0, still.outputs.index("tip_u2")]
+    assert abs(u2) == pytest.approx(2.0 * LENGTH**3 / (3 * SECTION["EI"]) + 2.0 * LENGTH / SECTION["GA"], rel=1e-9)
+    assert np.angle(u2) == pytest.approx(0.3, abs=1e-9)
+    assert "per_rev" not in still.rows[0]
+
+
+def test_all_modes_are_the_direct_response():
+    """Of 36 unknowns 36 modes, none of them overdamped: the sum over all pairs with left vectors is the inverse."""
+    little = {**STRUCTURE, "damping": {"rayleigh": [0.4, 1e-6]}}
+    whole = response(scene(structure=little, modes={"count": 36}), 1.0, 60.0, number=5)
+    assert whole.summary["difference"] < 1e-6
+
+
+def test_few_modes_come_with_the_static_answer_of_the_others(swept):
+    """Below the first mode left out (94 rad/s) what is missing is of order (ω/94)² of its flexibility."""
+    assert swept.rows[0]["difference"] < 1e-12
+    assert swept.rows[2]["difference"] < 1e-4
+
+
+def test_peaks_are_seen(swept):
+    """A peak stands at the frequency of its mode, and 1/√2 of it half a width aside, to what other modes add."""
+    first = swept.summary["modes"][0]
+    omega, half = first["frequency"], -first["growth"]
+    peak = swept.summary["peaks"]["tip_u2"]
+    assert peak["frequency"] == pytest.approx(omega, abs=half)
+    aside = np.abs(swept.frequencies - omega - half) < 1e-9 * omega
+    assert swept.amplitude("tip_u2")[aside] == pytest.approx(peak["amplitude"] / np.sqrt(2), rel=0.05)
+
+
+def test_a_long_history_swings_like_that():
+    """Reissner about the deformed steady state under a constant load; 1 % of the amplitude after 10 decay times."""
+    force = {"value": [0.0, 30.0], "harmonic": {"amplitude": [0.0, 0.1], "per_rev": 1}}
+    damped = {**STRUCTURE, "damping": {"rayleigh": [2.0, 1e-3]}}
+    tables = scene("reissner", 5.0, structure=damped, loads={"tip_force": force})
+    line = response(tables, per_rev=[1])
+    assert [row["per_rev"] for row in line.rows] == [1.0]
+    end = 10.0
+    history = rotfem.run(
+        tables | {"time": {"end": end, "step": 0.02}, "initial": {"state": "steady"}, "output": {"error": False}}
+    ).history
+    last = history["t"] > end - 4 * np.pi / 5.0
+    t, u2 = history["t"][last], history["tip_u2"][last]
+    columns = np.column_stack([np.ones(len(t)), np.cos(5.0 * t), np.sin(5.0 * t)])
+    _, cosine, sine = np.linalg.lstsq(columns, u2, rcond=None)[0]
+    found = line.direct[0, line.outputs.index("tip_u2")]
+    assert abs(cosine - 1j * sine - found) < 0.01 * abs(found)
+
+
+def test_without_damping_it_is_said():
+    tables = scene(structure=STRUCTURE)
+    warned = response(tables, 1.0, 10.0, number=3)
+    assert any("no damping" in line for line in warned.warnings)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"loads": {}}, "needs a harmonic load"),
+        ({"loads": {"tip_force": {**LOAD, "table": [[0, 0, 0], [1, 0, 1]]}}}, "must be constant or harmonic"),
+        ({"motion": {"type": "torque", "hub_inertia": 100.0}}, "free hub"),
+    ],
+)
+def test_what_has_none_is_refused(changes, message):
+    with pytest.raises(SceneError, match=message):
+        response(scene(**changes))
+
+
+@pytest.mark.parametrize(("low", "high", "per_rev"), [(2.0, 1.0, ()), ("3 m", None, ()), (None, None, (0.0,))])
+def test_wrong_frequencies_are_refused(low, high, per_rev):
+    with pytest.raises(SceneError, match=r"--from|--per-rev"):
+        response(scene(), low, high, per_rev=per_rev)
+
+
+def test_files_and_figure(swept, tmp_path):
+    swept.write(tmp_path)
+    table = (tmp_path / "response.csv").read_text().splitlines()
+    assert table[0].startswith("frequency,frequency_hz,per_rev,tip_u1,tip_u1_phase,tip_u1_modal,tip_u2")
+    assert len(table) == 1 + len(swept.rows)
+    assert len(swept.plot().axes) == 4  # u1, u2, alpha and the phases
