@@ -1,8 +1,8 @@
 """rotfem: rotating beams and plates with FEniCSx.
 
-One noun, the scene (`Scene`, `load_scene`), and verbs on it (`check`, `run`, `modes`, `campbell`, `response`, `explain`,
-`cost`); between scene and equations stands the `Problem`, which a script can build too. `register` adds a `Theory`,
-`Effect`, `Scheme`, `Shape` or `Output` of a user's own. What computes loads FEniCSx when first used.
+One noun, the scene (`Scene`, `load_scene`), and verbs on it (`check`, `run`, `modes`, `campbell`, `response`,
+`explain`, `cost`); between scene and equations stands the `Problem`, which a script can build too. `register` adds a
+`Theory`, `Effect`, `Scheme`, `Shape` or `Output` of a user's own. What computes loads FEniCSx when first used.
 """
 
 from __future__ import annotations
