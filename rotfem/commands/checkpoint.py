@@ -124,6 +124,7 @@ class Memory:
             "factorisations": run.system.factorisations,
             "columns": list(run.record.history.columns),
             "rows": np.array(run.record.history.rows()).reshape(len(run.record.history), -1),
+            "stations": None if run.record.stations is None else run.record.stations.kept_arrays(),
             "snapshots": None if snapshots is None else self._packed(vars(snapshots)),
             "choice": None if run.choice is None else vars(run.choice),
             "left_out": list(run.problem.left_out),
@@ -153,6 +154,8 @@ class Memory:
         run.farthest.seen, run.stability = seen["farthest"], seen["stability"]
         for row in tree["rows"]:
             run.record.history.append(row)
+        if run.record.stations is not None:
+            run.record.stations.put_back(tree["stations"])
         if run.record.snapshots is not None:
             vars(run.record.snapshots).update(self._unpacked(tree["snapshots"]))
         run.elapsed = tree["elapsed"]

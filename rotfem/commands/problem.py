@@ -51,7 +51,7 @@ class Problem(ProblemData):
             SceneError: the scene is not valid.
         """
         scene = as_scene(scene)
-        wanted = {name: Output.registry[name].form for name in scene.output.quantities}
+        wanted = {name: Output.registry[name].form for name in scene.output.functionals}
         with input_of(scene.file):
             motion = motion_of(scene)
             return cls(

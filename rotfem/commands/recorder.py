@@ -11,7 +11,9 @@ import numpy.typing as npt
 from rotfem.analysis.schemes import State
 from rotfem.commands.finite import check_finite
 from rotfem.commands.moment import hub_values
+from rotfem.commands.station_rows import StationRows
 from rotfem.results.run import RunResult, Table
+from rotfem.scene import OutputTable
 from rotfem.structures.paraview import Snapshots, writer
 
 Array = npt.NDArray[np.float64]
@@ -22,12 +24,13 @@ class Recorder:
 
     Args:
         system: equations of motion.
+        output: what is recorded beside what always is, of it the stations.
 
     Attributes:
         history: rows so far.
     """
 
-    def __init__(self, system: Any):
+    def __init__(self, system: Any, output: OutputTable | None = None):
         self.system = system
         names = tuple(f"tip_{c}" for c in system.structure.components)
         free = ("torque", "hub_kinetic", "angular_momentum", "impulse", "work") if system.hub is not None else ()
@@ -35,6 +38,8 @@ class Recorder:
         self.history = Table(("t", "psi", "psi_dot", *names, "kinetic", "strain", "jacobi", *root, *free, *further))
         self._last: State | None = None
         self.snapshots = Snapshots() if system.structure.mesh.topology.dim == 2 else None
+        stations = output is not None and output.stations is not None
+        self.stations = StationRows(system, output) if stations and output is not None else None
 
     def __call__(self, state: State) -> None:
         """Add a row for a state.
@@ -51,6 +56,8 @@ class Recorder:
         row += system.root_reaction().values()
         row += hub_values(system, state).values()
         row += system.outputs().values()
+        if self.stations is not None:
+            self.stations(t)
         self.add(row, state)
 
     def add(self, row: Sequence[float], state: State | None) -> None:
@@ -76,6 +83,8 @@ class Recorder:
             self.system.set_state(self._last.q, self._last.v, self._last.a)
         shape = self.system.shape() if len(self.history) else {}
         out = RunResult(summary, history, shape, triangles=structure.surface())
+        if self.stations is not None:
+            out.stations = self.stations.result()
         if self.snapshots is not None:
             out.fields = writer(structure, "fields", self.snapshots.kept)
         return out

@@ -104,10 +104,14 @@ class Rows:
         columns = np.column_stack([times, *turn[:2], tips, *energies[:3], root, *energies[3:]])
         for i, values in enumerate(columns):
             row = [float(value) for value in values]
-            state = self._state(i, a, turn) if i in kept or system.model.problem.outputs else None
+            stations = self.run.record.stations
+            at_stations = stations is not None and stations.due
+            state = self._state(i, a, turn) if i in kept or at_stations or system.model.problem.outputs else None
             if state is not None:
                 self.run.look(state)
                 row += self._outputs(state)
+            if stations is not None:
+                stations(float(times[i]))
             self.run.record.add(row, self._shown(state, i) if i in kept else None)
 
     def _turn(self) -> tuple[Array, Array, Array]:
@@ -161,7 +165,8 @@ class Rows:
         return State(float(response.times[i]), *parts)
 
     def _outputs(self, state: State) -> list[float]:
-        if not self.system.model.problem.outputs:
+        stations = self.run.record.stations
+        if not self.system.model.problem.outputs and not (stations is not None and stations.due):
             return []
         self.system.set_time(state.t)
         self.system.set_state(state.q, state.v, state.a)

@@ -83,7 +83,7 @@ class ResultFolder:
             OutputError: the small files cannot be written.
         """
         fields: Writer | None = getattr(result, "fields", None)
-        writers = [self._of_first(write) for write in further]
+        writers = [self._of_first(write) for write in (*result.large(), *further)]
         if plots:
             writers.append(self._of_first(partial(_plot, result)))
         if fields is not None:

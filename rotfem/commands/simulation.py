@@ -82,7 +82,7 @@ class Simulation:
         self.system: Any = compile_system(problem, comm, moving=scene.time is not None)
         self.system.compile_readings()
         self.compiled = perf_counter() - self.started
-        self.record = Recorder(self.system)
+        self.record = Recorder(self.system, scene.output)
         self.newton = Newton.of(scene.solver)
         self.stepper: Stepper | None = None
         self.reduced: Response | None = None

@@ -46,6 +46,10 @@ class Result(ABC):
     def files(self) -> dict[str, str]:
         """Return file name ↦ text, in the order they are written."""
 
+    def large(self) -> list[Callable[[Path], object]]:
+        """Return what writes files that are not text into a folder, each one whole or none; none here."""
+        return []
+
     @abstractmethod
     def drawings(self) -> dict[str, Callable[[], Figure]]:
         """Return file name ↦ what draws that figure, the main one first; empty where there is nothing to draw."""

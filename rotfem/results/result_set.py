@@ -33,9 +33,10 @@ SUMMARY = "summary.json"
 
 #: Names that are those of results in a folder with a summary of one; a set with others lists them in its summary.
 OURS = re.compile(
-    r"(history|shape|modes|mode_shapes|sensitivities|unknowns|campbell|cost|check)\.csv|(modes|campbell|explain|cost)\.json|"
-    r"(history|shape|modes|mode_\d+|campbell|travelling_waves|explain|cost|check)\.png|mode_\d+\.gif|state_space\.npz|"
-    r"[MCK]\.(mtx|npz)|(fields|modes)\.(bp|xdmf|h5)|checkpoint\.h5"
+    r"(history|shape|stations|modes|mode_shapes|sensitivities|unknowns|campbell|cost|check)\.csv|"
+    r"(modes|campbell|explain|cost)\.json|mode_\d+\.gif|state_space\.npz|"
+    r"(history|shape|stations|modes|mode_\d+|campbell|travelling_waves|explain|cost|check)\.png|"
+    r"[MCK]\.(mtx|npz)|(fields|modes)\.(bp|xdmf|h5)|(checkpoint|stations)\.h5"
 )
 
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from rotfem.results.files import csv_text, json_text
 from rotfem.results.frames import Variable, dataset, frame, nodes_of
 from rotfem.results.result import Result
+from rotfem.results.stations import StationHistory
 
 if TYPE_CHECKING:
     import pandas
@@ -62,12 +63,14 @@ class RunResult(Result):
         shape: column ↦ values along the structure at the end (`x` m, of a plate `y` m too, `u1` m, …).
         triangles: of a plate, triangles between the nodes of `shape`, (m, 3).
         fields: writes the fields for ParaView into a folder, on all ranks together; None of a beam.
+        stations: section forces, strains and unknowns at the stations of a beam; None where none are asked for.
     """
 
     history: dict[str, Array] = field(default_factory=dict)
     shape: dict[str, Array] = field(default_factory=dict)
     triangles: Any = field(default=None, repr=False)
     fields: Callable[[Path], list[Path]] | None = field(default=None, repr=False)
+    stations: StationHistory | None = field(default=None, repr=False)
 
     @property
     def t(self) -> Array:
@@ -100,10 +103,19 @@ class RunResult(Result):
         return self.history[name]
 
     def files(self) -> dict[str, str]:
-        """Return history.csv and shape.csv, as far as there is one, and summary.json."""
+        """Return history.csv, shape.csv and stations.csv, as far as there is one, and summary.json."""
         tables = {"history.csv": self.history, "shape.csv": self.shape}
         texts = {name: csv_text(columns) for name, columns in tables.items() if columns}
+        if self.stations is not None and self.stations.format == "csv":
+            texts["stations.csv"] = self.stations.text()
         return {**texts, "summary.json": json_text(self.summary)}
+
+    def large(self) -> list[Callable[[Path], object]]:
+        """Return what writes stations.h5, where that is asked for."""
+        stations = self.stations
+        if stations is None or stations.format != "hdf5":
+            return []
+        return [lambda folder: stations.write_hdf5(folder / "stations.h5")]
 
     def drawings(self) -> dict[str, Callable[[], Figure]]:
         """Return history.png of a time history, shape.png of a steady state and of plates."""
@@ -117,6 +129,8 @@ class RunResult(Result):
             out["shape.png"] = partial(plots_plate.shape_figure, self)
         elif self.shape and not over_time:
             out["shape.png"] = partial(plots.shape_figure, self)
+        if self.stations is not None and len(self.stations.t):
+            out["stations.png"] = partial(self.stations.figure, self.title)
         return out
 
     def to_pandas(self) -> pandas.DataFrame:

@@ -4,10 +4,11 @@ from rotfem import registry
 from rotfem.scene.beams import PlanarBeamStructure, SpatialBeamStructure
 from rotfem.scene.loads import Load, Loads, MomentLoad
 from rotfem.scene.motion import CallableMotion, ConstantMotion, SpinUpMotion, TableMotion, TorqueMotion
+from rotfem.scene.output import OutputTable
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.scene import Scene, as_scene, load_scene
 from rotfem.scene.section_shapes import Geometry, Shape
-from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver
+from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh, Solver
 from rotfem.scene.signals import Signal
 from rotfem.scene.stepping import Time
 

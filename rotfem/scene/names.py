@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 from rotfem.errors import show
 from rotfem.registry import Registry
 from rotfem.scene.problems import did_you_mean
 from rotfem.scene.values import problem
+
+
+class Named(Protocol):
+    """What a list may name, where that is more than one registry."""
+
+    kind: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All names, in their order."""
 
 
 def as_name(value: Any, registry: Registry[Any], key: str = "") -> str:
@@ -18,7 +28,7 @@ def as_name(value: Any, registry: Registry[Any], key: str = "") -> str:
     raise problem(key, value, f"{did_you_mean(value, names)}allowed: {', '.join(map(show, names))}")
 
 
-def as_names(value: Any, registry: Registry[Any], others: str = "") -> tuple[str, ...]:
+def as_names(value: Any, registry: Registry[Any] | Named, others: str = "") -> tuple[str, ...]:
     """Return the value as a tuple.
 
     Args:

@@ -41,8 +41,9 @@ from rotfem.scene.motion import (
     AnyMotion,
     Swept,
 )
+from rotfem.scene.output import OutputTable
 from rotfem.scene.problems import scene_error
-from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver
+from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh, Solver
 from rotfem.scene.stepping import Time
 from rotfem.scene.toml import apply_overrides, read_toml, set_key, to_builtin
 from rotfem.scene.units import in_si
@@ -254,6 +255,7 @@ class Scene(SceneModel):
         check_initial(self.structure, self.motion, self.initial)
         check_limits(self.limits, self.time, self.modes)
         check_accuracy(self.model, self.accuracy)
+        self.output.check(self.structure.type, self.structure.length)
         return self
 
 

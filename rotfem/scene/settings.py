@@ -1,4 +1,4 @@
-"""The tables that say how to compute: model, initial state, mesh, modes, solver, output; time in its own module."""
+"""The tables that say how to compute: model, initial state, mesh, modes, solver; time and output in their own ones."""
 
 from __future__ import annotations
 
@@ -22,10 +22,6 @@ def _as_effects(value: Any) -> str | tuple[str, ...]:
     return "auto" if value == "auto" else as_names(value, registry.effects, '"auto" or ')
 
 
-def _as_outputs(value: Any) -> tuple[str, ...]:
-    return as_names(value, registry.outputs)
-
-
 def _as_plate_elements(value: Any) -> tuple[int, int]:
     entries = list(value) if isinstance(value, list | tuple) else [value, value]
     if len(entries) != 2 or any(type(n) is not int or not 1 <= n <= 10**6 for n in entries):
@@ -43,7 +39,6 @@ def _as_reduced(value: Any) -> bool | float:
 
 Degree = Annotated[int, PlainValidator(Bounds(ge=1, le=6).integer)]
 Integration = Literal["reduced", "full"]
-AngularUnit = Literal["rad/s", "rpm", "Hz", "deg/s"]
 
 
 class Model(SceneModel):
@@ -230,19 +225,3 @@ class Solver(SceneModel):
     def past_limits(self) -> bool:
         """Whether a path of equilibria is followed past limit points."""
         return self.continuation == "arc_length"
-
-
-class OutputTable(SceneModel):
-    """The [output] table.
-
-    Attributes:
-        quantities: names of registered outputs, to be computed beside what is always recorded.
-        error: whether the error of what is computed is estimated.
-        speed: unit in which speeds are printed and drawn.
-        frequency: unit in which frequencies of modes are printed and drawn.
-    """
-
-    quantities: Annotated[tuple[str, ...], PlainValidator(_as_outputs)] = ()
-    error: bool = True
-    speed: AngularUnit = "rad/s"
-    frequency: AngularUnit = "rad/s"

@@ -59,6 +59,7 @@ UNITS: dict[str, Unit] = {
     "structure.masses.mass": "kg",
     "structure.masses.offset": "m",
     "structure.masses.inertia": ("kg*m**2",),
+    "output.stations": "m",
     **{f"time.{key}": "s" for key in ("end", "step", "max_step", "min_step", "output_step")},
 }
 

@@ -44,6 +44,8 @@ class Beam(Structure):
 
     def __init__(self, problem: Problem, comm: MPI.Comm, knots: tuple[float, ...]):
         super().__init__(problem, comm)
+        #: Places inside the beam where section or axis may change at once, m.
+        self.knots = tuple(sorted(knots))
         grid, s = problem.mesh, self.data
         self.length, self.hub_radius, self._section = s.length, s.hub_radius, s.section
         check_memory("mesh.elements", grid.elements, grid.elements * grid.degree + 1, self.size, 1, comm)
@@ -74,6 +76,14 @@ class Beam(Structure):
     def stretch(self, strains: list[Strain]) -> Any:
         """Return 1 + Γ₁, Γ₁ the axial strain."""
         return 1 + next(s.value for s in strains if s.name == "axial")
+
+    def section_strains(self, measures: Callable[..., tuple[Any, ...]]) -> Any:
+        """Return the strains of a section as one vector, in the order of `rotfem.section_quantities.STRAINS`."""
+        raise NotImplementedError
+
+    def stored(self, values: Any) -> list[Strain]:
+        """Return the strains, each with its stiffness, that make the stored energy of the strains of a section."""
+        raise NotImplementedError
 
     def profile(self, name: str, at: Callable[[Array], Array]) -> Any:
         """Return at(X) as a constant where the section is uniform, else as a field."""

@@ -64,7 +64,14 @@ class PlanarBeam(Beam):
 
     def strains(self, measures: Callable[..., tuple[Any, ...]]) -> list[Strain]:
         """Return the strains of one theory's measures with this section's EA, GA_s and EI."""
-        values = measures(self.k.q)
+        return self.stored(measures(self.k.q))
+
+    def section_strains(self, measures: Callable[..., tuple[Any, ...]]) -> Any:
+        """Return (Γ₁, Γ₂, κ)."""
+        return ufl.as_vector(measures(self.k.q))
+
+    def stored(self, values: Any) -> list[Strain]:
+        """Return (Γ₁, Γ₂, κ) with EA, GA_s and EI."""
         stiffness = (self.section["EA"], self.section["GA"], self.section["EI"])
         names = ("axial", "shear", "bending")
         return [Strain(n, g, c, self.dx_elastic) for n, g, c in zip(names, values, stiffness, strict=True)]

@@ -145,7 +145,19 @@ class SpatialBeam(Beam):
         return SectionTurn(rotation_part(q), self._turn.exact).rotate(self._from_datum(v))
 
     def strains(self, measures: Callable[..., tuple[Any, Any]]) -> list[Strain]:
-        """Return the strains (Γ, K) of one theory's measures with the section's stiffness.
+        """Return the strains (Γ, K) of one theory's measures with the section's stiffness."""
+        return self._forms.strains(*self._measured(measures), self.dx_elastic)
+
+    def section_strains(self, measures: Callable[..., tuple[Any, Any]]) -> Any:
+        """Return (Γ, K) along the section's axes t_i, of the reference axis."""
+        return ufl.as_vector([x[i] for x in self._measured(measures) for i in range(3)])
+
+    def stored(self, values: Any) -> list[Strain]:
+        """Return the strains that make the stored energy of (Γ, K)."""
+        return self._forms.strains([values[i] for i in (0, 1, 2)], [values[i] for i in (3, 4, 5)], self.dx_elastic)
+
+    def _measured(self, measures: Callable[..., tuple[Any, Any]]) -> tuple[Any, Any]:
+        """Return Γ and K of one theory's measures along t_i.
 
         Counted from a datum they are those of a beam with the axis R e and the curvature of the datum beforehand.
         """
@@ -154,11 +166,11 @@ class SpatialBeam(Beam):
         du = ufl.as_vector([dq[i] for i in (0, 1, 2)])
         if self.turns is None or self.turns.rotation is None:
             Gamma, K = measures(du, rotation_part(q), rotation_part(dq), e)
-            return self._forms.strains(self._along_triad(Gamma), self._along_triad(K), self.dx_elastic)
+            return self._along_triad(Gamma), self._along_triad(K)
         turned = self._from_datum(e)
         Gamma, K = measures(e + du - turned, rotation_part(q), rotation_part(dq), turned)
         before = ufl.as_vector([sum(t[i] * self.turns.curvature[i] for i in range(3)) for t in self._triad])
-        return self._forms.strains(self._along_triad(Gamma), self._along_triad(K) + before, self.dx_elastic)
+        return self._along_triad(Gamma), self._along_triad(K) + before
 
     def bodies(self, effects: Collection[str]) -> list[Body]:
         """Return mass-centre line, section directors, tip body and its directors, as the effects call for them."""

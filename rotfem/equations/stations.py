@@ -1,0 +1,162 @@
+"""Section forces, strains and unknowns at stations along a beam, where a state is written into its system.
+
+Stresses of finite elements are best at the Gauss points that also keep locking away: of elements of degree k they are
+off by O(h^(k+1)) there, and by O(h^k) elsewhere (Barlow, Int. J. Numer. Meth. Eng. 10 (1976) 243). So a station has the
+value of the polynomial through the Gauss points of its cell and the nearest one on either side, of degree k + 1, and
+with it the order of the points. It does not reach over places where the section, the axis or a point load may make the
+forces jump; a station there has what is on its outer side, the tip what is on its inner one.
+
+The forces are derivatives of the stored energy to the strains of the section, ∂W/∂Γ and ∂W/∂K, so they are those about
+the reference axis, along the turned axes t_i, on a section whose outer part they are of: N > 0 is tension, and at the
+root of an undeformed beam they are −f and −m of the hub (`rotfem.structures.root_reaction`).
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+
+from rotfem.numerics import forms
+from rotfem.section_quantities import FORCES, STRAINS
+from rotfem.structures.beam import Beam
+
+Array = npt.NDArray[np.float64]
+
+#: Part of a cell by which a station may be off one of its ends.
+AT_END = 1e-9
+
+
+def weights(points: Array, x: float) -> Array:
+    """Return the values at x of the Lagrange polynomials through points (n,)."""
+    others = [np.delete(points, i) for i in range(len(points))]
+    return np.array([np.prod((x - rest) / (p - rest)) for p, rest in zip(points, others, strict=True)])
+
+
+class Stations:
+    """What a beam has at its stations.
+
+    Args:
+        system: equations of motion of the beam, the hub held.
+        positions: of the stations, increasing, m.
+
+    Attributes:
+        names: of all quantities: forces (N, N·m), strains (1, 1/m) and unknowns (m, rad).
+    """
+
+    def __init__(self, system: Any, positions: tuple[float, ...]):
+        self.system, self.positions = system, np.array(positions)
+        self.beam: Beam = system.structure
+        self.comm, self.degree = system.comm, system.V.element.basix_element.degree
+        self.names = (*FORCES[self.beam.type], *STRAINS[self.beam.type], *self.beam.components)
+        self._points = forms.quadrature_points(self.beam.mesh, self.degree)
+        self._compiled: tuple[int, Any] | None = None
+        self._place()
+
+    # --- where ----------------------------------------------------------------------------------------------------
+
+    def _place(self) -> None:
+        """Find the cells of all stations, and the weights of Gauss points and nodes in their values."""
+        mesh, comm = self.beam.mesh, self.comm
+        owned = mesh.topology.index_map(1).size_local
+        ends = mesh.geometry.x[mesh.geometry.dofmap[:owned], 0].reshape(-1, 2)
+        parts = comm.allgather(ends)
+        owner = np.concatenate([np.full(len(part), rank) for rank, part in enumerate(parts)])
+        local = np.concatenate([np.arange(len(part)) for part in parts])
+        cells = np.concatenate(parts)
+        order = np.argsort(cells.min(axis=1))
+        cells, owner, local = cells[order], owner[order], local[order]
+        left, right = cells.min(axis=1), cells.max(axis=1)
+        found = np.searchsorted(left, self.positions + AT_END * (right - left).min(), side="right") - 1
+        found = np.clip(found, 0, len(left) - 1)
+        gauss = cells[:, :1] + self._points[:, 0] * (cells[:, 1:] - cells[:, :1])
+        patches = [self._patch(int(c), left, right) for c in found]
+        needed = np.unique(np.concatenate(patches))
+        place = {int(c): n for n, c in enumerate(needed)}
+        self._stress = np.zeros((len(found), len(needed), self.degree))
+        for row, (c, patch, x) in enumerate(zip(found, patches, self.positions, strict=True)):
+            chosen = self._chosen(int(c), patch, gauss)
+            values = weights(np.array([gauss[cell, i] for cell, i in chosen]), float(x))
+            for (cell, i), value in zip(chosen, values, strict=True):
+                self._stress[row, place[cell], i] = value
+        here = owner[needed] == comm.rank
+        self._rows, self._cells = np.flatnonzero(here), local[needed[here]].astype(np.int32)
+        self._shape = len(needed), self.degree
+        self._interpolate(found, cells, owner, local)
+
+    def _patch(self, cell: int, left: Array, right: Array) -> list[int]:
+        """Return the cell and up to two on each side of it between which nothing jumps."""
+        knots = self.beam.knots
+        out = [cell]
+        for step, ends in ((-1, left), (1, right)):
+            for there in (cell, cell + step):
+                near = AT_END * (right[there] - left[there])
+                if not 0 <= there + step < len(left) or any(abs(x - ends[there]) <= near for x in knots):
+                    break
+                out.append(there + step)
+        return out
+
+    def _chosen(self, cell: int, patch: list[int], gauss: Array) -> list[tuple[int, int]]:
+        """Return (cell, point) of the points of a polynomial: those of its cell, and the two nearest, one a side."""
+        own = [(cell, i) for i in range(self.degree)]
+        middle = float(gauss[cell].mean())
+        sides: tuple[list[tuple[float, int, int]], ...] = ([], [])
+        for other in patch[1:]:
+            for i, x in enumerate(gauss[other]):
+                sides[int(x > middle)].append((abs(x - middle), other, i))
+        low, high = (sorted(side) for side in sides)
+        taken = [*low[:1], *high[:1]] if low and high else (low or high)[:2]
+        return own + [(other, i) for _, other, i in taken]
+
+    def _interpolate(self, found: Array, cells: Array, owner: Array, local: Array) -> None:
+        """Find the nodes and the values of their functions at the stations in cells of this process."""
+        element, dofmap = self.system.V.element.basix_element, self.system.V.dofmap
+        self._nodal: list[tuple[int, Array, Array]] = []
+        for row, (c, x) in enumerate(zip(found, self.positions, strict=True)):
+            if owner[c] == self.comm.rank:
+                at = (x - cells[c, 0]) / (cells[c, 1] - cells[c, 0])
+                values = element.tabulate(0, np.array([[at]]))[0, 0, :, 0]
+                self._nodal.append((row, dofmap.cell_dofs(int(local[c])), values))
+
+    # --- what -----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _order(self) -> slice:
+        return slice(0, len(FORCES[self.beam.type]) + len(STRAINS[self.beam.type]))
+
+    def _expression(self) -> Any:
+        """Return forces and strains as a compiled expression, made anew where rotations are counted otherwise."""
+        if self._compiled is None or self._compiled[0] != self.system.compilations:
+            beam, model = self.beam, self.system.model
+            k, viscosity = beam.k, model.mechanics.damping.stiffness
+            strains = beam.section_strains(model.theory.measures(beam.type))
+            at = ufl.variable(strains)
+            energy = sum(ufl.inner(s.force(s.value), s.value) / 2 for s in beam.stored(at))
+            force = ufl.diff(energy, at)
+            if viscosity is not None:
+                force = force + viscosity * k.rate(force)
+            n = strains.ufl_shape[0]
+            both = ufl.as_vector([*(force[i] for i in range(n)), *(strains[i] for i in range(n))])
+            self._compiled = self.system.compilations, forms.expression(both, self._points, self.comm)
+        return self._compiled[1]
+
+    def __call__(self) -> Array:
+        """Return all quantities at all stations, (stations, names), on every rank; unknowns in the turning frame."""
+        values: Array = np.zeros((*self._shape, self._order.stop))
+        if len(self._cells):
+            found = self._expression().eval(self.beam.mesh, self._cells)
+            values[self._rows] = found.reshape(len(self._cells), self.degree, -1)
+        out: Array = np.zeros((len(self.positions), len(self.names)))
+        out[:, self._order] = np.tensordot(self._stress, values, 2)
+        total = self.beam.total(self.system.q.x.array).reshape(-1, self.beam.size)
+        for row, nodes, factors in self._nodal:
+            out[row, self._order.stop :] = self.beam.whole_values(factors @ total[nodes])
+        if self.comm.size > 1:
+            out = self.comm.allreduce(out)
+        if self.system.clamp is not None:
+            u = out[:, self._order.stop :]
+            out[:, self._order.stop :] = self.system.clamp.relative(u, self.positions, self.system.time)
+        return out

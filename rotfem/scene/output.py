@@ -1,0 +1,117 @@
+"""The [output] table: what is recorded beside what always is, and in which units numbers are shown."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import PlainValidator
+
+from rotfem import registry
+from rotfem.scene.names import Named, as_names
+from rotfem.scene.values import Count, SceneModel, problem
+from rotfem.section_quantities import FORCES, STRAINS
+
+AngularUnit = Literal["rad/s", "rpm", "Hz", "deg/s"]
+
+#: Most stations along a beam.
+MOST = 10_000
+
+
+class _Known(Named):
+    """Names that `quantities` may hold: registered outputs, and what beams have at a section."""
+
+    kind = "output"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All of them."""
+        sections = dict.fromkeys(name for table in (FORCES, STRAINS) for names in table.values() for name in names)
+        return (*registry.outputs.names, *sections)
+
+
+def _as_quantities(value: Any) -> tuple[str, ...]:
+    return as_names(value, _Known())
+
+
+def _as_stations(value: Any) -> int | tuple[float, ...]:
+    if type(value) is int and 2 <= value <= MOST:
+        return value
+    numbers = isinstance(value, list | tuple) and all(type(x) in (int, float) and np.isfinite(x) for x in value)
+    if not numbers or not 0 < len(value) <= MOST:
+        raise problem("", value, f"must be a list of positions along the beam (m), or how many there are, 2 to {MOST}")
+    if any(b <= a for a, b in pairwise(value)):
+        raise problem("", value, "must be positions that increase")
+    return tuple(float(x) for x in value)
+
+
+class OutputTable(SceneModel):
+    """The [output] table.
+
+    Attributes:
+        quantities: names of registered outputs, to be computed beside what is always recorded; and of what beams have
+            at their stations, all of it if none is named.
+        stations: positions along a beam (m) where section forces, strains and unknowns are recorded; a number of them
+            from end to end.
+        every: rows of history.csv from one record of the stations to the next.
+        format: of the file that they go to.
+        error: whether the error of what is computed is estimated.
+        speed: unit in which speeds are printed and drawn.
+        frequency: unit in which frequencies of modes are printed and drawn.
+    """
+
+    quantities: Annotated[tuple[str, ...], PlainValidator(_as_quantities)] = ()
+    stations: Annotated[int | tuple[float, ...] | None, PlainValidator(_as_stations)] = None
+    every: Count = 1
+    format: Literal["csv", "hdf5"] = "csv"
+    error: bool = True
+    speed: AngularUnit = "rad/s"
+    frequency: AngularUnit = "rad/s"
+
+    @property
+    def functionals(self) -> tuple[str, ...]:
+        """The registered outputs among the quantities."""
+        return tuple(name for name in self.quantities if name in registry.outputs)
+
+    def sections(self, kind: str) -> tuple[str, ...]:
+        """Return the quantities that a beam of a type is to have recorded at its stations: those named, or all."""
+        known = (*FORCES[kind], *STRAINS[kind])
+        return tuple(name for name in self.quantities if name in known) or known
+
+    def positions(self, length: float) -> tuple[float, ...]:
+        """Return the stations along a beam of a length, m; empty if there are none."""
+        if isinstance(self.stations, int):
+            return tuple(float(x) for x in np.linspace(0.0, length, self.stations))
+        return self.stations or ()
+
+    def check(self, kind: str, length: float | None) -> None:
+        """Refuse stations that a structure has not.
+
+        Args:
+            kind: its type.
+            length: its length, m; None where it is given by a mesh.
+
+        Raises:
+            PydanticCustomError: names the key.
+        """
+        sections = {name for table in (FORCES, STRAINS) for names in table.values() for name in names}
+        named = [name for name in self.quantities if name in sections and name not in registry.outputs]
+        if self.stations is None:
+            if named:
+                raise problem("output.quantities", list(self.quantities), f'"{named[0]}" needs output.stations')
+            for key in ("every", "format"):
+                if key in self.model_fields_set:
+                    raise problem(f"output.{key}", getattr(self, key), "has no meaning without output.stations")
+            return
+        if kind not in FORCES or length is None:
+            shown = self.stations if isinstance(self.stations, int) else list(self.stations)
+            raise problem("output.stations", shown, f"are places along a beam; a {kind} has none")
+        known = (*FORCES[kind], *STRAINS[kind])
+        for name in named:
+            if name not in known:
+                allowed = f'"{name}" is none of a {kind}; allowed: {", ".join(known)}'
+                raise problem("output.quantities", list(self.quantities), allowed)
+        outside = [x for x in self.positions(length) if not 0.0 <= x <= length]
+        if outside:
+            raise problem("output.stations", outside[0], f"must be from 0 to the length {length:g} m")

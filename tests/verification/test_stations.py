@@ -1,0 +1,150 @@
+"""Section forces, strains and unknowns at stations along a beam."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+import rotfem
+from rotfem.results.files import read_csv
+from tests.beams import SPIN_UP, STRUCTURE
+
+PLACES = [0.0, 0.7, 2.5, 5.3, 9.1, 10.0]
+LOADS = {"tip_force": [0.0, 3.0], "distributed": [0.0, 2.0]}
+STEADY: dict[str, Any] = {
+    "structure": {**STRUCTURE, "hub_radius": 0.5},
+    "motion": {"type": "constant", "speed": 3.0},
+    "loads": LOADS,
+    "output": {"stations": PLACES, "error": False},
+}
+
+
+def forces(elements: int, degree: int, theory: str = "reissner", **more: Any) -> dict[str, np.ndarray]:
+    """Return N, Q and M of the spinning, loaded beam at the places, and the moment at the root."""
+    scene = {**STEADY, "mesh": {"elements": elements, "degree": degree}, "model": {"theory": theory}, **more}
+    result = rotfem.run(scene)
+    assert result.stations is not None
+    return {name: result.stations[name][0] for name in ("N", "Q", "M")} | dict(result.summary["root"])
+
+
+@pytest.fixture(scope="module")
+def reference() -> dict[str, np.ndarray]:
+    """N, Q and M on a mesh that is so fine that its errors are round-off."""
+    return forces(48, 4)
+
+
+@pytest.mark.parametrize(("degree", "coarse", "order"), [(2, 8, 2.7), (3, 4, 3.7)])
+def test_order(degree: int, coarse: int, order: float, reference: dict[str, np.ndarray]) -> None:
+    """All section forces at all places, ends of cells among them, converge with the order k + 1 of the Gauss points."""
+    errors = []
+    for elements in (coarse, 2 * coarse):
+        found = forces(elements, degree)
+        errors.append([np.max(np.abs(found[n] - reference[n])) / np.max(np.abs(reference[n])) for n in ("Q", "M")])
+    assert np.all(np.log2(np.array(errors[0]) / errors[1]) > order)
+
+
+def test_equilibrium(reference: dict[str, np.ndarray]) -> None:
+    """At the root they are the force of the hub, and M(L) = 0."""
+    assert reference["M"][0] == pytest.approx(-reference["root_m3"], rel=1e-7)
+    assert reference["N"][0] == pytest.approx(-reference["root_f1"], rel=1e-7)
+    assert reference["Q"][0] == pytest.approx(-reference["root_f2"], rel=1e-7)
+    assert abs(reference["M"][-1]) < 1e-7 * reference["M"][0]
+
+
+def test_statics() -> None:
+    """A clamped beam in the linear theory: Q = F + q (L − X), M = F (L − X) + q (L − X)²/2, exactly."""
+    still = {"motion": {"type": "constant", "speed": 0.0}}
+    found = forces(2, 3, "linear", **still)
+    arm = 10.0 - np.array(PLACES)
+    np.testing.assert_allclose(found["Q"], 3.0 + 2.0 * arm, rtol=1e-7)
+    np.testing.assert_allclose(found["M"], 3.0 * arm + arm**2, rtol=1e-7, atol=1e-6)
+    np.testing.assert_allclose(found["N"], 0.0, atol=1e-9)
+
+
+def test_nothing_reaches_over_a_step_of_the_section() -> None:
+    """EI jumps by ten at mid-span: M = F (L − X) does not, nor M/EI beside it; a station there is the outer one."""
+    step = [[0.0, 1.4e5], [5.0, 1.4e5], [5.0, 1.4e4], [10.0, 1.4e4]]
+    section = {**STRUCTURE["section"], "EI": step}
+    try:
+        rotfem.Scene.from_dict({**SPIN_UP, "structure": {**STRUCTURE, "section": section}})
+    except rotfem.SceneError:
+        section["EI"] = [[0.0, 1.4e5], [4.999, 1.4e5], [5.0, 1.4e4], [10.0, 1.4e4]]
+    scene = {
+        "structure": {**STRUCTURE, "section": section},
+        "motion": {"type": "constant", "speed": 0.0},
+        "model": {"theory": "linear"},
+        "loads": {"tip_force": [0.0, 3.0]},
+        "output": {"stations": [4.9, 5.0, 5.1], "quantities": ["M", "kappa"]},
+    }
+    stations = rotfem.run(scene).stations
+    assert stations is not None
+    np.testing.assert_allclose(stations["M"][0], 3.0 * (10.0 - stations.x), rtol=1e-6)
+    np.testing.assert_allclose(stations["kappa"][0] * [1.4e5, 1.4e4, 1.4e4], stations["M"][0], rtol=1e-6)
+
+
+def test_a_spin_up_over_time(tmp_path: Path) -> None:
+    """M along the Reissner beam against a fine mesh, 1e-4 of its largest; files hold what the result has."""
+    time = {"end": 2.0, "step": 0.02}
+    scene = {**SPIN_UP, "motion": {"type": "spin_up", "speed": 6.0, "duration": 4.0}, "time": time}
+    output = {"stations": 5, "every": 10, "quantities": ["M"], "error": False}
+    coarse = rotfem.run({**scene, "output": output}, folder=tmp_path)
+    fine = rotfem.run({**scene, "output": output, "mesh": {"elements": 30, "degree": 3}})
+    assert coarse.stations is not None
+    assert fine.stations is not None
+    assert len(coarse.stations.t) == 11
+    scale = np.max(np.abs(fine.stations["M"]))
+    assert np.max(np.abs(coarse.stations["M"] - fine.stations["M"])) < 1e-4 * scale
+    assert coarse.stations["M"][-1, 0] == pytest.approx(-coarse.history["root_m3"][-1], rel=1e-3)
+    np.testing.assert_allclose(coarse.stations["u2"][:, -1], coarse.history["tip_u2"][::10], rtol=1e-12)
+    columns = read_csv(tmp_path / "stations.csv")
+    assert list(columns) == ["t", "x", "M", "u1", "u2", "alpha"]
+    np.testing.assert_array_equal(columns["M"].reshape(11, 5), coarse.stations["M"])
+    path = coarse.stations.write_hdf5(tmp_path / "stations.h5")
+    with h5py.File(path) as file:
+        np.testing.assert_array_equal(file["M"][:], coarse.stations["M"])
+        assert file["M"].attrs["units"] == "N·m"
+
+
+def test_a_spatial_beam_in_a_plane_is_a_planar_one() -> None:
+    """N, Q, M are N, Q2, M3 there, and T, Q3, M2 of a moment at the tip constant, with pretwist along turned axes."""
+    section = STRUCTURE["section"]
+    spatial = {
+        "type": "spatial_beam",
+        "length": 10.0,
+        "hub_radius": 0.5,
+        "section": {
+            **{"EA": section["EA"], "GA2": section["GA"], "GA3": section["GA"], "GJ": 1e4},
+            **{"EI2": 3e4, "EI3": section["EI"], "mass_per_length": section["mass_per_length"]},
+        },
+    }
+    scene = {**STEADY, "model": {"theory": "linear"}, "motion": {"type": "constant", "speed": 0.0}}
+    loads = {"tip_force": [5.0, 3.0, 0.0], "tip_moment": [2.0, 0.0, 0.0], "distributed": [0.0, 2.0, 0.0]}
+    three = rotfem.run({**scene, "structure": spatial, "loads": loads}).stations
+    plane = rotfem.run({**scene, "loads": {"tip_force": [5.0, 3.0], "distributed": [0.0, 2.0]}}).stations
+    assert three is not None
+    assert plane is not None
+    for one, other in (("N", "N"), ("Q", "Q2"), ("M", "M3"), ("kappa", "kappa3"), ("u2", "u2"), ("alpha", "theta3")):
+        scale = np.max(np.abs(plane[one]))
+        np.testing.assert_allclose(three[other], plane[one], atol=1e-6 * scale, err_msg=one)  # the work of the moment
+    np.testing.assert_allclose(three["T"], 2.0, rtol=1e-3)  # of moments on turned sections the work is of second order
+    np.testing.assert_allclose(three["kappa1"], three["T"] / 1e4, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("output", "key"),
+    [
+        ({"stations": [0.0, 11.0]}, "output.stations"),
+        ({"stations": [5.0, 1.0]}, "output.stations"),
+        ({"stations": 1}, "output.stations"),
+        ({"quantities": ["M"]}, "output.quantities"),
+        ({"stations": 3, "quantities": ["M2"]}, "output.quantities"),
+        ({"every": 2}, "output.every"),
+    ],
+)
+def test_refused(output: dict[str, Any], key: str) -> None:
+    with pytest.raises(rotfem.SceneError, match=key):
+        rotfem.Scene.from_dict({**SPIN_UP, "output": output})
