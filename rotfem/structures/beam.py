@@ -44,12 +44,12 @@ class Beam(Structure):
 
     def __init__(self, problem: Problem, comm: MPI.Comm, knots: tuple[float, ...]):
         super().__init__(problem, comm)
-        #: Places inside the beam where section or axis may change at once, m.
-        self.knots = tuple(sorted(knots))
         grid, s = problem.mesh, self.data
         self.length, self.hub_radius, self._section = s.length, s.hub_radius, s.section
         check_memory("mesh.elements", grid.elements, grid.elements * grid.degree + 1, self.size, 1, comm)
-        nodes = beam_nodes(self.length, grid.elements, apart((*knots, *stations(problem.loads)), self.length))
+        #: Places along the beam where section, axis, loads or forces may change at once, m.
+        self.knots = apart((*knots, *stations(problem.loads)), self.length)
+        nodes = beam_nodes(self.length, grid.elements, self.knots)
         interval = mesh.create_interval(comm, len(nodes) - 1, [0.0, 1.0])  # which dolfinx refuses below 2e-16 m
         x = interval.geometry.x
         x[:, 0] = np.interp(x[:, 0], np.linspace(0.0, 1.0, len(nodes)), nodes)
