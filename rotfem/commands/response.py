@@ -34,7 +34,8 @@ Array = npt.NDArray[Any]
 #: Frequencies of a response if nothing is said, and the part beyond the highest mode asked for that they reach to.
 NUMBER, BEYOND = 200, 1.2
 
-#: Difference of the direct response and that by modes above which it is said that more modes are needed.
+#: Median difference of the direct response and that by modes above which it is said that more modes are needed; the
+#: largest one is found between peaks, where what modes do cancels and little is left to be relative to.
 NOTABLE = 1e-2
 
 
@@ -153,7 +154,8 @@ def result_of(
     warnings = [*analysis.notes, *advice(analysis, spinning.speed), *instabilities(modes), *doubtful(modes)]
     warnings += [stability.warning()] if not stability.stable else []
     warnings += [said] if (said := theory.warning()) else []
-    warnings += told(modes, undamped, float(np.max(off)), scene.modes.count)
+    usual = float(np.median(off))
+    warnings += told(modes, undamped, usual, scene.modes.count)
     summary = {
         **modal_summary("response", analysis, scene, None, started),
         "speed": spinning.speed,
@@ -161,7 +163,7 @@ def result_of(
         "outputs": outputs,
         "frequencies": len(omegas),
         "peaks": {name: peak_of(omegas, np.abs(direct[:, i])) for i, name in enumerate(outputs)},
-        "difference": float(np.max(off)),
+        "difference": {"median": usual, "largest": float(np.max(off))},
         "modes": modes[: scene.modes.count],
         "theory_error": theory.summary(),
         "warnings": list(dict.fromkeys(warnings)),
@@ -206,6 +208,6 @@ def told(modes: Sequence[Mapping[str, Any]], undamped: Sequence[int], off: float
             f"no damping: the response has no height at {named}; what is seen there is how near a frequency came"
         )
     if off > NOTABLE:
-        why = f"{count} modes leave up to {100 * off:.2g} % of the direct response out; more modes.count"
+        why = f"at half of the frequencies {count} modes are {100 * off:.2g} % and more off; more modes.count"
         out.append(f"the response by modes is not that of all modes: {why}")
     return out
