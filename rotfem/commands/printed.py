@@ -128,7 +128,8 @@ def response_report(summary: dict[str, Any], folder: Path) -> list[str]:
     for name, peak in summary["peaks"].items():
         lines.append(f"{name:<14}{peak['amplitude']:>14.6g}{units.frequencies(peak['frequency']):>14.6f}")
     off = summary["difference"]
-    modes = f"difference of the response by {len(summary['modes'])} modes: {off['median']:.1e} (median), {off['largest']:.1e} (largest)"
+    sizes = f"{off['median']:.1e} (median), {off['largest']:.1e} (largest)"
+    modes = f"difference of the response by {len(summary['modes'])} modes: {sizes}"
     return [*lines, modes, f"results in {folder}"]
 
 
