@@ -125,6 +125,94 @@ SCENES: dict[str, dict[str, Any]] = {
 }
 
 
+#: A turbine blade of steel, flat at the tip, with its mass behind the elastic axis.
+STEEL_BLADE = {
+    **{"E": 2.1e11, "nu": 0.3, "rho": 7800.0, "shape": "rectangle", "width": 0.12, "height": 0.02},
+    "mass_center": [-0.01, 0.0],
+}
+#: A shaker arm of aluminium whose height halves towards the tip.
+TAPERED = {"E": 7.0e10, "nu": 0.33, "rho": 2700.0, "shape": "rectangle", "width": 0.05}
+
+#: Scenes of ten further kinds, made after the estimates were settled.
+FRESH: dict[str, dict[str, Any]] = {
+    "propeller, table": {
+        "structure": _beam(1.5, TAPERED | {"height": [[0.0, 0.03], [1.5, 0.012]]}, hub_radius=0.1),
+        "motion": {"type": "table", "table": [[0, 0], [0.15, 60.0], [0.4, 60.0], [0.5, 25.0], [0.8, 30.0]]},
+        "mesh": {"elements": 6},
+        "time": {"end": 1.0, "step": 0.002},
+    },
+    "once a turn": {
+        "structure": _beam(10.0, THIN, tip_mass=1.0, damping={"kelvin_voigt": 5e-3}),
+        "motion": {"type": "constant", "speed": 4.2},
+        "loads": {"gravity": [0.0, -2.0]},
+        "mesh": {"elements": 5},
+        "time": {"end": 12.0, "step": 0.02},
+    },
+    "moment pulse": {
+        "structure": _beam(2.0, THICK, hub_radius=0.5),
+        "motion": {"type": "constant", "speed": 0.8},
+        "loads": {"tip_moment": [[0, 0], [1.0, 0], [1.2, 0.02], [1.4, 0]]},
+        "mesh": {"elements": 4, "degree": 2},
+        "time": {"end": 20.0, "step": 0.05},
+    },
+    "hub, table": {
+        "structure": _beam(0.8, ARM, hub_radius=0.02, tip_mass=0.01),
+        "motion": {
+            **{"type": "torque", "hub_inertia": 5.0e-3, "hub_damping": 1.0e-3},
+            "table": [[0.0, 0.0], [0.05, 0.4], [0.25, 0.4], [0.3, 0.0]],
+        },
+        "mesh": {"elements": 6},
+        "time": {"end": 0.6, "step": 0.002},
+    },
+    "spin-down": {
+        "structure": _beam(8.0, HUB_BEAM, hub_radius=0.4, damping={"rayleigh": [0.0, 1e-3]}),
+        "motion": {"type": "table", "table": [[0, 8.0], [1.0, 8.0], [4.0, 0.5], [6.0, 0.5]]},
+        "initial": {"state": "steady"},
+        "loads": {"tip_force": [0.0, 0.3]},
+        "time": {"end": 8.0, "step": 0.01},
+    },
+    "gusts on a blade": {
+        "structure": {
+            **{"type": "spatial_beam", "length": 2.0, "hub_radius": 0.2, "section": STEEL_BLADE},
+            **{"pretwist": [[0.0, 0.4], [2.0, 0.1]], "damping": {"kelvin_voigt": 1e-4}},
+        },
+        "motion": {"type": "constant", "speed": 40.0},
+        "loads": {"distributed": [[0, 0, 0, 0], [0.1, 0, 20.0, 150.0], [0.3, 0, 20.0, 150.0], [0.35, 0, 0, 40.0]]},
+        "mesh": {"elements": 6},
+        "time": {"end": 0.6, "step": 0.001},
+    },
+    "coned rotor, steady": {
+        "structure": {
+            **{"type": "spatial_beam", "length": 10.0, "hub_radius": 0.5, "section": BLADE, "precone": 0.1},
+            **{"tip_mass": 1.0, "tip_offset": [0.0, 0.05, 0.0]},
+        },
+        "motion": {"type": "constant", "speed": 8.0},
+        "loads": {"distributed": [0.0, 0.0, 12.0]},
+        "mesh": {"elements": 4},
+        "modes": {"count": 4},
+    },
+    "plate in its plane": {
+        "structure": {**PLATE, "thickness": 0.02, "hub_radius": 0.1},
+        "motion": {"type": "table", "table": [[0, 0], [0.02, 150.0], [0.05, 150.0]], "interpolation": "linear"},
+        "loads": {"tip_force": [[0, 0, 0, 0], [0.01, 0, 0, 300.0], [0.03, 0, 0, 300.0], [0.035, 0, 0, 0]]},
+        "mesh": {"elements": [6, 3]},
+        "time": {"end": 0.06, "step": 0.0005},
+    },
+    "modes of a spinning plate": {
+        "structure": {**PLATE, "thickness": 0.015, "hub_radius": 0.25},
+        "motion": {"type": "constant", "speed": 90.0, "axis": [0, 1, 0]},
+        "mesh": {"elements": [6, 4]},
+        "modes": {"count": 5},
+    },
+    "hub with a plate": {
+        "structure": {**PLATE, "length": 2.0, "thickness": 0.01, "hub_radius": 0.2},
+        "motion": {"type": "torque", "hub_inertia": 60.0, "axis": [0, 1, 0], "pulses": [[0.0, 0.2, 120.0]]},
+        "mesh": {"elements": [6, 2]},
+        "time": {"end": 0.8, "step": 0.004},
+    },
+}
+
+
 def scene(name: str) -> Scene:
     """Return one of the scenes; beams on 10 elements of degree 3 where they do not say."""
-    return Scene.from_dict({"mesh": {"elements": 10}, **SCENES[name]}, name.replace(" ", "_"))
+    return Scene.from_dict({"mesh": {"elements": 10}, **(SCENES | FRESH)[name]}, name.replace(" ", "_"))

@@ -66,6 +66,7 @@ class ModalAnalysis:
         about: the state that modes are about: "steady" or "undeformed".
         newton: iteration control of the equilibria.
         comm: MPI communicator.
+        system: the equations of the problem where they are compiled already.
 
     Raises:
         InputError: the mesh cannot be shared by the processes, or a mesh or section that cannot be computed with.
@@ -82,10 +83,11 @@ class ModalAnalysis:
         about: str = "steady",
         newton: Newton | None = None,
         comm: MPI.Comm = MPI.COMM_WORLD,
+        system: Any = None,
     ):
         started = perf_counter()
         self.problem, self.about, self.comm = problem.replace(frame="rotating"), about, comm
-        self.system: Any = compile_system(self.problem, comm, moving=False)
+        self.system: Any = compile_system(self.problem, comm, moving=False) if system is None else system
         self.model, self.structure = self.system.model, self.system.structure
         self.structure.check_shared()  # SLEPc waits for ever where a process has no unknowns
         self.free = self.system.hub is not None

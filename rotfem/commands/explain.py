@@ -154,10 +154,11 @@ def check_changes(
     scene = scene.replace(exact)
     own = full_outputs(scene.replace({"model.effects": list(effects)}), trial, comm)
     for i, item in enumerate(changes, start=1):
-        if item.kind == "discretisation" and scene.time is not None and scene.time.step is None:
+        if item.name == "time.tolerance":
             continue  # adaptive steps have no common times
         if item.kind == "discretisation":
-            other = finer_steps(scene).replace({"model.effects": list(effects)})
+            finer = finer_steps if item.name == "time.step" else finer_mesh
+            other = finer(scene).replace({"model.effects": list(effects)})
         elif item.kind == "effect":
             kept = set(effects) ^ {item.name}
             other = scene.replace({"model.effects": [name for name in trial.effects if name in kept]})
@@ -170,12 +171,19 @@ def check_changes(
 
 
 def finer_steps(scene: Scene) -> Scene:
-    """Return a scene with shorter steps, its rows where they were as far as steps are fixed."""
+    """Return a scene with shorter steps, its rows where they were."""
     time = scene.time
     assert time is not None
-    if time.step is None:
-        return scene.replace({"time.tolerance": (time.tolerance or 0.0) / FINER**2})
+    assert time.step is not None
     return scene.replace({"time.step": time.step / FINER, "time.output_every": time.output_every * FINER})
+
+
+def finer_mesh(scene: Scene) -> Scene:
+    """Return a scene with twice the elements in each direction; of a mesh file, of a higher degree."""
+    if getattr(scene.structure, "mesh", None) is not None:
+        return scene.replace({"mesh.degree": scene.mesh.degree + 1})
+    elements = scene.mesh.elements
+    return scene.replace({"mesh.elements": [2 * n for n in elements] if isinstance(elements, tuple) else 2 * elements})
 
 
 def full_outputs(scene: Scene, trial: Trial, comm: MPI.Comm) -> Outputs:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -178,7 +179,7 @@ def explain_report(summary: dict[str, Any], folder: Path) -> list[str]:
         what = {True: "without ", False: "with "}[row["included"]] if row["kind"] == "effect" else ""
         what = "theory " if row["kind"] == "theory" else what
         kinds = ("estimate", "truth") if checked else ("estimate",)
-        cells = "".join(f"{row[kind][name]:>10.1e}" for name in outputs for kind in kinds)
+        cells = "".join(f"{row.get(kind, {}).get(name, nan):>10.1e}" for name in outputs for kind in kinds)
         lines.append(f"{what + row['name']:<26}{cells}  {row['verdict']}: {row['why']}")
     lines += choice_report(summary)
     lines += [f"no {name}: {text}" for name, text in summary["absent_effects"].items()]

@@ -120,7 +120,7 @@ class NonlinearSystem(System):
             before: q from which a correction has led to the state (see `PointStresses`); None for the true tangent.
         """
         self.A.zeroEntries()
-        if before is None:
+        if before is None or self.plain:
             self._assemble(self.A, (c_k, c_v, c_m), 1.0)
         else:
             self._stresses.come_from(before)

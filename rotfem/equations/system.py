@@ -52,12 +52,15 @@ class System(Readings, Solutions, ABC):
         view: how these are seen.
         seconds: time spent on assembly and solution of steps.
         assembled: time spent on assembly while compiling, s.
+        plain: whether tangents do without what is known of the way to a state (see `PointStresses`), which takes a form
+            of its own.
         compilations: how often the forms were made; once, or twice where rotations have become very large.
     """
 
     linear = False
     solved_at_once = False
     settled = False
+    plain = False
     hub: Any = None
     courses: tuple[Course, ...] = ()
     view: View

@@ -10,6 +10,7 @@ import ufl
 from dolfinx import default_scalar_type, fem, mesh
 
 from rotfem.mechanics.motion import Motion
+from rotfem.numerics import forms
 
 Array = npt.NDArray[np.float64]
 
@@ -37,7 +38,7 @@ class Frame:
 
     def _constant(self, name: str, size: int) -> fem.Constant:
         if name not in self.constants:
-            self.constants[name] = fem.Constant(self._domain, np.zeros(size, dtype=default_scalar_type))
+            self.constants[name] = forms.constant(self._domain, np.zeros(size, dtype=default_scalar_type))
             self._entries[name] = self.constants[name].value
         return self.constants[name]
 

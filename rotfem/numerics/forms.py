@@ -39,6 +39,17 @@ def form(f: Any, once: bool = False) -> Any:
     return _compiled(lambda options: fem.form(f, jit_options=options | more), domain.comm, f.signature())
 
 
+def constant(domain: Any, value: npt.NDArray[Any]) -> fem.Constant:
+    """Return a constant on a mesh, which forms sort by when it was made.
+
+    UFL sorts constants by their text, in which 10 comes before 9: a form made anew could have its factors in another
+    order than before, and would be compiled again.
+    """
+    out = fem.Constant(domain, value)
+    out._repr = f"Constant({out.ufl_domain()!r}, {out.ufl_shape!r}, {out.count():012d})"
+    return out
+
+
 def expression(e: Any, points: npt.NDArray[Any], comm: Any) -> fem.Expression:
     """Return a UFL expression compiled for evaluation at points of the reference cell, shape (number, dim).
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,10 @@ from rotfem.selection.case import Case
 from rotfem.selection.distance import Beyond, Bound, Outputs
 
 Array = npt.NDArray[Any]
+T = TypeVar("T")
+
+#: Share of halved steps from which on steps are too long to be trusted.
+HALVED = 0.01
 
 
 class Halved(ComputationError):
@@ -59,7 +63,24 @@ class Candidate:
         Raises:
             ComputationError: there is none.
         """
-        return steady_state(self.switched(), self.case.problem.motion.speed(0.0), self.case.newton())
+        system, speed = self.switched(), self.case.problem.motion.speed(0.0)
+        return self.plainly(lambda: steady_state(system, speed, self.case.newton()))
+
+    def plainly(self, compute: Callable[[], T]) -> T:
+        """Return what is computed with plain tangents, or where that fails with those that take longer to compile."""
+        held = self.system.held
+        held.plain = True
+        try:
+            return compute()
+        except Beyond:
+            raise
+        except ComputationError:
+            if held.linear:
+                raise
+            held.plain = False
+            return compute()
+        finally:
+            held.plain = False
 
     def steady(self, out: Outputs) -> None:
         """Write the equilibrium into the outputs.
@@ -85,7 +106,7 @@ class Candidate:
             held.set_time(0.0, self.case.problem.motion.at_speed(speed))
             held.set_state(held.zeros())
         else:
-            steady_state(held, speed, self.case.newton())
+            self.plainly(lambda: steady_state(held, speed, self.case.newton()))
         matrices = held.mass_damping_stiffness()
         pencil = Pencil(*matrices)
         if self.system.hub is None:
@@ -108,6 +129,15 @@ class Candidate:
             Halved: more steps were halved than is allowed.
             ComputationError: a step failed, or a linear theory has lost its meaning.
         """
+        count = sum(steps.parts or ())
+
+        def compute() -> None:
+            few = HALVED * count if self.system.held.plain and count else watch.halved
+            self._history(steps, q, out, replace(watch, halved=min(few, watch.halved)))
+
+        self.plainly(compute)
+
+    def _history(self, steps: Steps, q: Array | None, out: Outputs, watch: Watch) -> None:
         system, scheme = self.switched(), self.case.scheme
         assert scheme is not None
         march = March(system, scheme, steps, self.case.newton(), q)

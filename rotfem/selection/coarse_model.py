@@ -18,7 +18,7 @@ from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.eigenproblem import Pencil
-from rotfem.selection.candidate import Candidate, Watch, stand_in, theories_of
+from rotfem.selection.candidate import HALVED, Candidate, Watch, stand_in, theories_of
 from rotfem.selection.case import Case
 from rotfem.selection.distance import HISTORY, MODES, STEADY, Beyond, Bound, Outputs
 from rotfem.selection.resolution import given
@@ -31,9 +31,6 @@ NODES_A_MODE, FEWEST_NODES = 3, 12
 
 #: Share of the case's own steps from which on shorter steps of a trial cost more than they can save.
 DEAR = 0.5
-
-#: Share of halved steps from which on steps are too long to be trusted.
-HALVED = 0.01
 
 #: Times at which the speed of a free hub is looked at.
 HUB_LOOKS = 2001
@@ -149,6 +146,17 @@ class Trial:
         check_steady(self.full.problem.replace(effects=None))
         raise InputError("", None, self.full.unsteady or "there is nothing to compare models by")
 
+    def shorten(self, error: float) -> None:
+        """Shorten the steps of the histories until no two of them differ by what steps make of the same motion.
+
+        Args:
+            error: relative, of a history in the steps of the case itself, if those are fixed.
+        """
+        own = self.full.steps
+        if self.samples is None or self.full.scheme is None or own is None or own.step is None or self._done:
+            return
+        self.samples = self.samples.shortened(error, own.step, self.full.scheme.order)
+
     def outputs(
         self,
         theory: str,
@@ -194,9 +202,13 @@ class Trial:
         problem = self.case.problem
         own, left_out = stand_in(self.theories[theory], self.theories, problem.structure.type)
         if own.name not in self._systems:
-            moving = HISTORY in self.wanted
-            self._systems[own.name] = compile_system(problem.replace(theory=own), self.comm, moving)
+            self._systems[own.name] = self.compiled(problem, own.name)
         return Candidate(self.case, self._systems[own.name], left_out.union(without))
+
+    def compiled(self, problem: Problem, theory: str) -> Any:
+        """Return the system that a theory of a problem is tried out on; the mesh may be another one."""
+        own, _ = stand_in(self.theories[theory], self.theories, problem.structure.type)
+        return compile_system(problem.replace(theory=own), self.comm, HISTORY in self.wanted)
 
     def _frequencies_at_rest(self) -> Array:
         """Return the frequencies (rad/s) of the resting structure, its hub held."""

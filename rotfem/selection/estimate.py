@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from rotfem.selection.coarse_model import Trial
+from rotfem.selection.coarse_model import Trial, from_file
+from rotfem.selection.discretisation import Discretisation, discretisation
 from rotfem.selection.distance import HISTORY, Outputs, change, notes
 from rotfem.selection.reduced_effects import reduced_effects
-from rotfem.selection.step_error import step_error
 
 #: Factor by which an estimate may be wrong: estimates below a tolerance are believed only with it.
 SAFETY = 3.0
@@ -93,26 +93,36 @@ class Estimates:
             return {}
         return reduced_effects(self.trial, self.theory, self.trial.effects)
 
-    def steps(self) -> Change | None:
-        """Return what the steps of the case put its history off; None where there is none or it cannot be told."""
-        steps = self.trial.full.steps
-        off = step_error(self.trial, self.theory, self.without) if HISTORY in self.trial.wanted else None
-        if steps is None or off is None:
-            return None
-        key = "time.step" if steps.step is not None else "time.tolerance"
-        estimate = {name: off if name == HISTORY else 0.0 for name in self.trial.wanted}
-        return Change("discretisation", key, True, estimate)
+    @cached_property
+    def off(self) -> Discretisation:
+        """What steps and mesh of the case put its outputs off, as far as it can be told."""
+        return discretisation(self.trial, self.theory, self.without)
+
+    def discretisations(self) -> list[Change]:
+        """Return what steps and mesh of the case put its outputs off, each as far as it can be told."""
+        full = self.trial.full
+        fixed = full.steps is not None and full.steps.step is not None
+        keys = {
+            "time.step" if fixed else "time.tolerance": self.off.steps,
+            "mesh.degree" if from_file(full.problem) else "mesh.elements": self.off.mesh,
+        }
+        wanted = self.trial.wanted
+        return [
+            Change("discretisation", key, True, {name: found.get(name, 0.0) for name in wanted})
+            for key, found in keys.items()
+            if found
+        ]
 
     def replaced(self, theory: str) -> Change:
         """Return what another theory makes of the case."""
         return self._change("theory", theory, theory == self.theory, self.trial.outputs(theory, self.without))
 
     def all(self) -> list[Change]:
-        """Return every effect there are data for, then every other theory, and the steps of a history."""
+        """Return every effect there are data for, then every other theory, the steps of a history, and the mesh."""
+        self.trial.shorten(self.off.steps.get(HISTORY, 0.0))
         effects = [self.effect(name) for name in self.trial.effects]
         others = [self.replaced(name) for name in self.trial.theories if name != self.theory]
-        steps = self.steps()
-        return [*effects, *others, *([] if steps is None else [steps])]
+        return [*effects, *others, *self.discretisations()]
 
     def _change(
         self, kind: str, name: str, included: bool, other: Outputs, known: Mapping[str, float] | None = None

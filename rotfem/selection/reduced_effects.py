@@ -23,6 +23,9 @@ Array = npt.NDArray[np.float64]
 #: Displacement of the tip over the length from which a trial is asked.
 MODERATE = 0.1
 
+#: Relative change of a history from which a trial is asked.
+LARGEST = 3.0
+
 #: Accuracy of the basis: changes of a history are found in one basis, and are much better than it.
 ACCURACY = 1e-4
 
@@ -47,7 +50,7 @@ def reduced_effects(trial: Trial, theory: str, effects: Collection[str]) -> dict
         found = effect_sizes(response, effects)
     except (ComputationError, np.linalg.LinAlgError):
         return {}
-    return {name: size for name, size in found.items() if np.isfinite(size)}
+    return {name: size for name, size in found.items() if size < LARGEST}
 
 
 def linear_of(trial: Trial, theory: str) -> Theory | None:

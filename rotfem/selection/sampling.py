@@ -6,7 +6,7 @@ there are as many steps as what is prescribed needs, or Newton, but never more t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -19,6 +19,9 @@ Array = npt.NDArray[Any]
 
 #: Steps in a period of the first and of the second eigenfrequency, and the fewest and most of a history.
 STEPS_A_PERIOD, FEWEST_STEPS, MOST_STEPS = (32, 10), 200, 1500
+
+#: Error by its steps with which a history is still good to see what changes.
+ROUGH = 0.1
 
 #: Steps between two samples of a history, tried one after the other as far as the case has as many steps itself.
 FINER = (1, 4, 16)
@@ -69,6 +72,22 @@ class Sampling:
         while self.own is not None and finest > 1 and self.count(finest) > self.own:
             finest -= 1
         return tuple(dict.fromkeys(min(finer, finest) for finer in FINER))
+
+    def shortened(self, error: float, step: float, order: int) -> Self:
+        """Return the same samples with steps between them so short that the error is none to speak of.
+
+        Args:
+            error: relative, of a history in steps of a length.
+            step: that length, s.
+            order: of the scheme.
+        """
+        wanted = step * (ROUGH / error) ** (1 / order) if error > 0.0 else np.inf
+        most = max(1, MOST_STEPS // len(self.parts))
+        finer = min(int(np.ceil(self.step / wanted - 1e-9)), most)
+        if finer <= 1:
+            return self
+        parts = np.maximum(self.parts, finer)
+        return replace(self, parts=parts, own=None if self.own is None else max(self.own, int(parts.sum())))
 
     def count(self, finer: int) -> int:
         """Return the steps of a history with at least so many between two samples."""

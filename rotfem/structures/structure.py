@@ -15,6 +15,7 @@ from mpi4py import MPI
 from rotfem.errors import InputError, shown
 from rotfem.mechanics.bodies import Body, Damping, Kinematics, Strain
 from rotfem.mechanics.problem import Problem
+from rotfem.numerics import forms
 from rotfem.structures.applied_loads import LoadsOfStructure
 from rotfem.structures.datum import Turns
 from rotfem.structures.tip_values import TipValues
@@ -163,7 +164,7 @@ class Structure(LoadsOfStructure):
 
     def constant(self, value: npt.ArrayLike) -> fem.Constant:
         """Return a constant on the mesh: its value can change without a new compilation."""
-        return fem.Constant(self.mesh, np.asarray(value, dtype=default_scalar_type))
+        return forms.constant(self.mesh, np.asarray(value, dtype=default_scalar_type))
 
     def scalar(self, name: str, value: float) -> fem.Constant:
         """Return the constant of a named number, one and the same at every call."""

@@ -243,13 +243,31 @@ def test_row_of_the_steps_is_their_true_error() -> None:
     """Steps of 0.04 s, against those of a quarter: what is left of the latter is a sixteenth."""
     scene = Scene.from_dict({"structure": STRUCTURE, **COARSE_STEPS})
     estimates = Estimates(Trial(case_of(scene)), "reissner", case_of(scene).problem.effective_effects())
-    row = estimates.steps()
-    assert row is not None
+    row, _ = estimates.discretisations()
     rough = rotfem.run(scene).history
     fine = rotfem.run(scene.replace({"time.step": 0.01, "time.output_every": 4})).history
     tips = [np.column_stack([h["tip_u1"], h["tip_u2"]]) for h in (fine, rough)]
     assert row.estimate[HISTORY] == pytest.approx(tip_change(*tips), rel=0.5)
     assert row.name == "time.step"
+
+
+@pytest.mark.parametrize("time", [{"time": COARSE_STEPS["time"]}, {}], ids=["history", "steady"])
+def test_row_of_the_mesh_is_what_a_run_says_of_it(time: dict[str, Any]) -> None:
+    """The trial has six of the ten elements, and scales what it finds; of modes the truth is on twice as many.
+
+    Both are good to a factor: what is compared is found from shapes on different meshes, and by the size of elements.
+    """
+    motion = COARSE_STEPS["motion"] if time else {"type": "constant", "speed": 3.0}
+    tables = {"structure": STRUCTURE, "motion": motion, "loads": {"tip_force": [0.0, 10.0]}, **time}
+    scene = Scene.from_dict({**tables, "modes": {"count": 2}, "mesh": {"elements": 10, "degree": 2}})
+    trial = Trial(case_of(scene))
+    row = Estimates(trial, "reissner", trial.effects).discretisations()[-1]
+    assert row.name == "mesh.elements"
+    assert trial.case.problem.mesh.elements == 6
+    assert row.estimate[trial.wanted[0]] == pytest.approx(rotfem.run(scene).summary["error"]["space"], rel=0.2)
+    finer = (scene, scene.replace({"mesh.elements": 20}))
+    rough, fine = (np.array([row["frequency"] for row in rotfem.modes(s).rows]) for s in finer)
+    assert 1 / 3 < row.estimate[MODES] / np.max(np.abs(rough / fine - 1)) < 3
 
 
 def test_effects_of_a_reduced_model_are_those_of_trials() -> None:
