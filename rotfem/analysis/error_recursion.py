@@ -22,6 +22,9 @@ Index = npt.NDArray[np.int64]
 #: |λh| up to which integrals are summed by Gauss points, and how many.
 SMALL, POINTS = 1.0, 8
 
+#: Samples after the first of a piece by which it is judged, and how many times their bends its own are if it jumps.
+AFTER, JUMP = 5, 4.0
+
 #: Steps on either side in which samples show whether they are smooth.
 NEAR = 3
 
@@ -132,6 +135,27 @@ class Spans:
         """Return the steps of an index array."""
         s = self
         return Spans(s.starts[index], s.lengths[index], s.near[index], s.first[index], s.last[index])
+
+
+def settled(times: Array, values: Array, first: Index) -> Array:
+    """Return samples (N, r); where those that smooth pieces start with jump, they are put on the line of the next two.
+
+    What a piece starts with may not be what goes on: stress comes up within a step that does not resolve how.
+
+    Args:
+        times: of the samples, s, (N,).
+        values: samples, (N, r).
+        first: numbers of the first samples of all pieces.
+    """
+    out = values.copy()
+    ends = np.append(first[1:], len(times))
+    for i in first[ends - first > AFTER]:
+        t, x = times[i : i + AFTER + 1], values[i : i + AFTER + 1]
+        slopes = np.diff(x, axis=0) / np.diff(t)[:, None]
+        bends = np.abs(np.diff(slopes, axis=0)) * np.diff(t)[1:, None]
+        jumps = bends[0] > JUMP * bends[1:].max(axis=0)
+        out[i, jumps] = (x[1] - (t[1] - t[0]) * slopes[1])[jumps]
+    return out
 
 
 def interpolated(times: Array, values: Array, spans: Spans, order: int) -> Array:

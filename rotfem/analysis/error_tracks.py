@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.error_recursion import Propagator, accumulated, interpolated
+from rotfem.analysis.error_recursion import Propagator, accumulated, interpolated, settled
 from rotfem.analysis.error_window import Window
 
 Array = npt.NDArray[np.float64]
@@ -127,7 +127,11 @@ class Track:
         self.carried = np.array([exact.sampled(e) for e in errors[-1]]).reshape(len(parts), 2, -1)
         r, tip = window.shapes.V.shape[1], window.shapes.tip
         self.carried[:, :, :r] *= window.bends  # what stretches has no phase to lose
-        sizes = [np.linalg.norm(exact.displacements(e)[:, :r] @ tip.T, axis=1) for e in np.moveaxis(errors, 1, 0)]
+        moved = [exact.displacements(e)[:, :r] for e in np.moveaxis(errors, 1, 0)]
+        if self.space:  # a vibration of another frequency is off by twice its amplitude at most
+            most = 2.0 * np.abs(window.motion[0][:, :r]).max(axis=0)
+            moved[1] = np.clip(moved[1], -most, most)
+        sizes = [np.linalg.norm(c @ tip.T, axis=1) for c in moved]
         return [(float(size.max()), float(window.t[end[int(size.argmax())]])) for size in sizes]
 
     def _start(self, window: Window, parts: int) -> tuple[Array, Array]:
@@ -142,7 +146,8 @@ class Track:
         """Return γ over every step as polynomials."""
         (c, v, a), most = window.motion, self.scheme.order + BEYOND
         if self.scheme.balanced_at_end:
-            return interpolated(window.t, a + v @ window.C.T + c @ K.T, window.at_ends, most)
+            drives = settled(window.t, a + v @ window.C.T + c @ K.T, np.array(window.samples.pieces))
+            return interpolated(window.t, drives, window.at_ends, most)
         begin, end = window.ends
         t, c, v = (0.5 * (x[begin] + x[end]) for x in (window.t, c, v))
         return interpolated(t, a[end] + v @ window.C.T + c @ K.T, window.in_middles, most)
@@ -150,7 +155,7 @@ class Track:
     @staticmethod
     def _mesh_force(window: Window) -> Array:
         """Return 2 ε c̈: the forces of inertia, whose static answer the mesh puts off by 2 ε."""
-        a = window.motion[2]
+        a = settled(window.t, window.motion[2], np.array(window.samples.pieces))
         out, r = np.zeros_like(a), len(window.epsilon)
         out[:, :r] = 2.0 * window.epsilon * a[:, :r]
         return out

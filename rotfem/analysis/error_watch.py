@@ -19,8 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.error_tracks import largest_errors
-from rotfem.analysis.error_window import Samples, Window
-from rotfem.analysis.refined_mesh import error_by_refinement
+from rotfem.analysis.error_window import MeshErrors, Samples, Window
+from rotfem.analysis.refined_mesh import RefinedMesh
 from rotfem.analysis.schemes import State
 from rotfem.analysis.shape_error import ShapeError
 from rotfem.errors import ComputationError
@@ -29,9 +29,6 @@ Array = npt.NDArray[np.float64]
 
 #: Windows of a history, fewest steps in one by unknowns, and most bytes of states that are kept.
 WINDOWS, FEWEST, LARGE, MEMORY = 8, (25, 100), 2000, 64_000_000
-
-#: Error of a shape, told from itself, from which it is looked at on a finer mesh.
-DOUBTFUL = 3e-3
 
 
 @dataclass(frozen=True)
@@ -66,7 +63,7 @@ class ErrorWatch:
     def __init__(self, system: Any, end: float = 0.0, scheme: Any = None):
         self.system, self.end, self.scheme = system, end, scheme
         self.since: float | None = None
-        self._mesh = ShapeError(system.held)
+        self._mesh = MeshErrors(ShapeError(system.held), RefinedMesh(system))
         self._fewest = FEWEST[system.A.getSize()[0] > LARGE]
         self._now = Samples([], [], [])
         self._windows: list[Window] = []
@@ -75,6 +72,7 @@ class ErrorWatch:
         #: Whether all windows could be solved, and there were equations to solve them by.
         self._sound = system.clamp is None
         self._farthest: tuple[float, State | None] = (0.0, None)
+        self._roughest: tuple[float, State | None] = (0.0, None)
 
     def __call__(self, old: Any, new: Any) -> None:
         """Look at a step from an old to a new state."""
@@ -103,7 +101,7 @@ class ErrorWatch:
         size, state = self._farthest
         if state is None:
             size, state = float(self._tip_sizes([last.q])[0]), last
-        shape = self._shape(state, size)
+        shape = max(self._shape(s, size) for s in (state, self._roughest[1]) if s is not None)
         found: dict[str, tuple[float, float]] = {"time": (0.0, 0.0), "space": (0.0, 0.0)}
         if self._windows and self._sound:
             with np.errstate(all="ignore"):  # where damping or growth is beyond numbers nothing is known
@@ -113,15 +111,13 @@ class ErrorWatch:
         return TipErrors(found["time"] if self._sound else None, found["space"], shape, size)
 
     def _shape(self, state: State, size: float) -> float:
-        """Return the relative error of a deflection (of so many m at the tip) by the mesh.
+        """Return the error of a state by the mesh, relative to the largest deflection (m).
 
-        Its own shape says it roughly; where that may matter, a finer mesh does.
+        A finer mesh says it; without one the deflection's own shape says it roughly.
         """
-        rough = self._mesh.of_shape(state.q[: len(self.system.held.zeros())], state.datum)
-        if max(rough, self._mesh.of_turns(state.q)) < DOUBTFUL or not size > 0.0:
-            return rough
-        fine = error_by_refinement(self.system, state)
-        return rough if fine is None else fine / size
+        if size > 0.0 and (fine := self._mesh.refined.of_state(state)) is not None:
+            return fine / size
+        return self._mesh.shape.of_shape(state.q[: len(self.system.held.zeros())], state.datum)
 
     def _close(self, last: Any) -> None:
         """End a window with the last state."""
@@ -129,7 +125,11 @@ class ErrorWatch:
         sizes = self._tip_sizes([state[1] for state in now.states])
         i = int(np.argmax(sizes))
         if sizes[i] > self._farthest[0]:
-            self._farthest = (float(sizes[i]), State(*now.states[i][:4], datum=now.states[i][4]))
+            self._farthest = (float(sizes[i]), now.state(i))
+        n = len(self.system.held.zeros())
+        i, rough = self._mesh.shape.roughest(np.array([state[1][:n] for state in now.states]))
+        if rough > self._roughest[0]:
+            self._roughest = (rough, now.state(i))
         if self._sound:
             before = self._windows[-1] if self._windows else None
             try:

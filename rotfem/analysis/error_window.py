@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.error_recursion import Index, Spans
 from rotfem.analysis.reduced_tangents import Tangents
+from rotfem.analysis.refined_mesh import RefinedMesh
 from rotfem.analysis.ritz_vectors import RitzVectors
 from rotfem.analysis.schemes import State
 from rotfem.analysis.shape_error import ShapeError
@@ -22,6 +23,9 @@ PERIODS, SLOW = 2.0, 0.7
 
 #: Part of a turn in a history by which the angle of a free hub is held, so that no eigenvalue is double.
 HELD = 0.01
+
+#: Factor of the squares of the LOWEST frequencies up to which the errors that the mesh makes of them are kept.
+LIKE, LOWEST = 2.0, 3
 
 #: Product of two shapes from which they are one, and a square of a frequency that is none, 1/s².
 SAME, TINY = 0.5, 1e-300
@@ -48,6 +52,11 @@ class Samples:
         begin, end = self.steps[int(np.searchsorted(t, 0.5 * (t[0] + t[-1])))]
         return end, self.states[end][0] - self.states[begin][0]
 
+    def state(self, number: int) -> State:
+        """Return the state of a number."""
+        t, q, v, a, datum = self.states[number]
+        return State(t, q, v, a, datum=datum)
+
     def around(self, number: int, most: int) -> Any:
         """Return so many states on either side of one, and itself, if they are smooth with it; else None."""
         own = int(np.searchsorted(self.pieces, number, side="right")) - 1
@@ -58,12 +67,25 @@ class Samples:
         return found if all(state[4] is found[0][4] for state in found) else None
 
 
+@dataclass
+class MeshErrors:
+    """What is known of the errors that a mesh makes.
+
+    Attributes:
+        shape: of shapes, told from themselves.
+        refined: by a finer mesh.
+    """
+
+    shape: ShapeError
+    refined: RefinedMesh
+
+
 class Window:
     """A motion in the shapes that move the tip, c = Vᵀ M q; of a free hub with its angle as last coordinate.
 
     Args:
         system: equations of motion; time and state are set in it.
-        mesh: errors of shapes.
+        mesh: errors of shapes, told from themselves and by a finer mesh.
         samples: the motion.
         end: length of the whole history, s.
         before: the window before; None for the first.
@@ -79,7 +101,7 @@ class Window:
         turn: Vᵀ M V_before, by which errors are handed on; None for the first.
     """
 
-    def __init__(self, system: Any, mesh: ShapeError, samples: Samples, end: float, before: Window | None):
+    def __init__(self, system: Any, mesh: MeshErrors, samples: Samples, end: float, before: Window | None):
         self.samples, self.free = samples, system.hub is not None
         self.turn: Array | None = None
         self.t = np.array([state[0] for state in samples.states])
@@ -104,7 +126,7 @@ class Window:
         same = system.hub is None and motion.rate(t) == 0.0 and abs(motion.speed(t)) == before.speed
         return bool(system.held.linear and same)
 
-    def _reduce(self, system: Any, mesh: ShapeError, end: float, before: Window | None) -> None:
+    def _reduce(self, system: Any, mesh: MeshErrors, end: float, before: Window | None) -> None:
         """Find shapes and matrices."""
         self.shapes, tangents = self._tangents(system, mesh)
         self.speed = tangents.speed
@@ -112,9 +134,21 @@ class Window:
         if self.free:
             K[-1, -1] += HELD * M[-1, -1] * (2 * np.pi / end) ** 2
         self.C, self.K = (np.asarray(np.linalg.solve(M, A), dtype=float) for A in (C, K))
-        self.bends, self.epsilon = mesh.bend(self.shapes), mesh.of_modes(self.shapes)
+        self.bends = mesh.shape.bend(self.shapes)
+        self.epsilon = self._errors_by_mesh(mesh, tangents, before)
+        self.shapes.release()
         if before is not None:
             self.turn = self._turned(before.shapes)
+
+    def _errors_by_mesh(self, mesh: MeshErrors, tangents: Tangents, before: Window | None) -> Array:
+        """Return the relative errors of the frequencies: those of the window before where they are much the same."""
+        mine = self.shapes.squares
+        if before is not None and len(before.epsilon) == len(mine):
+            ratio = np.abs(mine[:LOWEST]) / np.maximum(np.abs(before.shapes.squares[:LOWEST]), TINY)
+            if np.all((ratio <= LIKE) & (ratio >= 1.0 / LIKE)):
+                return before.epsilon
+        found = mesh.refined.of_frequencies(self.shapes, tangents.t, tangents.speed)
+        return mesh.shape.of_modes(self.shapes) if found is None else found
 
     @cached_property
     def ends(self) -> tuple[Index, Index]:
@@ -162,19 +196,19 @@ class Window:
 
     # --- the tangent -------------------------------------------------------------------------------------------------
 
-    def _tangents(self, system: Any, mesh: ShapeError) -> tuple[RitzVectors, Tangents]:
+    def _tangents(self, system: Any, mesh: MeshErrors) -> tuple[RitzVectors, Tangents]:
         """Return shapes and matrices in the middle of the window."""
         number, h = self.samples.middle
-        t, q, v, a, datum = self.samples.states[number]
-        tangents = Tangents(system, State(t, q, v, a, datum=datum))
+        state = self.samples.state(number)
+        tangents = Tangents(system, state)
         shapes = tangents.shapes()
         if system.held.linear:
             return shapes, tangents
-        quick = self._vibrating(shapes, mesh.bend(shapes), number, h)
+        quick = self._vibrating(shapes, mesh.shape.bend(shapes), number, h)
         if not np.any(quick):
             return shapes, tangents
-        q, v, a = (_without(x, moved) for x, moved in zip((q, v, a), quick, strict=True))
-        tangents = Tangents(system, State(t, q, v, a, datum=datum))
+        q, v, a = (_without(x, moved) for x, moved in zip((state.q, state.v, state.a), quick, strict=True))
+        tangents = Tangents(system, state.changed(q=q, v=v, a=a))
         return tangents.shapes(), tangents
 
     def _vibrating(self, shapes: RitzVectors, bends: Any, number: int, h: float) -> Array:

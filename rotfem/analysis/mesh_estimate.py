@@ -11,6 +11,7 @@ much again, for which a factor stands.
 
 from __future__ import annotations
 
+from functools import cached_property
 from math import factorial
 from typing import Any
 
@@ -53,7 +54,7 @@ class MeshEstimate:
         # Along the directions of the cell, whose degrees are counted, and per unit length.
         self._per_length = 1 / np.linalg.norm(J, axis=2)
         self._weights = weights * np.abs(np.linalg.det(J))
-        self._shape = shape
+        self._shape, self._points = shape, points
         self._polynomials = basix.tabulate_polynomials(basix.PolynomialType.legendre, cell, self.degree, points)
         self._reference = weights
         if cell == basix.CellType.quadrilateral:
@@ -81,6 +82,24 @@ class MeshEstimate:
         if total == 0.0:
             return 0.0
         return min(1.0, SAFE * 0.5 * sum(self._missing(energy, level) for level in self._levels) / total)
+
+    @cached_property
+    def _top(self) -> Array:
+        """What the values at the nodes of a cell have of the highest degree, shape (polynomials, nodes)."""
+        e = self.V.ufl_element()
+        base = e.sub_elements[0] if e.block_size > 1 else e
+        values = base.tabulate(0, self._points)[0]
+        highest = np.max(self._levels, axis=0) == self.degree
+        return np.asarray(self._polynomials[highest] * self._reference @ values)
+
+    def roughness(self, values: Array) -> Array:
+        """Return how much of the highest degree nodal values (states, local nodes, components) have, shape (states,).
+
+        That is what the mesh follows last: where it is large, the mesh is the farthest off.
+        """
+        own = (np.einsum("pn,scnk->scpk", self._top, values[:, self.cells]) ** 2).sum(axis=(1, 2, 3))
+        comm = self.V.mesh.comm
+        return np.asarray(comm.allreduce(own) if comm.size > 1 else own)
 
     def of_shapes(self, X: Array, components: list[list[int]]) -> list[float]:
         """Return the estimates of complex shapes, columns of owned unknowns, each for some of their components."""

@@ -1,86 +1,191 @@
-"""How far the mesh of a beam puts a state off, by the same state on elements of half the length.
+"""How far the mesh puts a motion off, by its own equations on cells of half the size.
 
-The state is put on the finer mesh, where its forces are out of balance by what the elements could not follow. The
-displacements that balance them, by Newton's method with velocities and accelerations as they are, are the error of the
-coarser mesh but for that of the finer one. The forms are those of the run itself, so nothing is compiled.
+*A state.* Put on the finer mesh, its forces are out of balance by what the cells could not follow. The displacements
+that balance them, by Newton's method with velocities and accelerations as they are, are the error of the coarser mesh.
+
+*Frequencies.* Shapes X of the coarse mesh become Y = (K + sM)⁻¹ M X on either mesh, by which what the cells cannot
+follow is out of them, and the frequencies of the two meshes in Y are compared one by one: of a nonlinear theory those
+about the equilibrium at the speed, without loads. About a state that moves they say less: a tangent is off by stress in
+the points of integration, and the path of the motion is not.
+
+Both leave out the error of the finer mesh, a small part: (½)^{2k} of it in smooth shapes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import scipy.linalg
+from dolfinx import fem
 
+from rotfem.analysis.ritz_vectors import RitzVectors
 from rotfem.analysis.schemes import State
-from rotfem.equations.compiled import compile_system
-from rotfem.errors import ComputationError, InputError
+from rotfem.equations.finer import FinerEquations
+from rotfem.errors import ComputationError
 from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.refinement import NotRefined
 
 Array = npt.NDArray[np.float64]
 
 #: Most corrections, the relative size of one that is small, and how many of these in a row are the last.
 CORRECTIONS, SMALL, ENOUGH = 15, 0.02, 2
 
-#: Distance of two nodes that are one, as a part of the length.
-ONE = 1e-9
+#: Size of the last increment of an equilibrium, relative to its largest unknown (m or rad) or to 1.
+SETTLED = 1e-9
+
+#: Most unknowns of the refined mesh.
+MOST = 40_000
 
 
-def error_by_refinement(system: Any, state: State) -> float | None:
-    """Return the error (m) of the tip at a state; None of other structures than beams, and where it cannot be found.
+class RefinedMesh:
+    """The equations of a system on its mesh refined, made when they are first asked for.
 
     Args:
-        system: equations of motion, in the frame that turns.
-        state: where; its rotations counted from the undeformed structure.
+        system: equations of motion, in the frame that turns; states and times are set in it.
     """
-    inner = system.held
-    if inner.structure.mesh.topology.dim != 1 or system.clamp is not None or state.datum is not None:
-        return None
-    problem = inner.model.problem
-    try:
-        mesh = problem.mesh.model_copy(update={"elements": 2 * problem.mesh.elements})
-        fine = compile_system(problem.replace(mesh=mesh, outputs={}), inner.comm, inner.moving)
-        return _corrected(system, fine, state) if fine.structure.unknowns == inner.structure.unknowns else None
-    except (ComputationError, InputError):
+
+    def __init__(self, system: Any):
+        self.system = system
+        inner = system.held
+        cells = 2**inner.structure.mesh.topology.dim
+        self._known = system.clamp is None and cells * system.A.getSize()[0] <= MOST
+        self._made: FinerEquations | None = None
+
+    @property
+    def equations(self) -> FinerEquations | None:
+        """The equations on the refined mesh; None where there are none."""
+        inner = self.system.held
+        if self._known and (self._made is None or self._made.compilations != inner.compilations):
+            try:
+                self._made = FinerEquations(inner)
+            except NotRefined:
+                self._known = False
+        return self._made if self._known else None
+
+    def of_state(self, state: State) -> float | None:
+        """Return the error (m) of the tip at a state; None where it cannot be found."""
+        system = self.system
+        system.count_rotations_from(state.datum)
+        if (fine := self.equations) is None:
+            return None
+        system.set_time(state.t)
+        system.set_state(state.q, state.v, state.a)
+        try:
+            fine.take()
+            return self._corrected(fine)
+        except (ComputationError, NotRefined):
+            return None
+
+    def _corrected(self, fine: FinerEquations) -> float | None:
+        """Return by how much the tip moves when a state is balanced on the finer mesh; None where that does not end."""
+        q, start = fine.q.x.array, fine.q.x.array.copy()
+        increment, done = Increment(fine.V), 0
+        moves = [i for i, name in enumerate(self.system.held.structure.unknowns) if name.startswith("u")]
+        for _ in range(CORRECTIONS):
+            dq = increment.solve(DirectSolver(fine.matrix("K", 1.0)), fine.imbalance())
+            q += dq
+            last = float(np.linalg.norm(fine.tip(dq)[moves]))
+            size = float(np.linalg.norm(fine.tip(q - start)[moves]))
+            if not np.isfinite(size):
+                return None
+            done = done + 1 if last <= SMALL * size else 0
+            if self.system.held.linear or done == ENOUGH:
+                return size
         return None
 
+    def of_frequencies(self, shapes: RitzVectors, t: float, speed: float) -> Array | None:
+        """Return (ω − ω_fine)/ω of shapes, shape (r,); None where it cannot be found.
 
-def _corrected(system: Any, fine: Any, state: State) -> float | None:
-    """Return by how much the tip moves when a state is balanced on a finer mesh; None where that does not end."""
-    motion = [_on(system.held, fine.held, x[: len(system.held.zeros())]) for x in (state.q, state.v, state.a)]
-    q, hub = motion[0].copy(), [x[-1:] for x in (state.q, state.v, state.a)]
-    increment, done = Increment(fine.V), 0
-    moves = [i for i, name in enumerate(fine.structure.unknowns) if name.startswith("u")]
+        Args:
+            shapes: of the system's own mesh.
+            t: when, s.
+            speed: of the frame then, rad/s.
+        """
+        if (fine := self.equations) is None:
+            return None
+        inner = self.system.held
+        try:
+            if not inner.linear:
+                inner.set_time(t, inner.motion.at_speed(speed), 0.0)
+                inner.set_state(inner.zeros())
+                _settle(Increment(inner.V), lambda: inner.matrix(1.0, 0.0, 0.0, 1.0), inner.residual, inner.q)
+            fine.take()
+            if not inner.linear:
+                _settle(Increment(fine.V), lambda: fine.matrix("K", 1.0), fine.imbalance, fine.q)
+            M, K = inner.matrix(0.0, 0.0, 1.0, 0.0), inner.matrix(1.0, 0.0, 0.0, 1.0)
+            here = _frequencies(shapes, (M, K, inner.clamped), shapes.V)
+            M, K = fine.matrix("M"), fine.matrix("K", 1.0)
+            X = fine.carried(_local(inner, shapes.V))
+            there = _frequencies(shapes, (M, K, fine.clamped), X, own=False)
+        except (ComputationError, NotRefined, np.linalg.LinAlgError):
+            return None
+        errors = 0.5 * (here - there) / np.maximum(np.abs(here), np.finfo(float).tiny)
+        return np.asarray(np.clip(errors, -1.0, 1.0)) if np.all(np.isfinite(errors)) else None
+
+
+def _settle(increment: Increment, stiffness: Callable[[], Any], imbalance: Callable[[], Any], q: Any) -> None:
+    """Put the function q into the equilibrium near it.
+
+    Raises:
+        ComputationError: there is none that a few corrections lead to.
+    """
     for _ in range(CORRECTIONS):
-        fine.set_time(state.t)
-        whole = [q, motion[1], motion[2]]
-        if system.hub is not None:
-            whole = [np.append(x, angle) for x, angle in zip(whole, hub, strict=True)]
-        fine.set_state(*whole)
-        dq = increment.solve(DirectSolver(fine.held.matrix(1.0, 0.0, 0.0, 1.0)), fine.held.residual())
-        q += dq
-        last = float(np.linalg.norm(fine.structure.tip_values(dq)[moves]))
-        size = float(np.linalg.norm(fine.structure.tip_values(q - motion[0])[moves]))
-        done = done + 1 if last <= SMALL * size else 0
-        if system.held.linear or done == ENOUGH:
-            return size
-    return None
+        dq = increment.solve(DirectSolver(stiffness()), imbalance())
+        q.x.array[:] += dq
+        size, whole = (float(np.max(np.abs(x), initial=0.0)) for x in (dq, q.x.array))
+        comm = increment.function.function_space.mesh.comm
+        size, whole = max(comm.allgather((size, whole))) if comm.size > 1 else (size, whole)
+        if not np.isfinite(size):
+            break
+        if size <= SETTLED * max(whole, 1.0):
+            return
+    raise ComputationError("no equilibrium at the speed")
 
 
-def _on(coarse: Any, fine: Any, values: Array) -> Array:
-    """Return the function of local dofs on a coarser line at the nodes of a finer one, local dofs of that."""
-    x, q = coarse.structure.gather(values)
-    order = np.argsort(x[:, 0], kind="stable")
-    x, q = x[order, 0], q[order]
-    degree = coarse.structure.problem.mesh.degree
-    ends = x[::degree]
-    at = fine.V.tabulate_dof_coordinates()[:, 0]
-    cell = np.clip(np.searchsorted(ends, at + ONE * ends[-1], side="right") - 1, 0, len(ends) - 2)
-    nodes = cell[:, None] * degree + np.arange(degree + 1)
-    points = x[nodes]
-    shape = np.ones_like(points)
-    for j in range(degree + 1):
-        for m in range(degree + 1):
-            if m != j:
-                shape[:, j] *= (at - points[:, m]) / (points[:, j] - points[:, m])
-    return np.asarray(np.einsum("nj,njc->nc", shape, q[nodes]).ravel())
+def _local(system: Any, owned: Array) -> Array:
+    """Return owned columns with the values of ghosts."""
+    function = fem.Function(system.V)
+    out = np.empty((len(function.x.array), owned.shape[1]))
+    for i, column in enumerate(owned.T):
+        function.x.array[: len(owned)] = column
+        function.x.scatter_forward()
+        out[:, i] = function.x.array
+    return out
+
+
+def _frequencies(shapes: RitzVectors, system: tuple[Any, Any, Any], X: Array, own: bool = True) -> Array:
+    """Return the squares of frequencies in (K + shift M)⁻¹ M X, increasing.
+
+    Args:
+        shapes: whose shift it is, and whose sums over the ranks where the system is theirs.
+        system: M, K (with 1 at clamped unknowns), and the clamped unknowns.
+        X: columns.
+        own: whether it is.
+    """
+    M, K, clamped = system
+    A = K.copy()
+    A.axpy(shapes.shift, M)
+    solver, Y = DirectSolver(A), _times(M, X)
+    x, y = M.createVecs()
+    for column in Y.T:
+        x.array[:] = column
+        x.array[clamped] = 0.0
+        solver.solve(x, y)
+        column[:] = y.array
+    small = [Y.T @ _times(B, Y) for B in (K, M)]
+    stiffness, mass = (shapes.sum(B) if own else B for B in small)
+    return np.asarray(scipy.linalg.eigh(*(0.5 * (B + B.T) for B in (stiffness, mass)), eigvals_only=True))
+
+
+def _times(A: Any, X: Array) -> Array:
+    """Return A X of columns."""
+    x, y = A.createVecs()
+    out = np.empty_like(X)
+    for i, column in enumerate(X.T):
+        x.array[:] = column
+        A.mult(x, y)
+        out[:, i] = y.array
+    return out

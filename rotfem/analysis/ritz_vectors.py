@@ -37,6 +37,7 @@ class RitzVectors:
         massed: M V.
         squares: diagonal of Vᵀ K V, 1/s², increasing.
         tip: displacement of the tip of each column, shape (d, r), on every rank.
+        shift: as it was given.
     """
 
     def __init__(self, system: Any, M: Any, K: Any, shift: float):
@@ -44,7 +45,8 @@ class RitzVectors:
         self._x, self._y = M.createVecs()
         A = K.copy()
         A.axpy(shift, M)
-        self._solver, self._M, self._clamped = DirectSolver(A), M, system.clamped
+        self.shift, self._M = shift, M
+        self._solver, self._clamped = DirectSolver(A), system.clamped
         moves = [i for i, name in enumerate(system.structure.unknowns) if name.startswith("u")]
         columns: list[Array] = []
         massed: list[Array] = []
@@ -66,6 +68,10 @@ class RitzVectors:
     def sum(self, local: Array) -> Array:
         """Return the sum over all ranks."""
         return local if self.comm.size == 1 else np.asarray(self.comm.allreduce(local))
+
+    def release(self) -> None:
+        """Let go of the factor and the matrix, which nothing asks for any more."""
+        del self._solver, self._M
 
     def times(self, A: Any, x: Array) -> Array:
         """Return A x of owned unknowns."""

@@ -67,9 +67,13 @@ class ShapeError:
         bends = datum is None and self._turns and np.any(sizes[list(self._rotations)] > 0.0)
         return min(1.0, 2.0 / SAFE * self._estimate(nodal[:, self._turns if bends else self._moves]))
 
-    def of_turns(self, q: Array) -> float:
-        """Return a rough error of elements that turn much, (θ/k)^{2k} for θ in each of degree k."""
-        mesh, degree = self.system.structure.mesh, self._estimate.degree
-        cells = mesh.topology.index_map(mesh.topology.dim).size_global ** (1 / mesh.topology.dim)
-        turn = 2.0 * max(self.system.sizes(q[: len(self.system.zeros())])[list(self._rotations)], default=0.0) / cells
-        return float((turn / degree) ** (2 * degree))
+    def roughest(self, states: Array) -> tuple[int, float]:
+        """Return which of some states (n, unknowns) the mesh follows worst, and how much it has of the highest degree.
+
+        Args:
+            states: local dof arrays.
+        """
+        nodal = states.reshape(len(states), -1, self._size)
+        found = self._estimate.roughness(nodal[:, :, self._turns or self._moves])
+        worst = int(np.argmax(found))
+        return worst, float(found[worst])

@@ -5,7 +5,8 @@ The pieces are assembled once (see `rotfem.equations.pieces`); a new speed costs
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from functools import cached_property
 from typing import Any
 
@@ -58,6 +59,36 @@ class AffineSystem(System):
         """Number of integrals in F, and in the pieces' forms."""
         count = sum(len(form.integrals()) for kind, form in self._decomposed.at_rest.items() if kind != "f")
         return {"F": forms.integral_count(self.model.residual), "J": count}
+
+    def known_form(self, name: str) -> tuple[Any, Any]:
+        """Return a form, UFL and compiled: F at rest, K, C, M at rest, or the geometric stiffness G."""
+        return self._decomposed.known_form("f" if name == "F" else name)
+
+    def tangent_forms(self, kind: str) -> tuple[tuple[str, ...], tuple[float, ...]]:
+        """Return the names of the forms that M, C or K is the sum of at the time set; there are no shifts."""
+        there = (kind,) if kind in self._decomposed.at_rest else ()
+        return (*there, "G") if kind == "K" and self.prestressed else there, ()
+
+    def shift(self, shifts: tuple[float, ...]) -> None:
+        """Take no shifts: the forms have none."""
+
+    @property
+    def prestressing(self) -> Any:
+        """The function that N⁰ of the form G is of: the displacement under the loads, by the material alone."""
+        return self._decomposed.prestressed
+
+    @contextmanager
+    def of_material(self) -> Iterator[None]:
+        """Let the form K be that of the strains alone."""
+        switches = self.model.switches
+        values = {name: float(switch.value) for name, switch in switches.items()}
+        for name, switch in switches.items():
+            switch.value = float(name == "internal")
+        try:
+            yield
+        finally:
+            for name, switch in switches.items():
+                switch.value = values[name]
 
     def leave_out(self, effects: Collection[str]) -> None:
         """Take the pieces of some effects, their bodies or the PRESTRESS out, and put all others back in."""

@@ -70,6 +70,18 @@ class NonlinearSystem(System):
         found = {name: self._at_rest[name] for name in "KCM"}
         return {name: None if form.empty() else forms.form(form, once=True) for name, form in found.items()}
 
+    def known_form(self, name: str) -> tuple[Any, Any]:
+        """Return a form, UFL and compiled: F, and J of a moving system or else K, C, M (see `tangent_forms`)."""
+        if self.moving:
+            return (self.model.residual, self._F) if name == "F" else (self._tangent_form, self._J)
+        return (self._at_rest["f"], self._F) if name == "F" else (self._at_rest[name], self._parts[name])
+
+    def tangent_forms(self, kind: str) -> tuple[tuple[str, ...], tuple[float, ...]]:
+        """Return the names of the forms that M, C or K is the sum of, and the shifts to be set before."""
+        if self.moving:
+            return ("J",), (float(kind == "K"), float(kind == "C"), float(kind == "M"))
+        return () if self._parts[kind] is None else (kind,), self._shift_values
+
     @property
     def integrals(self) -> dict[str, int]:
         """Number of integrals in F and J."""
@@ -124,7 +136,7 @@ class NonlinearSystem(System):
             self._assemble(self.A, (c_k, c_v, c_m), 1.0)
         else:
             self._stresses.come_from(before)
-            self._shift((c_k, c_v, c_m))
+            self.shift((c_k, c_v, c_m))
             fem_petsc.assemble_matrix(self.A, self._on_the_way, self.bcs)
             self.A.assemble()
         return self.A, True
@@ -144,7 +156,8 @@ class NonlinearSystem(System):
         A.zeroEntries()
         return A
 
-    def _shift(self, shifts: tuple[float, float, float]) -> None:
+    def shift(self, shifts: tuple[float, ...]) -> None:
+        """Set the factors of K, C and M in the form J."""
         if shifts != self._shift_values:
             for constant, value in zip(self._shifts, shifts, strict=True):
                 constant.value = value
@@ -152,7 +165,7 @@ class NonlinearSystem(System):
 
     def _assemble(self, A: Any, shifts: tuple[float, float, float], diagonal: float) -> None:
         if self.moving:
-            self._shift(shifts)
+            self.shift(shifts)
             fem_petsc.assemble_matrix(A, self._J, self.bcs, diagonal)
             A.assemble()
             return

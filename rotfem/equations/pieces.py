@@ -256,11 +256,16 @@ class Pieces:
         theory = theory or self.model.theory
         return geometric_stiffness(self.model, (self.q, base), u, w, theory) if theory.prestress else 0
 
+    def known_form(self, name: str) -> tuple[Any, Any]:
+        """Return f, K, C, M at rest, or G, as UFL and as compiled form."""
+        return self._geometric if name == "G" else self.at_rest[name], self._forms[name]
+
     def _prestress(self) -> None:
         """Add the geometric stiffness of the axial force that each load piece causes in the linear structure."""
         q0 = self.prestressed
         solver, x = DirectSolver(self.material, symmetric=True), compat.wrap(q0.x)
-        compiled = forms.form(self.geometric(ufl.TestFunction(self.V), ufl.TrialFunction(self.V), q0), once=True)
+        self._geometric = self.geometric(ufl.TestFunction(self.V), ufl.TrialFunction(self.V), q0)
+        compiled = self._forms["G"] = forms.form(self._geometric, once=True)
         started = perf_counter()
         for piece in [p for p in self.all if p.kind == "f"]:
             solver.solve(piece.operator, x)

@@ -1,0 +1,122 @@
+"""Scenes that no constant of an error estimate was ever fitted to: other sizes, materials and kinds of motion.
+
+Lengths from 0.4 to 25 m, first frequencies from 2 to 130 rad/s, coarse and fine meshes and steps; `SCENES` is
+name ↦ tables. One needs a mesh file, which `made` makes.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+Tables = dict[str, Any]
+
+#: Steel and aluminium, Pa and kg/m³.
+STEEL = {"E": 2.0e11, "nu": 0.3, "rho": 7800.0}
+ALUMINIUM = {"E": 7.0e10, "nu": 0.33, "rho": 2700.0}
+STRIP = {**STEEL, "shape": "rectangle", "width": 0.03, "height": 0.003}
+#: A blade of composite, as a table of stiffnesses.
+BLADE = {
+    **{"EA": 6.0e7, "GA2": 9.0e6, "GA3": 7.0e6, "GJ": 4.0e3, "EI2": 9.0e3, "EI3": 2.5e5},
+    **{"mass_per_length": 4.0, "rotary_inertia2": 6.0e-4, "rotary_inertia3": 1.7e-2},
+}
+
+
+def made(folder: Path) -> str:
+    """Return the path of the mesh of a swept blade, made if it is not there."""
+    path = folder / "rotfem-held-out-blade.msh"
+    if not path.exists():
+        sys.path.insert(0, str(Path(__file__).parent.parent / "meshes"))
+        import trapezoidal_blade
+
+        trapezoidal_blade.make(path, length=0.6, root=0.2, tip=0.1, sweep=0.08, size=0.1)
+    return str(path)
+
+
+SCENES: dict[str, Tables] = {
+    "rotor blade struck in flap": {
+        "structure": {
+            **{"type": "spatial_beam", "length": 6.0, "hub_radius": 0.3, "section": BLADE, "precone": 0.03},
+            **{"tip_mass": 0.5, "tip_offset": [0.0, 0.05, 0.0], "damping": {"rayleigh": [0.3, 0.0]}},
+        },
+        "motion": {"type": "constant", "speed": 9.0},
+        "loads": {"tip_force": [[0.0, 0, 0, 0], [0.2, 0, 0, 0], [0.3, 0, 0, 60.0], [0.6, 0, 0, 60.0], [0.7, 0, 0, 0]]},
+        "mesh": {"elements": 4},
+        "time": {"end": 2.0, "step": 0.01},
+    },
+    "swept plate of a mesh file": {
+        "structure": {
+            **{"type": "plate", "mesh": made(Path(tempfile.gettempdir())), "thickness": 0.002, "hub_radius": 0.1},
+            **ALUMINIUM,
+        },
+        "motion": {"type": "table", "table": [[0.0, 0.0], [0.15, 30.0], [0.3, 20.0]], "axis": [0, 1, 0]},
+        "model": {"theory": "von_karman_linear"},
+        "time": {"end": 0.4, "step": 0.004},
+    },
+    "free hub there and back, tip mass": {
+        "structure": {"type": "planar_beam", "length": 1.2, "section": STRIP, "hub_radius": 0.1, "tip_mass": 0.2},
+        "motion": {
+            **{"type": "torque", "hub_inertia": 0.15, "hub_damping": 0.01},
+            "pulses": [[0.0, 0.1, 6.0], [0.4, 0.5, -6.0], [0.8, 0.9, -6.0], [1.2, 1.3, 6.0]],
+        },
+        "mesh": {"elements": 5},
+        "time": {"end": 1.6, "step": 0.005},
+    },
+    "mast on a shaken base": {
+        "structure": {
+            **{"type": "planar_beam", "length": 4.0, "tip_mass": 6.0, "tip_inertia": 0.1},
+            "section": {**ALUMINIUM, "shape": "tube", "outer_radius": 0.03, "inner_radius": 0.026},
+            "damping": {"kelvin_voigt": 2e-4},
+        },
+        "motion": {
+            **{"type": "constant", "speed": 0.5},
+            "base_acceleration": [[0, 0, 0], [0.1, 0, 9.0], [0.3, 2.0, -9.0], [0.5, 0, 6.0], [0.6, 0, 0]],
+        },
+        "mesh": {"elements": 2},
+        "time": {"end": 2.5, "step": 0.02},
+    },
+    "long tapered blade spun down": {
+        "structure": {
+            **{"type": "planar_beam", "length": 25.0, "hub_radius": 1.0},
+            "section": {
+                **{"EA": [[0, 4.0e8], [25, 5.0e7]], "GA": [[0, 1.2e8], [25, 1.5e7]], "EI": [[0, 9.0e6], [25, 2.0e5]]},
+                **{"mass_per_length": [[0, 40.0], [25, 6.0]], "rotary_inertia": 0.3},
+            },
+        },
+        "motion": {"type": "table", "table": [[0.0, 3.0], [4.0, 3.0], [7.0, 0.6], [16.0, 0.6]]},
+        "initial": {"state": "steady"},
+        "model": {"theory": "second_order"},
+        "mesh": {"elements": 6, "degree": 2},
+        "time": {"end": 16.0, "step": 0.1},
+    },
+    "follower on a soft strip": {
+        "structure": {
+            **{"type": "planar_beam", "length": 0.4, "damping": {"rayleigh": [2.0, 1e-4]}},
+            "section": {"EA": 4.0e5, "GA": 1.5e5, "EI": 0.05, "mass_per_length": 0.02, "rotary_inertia": 3.0e-9},
+        },
+        "motion": {"type": "constant", "speed": 0.0},
+        "loads": {
+            "tip_force": {"table": [[0.0, 0, 0], [0.3, -1.0, 0.5], [1.0, -1.0, 0.5]], "kind": "follower"},
+            "gravity": [0.0, -9.81],
+        },
+        "mesh": {"elements": 4},
+        "time": {"end": 1.5, "step": 0.01},
+    },
+    "spin-up seen from outside": {
+        "structure": {"type": "planar_beam", "length": 2.0, "section": STRIP, "hub_radius": 0.2},
+        "motion": {"type": "spin_up", "speed": 12.0, "duration": 2.0},
+        "model": {"frame": "inertial"},
+        "mesh": {"elements": 4},
+        "time": {"end": 3.0, "step": 0.01},
+    },
+    "let go on a turning hub": {
+        "structure": {"type": "planar_beam", "length": 1.2, "section": STRIP, "hub_radius": 0.3},
+        "motion": {"type": "constant", "speed": 25.0},
+        "initial": {"tip_displacement": 0.1},
+        "model": {"theory": "von_karman"},
+        "mesh": {"elements": 2},
+        "time": {"end": 0.8, "step": 0.004, "scheme": "esdirk4"},
+    },
+}

@@ -1,0 +1,122 @@
+"""The equations of a system on its mesh refined, at the states and times that are set in the system itself.
+
+Forms, constants and scalars are the system's own, carried to the refined mesh (`rotfem.numerics.refinement`); fields
+and states are what they are on the coarse mesh. So nothing is compiled, and building it takes some milliseconds.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
+
+from rotfem.numerics import compat
+from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.refinement import Refinement
+from rotfem.structures.tip_values import TipValues
+
+Array = npt.NDArray[np.float64]
+
+
+class FinerEquations:
+    """M, C, K and −F of a system with cells of half the size.
+
+    Args:
+        system: equations of the structure, its hub held.
+
+    Attributes:
+        V: the space of the unknowns on the refined mesh.
+        tip: reads the values at the tip of an array over it.
+
+    Raises:
+        NotRefined: the mesh, or what is on it, cannot be refined.
+    """
+
+    def __init__(self, system: Any):
+        self.system, self.compilations = system, system.compilations
+        self._refined = Refinement(system.V)
+        self.V = self._refined.V
+        self.q, self.v, self.a = (fem.Function(self.V) for _ in range(3))
+        self._functions: dict[Any, fem.Function] = {system.q: self.q, system.v: self.v, system.a: self.a}
+        self._forms: dict[str, Any] = {}
+        nodes = self._refined.clamped(system.structure.clamped)
+        size = self.V.dofmap.index_map_bs
+        self.clamped = (nodes[:, None] * size + np.arange(size)).ravel()
+        self._bcs = [fem.dirichletbc(fem.Function(self.V), nodes)]
+        self.tip = TipValues(self.V, _tip(system))
+
+    def take(self) -> None:
+        """Take the state, and all fields, that are set in the system."""
+        for f, g in self._functions.items():
+            g.x.array[:] = self._refined.carried(f.function_space, f.x.array, g.function_space)
+        if self.system.linear and self.system.prestressed:
+            self._prestress()
+
+    def _prestress(self) -> None:
+        """Set the displacement that stresses a linear theory to that of the finer mesh."""
+        s = self.system
+        base = self._functions.setdefault(s.prestressing, fem.Function(self.V))
+        with s.of_material():
+            K = self._assembled(("K",), 1.0)
+        load = compat.create_vector(self.V)
+        fem_petsc.assemble_vector(load, self._form("F"))
+        load.array[self.clamped] = 0.0
+        base.x.array[:] = -Increment(self.V).solve(DirectSolver(K, symmetric=True), load)
+
+    def carried(self, columns: Array) -> Array:
+        """Return columns (n, r) of local dof arrays of the system on the refined mesh."""
+        return self._refined.carried(self.system.V, columns, self.V)
+
+    def matrix(self, kind: str, diagonal: float = 0.0) -> Any:
+        """Return M, C or K at the state that was taken, a new PETSc matrix with `diagonal` at clamped unknowns."""
+        names, shifts = self.system.tangent_forms(kind)
+        self.system.shift(shifts)
+        return self._assembled(names, diagonal)
+
+    def _assembled(self, names: tuple[str, ...], diagonal: float) -> Any:
+        A = fem_petsc.create_matrix(self._form(names[0]))
+        for name in names:
+            fem_petsc.assemble_matrix(A, self._form(name), self._bcs, 0.0)
+            A.assemble()
+        d = A.getDiagonal()
+        d.array[self.clamped] = diagonal
+        A.setDiagonal(d)
+        return A
+
+    def imbalance(self) -> Any:
+        """Return −F at q, v, a as a PETSc vector, zero at clamped unknowns."""
+        b = compat.create_vector(self.V)
+        fem_petsc.assemble_vector(b, self._form("F"))
+        if self.system.linear:
+            for kind, x in (("M", self.a), ("C", self.v), ("K", self.q)):
+                self._add(b, kind, x)
+        b.scale(-1.0)
+        b.array[self.clamped] = 0.0
+        return b
+
+    def _add(self, b: Any, kind: str, x: fem.Function) -> None:
+        """Add A x to a vector, A of a linear theory; it has all of one kind there is, or none."""
+        if self.system.tangent_forms(kind)[0]:
+            A = self.matrix(kind)
+            A.multAdd(compat.wrap(x.x), b, b)
+
+    def _form(self, name: str) -> Any:
+        """Return a form of the system on the refined mesh."""
+        if name not in self._forms:
+            f, compiled = self.system.known_form(name)
+            self._forms[name] = self._refined.form(compiled, f, self._functions)
+        return self._forms[name]
+
+
+def _tip(system: Any) -> Array:
+    """Return where the tip of a structure is (3,), m."""
+    values, x = system.structure.tip_values, system.V.tabulate_dof_coordinates()
+    at: Array = np.zeros(3)
+    if system.comm.rank == values._owner:
+        at[:] = x[values.dofs.start // values.size]
+    if system.comm.size > 1:
+        system.comm.Bcast(at, root=values._owner)
+    return at

@@ -1,0 +1,212 @@
+"""The mesh of a space with every cell cut into equal parts, and what is known on the one carried to the other.
+
+Cells keep their shape: a line is halved, a triangle or a quadrilateral quartered along the middles of its edges, curved
+ones too. Compiled forms are used again as they are, with the constants that they have: no form is made or compiled.
+Every process holds the whole refined mesh.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from itertools import product
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from basix.ufl import element
+from dolfinx import fem, mesh
+from dolfinx.fem.forms import get_integration_domains
+from mpi4py import MPI
+
+from rotfem.numerics import compat
+
+Array = npt.NDArray[np.float64]
+
+#: Corners of the parts of a triangle, in halves of its edges; parts of lines and quadrilaterals are shifted halves.
+PARTS_OF_TRIANGLE = (
+    ((0, 0), (1, 0), (0, 1)),
+    ((1, 0), (2, 0), (1, 1)),
+    ((0, 1), (1, 1), (0, 2)),
+    ((1, 1), (0, 1), (1, 0)),
+)
+
+#: Weights that are none, and the steps in which weights of nodes are told apart.
+NONE, STEP = 1e-10, 1e-6
+
+
+class NotRefined(Exception):
+    """What is on the mesh cannot be carried to a finer one."""
+
+
+@lru_cache(maxsize=4)
+def parts(cell: str) -> tuple[Array, Array]:
+    """Return (origins, axes) of the parts of a reference cell: a point X of part i lies at origin_i + axes_i X.
+
+    Raises:
+        NotRefined: no line, triangle or quadrilateral.
+    """
+    if cell == "triangle":
+        corners = np.array(PARTS_OF_TRIANGLE) / 2
+        return corners[:, 0], np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    if cell not in ("interval", "quadrilateral"):
+        raise NotRefined(cell)
+    dim = 1 if cell == "interval" else 2
+    origins = np.array(list(product((0.0, 0.5), repeat=dim)))
+    return origins, np.tile(np.eye(dim) / 2, (len(origins), 1, 1))
+
+
+class Refinement:
+    """A refined mesh, with the space of the unknowns on it.
+
+    Args:
+        V: the space on the mesh that is refined.
+
+    Attributes:
+        mesh, V: the refined ones.
+    """
+
+    def __init__(self, V: fem.FunctionSpace):
+        self._coarse, self._comm, old = V, V.mesh.comm, V.mesh
+        self._cell = old.topology.cell_name()
+        self.origins, self.axes = parts(self._cell)
+        self._owned = old.topology.index_map(old.topology.dim).size_local
+        self._first = sum(self._comm.allgather(self._owned)[: self._comm.rank])
+        cells, x = self._nodes(old)
+        gdim, degree = old.geometry.dim, old.geometry.cmap.degree
+        domain = element("Lagrange", self._cell, degree, shape=(gdim,))
+        self.mesh = mesh.create_mesh(MPI.COMM_SELF, cells=cells, x=x[:, :gdim].copy(), e=domain)
+        #: Number of every refined cell as it was made: parts of one cell follow one another.
+        made = np.asarray(self.mesh.topology.original_cell_index, dtype=np.int64)
+        self._parent, self._part = np.divmod(made, len(self.origins))
+        self._number = np.empty_like(made)
+        self._number[made] = np.arange(len(made))
+        self.V = fem.functionspace(self.mesh, V.ufl_element())
+
+    def _nodes(self, old: Any) -> tuple[npt.NDArray[np.int64], Array]:
+        """Return the nodes of all parts, and where each node lies (m); what cells share is one node."""
+        geometry = old.geometry
+        dofmap = geometry.dofmap[: self._owned]
+        known = np.concatenate(self._comm.allgather(np.asarray(geometry.input_global_indices)[dofmap]))
+        at = np.concatenate(self._comm.allgather(geometry.x[dofmap]))
+        shape = element("Lagrange", self._cell, geometry.cmap.degree)
+        weights = np.stack([shape.tabulate(0, self._of(i, shape))[0] for i in range(len(self.origins))])
+        keys = np.rint(weights / STEP).astype(np.int64)
+        numbers: dict[tuple[Any, ...], int] = {}
+        cells = np.empty((len(known), *weights.shape[:2]), dtype=np.int64)
+        used = [[np.flatnonzero(key) for key in part] for part in keys]
+        for c, nodes in enumerate(known):
+            for i, part in enumerate(used):
+                for j, chosen in enumerate(part):
+                    key = tuple(sorted((int(nodes[n]), int(keys[i, j, n])) for n in chosen))
+                    cells[c, i, j] = numbers.setdefault(key, len(numbers))
+        x = np.empty((len(numbers), 3))
+        x[cells.ravel()] = np.einsum("ijn,cnd->cijd", weights, at).reshape(-1, 3)
+        return cells.reshape(-1, cells.shape[2]), x
+
+    def _of(self, part: int, e: Any) -> Array:
+        """Return where the points of an element on a part lie in the whole reference cell."""
+        return np.asarray(self.origins[part] + e.basix_element.points @ self.axes[part].T)
+
+    # --- functions ---------------------------------------------------------------------------------------------------
+
+    def carried(self, space: Any, values: Array, to: Any) -> Array:
+        """Return local values of a space, unknowns (n,) or columns (n, r), at the unknowns of the same on the new mesh.
+
+        Args:
+            space: of Lagrange functions, continuous or not.
+            values: of this process, ghosts too.
+            to: the same space on the refined mesh.
+        """
+        bs, dofmap = space.dofmap.index_map_bs, space.dofmap.list[: self._owned]
+        columns = values.reshape(-1, bs * (values.shape[1] if values.ndim > 1 else 1))
+        cells = np.concatenate(self._comm.allgather(columns[dofmap]))
+        out = np.empty((to.dofmap.index_map.size_local, columns.shape[1]))
+        for i, weights in enumerate(self._weights(space)):
+            mine = self._part == i
+            out[to.dofmap.list[mine]] = np.einsum("jn,cnk->cjk", weights, cells[self._parent[mine]])
+        return out.reshape(-1, *values.shape[1:])
+
+    def function(self, f: fem.Function) -> fem.Function:
+        """Return a function on the refined mesh with the values of one on the coarse mesh."""
+        space = f.function_space
+        to = self.V if space == self._coarse else fem.functionspace(self.mesh, space.ufl_element())
+        out = fem.Function(to)
+        out.x.array[:] = self.carried(space, f.x.array, to)
+        return out
+
+    def clamped(self, nodes: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
+        """Return the nodes of the unknowns on the refined mesh that hang on these nodes (local numbers) alone."""
+        space = self._coarse
+        free = np.ones(space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts, dtype=bool)
+        free[nodes] = False
+        cells = np.concatenate(self._comm.allgather(free[space.dofmap.list[: self._owned]]))
+        out = np.zeros(self.V.dofmap.index_map.size_local, dtype=bool)
+        for i, weights in enumerate(self._weights(space)):
+            mine = self._part == i
+            out[self.V.dofmap.list[mine]] = cells[self._parent[mine]] @ (np.abs(weights.T) > NONE)
+        return np.flatnonzero(~out).astype(np.int32)
+
+    def _weights(self, space: Any) -> list[Array]:
+        """Return for every part the values of the basis at its nodes, shape (nodes, basis)."""
+        e = space.ufl_element()
+        base = e.sub_elements[0] if e.block_size > 1 else e
+        try:
+            return [base.tabulate(0, self._of(i, base))[0] for i in range(len(self.origins))]
+        except (AttributeError, NotImplementedError) as error:
+            raise NotRefined(str(e)) from error
+
+    # --- forms -------------------------------------------------------------------------------------------------------
+
+    def form(self, compiled: Any, f: Any, functions: dict[Any, fem.Function]) -> Any:
+        """Return a compiled form on the refined mesh.
+
+        Args:
+            compiled: what dolfinx has made of f.
+            f: the UFL form.
+            functions: those of f ↦ those on the refined mesh; others are carried there, and kept here.
+
+        Raises:
+            NotRefined: it has integrals over parts of the cells.
+        """
+        domains: dict[str, list[Any]] = next(iter(f.subdomain_data().values()))
+        coefficients = f.coefficients()
+        for number in range(compiled.ufcx_form.num_coefficients):
+            c = coefficients[compiled.ufcx_form.original_coefficient_positions[number]]
+            if c not in functions:
+                functions[c] = self.function(c)
+        subdomains = {name: self._subdomains(f, name, data[0]) for name, data in domains.items()}
+        return compat.form_elsewhere(compiled, f, self.V, functions, subdomains)
+
+    def _subdomains(self, f: Any, name: str, data: Any) -> list[tuple[int, npt.NDArray[np.int32]]]:
+        """Return the parts of the entities that integrals of one type go over, by their numbers."""
+        if data is None:
+            return []
+        if name != "exterior_facet":
+            raise NotRefined(name)
+        ids = sorted({i for part in f.integrals() if part.integral_type() == name for i in _numbers(part)})
+        found = get_integration_domains(fem.IntegralType.exterior_facet, data, ids)
+        out: list[tuple[int, npt.NDArray[np.int32]]] = []
+        for number, entities in found:
+            pairs = np.asarray(entities).reshape(-1, 2) + np.array([self._first, 0])
+            everywhere = np.concatenate(self._comm.allgather(pairs))
+            cut = [(self._number[c * len(self.origins) + i], m) for c, side in everywhere for i, m in self._on(side)]
+            shape = (-1, 2) if np.ndim(entities) == 2 else -1  # flat in dolfinx 0.9
+            out.append((number, np.array(cut, dtype=np.int32).reshape(shape)))
+        return out
+
+    def _on(self, side: int) -> list[tuple[int, int]]:
+        """Return the (part, its facet) that lie on a facet of the whole cell."""
+        base = element("Lagrange", self._cell, 1).basix_element
+        corners = [base.entity_closure_dofs[-2][k] for k in range(len(base.entity_closure_dofs[-2]))]
+        out = []
+        for i in range(len(self.origins)):
+            weights = base.tabulate(0, self.origins[i] + base.points @ self.axes[i].T)[0, :, :, 0]
+            beside = np.delete(weights, corners[side], axis=1)
+            out += [(i, m) for m, ends in enumerate(corners) if np.all(np.abs(beside[ends]) < NONE)]
+        return out
+
+
+def _numbers(integral: Any) -> list[int]:
+    """Return the numbers of the subdomains that an integral goes over."""
+    number = integral.subdomain_id()
+    return [i for i in (number if isinstance(number, tuple) else (number,)) if isinstance(i, int)]
