@@ -9,10 +9,10 @@ import numpy.typing as npt
 from petsc4py import PETSc
 from slepc4py import SLEPc
 
-from rotfem.analysis.projection import summed, times
 from rotfem.errors import ComputationError
 from rotfem.numerics.balance import unknown_scale
 from rotfem.numerics.linear import use_direct_solver
+from rotfem.numerics.projection import summed, times
 
 
 def critical_speed(system: Any) -> float | None:

@@ -37,12 +37,14 @@ class KeptDigits:
         """Return the pairs, or those of the saddle form where digits are lost and it keeps more of them.
 
         Args:
-            pencil: M, C and K at the state that is set.
+            pencil: M, C and K at the state that is set; with damping by mode nothing better is tried.
             pairs: its eigenpairs.
             count: number of pairs wanted.
         """
         worst = float(np.max(pairs.bounds[:count], initial=0.0))
-        if worst <= LOST or not Resultants.possible(self.system) or self._in_damping(pairs, count) > WORTH:
+        if worst <= LOST or pencil.by_mode is not None or not Resultants.possible(self.system):
+            return pairs
+        if self._in_damping(pairs, count) > WORTH:
             return pairs
         if self._resultants is None:
             self._resultants = Resultants(self.system)

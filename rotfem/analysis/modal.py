@@ -20,6 +20,7 @@ from rotfem.analysis.kept_digits import KeptDigits
 from rotfem.analysis.mesh_estimate import MeshEstimate
 from rotfem.analysis.mode_labels import with_overdamped
 from rotfem.equations.compiled import compile_system
+from rotfem.equations.modes_at_rest import family_products, massed
 from rotfem.errors import InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.eigenproblem import SAME, ZERO, Eigenpairs, Pencil
@@ -126,8 +127,8 @@ class ModalAnalysis:
         q = self.equilibrium(speed, start)
         t1 = perf_counter()
         matrices = self.system.mass_damping_stiffness(keep)
-        clamped = Pencil(*matrices)
-        pencil = Pencil(*self.system.with_hub(matrices)) if self.free else clamped
+        clamped = Pencil(*matrices, by_mode=self.system.held.by_mode)
+        pencil = Pencil(*self.system.with_hub(matrices), by_mode=self.system.by_mode) if self.free else clamped
         t2 = perf_counter()
         clamped.unit = pencil.unit = self._unit
         pencil.sizes = self.stiffness_sizes(pencil.K)
@@ -205,17 +206,13 @@ class ModalAnalysis:
     def shares(self, spinning: Spinning) -> dict[str, Array]:
         """Return family ↦ share of the kinetic energy x^H M x in its components, shape (m,)."""
         X, MX = self.right(spinning), self.mass_times(spinning)
-        bs = self.system.V.dofmap.index_map_bs
-        owned = self.system.V.dofmap.index_map.size_local * bs
-        along = [self.structure.oriented(Y[:owned].reshape(-1, bs, X.shape[1])) for Y in (X, MX)]
-        local = np.real(along[0].conj() * along[1]).sum(axis=0)
-        hub = np.real(X[owned:].conj() * MX[owned:]).sum(axis=0, keepdims=True)  # on the last rank, if it is free
-        energy = np.concatenate([local, hub])
-        energy = self.comm.allreduce(energy) if self.comm.size > 1 else energy
-        total = energy.sum(axis=0)
-        families = self.structure.families
-        shares = {name: energy[list(components)].sum(axis=0) / total for name, (components, _) in families.items()}
-        return {**shares, "hub": energy[-1] / total} if self.free else shares
+        products = np.real(X.conj() * MX)
+        owned = self.system.V.dofmap.index_map.size_local * self.system.V.dofmap.index_map_bs
+        local = np.array([products.sum(axis=0), products[owned:].sum(axis=0)])  # the hub is on the last rank
+        total, hub = self.comm.allreduce(local) if self.comm.size > 1 else local
+        energies = family_products(self.system.held, X, MX)
+        shares = {name: np.real(np.diag(energy)) / total for name, energy in energies.items()}
+        return {**shares, "hub": hub / total} if self.free else shares
 
     def mesh_errors(self, spinning: Spinning) -> list[float]:
         """Return for every mode how far the mesh can put its frequency off, relative (see `mesh_estimate`)."""
@@ -272,13 +269,6 @@ class ModalAnalysis:
         coordinates, real = self.structure.nodes(x.real)
         _, imaginary = self.structure.nodes(x.imag)
         return coordinates, real + 1j * imaginary
-
-
-def massed(M: Any) -> int:
-    """Return how many unknowns have a mass: as many modes there are, and infinite eigenvalues beyond them."""
-    indptr, _, data = M.getValuesCSR()
-    rows = np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))
-    return int(M.comm.tompi4py().allreduce(len(np.unique(rows[data != 0.0]))))
 
 
 def stability(lam: complex, bound: float = 0.0) -> str:

@@ -45,6 +45,7 @@ class Tangents:
                 x.x.scatter_forward()
         self.speed = abs(float(system.motion.speed(state.t)))
         self.matrices = {n: inner.matrix(*shift, 1.0 if n == "K" else 0.0) for n, shift in SHIFTS.items()}
+        self.by_mode = inner.by_mode
         self.borders: dict[str, Border] = {}
         if system.hub is not None:
             for name, shift in SHIFTS.items():
@@ -61,6 +62,9 @@ class Tangents:
         for name, A in self.matrices.items():
             product = np.stack([shapes.times(A, x) for x in shapes.V.T], axis=1)
             small = shapes.sum(shapes.V.T @ product)
+            if name == "C" and self.by_mode is not None:
+                along = self.by_mode.along(shapes.V)
+                small = small + along.T @ along
             if name in self.borders:
                 border = self.borders[name]
                 row, column = shapes.sum(np.array([border.row @ shapes.V, border.column @ shapes.V]))

@@ -22,6 +22,8 @@ from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms import expand_derivatives
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
+from rotfem.equations.modal_damping import KEY
+from rotfem.errors import InputError
 from rotfem.numerics import compat, forms
 from rotfem.numerics.linear import DirectSolver
 
@@ -248,9 +250,12 @@ def sensitivities(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str,
     `relative`.
 
     Raises:
-        InputError: the hub is free.
+        InputError: the hub is free, or damping is by mode.
     """
     analysis.needs_fixed_hub("sensitivities")
+    if analysis.system.by_mode is not None:
+        damping = analysis.problem.structure.damping.modal
+        raise InputError(KEY, damping, "sensitivities need damping whose derivatives are known; leave it out for them")
     study = Sensitivity(analysis, spinning)
     values = {p.name: p.value for p in study.parameters()}
     rows = []

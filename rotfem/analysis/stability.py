@@ -110,9 +110,10 @@ def stability_of(system: Any, q: Array, speed: float) -> Stability:
         return Stability()
     matrices = (held.matrix(0.0, 0.0, 1.0, 0.0), held.matrix(0.0, 1.0, 0.0, 0.0), K)
     if system.hub is None:
-        return by_motions(Pencil(*matrices), negative)
+        return by_motions(Pencil(*matrices, by_mode=held.by_mode), negative)
     # A free hub keeps its momentum, not its speed: K of the structure alone decides nothing.
-    return by_motions(Pencil(*system.with_hub(matrices)), None, Pencil(*matrices).scale())
+    pencil = Pencil(*system.with_hub(matrices), by_mode=system.by_mode)
+    return by_motions(pencil, None, Pencil(*matrices).scale())
 
 
 def stability_of_pencil(pencil: Pencil, clamped: Pencil) -> Stability:

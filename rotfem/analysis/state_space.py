@@ -17,10 +17,14 @@ from scipy.linalg import block_diag
 from scipy.sparse import csr_array, save_npz
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
-from rotfem.errors import OutputError, SceneError
+from rotfem.equations.modal_damping import KEY
+from rotfem.errors import InputError, OutputError, SceneError
 from rotfem.numerics.linear import DirectSolver, Increment
 
 Array = npt.NDArray[Any]
+
+#: Unknowns up to which a C without zeros is written, 100 MB of text.
+FULL = 2000
 
 
 @dataclass(frozen=True)
@@ -113,17 +117,23 @@ def write_matrices(analysis: ModalAnalysis, spinning: Spinning, folder: Path) ->
     Raises:
         OutputError: the folder cannot be written.
         SceneError: the analysis is distributed over several processes.
+        InputError: C is full and too large to be written.
     """
     serial(analysis, "the export of matrices")
     structure = analysis.structure
     free = np.setdiff1d(np.arange(len(spinning.q)), analysis.system.clamped)
-    paths = []
+    by_mode, paths = spinning.pencil.by_mode, []
+    if by_mode is not None and len(free) > FULL:
+        why = f"C is full with damping by mode; it is written for up to {FULL} free unknowns, and here are {len(free)}"
+        raise InputError(KEY, analysis.problem.structure.damping.modal, why)
     try:
         for name in "MCK":
             A = getattr(spinning.pencil, name)
             indptr, indices, data = A.getValuesCSR()
             matrix = csr_array((data, indices, indptr), shape=A.getSize())[free][:, free]
             matrix.eliminate_zeros()
+            if name == "C" and by_mode is not None:
+                matrix = csr_array(matrix.toarray() + by_mode.B[free] @ by_mode.B[free].T)
             mmwrite(folder / f"{name}.mtx", matrix, symmetry="general", precision=17)
             save_npz(folder / f"{name}.npz", matrix)
             paths += [folder / f"{name}.mtx", folder / f"{name}.npz"]

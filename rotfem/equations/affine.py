@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.equations.pieces import PRESTRESS, Pieces, set_diagonal
+from rotfem.equations.modal_damping import EFFECT
+from rotfem.equations.model import Model
+from rotfem.equations.pieces import PRESTRESS, Piece, Pieces, set_diagonal
 from rotfem.equations.system import System
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.theories import Theory
@@ -32,10 +34,22 @@ class AffineSystem(System):
 
     linear = True
     solved_at_once = True
+    pieces: list[Piece]
+
+    def __init__(self, model: Model, moving: bool = True):
+        super().__init__(model, moving)
+        if self._by_mode is not None:  # to those who project the pieces it is one like others
+            self.pieces = [
+                *self.pieces,
+                Piece("C", (), self._by_mode, frozenset((EFFECT, "")), np.zeros_like(self.root.weights)),
+            ]
+            self._factors = self._factor_indices()
+            self.leave_out(())
 
     def _compile(self) -> Any:
         self._decomposed = Pieces(self.model, self.bcs, self.clamped, self.root.weights)
-        self.pieces, self._constants = self._decomposed.all, self._decomposed.constants
+        self.pieces = self._decomposed.all
+        self._constants = self._decomposed.constants
         self.assembled = self._decomposed.assembled
         pattern = self._decomposed.pattern
         self._operators = {kind: pattern.duplicate() for kind in "MCK"}
@@ -169,6 +183,8 @@ class AffineSystem(System):
         for operator, x in zip((self._operators[k] for k in "KCM"), self._qva, strict=True):
             operator.multAdd(x, self.b, self._work)
             self._work.copy(self.b)
+        if self.by_mode is not None:
+            self.b.array[:] += self.by_mode.times(self._qva[1].array)
         self.b.scale(-1.0)
         self.b.array[self.clamped] = 0.0
         return self.b
@@ -223,6 +239,16 @@ class AffineSystem(System):
         if keep:
             return super().mass_damping_stiffness()
         return self._operators["M"], self._operators["C"], self._operators["K"]
+
+    def matrices_at_rest(self) -> tuple[Any, Any]:
+        """Return (M, K) of the undeformed structure at rest without spin and loads (see `System`)."""
+        out = []
+        for kind in "MK":
+            A = self.A.duplicate()
+            chosen = [p.operator for p in self.pieces if p.kind == kind and not p.key and PRESTRESS not in p.of]
+            combine(A, chosen, np.ones(len(chosen)))
+            out.append(A)
+        return out[0], out[1]
 
     def spin_derivative(self, c_v: float, c_m: float) -> Any:
         """Return c_v ∂F/∂Omega + c_m ∂F/∂Omega' of the state, a PETSc vector: the speed along the axis varies."""

@@ -23,6 +23,7 @@ from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.motion import Motion
 from rotfem.numerics.linear import Increment
+from rotfem.numerics.low_rank import LowRank
 from rotfem.structures.root_reaction import along_axis
 
 Array = npt.NDArray[np.float64]
@@ -120,7 +121,7 @@ class BorderedSystem:
         b, c = s.spin_derivative(c_v, c_m), row.row(shifts)
         r, d = -row.residual(s.time), row.diagonal(c_v, c_m)
         assembled_at = perf_counter()
-        out = self._eliminated(s.factor(A, changed), (R, b), c, r, d)
+        out = self._eliminated(s.factor(A, c_v, changed), (R, b), c, r, d)
         s.seconds["assemble"] += assembled_at - started
         s.seconds["solve"] += perf_counter() - assembled_at
         return out
@@ -160,6 +161,12 @@ class BorderedSystem:
     def linearised(self) -> BorderedLinearised:
         """Return the equations linearised about the state and time set."""
         return BorderedLinearised(self)
+
+    @property
+    def by_mode(self) -> LowRank | None:
+        """What damping by mode adds to C, with the angle of the hub as last unknown: it acts in the frame."""
+        part = self.inner.by_mode
+        return None if part is None else part.bordered()
 
     def with_hub(self, matrices: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
         """Return M, C, K of the structure with the angle of the hub as last unknown, about the state and speed set."""

@@ -32,6 +32,7 @@ from petsc4py import PETSc
 from rotfem.equations.solutions import Solutions
 from rotfem.mechanics.effects import INTERNAL
 from rotfem.numerics import compat, forms
+from rotfem.numerics.low_rank import LowRank
 
 Array = npt.NDArray[np.float64]
 
@@ -165,12 +166,24 @@ class EnergyBalance(Solutions):
         self.system.set_state(q, v)
         return float(self.system.total(self._energy))
 
+    @property
+    def by_mode(self) -> LowRank | None:
+        """What damping by mode adds to C; None without."""
+        part: LowRank | None = self.system.by_mode
+        return part
+
     def _given(self) -> float:
         """Return the work of the clamp and of the terms without energy over the step to the state set, J."""
         work = -self.system.total(self._work)
+        if self.by_mode is not None:
+            work -= self._product(self._damping_by_mode(self.by_mode), self._move.x.array[self._owned], slice(None))
         if self.system.clamp is not None:
             work += self._product(self._assembled(), self._move.x.array, self.system.clamped)
         return float(work)
+
+    def _damping_by_mode(self, part: LowRank) -> Array:
+        """Return its force at the middle of the step, owned rows."""
+        return part.times(self._state[1][self._owned])
 
     def _assembled(self) -> Array:
         self._b.array[:] = 0.0
@@ -192,6 +205,8 @@ class EnergyBalance(Solutions):
         b = self._assembled()
         if self.model.hub is None:
             self._balance(b)
+        if self.by_mode is not None:
+            b[self._owned] += self._damping_by_mode(self.by_mode)
         np.negative(b, out=b)
         b[self.system.clamped] = 0.0
         return self.b

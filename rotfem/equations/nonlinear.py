@@ -89,20 +89,23 @@ class NonlinearSystem(System):
 
     def residual(self) -> Any:
         """Return −F at the state in q, v, a as a PETSc vector (reused), zero at clamped unknowns."""
-        return self._negative(self._F)
+        return self._negative(self._F, self.moving)
 
     def residual_in_motion(self) -> Any:
         """Return −F as `residual` does, of a system that is not moving with velocities and accelerations too."""
-        return self._negative(self._F_in_motion)
+        return self._negative(self._F_in_motion, True)
 
     @cached_property
     def _F_in_motion(self) -> Any:
         return self._F if self.moving else forms.form(self.model.residual, once=True)
 
-    def _negative(self, form: Any) -> Any:
+    def _negative(self, form: Any, moving: bool) -> Any:
         b = self._assembled(form)
         np.negative(b, out=b)
         b[self.clamped] = 0.0
+        if moving and self.by_mode is not None:
+            owned = self.b.array
+            owned -= self.by_mode.times(self._state[1][: len(owned)])
         return self.b
 
     def _assembled(self, form: Any) -> Array:

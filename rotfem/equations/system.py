@@ -15,14 +15,17 @@ import numpy as np
 import numpy.typing as npt
 from dolfinx import fem, la
 
+from rotfem.equations.modal_damping import EFFECT, damping_by_mode
 from rotfem.equations.model import Model
 from rotfem.equations.readings import Readings
 from rotfem.equations.solutions import Solutions
+from rotfem.errors import ComputationError
 from rotfem.mechanics.courses import Course, View
 from rotfem.mechanics.motion import IDENTITY, Motion
 from rotfem.numerics import compat
 from rotfem.numerics.caching import forget
 from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.low_rank import LowRank
 from rotfem.structures.root_reaction import RootReaction
 from rotfem.structures.turning_clamp import TurningClamp
 
@@ -87,7 +90,10 @@ class System(Readings, Solutions, ABC):
         self.b = compat.wrap(self._b)
         self._solver: DirectSolver | None = None
         self._dx = Increment(self.V)
+        self._by_mode: LowRank | None = None
+        self._damped = True
         self.A = self._compile()
+        self._by_mode = damping_by_mode(self)
         #: Whether a factor is kept for the steps that follow, where factorising is dear.
         self.keeps_factor = self.A.getSize()[0] > KEPT_FROM[self.structure.mesh.topology.dim]
 
@@ -97,6 +103,12 @@ class System(Readings, Solutions, ABC):
         The first time all forms are made anew, with the datum in them; set_time must follow then.
         """
         turns = self.structure.turns
+        if datum is not None and self._by_mode is not None:
+            raise ComputationError(
+                "the rotations have become too large for damping by mode, which is that of small motions",
+                time=self.time,
+                advice="structure.damping.kelvin_voigt or rayleigh",
+            )
         if turns is not None and turns.use(datum):
             self.model.compose()
             forget(self)
@@ -142,6 +154,12 @@ class System(Readings, Solutions, ABC):
         """Switch effects off, all others on."""
         for name, switch in self.model.switches.items():
             switch.value = 0.0 if name in effects else 1.0
+        self._damped = EFFECT not in effects
+
+    @property
+    def by_mode(self) -> LowRank | None:
+        """What damping by mode adds to C, which has it nowhere else; None without, and where damping is left out."""
+        return self._by_mode if self._damped else None
 
     @property
     def balance(self) -> Any:
@@ -213,12 +231,29 @@ class System(Readings, Solutions, ABC):
     # --- matrices --------------------------------------------------------------------------------------------------
 
     def mass_damping_stiffness(self, keep: bool = True) -> tuple[Any, Any, Any]:
-        """Return (M, C, K) at the state and time set; clamped unknowns have 1 in K, 0 in M and C.
+        """Return (M, C, K) at the state and time set, C without `by_mode`; clamped unknowns have 1 in K, 0 in M and C.
 
         Args:
             keep: whether they must outlast the next state or time that is set.
         """
         return self.matrix(0, 0, 1, 0.0), self.matrix(0, 1, 0, 0.0), self.matrix(1, 0, 0, 1.0)
+
+    def matrices_at_rest(self) -> tuple[Any, Any]:
+        """Return (M, K) of the undeformed structure at rest without spin and loads, as `mass_damping_stiffness` does.
+
+        To be asked for before effects are switched.
+        """
+        loads = [constant for constant, _ in self.structure.load_constants.values()]
+        constants = [*self.model.frame.constants.values(), *loads]
+        kept = [c.value.copy() for c in constants], [x.copy() for x in self._state]
+        for constant in constants:
+            constant.value[...] = 0.0
+        self.set_state(self.zeros())
+        out = self.matrix(0, 0, 1, 0.0), self.matrix(1, 0, 0, 1.0)
+        for constant, value in zip(constants, kept[0], strict=True):
+            constant.value[...] = value
+        self.set_state(*kept[1])
+        return out
 
     def with_hub(self, matrices: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
         """Return M, C, K with the angle of a free hub as last unknown; there is none here."""

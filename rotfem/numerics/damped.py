@@ -9,7 +9,7 @@ the basis grows by K⁻¹ times the residuals of right and left vectors (Davidso
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -19,8 +19,11 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics.linear import DirectSolver
+from rotfem.numerics.low_rank import LowRank
+from rotfem.numerics.projection import times
 
 Array = npt.NDArray[Any]
+Matrices: TypeAlias = tuple[Any, Any, Any, LowRank | None]
 
 #: Part −Re λ/|λ| from which damping is heavy.
 HEAVY = 0.3
@@ -120,7 +123,7 @@ class RitzPairs:
     """Ritz pairs of M, C and K (balanced PETSc matrices) in a growing real basis.
 
     Args:
-        matrices: M, C, K.
+        matrices: M, C, K, and what damping by mode adds to C, None without.
         start: first directions, columns of owned unknowns.
         target: where K + σ C + σ² M is factorised, 0 or beside the zero eigenvalue of a free hub.
 
@@ -128,10 +131,12 @@ class RitzPairs:
         values, right, left, errors: λ, vectors of owned unknowns, and the larger backward error of both.
     """
 
-    def __init__(self, matrices: tuple[Any, Any, Any], start: Array, target: float):
-        self.matrices, self.target = matrices, target
+    def __init__(self, matrices: Matrices, start: Array, target: float):
+        self.matrices, self.by_mode, self.target = matrices[:3], matrices[3], target
         self.comm: MPI.Comm = matrices[2].comm.tompi4py()
-        self.norms = np.array([A.norm(PETSc.NormType.INFINITY) for A in matrices])
+        self.norms = np.array([A.norm(PETSc.NormType.INFINITY) for A in self.matrices])
+        if self.by_mode is not None:
+            self.norms[1] += self.by_mode.bound()
         P = matrices[2].copy()
         for A, factor in ((matrices[1], target), (matrices[0], target**2)):
             if factor != 0.0:
@@ -146,12 +151,8 @@ class RitzPairs:
         return np.asarray(self.comm.allreduce(local) if self.comm.size > 1 else local)
 
     def _apply(self, A: Any, X: Array) -> Array:
-        out = np.empty_like(X)
-        for j in range(X.shape[1]):
-            self._x.array[:] = X[:, j]
-            A.mult(self._x, self._b)
-            out[:, j] = self._b.array
-        return out
+        out = times(A, X)
+        return out if self.by_mode is None or A is not self.matrices[1] else out + self.by_mode.times(X)
 
     def add(self, columns: Array) -> int:
         """Put what is new in real columns into the orthonormal basis; return how many directions that were."""
@@ -192,7 +193,7 @@ class RitzPairs:
                     self._x.array[:] = part[:, j]
                     A.multTranspose(self._x, self._b)
                     total[:, j] += factor * np.conj(self.values[j]) ** power * self._b.array
-        return total
+        return total if self.by_mode is None else total + np.conj(self.values) * self.by_mode.times(Y)
 
     def grow(self) -> int:
         """Add K⁻¹ times the residuals of pairs that are not done; return how many directions are new."""
@@ -208,13 +209,11 @@ class RitzPairs:
         return self.add(np.array(new).T) if new else 0
 
 
-def damped_pairs(
-    matrices: tuple[Any, Any, Any], undamped: Array, count: int, target: float
-) -> tuple[Array, Array, Array, Array]:
+def damped_pairs(matrices: Matrices, undamped: Array, count: int, target: float) -> tuple[Array, Array, Array, Array]:
     """Return (λ, x, y, backward errors) of the shapes that vibrate slowest without damping.
 
     Args:
-        matrices: M, C, K, balanced.
+        matrices: M, C, K, balanced, and what damping by mode adds to C.
         undamped: vectors of the pencil without damping, columns of owned unknowns.
         count: number of pairs.
         target: see `RitzPairs`.

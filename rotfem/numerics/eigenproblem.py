@@ -15,11 +15,13 @@ from scipy.sparse import csr_array
 from slepc4py import SLEPc
 
 from rotfem.errors import ComputationError
+from rotfem.numerics.asymmetry import asymmetries
 from rotfem.numerics.balance import balanced, least_frequency, power_of_two
 from rotfem.numerics.bounds import RoundOff
 from rotfem.numerics.damped import MORE, damped_pairs, heavily_damped
 from rotfem.numerics.left_vectors import matched, mirror_error, mirrored
-from rotfem.numerics.linear import SMALL, transposed, use_direct_solver
+from rotfem.numerics.linear import transposed, use_direct_solver
+from rotfem.numerics.low_rank import LowRank
 
 Array = npt.NDArray[Any]
 
@@ -28,9 +30,6 @@ BACKWARD_TOLERANCE = 1e-8
 
 #: Backward error below which a solution need not be done again in a better unit of time.
 GOOD = 1e-10
-
-#: Random vectors by which the asymmetry of a large matrix is estimated.
-PROBES = 4
 
 #: Part of the median |λ| below which an eigenvalue counts as zero where zero is an eigenvalue.
 ZERO = 1e-3
@@ -68,13 +67,14 @@ class Pencil:
 
     Args:
         M: mass, C: gyroscopic and damping, K: stiffness matrix.
+        by_mode: what damping by mode adds to C; None without.
 
     Attributes:
         owner: kept alive with the matrices.
     """
 
-    def __init__(self, M: Any, C: Any, K: Any):
-        self.M, self.C, self.K = M, C, K
+    def __init__(self, M: Any, C: Any, K: Any, *, by_mode: LowRank | None = None):
+        self.M, self.C, self.K, self.by_mode = M, C, K, by_mode
         self.owner: Any = None
         self.comm: MPI.Comm = M.comm.tompi4py()
         self._x, self._y = K.createVecs()
@@ -92,7 +92,11 @@ class Pencil:
         self.spectrum_error: float | None = None
 
     def apply(self, A: Any, X: Array) -> Array:
-        """Return A X for complex columns X of locally owned unknowns."""
+        """Return A X for complex columns X of locally owned unknowns; C has damping by mode in it."""
+        out = self._apply(A, X)
+        return out if A is not self.C or self.by_mode is None else out + self.by_mode.times(X)
+
+    def _apply(self, A: Any, X: Array) -> Array:
         if self.comm.size == 1:
             indptr, indices, data = A.getValuesCSR()
             return np.asarray(csr_array((data, indices, indptr), shape=A.getSize()) @ X)
@@ -111,33 +115,8 @@ class Pencil:
         return np.asarray((lam[:, None] + mu[None, :]) * mass + gyroscopic)
 
     def asymmetries(self) -> dict[str, float]:
-        """Return relative ‖M − Mᵀ‖, ‖C + Cᵀ‖ and ‖K − Kᵀ‖ (Frobenius).
-
-        Of large matrices they are estimates from a few random signs r: the mean of ‖A r‖² is the norm's square.
-        """
-        out = {}
-        with balanced(
-            self.M, self.C, self.K, scale=self.unknowns
-        ):  # else the unit of length would say which entries count
-            for name, A, sign in (("M", self.M, -1.0), ("C", self.C, 1.0), ("K", self.K, -1.0)):
-                size = A.norm()
-                out[name] = self._distance_from_transpose(A, sign) / size if size > 0 else 0.0
-        return out
-
-    def _distance_from_transpose(self, A: Any, sign: float) -> float:
-        """Return ‖Aᵀ + sign A‖."""
-        if A.getSize()[0] <= SMALL:
-            D = transposed(A)
-            D.axpy(sign, A)
-            return float(D.norm())
-        r, total, random = self._x.duplicate(), 0.0, np.random.default_rng(self.comm.rank)
-        for _ in range(PROBES):
-            r.array[:] = random.choice([-1.0, 1.0], r.getLocalSize())
-            A.mult(r, self._x)
-            A.multTranspose(r, self._y)
-            self._y.axpy(sign, self._x)
-            total += self._y.norm() ** 2
-        return float(np.sqrt(total / PROBES))
+        """Return how far M and K are from symmetric and C from skew (see `rotfem.numerics.asymmetry`)."""
+        return asymmetries(self)
 
     @cached_property
     def conservative(self) -> bool:
@@ -164,6 +143,8 @@ class Pencil:
             return self._solve(count, 0.1 * self._smallest)
 
     def _solve(self, count: int, target: float) -> Eigenpairs:
+        if self.by_mode is not None:
+            return self._damped(count, target)
         try:
             values, right, errors = self._right(self.M, self.C, self.K, count, target)
         except ComputationError:
@@ -204,9 +185,10 @@ class Pencil:
         gyroscopic.scale(0.5)
         undamped = Pencil(self.M, gyroscopic, self.K)
         shapes = undamped.solve(count + MORE, target).right
-        self.unit = undamped.unit or 1.0
+        self.unit, self._smallest = undamped.unit or 1.0, undamped._smallest
         with balanced(self.M, self.C, self.K, self.unit) as d:
-            matrices, more = (self.M, self.C, self.K), min(2 * count, count + MORE)
+            by_mode = None if self.by_mode is None else self.by_mode.scaled(np.sqrt(self.unit) * d)
+            matrices, more = (self.M, self.C, self.K, by_mode), min(2 * count, count + MORE)
             values, right, left, errors = damped_pairs(matrices, shapes / d[:, None], more, target / self.unit)
         vectors = d[:, None] * right, d[:, None] * left
         return self._checked(self.unit * values, vectors, errors, ZERO * self.unit if target > 0.0 else 0.0)

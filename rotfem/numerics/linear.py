@@ -11,6 +11,7 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics import compat
+from rotfem.numerics.low_rank import LowRank, Update
 
 Array = npt.NDArray[np.float64]
 
@@ -68,6 +69,8 @@ class DirectSolver:
 
     def __init__(self, A: Any, symmetric: bool = False):
         self.A, self.factorisations = A, 0
+        self._beside: tuple[LowRank, float] | None = None
+        self._update: Update | None = None
         self._ksp = PETSc.KSP().create(A.comm)
         if symmetric:
             A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
@@ -75,12 +78,13 @@ class DirectSolver:
         self._ksp.setErrorIfNotConverged(False)
         self._stale = True
 
-    def refresh(self) -> None:
-        """Say that the entries of A have changed."""
+    def refresh(self, beside: LowRank | None = None, factor: float = 1.0) -> None:
+        """Say that the entries of A have changed, and what times a factor is to be added to A in solutions."""
         self._stale = True
+        self._beside = None if beside is None or factor == 0.0 else (beside, factor)
 
     def solve(self, b: Any, x: Any) -> None:
-        """Solve A x = b.
+        """Solve A x = b, or with what is added to A.
 
         Raises:
             ComputationError: A is singular to working precision.
@@ -89,9 +93,22 @@ class DirectSolver:
             self._ksp.setOperators(self.A)
             self.factorisations += 1
             self._stale = False
+            self._update = None if self._beside is None else Update(*self._beside, self._column)
+        self._apply(b, x)
+        if self._update is not None:
+            x.array[:] = self._update(x.array)
+
+    def _apply(self, b: Any, x: Any) -> None:
         self._ksp.solve(b, x)
         if self._ksp.getConvergedReason() < 0:
             raise ComputationError("the tangent is singular: the factorisation met a zero pivot")
+
+    def _column(self, b: Array) -> Array:
+        """Return A⁻¹ b of owned rows."""
+        x, right = self.A.createVecs()
+        right.array[:] = b
+        self._apply(right, x)
+        return np.array(x.array)
 
 
 class Increment:

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Mapping
+from typing import Annotated, Any, TypeAlias
 
+import numpy as np
 from pydantic import PlainValidator
+from pydantic_core import PydanticCustomError
 
-from rotfem.scene.values import NonNegative, SceneModel, as_vector, problem
+from rotfem.scene.values import Bounds, NonNegative, SceneModel, as_vector, problem
+
+#: One ratio for the first modes, one for each in the order of frequency, or family ↦ such ratios.
+Ratios: TypeAlias = float | tuple[float, ...] | dict[str, tuple[float, ...]]
+
+_RATIO = Bounds(ge=0.0, lt=1.0)
 
 
 def _as_rayleigh(value: Any) -> tuple[float, float]:
@@ -16,21 +24,46 @@ def _as_rayleigh(value: Any) -> tuple[float, float]:
     return a0, a1
 
 
+def _as_modal(value: Any) -> Ratios:
+    if isinstance(value, Mapping):
+        return {str(family): _as_ratios(given, str(family)) for family, given in value.items()}
+    return _as_ratios(value, "") if isinstance(value, list | tuple) else _RATIO.number(value)
+
+
+def _as_ratios(value: Any, key: str) -> tuple[float, ...]:
+    """Return ratios in the order of frequency; a number is one."""
+    entries = value if isinstance(value, list | tuple) else [value]
+    try:
+        return tuple(_RATIO.number(entry) for entry in entries)
+    except PydanticCustomError as error:
+        many = "must be damping ratios (0.005 is half a per cent); one " if entries is value else ""
+        raise problem(key, value, f"{many}{error.message()}") from None
+
+
 class Damping(SceneModel):
     """The [structure.damping] table.
 
     Attributes:
         kelvin_voigt: η (s) in stress = C (ε + η ε̇).
         rayleigh: (a0, a1): mass-proportional (1/s) and stiffness-proportional (s) coefficient.
+        modal: damping ratios of modes at rest: one for the first ten, one for each in the order of frequency, or by
+            family. See `rotfem.equations.modal_damping`.
     """
 
     kelvin_voigt: NonNegative = 0.0
     rayleigh: Annotated[tuple[float, float], PlainValidator(_as_rayleigh)] = (0.0, 0.0)
+    modal: Annotated[Ratios, PlainValidator(_as_modal)] = 0.0
 
     @property
     def is_zero(self) -> bool:
         """Whether there is no damping at all."""
-        return self.kelvin_voigt == 0.0 and self.rayleigh == (0.0, 0.0)
+        return self.kelvin_voigt == 0.0 and self.rayleigh == (0.0, 0.0) and not self.has_modal
+
+    @property
+    def has_modal(self) -> bool:
+        """Whether modes at rest have ratios that are not zero."""
+        families = self.modal.values() if isinstance(self.modal, dict) else [self.modal]
+        return any(bool(np.any(np.asarray(ratios))) for ratios in families)
 
 
 def check_one_hub(hub_radius: float, hub_offset: tuple[float, float, float] | None) -> None:

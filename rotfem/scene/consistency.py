@@ -78,6 +78,9 @@ def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:
             list(structure.damping.rayleigh),
             'the mass-proportional part must be 0 with frame = "inertial", where it would brake the revolution itself',
         )
+    if structure.damping.has_modal:
+        why = 'is not available with frame = "inertial", where the modes at rest turn; use "rotating"'
+        raise problem("structure.damping.modal", structure.damping.modal, why)
     for effect in registry.effects:
         if effect.of_rotation and model.effects != "auto" and effect.name in model.effects:
             raise problem(

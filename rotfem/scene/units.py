@@ -41,6 +41,7 @@ UNITS: dict[str, Unit] = {
     "structure.section.area": "m**2",
     "structure.damping.kelvin_voigt": "s",
     "structure.damping.rayleigh": ("1/s", "s"),
+    "structure.damping.modal": "dimensionless",
     "motion.speed": "rad/s",
     "motion.duration": "s",
     "motion.hub_inertia": "kg*m**2",

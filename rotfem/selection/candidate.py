@@ -108,10 +108,11 @@ class Candidate:
         else:
             self.plainly(lambda: steady_state(held, speed, self.case.newton()))
         matrices = held.mass_damping_stiffness()
-        pencil = Pencil(*matrices)
+        pencil = Pencil(*matrices, by_mode=held.by_mode)
         if self.system.hub is None:
             return pencil.solve(count).values[:count]
-        values: Array = Pencil(*self.system.with_hub(matrices)).solve(count, pencil.scale()).values
+        whole = Pencil(*self.system.with_hub(matrices), by_mode=self.system.by_mode)
+        values: Array = whole.solve(count, pencil.scale()).values
         flexible: Array = np.abs(values) > ZERO * np.median(np.abs(values))
         return values[flexible][: count - int(not flexible.all())]
 

@@ -13,10 +13,10 @@ import numpy.typing as npt
 import ufl
 from dolfinx.fem import petsc as fem_petsc
 
-from rotfem.analysis.projection import summed
 from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.equations.pieces import PRESTRESS
 from rotfem.numerics import compat, forms
+from rotfem.numerics.projection import summed
 
 Array = npt.NDArray[np.float64]
 

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.projection import summed
 from rotfem.analysis.reduced.model import ReducedModel
+from rotfem.numerics.projection import summed
 
 Array = npt.NDArray[np.float64]
 

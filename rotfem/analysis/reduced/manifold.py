@@ -22,7 +22,6 @@ import ufl
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 
-from rotfem.analysis.projection import summed, times
 from rotfem.analysis.reduced.response import Response, largest, tips_of
 from rotfem.analysis.reduced.solution import Solution, Trajectory
 from rotfem.analysis.theory_error import TheoryError, stiffened
@@ -30,6 +29,7 @@ from rotfem.equations.pieces import PRESTRESS
 from rotfem.mechanics.effects import INTERNAL, Effect
 from rotfem.numerics import compat, forms
 from rotfem.numerics.linear import DirectSolver
+from rotfem.numerics.projection import summed, times
 
 Array = npt.NDArray[np.float64]
 

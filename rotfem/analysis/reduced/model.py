@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.projection import orthonormal, summed, times
 from rotfem.numerics.linear import DirectSolver, Increment, combine
+from rotfem.numerics.projection import orthonormal, summed, times
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.projection import summed
 from rotfem.analysis.reduced.model import ReducedModel
+from rotfem.numerics.projection import summed
 
 Array = npt.NDArray[np.float64]
 

@@ -1,0 +1,61 @@
+"""How far the matrices of a pencil are from symmetric, and from skew ones; no physics."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotfem.numerics.balance import balanced
+from rotfem.numerics.linear import SMALL, transposed
+from rotfem.numerics.low_rank import LowRank
+
+if TYPE_CHECKING:
+    from rotfem.numerics.eigenproblem import Pencil
+
+#: Random vectors by which norms of large matrices are estimated.
+PROBES = 4
+
+
+def asymmetries(pencil: Pencil) -> dict[str, float]:
+    """Return relative ‖M − Mᵀ‖, ‖C + Cᵀ‖ and ‖K − Kᵀ‖ (Frobenius).
+
+    Of large matrices, and of C with damping by mode, they are estimates from a few random signs r: the mean of ‖A r‖²
+    is the norm's square.
+    """
+    out = {}
+    matrices = pencil.M, pencil.C, pencil.K
+    with balanced(*matrices, scale=pencil.unknowns) as d:  # else the unit of length would say which entries count
+        for name, A, sign in zip("MCK", matrices, (-1.0, 1.0, -1.0), strict=True):
+            part = None if name != "C" or pencil.by_mode is None else pencil.by_mode.scaled(d)
+            distance, size = _by_probes(A, sign, part) if part is not None else (_distance(A, sign), A.norm())
+            out[name] = distance / size if size > 0 else 0.0
+    return out
+
+
+def _distance(A: Any, sign: float) -> float:
+    """Return ‖Aᵀ + sign A‖."""
+    if A.getSize()[0] > SMALL:
+        return _by_probes(A, sign, None)[0]
+    D = transposed(A)
+    D.axpy(sign, A)
+    return float(D.norm())
+
+
+def _by_probes(A: Any, sign: float, part: LowRank | None) -> tuple[float, float]:
+    """Return estimates of ‖Aᵀ + sign A‖ and ‖A‖, of A with a symmetric part beside it."""
+    r, y = A.createVecs()
+    z, squares, random = y.duplicate(), np.zeros(2), np.random.default_rng(A.comm.rank)
+    for _ in range(PROBES):
+        r.array[:] = random.choice([-1.0, 1.0], r.getLocalSize())
+        A.mult(r, y)
+        A.multTranspose(r, z)
+        if part is not None:
+            more = part.times(r.array)
+            y.array[:] += more
+            z.array[:] += more
+        size = y.norm()
+        z.axpy(sign, y)
+        squares += z.norm() ** 2, size**2
+    distance, size = np.sqrt(squares / PROBES)
+    return float(distance), float(size)
