@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.numerics.complex_solver import ComplexSolver
+from rotfem.numerics.residuals import solve_by_nearby
 
 Array = npt.NDArray[Any]
 
@@ -29,6 +30,10 @@ ABOUT_PEAK = np.array([-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0])
 #: Damping ratio below which a mode has none, and the distance from its frequency at which its peak is then looked at.
 UNDAMPED = 1e-8
 BESIDE = 1e-3
+
+#: Part of the inertia that brakes the motion where damping is by mode, in a matrix that is factorised without it: that
+#: of the structure alone would be singular at its resonances.
+BRAKED = 0.05
 
 
 class FrequencyResponse:
@@ -56,8 +61,19 @@ class FrequencyResponse:
             ComputationError: there is no answer, at the frequency of a mode that has no damping.
         """
         K, C, M = self._values
-        self._solver.factor(K + 1j * omega * C - omega**2 * M)
-        return self._at_tip(self._solver.solve(self.force))
+        by_mode = self.spinning.pencil.by_mode
+        if by_mode is None:
+            self._solver.factor(K + 1j * omega * C - omega**2 * M)
+            return self._at_tip(self._solver.solve(self.force))
+        self._solver.factor(K + 1j * omega * C - (1 - 1j * BRAKED) * omega**2 * M, by_mode, 1j * omega)
+        x = solve_by_nearby(lambda x: self._times(omega, x), self._solver.solve, self.force, self.analysis.comm)
+        return self._at_tip(x)
+
+    def _times(self, omega: float, x: Array) -> Array:
+        """Return (K + iω C − ω² M) x."""
+        pencil = self.spinning.pencil
+        K, C, M = (pencil.apply(A, x[:, None])[:, 0] for A in (pencil.K, pencil.C, pencil.M))
+        return np.asarray(K + 1j * omega * C - omega**2 * M)
 
     def modal(self, frequencies: Array, count: int) -> Array:
         """Return the amplitudes of the tip's components at frequencies (n,), rad/s, by modes; shape (n, components).

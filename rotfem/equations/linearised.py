@@ -14,7 +14,6 @@ import numpy.typing as npt
 from rotfem.errors import ComputationError
 from rotfem.numerics.complex_solver import ComplexSolver
 from rotfem.numerics.linear import DirectSolver, Increment, combine
-from rotfem.numerics.low_rank import Update
 
 Array = npt.NDArray[Any]
 
@@ -40,7 +39,6 @@ class Linearised:
         self._real_matrix = self._matrices[0].duplicate()
         self._real = DirectSolver(self._real_matrix)
         self._complex = ComplexSolver(self._matrices[0])
-        self._update: Update | None = None
         self._b = self._real_matrix.createVecLeft()
 
     def take(self, shifts: tuple[float, complex]) -> None:
@@ -52,14 +50,12 @@ class Linearised:
         combine(self._real_matrix, list(self._matrices), np.array([1.0, s, s * s]))
         self._real.refresh(part, s)
         k, c, m = self._values
-        self._complex.factor(k + z * c + z * z * m)
-        self._update = None if part is None else Update(part, z, lambda b: self._complex.solve(b.astype(complex)))
+        self._complex.factor(k + z * c + z * z * m, part, z)
         self._shift = s
 
     def solve(self, real: Array, complex_: Array) -> tuple[Array, Array]:
         """Return (K + s C + s² M)⁻¹ r for the real and the complex s, local arrays, of owned ones."""
-        x = self._complex.solve(complex_)
-        return self._solve_real(real), self._local(x if self._update is None else self._update(x))
+        return self._solve_real(real), self._local(self._complex.solve(complex_))
 
     def _solve_real(self, r: Array) -> Array:
         self._b.array[:] = r

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from rotfem.numerics.linear import DirectSolver
+from rotfem.numerics.low_rank import LowRank, Update
 
 Complex = npt.NDArray[np.complex128]
 
@@ -43,15 +44,26 @@ class ComplexSolver:
         csr = (self._indptr, self._indices, self._values)
         self._matrix = PETSc.Mat().createAIJ(shape, csr=csr, comm=pattern.comm)
         self._solver = DirectSolver(self._matrix)
+        self._update: Update | None = None
         self._x, self._b = self._matrix.createVecs()
 
-    def factor(self, values: Complex) -> None:
-        """Factorise the matrix whose non-zeros (owned rows, row by row) these are."""
+    def factor(self, values: Complex, beside: LowRank | None = None, factor: complex = 1.0) -> None:
+        """Factorise the matrix whose non-zeros (owned rows, row by row) these are.
+
+        Args:
+            values: non-zeros.
+            beside: what times a factor is to be added to the matrix in solutions.
+            factor: that factor.
+        """
         self._values[self._upper] = np.stack([values.real, -values.imag], axis=1)
         self._values[self._lower] = np.stack([values.imag, values.real], axis=1)
         self._matrix.setValuesCSR(self._indptr, self._indices, self._values)
         self._matrix.assemble()
         self._solver.refresh()
+        self._update = None if beside is None else Update(beside, factor, self._column)
+
+    def _column(self, b: Any) -> Complex:
+        return self._solved(b.astype(np.complex128))
 
     def solve(self, b: Complex) -> Complex:
         """Return the owned part of the solution, of the owned part of a right-hand side.
@@ -59,6 +71,10 @@ class ComplexSolver:
         Raises:
             ComputationError: the matrix is singular to working precision.
         """
+        x = self._solved(b)
+        return x if self._update is None else self._update(x)
+
+    def _solved(self, b: Complex) -> Complex:
         self._b.array[:] = np.ascontiguousarray(b).view(np.float64)
         self._solver.solve(self._b, self._x)
         return np.array(self._x.array).view(np.complex128)

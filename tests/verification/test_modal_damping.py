@@ -16,6 +16,7 @@ from rotfem.analysis.reduced_basis import ReducedAnalysis
 from rotfem.analysis.sensitivity import sensitivities
 from rotfem.analysis.state_space import state_space, write_matrices
 from rotfem.analysis.time_loop import March, Steps
+from rotfem.commands.response import response
 from rotfem.errors import ComputationError
 from rotfem.numerics.newton import Newton
 from rotfem.registry import schemes
@@ -130,6 +131,22 @@ def test_state_space_and_matrices_have_the_poles(tmp_path: Path) -> None:
     x = np.delete(x, result.analysis.system.clamped)
     residual = (lam**2 * M + lam * C + K) @ x
     assert np.linalg.norm(residual) < 1e-9 * np.linalg.norm(K @ np.abs(x))
+
+
+def test_response_at_the_resonance_at_rest(tmp_path: Path) -> None:
+    """Against the matrices written out, where K − ω² M alone is singular: to round-off over the ratio."""
+    load = {"loads.tip_force": {"harmonic": {"amplitude": [0.0, 2.0], "frequency": 1.0}}}
+    scene = beam([0.005, 0.01])
+    result = modes(scene)
+    M, C, K = matrices(result, tmp_path)
+    omega = float(modes(beam(0.0)).frequencies[0])
+    force = np.zeros(len(M), dtype=complex)
+    tip = result.analysis.structure.tip_values.dofs.start + 1 - len(result.analysis.system.clamped)
+    force[tip] = 2.0
+    found = response(scene.replace(load), omega, 2 * omega, number=2)
+    for frequency, direct in zip(found.frequencies, found.direct, strict=True):
+        expected = np.linalg.solve(K + 1j * frequency * C - frequency**2 * M, force)[tip]
+        assert direct[1] == pytest.approx(expected, rel=1e-6)
 
 
 def test_branches_over_speed_are_damped() -> None:
