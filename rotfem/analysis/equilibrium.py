@@ -9,7 +9,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.arc_length import LoadPath, Tracer
-from rotfem.analysis.load_steps import LESS, SMALLEST_SHARE, balance, counted, raised
+from rotfem.analysis.load_steps import LESS, SMALLEST_SHARE, balance, counted, from_held_root, raised
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError, InputError
@@ -60,6 +60,10 @@ def steady_state(
             pass
     if system.linear:
         return balance(system, omega, 1.0, system.zeros(), newton)
+    if any(hinge.stiffness == 0.0 for hinge in system.structure.hinges.values()):
+        released = from_held_root(system, omega, newton)
+        if released is not None:
+            return released
     if past_limits:
         return _followed(system, omega, newton, notes)
     try:

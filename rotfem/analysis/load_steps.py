@@ -92,6 +92,37 @@ def raised(system: System, omega: float, newton: Newton) -> Raised:
     return Raised(np.asarray(q), datum)
 
 
+def from_held_root(system: System, omega: float, newton: Newton) -> Array | None:
+    """Return the equilibrium with hinges that the spin holds, from that of a root held by springs; None if it fails.
+
+    At q = 0 a hinge without a spring has no stiffness: it comes of the tension that the spin makes.
+
+    Args:
+        system: equations of motion of a nonlinear theory, the hub held.
+        omega: speed, rad/s.
+        newton: iteration control.
+    """
+    constants = [spring.stiffness for spring in system.structure.springs()]
+    given = [float(constant.value) for constant in constants]
+    system.count_rotations_from(None)
+    system.set_time(0.0, system.motion.at_speed(0.0), 0.0)
+    system.set_state(system.zeros())
+    A, _ = system.tangent(1.0, 0.0, 0.0)
+    held = float(A.norm(norm_type=3))  # the largest sum of a row: far above the stiffness of a turn
+    try:
+        for constant, own in zip(constants, given, strict=True):
+            constant.value = max(own, held)
+        q = raised(system, omega, newton).q
+        for constant, own in zip(constants, given, strict=True):
+            constant.value = own
+        return balance(system, omega, 1.0, q, newton)
+    except ComputationError:
+        return None
+    finally:
+        for constant, own in zip(constants, given, strict=True):
+            constant.value = own
+
+
 def counted(system: System, omega: float, share: float, q: Array, newton: Newton) -> Array:
     """Return a balanced state, where its rotations are large counted from a shape near it and balanced again.
 

@@ -70,7 +70,8 @@ class Beside:
         self._state, self._b = s.k.functions[:3], self.model.b
         self.V = self._b.function_space
         self._base = fem.Function(self._state[0].function_space)
-        self.bcs = [fem.dirichletbc(fem.Function(self.V), s.clamped)]
+        others = [i for i in range(len(s.components)) if i not in s.kept]
+        self.bcs = s.clamp_conditions(self.V, others)
 
     @cached_property
     def _F(self) -> Any:

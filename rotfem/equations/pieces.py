@@ -78,9 +78,11 @@ class Pieces:
     def __init__(self, model: Model, bcs: list[Any], clamped: npt.NDArray[Any], rigid: Array):
         self.model, self.structure, self.bcs, self.clamped = model, model.structure, bcs, clamped
         self.q, self.V = model.structure.k.functions[0], model.structure.V
-        self._motions = [compat.create_vector(self.V) for _ in rigid.T]
-        for motion, column in zip(self._motions, rigid.T, strict=True):
-            motion.array[:] = column
+        held = np.zeros(len(rigid), dtype=bool)
+        held[clamped] = True
+        self._motions = [self._vector(np.where(held, column, 0.0)) for column in rigid.T]
+        self._turns = [self._vector(np.where(held, 0.0, column)) for column in rigid.T]  # of its hinges
+        self._hinged = np.flatnonzero(np.any(rigid != 0.0, axis=1) & ~held)
         self._work, self._free = compat.create_vector(self.V), compat.create_vector(self.V)
         self._free.array[:] = 1.0
         self._free.array[clamped] = 0.0
@@ -99,6 +101,11 @@ class Pieces:
         self._set_switches(None)
         if model.theory.prestress:
             self._prestress()
+
+    def _vector(self, values: Array) -> Any:
+        out = compat.create_vector(self.V)
+        out.array[:] = values
+        return out
 
     def _forms_at_rest(self) -> dict[str, Any]:
         """Return f, K, C and M at q = v = a = 0 as UFL forms; those that vanish are left out."""
@@ -172,16 +179,17 @@ class Pieces:
             at_root = np.array([operator.array @ motion.array for motion in self._motions])
             operator.array[self.clamped] = 0.0
         else:
-            at_root = self._at_root(operator)
+            between = any(self.model.acting[n].at_root for n in of if n in self.model.acting)
+            at_root = -self._at_root(operator, self._turns) if between else self._at_root(operator, self._motions)
             operator.diagonalScale(self._free, self._free)
             if kind == "K" and "internal" in of and PRESTRESS not in of:
                 set_diagonal(self.clamped, operator, 1.0)
         self.all.append(Piece(kind, key, operator, of, at_root))
 
-    def _at_root(self, operator: Any) -> Array:
-        """Return Aᵀ times the unit motions of the clamp, owned rows."""
-        out, product = np.zeros((len(self._work.array), len(self._motions))), self._work
-        for column, motion in zip(out.T, self._motions, strict=True):
+    def _at_root(self, operator: Any, motions: list[Any]) -> Array:
+        """Return Aᵀ times unit motions of the clamp, owned rows."""
+        out, product = np.zeros((len(self._work.array), len(motions))), self._work
+        for column, motion in zip(out.T, motions, strict=True):
             operator.multTranspose(motion, product)
             column[:] = product.array
         return out
@@ -234,10 +242,19 @@ class Pieces:
         A.assemble()
         return A
 
-    @property
+    @cached_property
     def material(self) -> Any:
-        """Stiffness of the strains alone, clamped rows 1."""
-        return next(p.operator for p in self.all if p.kind == "K" and "internal" in p.of)
+        """Stiffness of the strains alone, clamped rows 1; hinges of the root are held by springs.
+
+        Without these it would be singular. The force N⁰ of a beam, which has one end free, does not feel them.
+        """
+        K = next(p.operator for p in self.all if p.kind == "K" and "internal" in p.of)
+        if self.structure.hinges:
+            K = K.copy()
+            d = K.getDiagonal()
+            d.array[self._hinged] *= 2.0
+            K.setDiagonal(d)
+        return K
 
     @cached_property
     def prestressed(self) -> fem.Function:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx import fem, la
+from dolfinx import la
 
 from rotfem.equations.modal_damping import EFFECT, damping_by_mode
 from rotfem.equations.model import Model
@@ -78,11 +78,7 @@ class System(Readings, Solutions, ABC):
         self.time = self.assembled = 0.0
         self.compilations = 1
         self.seconds = {"assemble": 0.0, "solve": 0.0}
-        self.bcs = [fem.dirichletbc(fem.Function(self.V), self.structure.clamped)]
-        owned = self.V.dofmap.index_map.size_local
-        nodes = self.structure.clamped[self.structure.clamped < owned]
-        bs = self.V.dofmap.index_map_bs
-        self.clamped = (nodes[:, None] * bs + np.arange(bs)).ravel()
+        self.bcs, self.clamped = self.structure.clamp_conditions(), self.structure.clamped_unknowns()
         self.clamp = TurningClamp(self.structure, self.motion) if model.fixed else None
         self.root = RootReaction(self.structure)
         self._b = la.vector(self.V.dofmap.index_map, self.V.dofmap.index_map_bs)

@@ -103,6 +103,23 @@ class AppliedLoad:
 
 
 @dataclass(frozen=True)
+class RootSpring:
+    """A spring and a damper against a turn of the root.
+
+    Attributes:
+        turn: the angle as an expression of q, rad.
+        stiffness: N·m/rad, a constant.
+        damping: N·m·s/rad, a constant.
+        measure: UFL measure of the root.
+    """
+
+    turn: Any
+    stiffness: Any
+    damping: Any
+    measure: Any
+
+
+@dataclass(frozen=True)
 class Damping:
     """Viscosity η (s) of the strains and mass-proportional rate a0 (1/s), constants or None."""
 

@@ -39,6 +39,7 @@ class Effect:
         momentum: whether its work in a rigid turn is a change of angular momentum; the moments of all others are the
             impulse that hub and structure are given.
         passive: whether its forces store energy or take it, and never give any that was not there.
+        at_root: whether its forces act between the hub and the root only, and are what the hub exerts there.
         kinetic: the part "T1" or "T0" of the kinetic energy that belongs to it.
         potential: mechanics ↦ its potential energy (J), a UFL form; None if it has none.
     """
@@ -54,6 +55,7 @@ class Effect:
     internal: bool = False
     momentum: bool = False
     passive: bool = False
+    at_root: bool = False
     kinetic: str = ""
     potential: Potential | None = None
 
@@ -77,6 +79,11 @@ def present_effects(problem: Any) -> tuple[str, ...]:
 
 def _work(name: str) -> str:
     return f"rotfem.mechanics.work:{name}"
+
+
+def hinges_of(problem: Any) -> list[Any]:
+    """Return the hinges at the root of a problem's structure."""
+    return list(getattr(problem.structure, "hinges", {}).values())
 
 
 # What every model has.
@@ -143,6 +150,27 @@ for _effect in (
         (),
         internal=True,
         passive=True,
+    ),
+    Effect(
+        "root_springs",
+        _work("root_springs"),
+        lambda problem: bool(hinges_of(problem)),
+        ("the root has hinges or springs", "the root is rigid"),
+        (),
+        internal=True,
+        passive=True,
+        at_root=True,
+        potential=_work("potential_of_root_springs"),
+    ),
+    Effect(
+        "root_dampers",
+        _work("root_dampers"),
+        lambda problem: any(hinge.damping > 0.0 for hinge in hinges_of(problem)),
+        ("the root has dampers", "the root has no dampers"),
+        (),
+        internal=True,
+        passive=True,
+        at_root=True,
     ),
     Effect(
         "tip_mass",

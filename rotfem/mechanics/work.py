@@ -147,6 +147,16 @@ def damping(m: Mechanics, delta: Variation) -> Any:
     return added(work)
 
 
+def root_springs(m: Mechanics, delta: Variation) -> Any:
+    """Return Σ k φ δφ over the turns φ that the root makes against springs."""
+    return added(s.stiffness * s.turn * m.k.variation(s.turn) * s.measure for s in m.structure.springs())
+
+
+def root_dampers(m: Mechanics, delta: Variation) -> Any:
+    """Return Σ c φ̇ δφ over the turns φ that the root makes against dampers."""
+    return added(s.damping * m.k.rate(s.turn) * m.k.variation(s.turn) * s.measure for s in m.structure.springs())
+
+
 def loads(m: Mechanics, delta: Any) -> Any:
     """Return −Σ ∫ (force · δx) over applied forces and moments."""
     return added(-ufl.inner(load.force, delta.of(load)) * load.measure for load in m.loads)
@@ -194,6 +204,11 @@ def potential_of_base(m: Mechanics) -> Any:
 def potential_of_gravity(m: Mechanics) -> Any:
     """Return −∫ ρ g·x."""
     return _potential_in(m, m.frame.gravity)
+
+
+def potential_of_root_springs(m: Mechanics) -> Any:
+    """Return Σ ½ k φ² over the springs of the root."""
+    return added(s.stiffness * s.turn**2 / 2 * s.measure for s in m.structure.springs())
 
 
 def potential_of_loads(m: Mechanics) -> Any:

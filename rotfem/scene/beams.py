@@ -15,6 +15,7 @@ from rotfem.scene.magnitudes import check_magnitudes
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.point_masses import PointMass, as_inertia, check_masses
 from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_through
+from rotfem.scene.root import Hinge, Root, SpatialRoot, check_cone
 from rotfem.scene.section import PlanarSection
 from rotfem.scene.section_spatial import SpatialSection
 from rotfem.scene.structure import MeanBeam, StructureTable, apart, means
@@ -61,6 +62,7 @@ class PlanarBeamStructure(StructureTable):
         tip_inertia: its moment of inertia about axis 3 (kg·m²).
         masses: further masses along the beam.
         section: cross-section.
+        root: hinge, spring and damper at the clamp.
         damping: damping coefficients.
     """
 
@@ -70,6 +72,7 @@ class PlanarBeamStructure(StructureTable):
     tip_mass: NonNegative = 0.0
     tip_inertia: NonNegative = 0.0
     masses: tuple[PointMass, ...] = ()
+    root: Root = Root()
     section: PlanarSection = Field(description="a table of section properties")
     damping: Damping = Damping()
 
@@ -77,6 +80,16 @@ class PlanarBeamStructure(StructureTable):
     def is_planar(self) -> bool:
         """Whether it moves in the plane (1, 2) of the frame only: it does."""
         return True
+
+    @property
+    def root_position(self) -> tuple[float, float, float]:
+        """Position of the root in the frame (m)."""
+        return self.hub_radius + self.root.hinge_offset, 0.0, 0.0
+
+    @property
+    def hinges(self) -> dict[int, Hinge]:
+        """Axis ↦ the hinge about it at the root."""
+        return self.root.hinges
 
     @property
     def knots(self) -> tuple[float, ...]:
@@ -102,7 +115,7 @@ class PlanarBeamStructure(StructureTable):
         """Return the uniform beam with the mean of its section."""
         s = means(self.section.at, self.length)
         mass = s["mass_per_length"] + (self.tip_mass + sum(body.mass for body in self.masses)) / self.length
-        return MeanBeam(self.length, self.hub_radius, s["EA"], mass, {"lag": (s["EI"], 0.0)})
+        return MeanBeam(self.length, self.root_position[0], s["EA"], mass, {"lag": (s["EI"], 0.0)})
 
     @model_validator(mode="before")
     @classmethod
@@ -139,6 +152,7 @@ class SpatialBeamStructure(StructureTable):
             need not be given then.
         precone: angle of the beam axis out of the plane (1, 2), towards direction 3 (rad). May also stand in the
             section table.
+        root: hinges, springs, dampers and pitch angle at the clamp.
         damping: damping coefficients.
     """
 
@@ -155,6 +169,7 @@ class SpatialBeamStructure(StructureTable):
     sweep: Annotated[Profile, PlainValidator(_as_sweep)] = 0.0
     line: Annotated[Matrix, PlainValidator(as_line)] | None = None
     precone: Number = 0.0
+    root: SpatialRoot = SpatialRoot()
     damping: Damping = Damping()
 
     @property
@@ -181,8 +196,14 @@ class SpatialBeamStructure(StructureTable):
 
     @property
     def root_position(self) -> tuple[float, float, float]:
-        """Position of the clamp in the frame (m): the hub offset, or (hub radius, 0, 0)."""
-        return self.hub_offset if self.hub_offset is not None else (self.hub_radius, 0.0, 0.0)
+        """Position of the root in the frame (m): the hub offset, or (hub radius, 0, 0), and the hinge offset."""
+        x, y, z = self.hub_offset if self.hub_offset is not None else (self.hub_radius, 0.0, 0.0)
+        return x + self.root.hinge_offset, y, z
+
+    @property
+    def hinges(self) -> dict[int, Hinge]:
+        """Axis ↦ the hinge about it at the root."""
+        return self.root.hinges
 
     @property
     def has_tip_mass(self) -> bool:
@@ -201,7 +222,7 @@ class SpatialBeamStructure(StructureTable):
         s = means(self.section.central, self.length)
         mass = s["mass_per_length"] + (self.tip_mass + sum(body.mass for body in self.masses)) / self.length
         bending = {"flap": (s["EI2"], 1.0), "lag": (s["EI3"], 0.0)}
-        return MeanBeam(self.length, self.hub_radius, s["EA"], mass, bending)
+        return MeanBeam(self.length, self.root_position[0], s["EA"], mass, bending)
 
     @model_validator(mode="before")
     @classmethod
@@ -233,6 +254,7 @@ class SpatialBeamStructure(StructureTable):
             raise problem("sweep", None, "cannot be combined with line, which holds it")
         check_one_hub(self.hub_radius, self.hub_offset)
         check_masses(self.masses, self.length, planar=False)
+        check_cone(self.root, self.precone)
         return self
 
 

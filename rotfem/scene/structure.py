@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -61,6 +61,11 @@ class StructureTable(SceneModel):
     def knots(self) -> tuple[float, ...]:
         """Places (m) along a beam, increasing, at which tables have rows: nodes of its mesh."""
         return ()
+
+    @property
+    def hinges(self) -> dict[int, Any]:
+        """Axis, 1 to 3, ↦ name, stiffness and damping of the turn that the root may make about it."""
+        return {}
 
     @property
     def mesh_file(self) -> str | None:

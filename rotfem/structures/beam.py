@@ -11,7 +11,7 @@ from basix.ufl import element
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from rotfem.mechanics.bodies import Strain
+from rotfem.mechanics.bodies import RootSpring, Strain
 from rotfem.mechanics.loads import stations
 from rotfem.mechanics.problem import Problem
 from rotfem.structures.memory import check_memory
@@ -45,7 +45,8 @@ class Beam(Structure):
     def __init__(self, problem: Problem, comm: MPI.Comm, knots: tuple[float, ...]):
         super().__init__(problem, comm)
         grid, s = problem.mesh, self.data
-        self.length, self.hub_radius, self._section = s.length, s.hub_radius, s.section
+        root = getattr(s, "root_position", (s.hub_radius, 0.0, 0.0))
+        self.length, self.hub_radius, self._section = s.length, root[0], s.section
         check_memory("mesh.elements", grid.elements, grid.elements * grid.degree + 1, self.size, 1, comm)
         #: Places along the beam where section, axis, loads or forces may change at once, m.
         self.knots = apart((*knots, *stations(problem.loads)), self.length)
@@ -72,6 +73,28 @@ class Beam(Structure):
         self.tip, self.root = (ufl.ds(tag, domain=self.mesh, subdomain_data=at) for tag in (1, 2))
         self.clamped = fem.locate_dofs_topological(self.V, 0, ends[1])
         self.tip_values = TipValues(self.V, np.array([self.length, 0.0, 0.0]))
+
+    @property
+    def hinges(self) -> dict[int, Any]:
+        """Axis, 1 to 3, ↦ name, stiffness and damping of the turn that the root may make about it."""
+        return getattr(self.data, "hinges", {})
+
+    def root_turn(self, axis: int) -> Any:
+        """Return the rotation at the root about an axis, 1 to 3, of the blade there: an expression, rad."""
+        raise NotImplementedError
+
+    def springs(self) -> list[RootSpring]:
+        """Return what holds the hinges of the root."""
+        found = self.hinges.items()
+        return [
+            RootSpring(
+                self.root_turn(axis),
+                self.scalar(f"{hinge.name}_stiffness", hinge.stiffness),
+                self.scalar(f"{hinge.name}_damping", hinge.damping),
+                self.root,
+            )
+            for axis, hinge in found
+        ]
 
     def stretch(self, strains: list[Strain]) -> Any:
         """Return 1 + Γ₁, Γ₁ the axial strain."""

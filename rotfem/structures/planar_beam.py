@@ -27,6 +27,7 @@ class PlanarBeam(Beam):
 
     type = "planar_beam"
     planar = True
+    turns_of: ClassVar = {3: 2}
     components = ("u1", "u2", "alpha")
     dimension = 2
     #: Conjugates of the tip's components: inputs of the state-space model.
@@ -39,7 +40,7 @@ class PlanarBeam(Beam):
         super().__init__(problem, comm, s.knots)
         for name in s.section.at(np.zeros(1)):
             self.section[name] = self.profile(name, partial(self._property, name))
-        self.scalar("hub_radius", s.hub_radius)
+        self.scalar("hub_radius", self.hub_radius)
 
     def _property(self, name: str, x: Array) -> Array:
         properties: dict[str, Array] = self.data.section.at(x)
@@ -61,6 +62,10 @@ class PlanarBeam(Beam):
         """Return v_1 t_1 + v_2 t_2."""
         t_1, t_2 = self.triad(q)
         return v[0] * t_1 + v[1] * t_2
+
+    def root_turn(self, axis: int) -> Any:
+        """Return the rotation at the root: alpha."""
+        return self.k.q[2]
 
     def strains(self, measures: Callable[..., tuple[Any, ...]]) -> list[Strain]:
         """Return the strains of one theory's measures with this section's EA, GA_s and EI."""

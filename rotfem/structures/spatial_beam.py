@@ -56,6 +56,7 @@ class SpatialBeam(Beam):
 
     type = "spatial_beam"
     planar = False
+    turns_of: ClassVar = {1: 3, 2: 4, 3: 5}
     components = ("u1", "u2", "u3", "theta1", "theta2", "theta3")
     planes: ClassVar = {1: (0, 2, 4), 2: (0, 1, 5)}
     across: ClassVar = {1: (1, 5), 2: (2, 4)}
@@ -70,12 +71,13 @@ class SpatialBeam(Beam):
         super().__init__(problem, comm, s.knots)
         self._forms = SectionForms(self, s.section)
         if s.hub_offset is None:
-            self._root = ufl.as_vector((self.scalar("hub_radius", s.hub_radius), 0, 0))
+            self._root = ufl.as_vector((self.scalar("hub_radius", self.hub_radius), 0, 0))
         else:
-            parts = [self.scalar(f"hub_offset_{i}", x) for i, x in enumerate(s.hub_offset, start=1)]
+            parts = [self.scalar(f"hub_offset_{i}", x) for i, x in enumerate(s.root_position, start=1)]
             self._root = ufl.as_vector(parts)
         self._triad = self._undeformed_triad()
-        self.turns = SectionTurns.of(self) if self.size == len(self.components) else None
+        whole = self.size == len(self.components) and not self.hinges  # whose turns are counted from the hub
+        self.turns = SectionTurns.of(self) if whole else None
 
     def use(self, kinematics: Kinematics) -> None:
         """Take these unknowns, and the turn of the sections that they are."""
@@ -90,6 +92,11 @@ class SpatialBeam(Beam):
         beta = self.scalar("precone", cone) if cone != 0.0 else 0
         c, s = (ufl.cos(beta), ufl.sin(beta)) if cone != 0.0 else (1, 0)
         e_1, e_2, e_3 = ufl.as_vector((c, 0, s)), ufl.as_vector((0, 1, 0)), ufl.as_vector((-s, 0, c))
+        self._root_axes = (e_1, e_2, e_3)
+        if self.data.root.pitch != 0.0:
+            pitch = self.scalar("pitch", self.data.root.pitch)
+            c, s = ufl.cos(pitch), ufl.sin(pitch)
+            e_2, e_3 = c * e_2 + s * e_3, c * e_3 - s * e_2
         X = ufl.SpatialCoordinate(self.mesh)[0]
         self._axis = X * e_1
         sweep, line = self.data.sweep, self.data.reference_line
@@ -143,6 +150,11 @@ class SpatialBeam(Beam):
     def turned(self, q: Any, v: Any) -> Any:
         """Return Λ v = exp(θ) R v."""
         return SectionTurn(rotation_part(q), self._turn.exact).rotate(self._from_datum(v))
+
+    def root_turn(self, axis: int) -> Any:
+        """Return θ·e at the root, e the axis of the blade there (1), the flap axis (2) or the lag axis (3)."""
+        theta, e = rotation_part(self.k.q), self._root_axes[axis - 1]
+        return sum(e[i] * theta[i] for i in range(3))
 
     def strains(self, measures: Callable[..., tuple[Any, Any]]) -> list[Strain]:
         """Return the strains (Γ, K) of one theory's measures with the section's stiffness."""

@@ -13,7 +13,7 @@ from dolfinx import default_scalar_type, fem
 from mpi4py import MPI
 
 from rotfem.errors import InputError, shown
-from rotfem.mechanics.bodies import Body, Damping, Kinematics, Strain
+from rotfem.mechanics.bodies import Body, Damping, Kinematics, RootSpring, Strain
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import forms
 from rotfem.structures.applied_loads import LoadsOfStructure
@@ -50,6 +50,8 @@ class Structure(LoadsOfStructure):
     planes: ClassVar[dict[int, tuple[int, ...]]] = {}
     #: Direction of forces ↦ the components that, in a linear theory, may be moved by them alone.
     across: ClassVar[dict[int, tuple[int, ...]]] = {}
+    #: Axis of a hinge at the root, 1 to 3 ↦ the component that turns in it.
+    turns_of: ClassVar[dict[int, int]] = {}
     #: Strains whose force makes geometric stiffness in the prestressed linear theories.
     prestressing: ClassVar[tuple[str, ...]]
     #: Strains whose stiffness may outweigh that of the others by so much that round-off of it spoils them.
@@ -144,9 +146,39 @@ class Structure(LoadsOfStructure):
 
     def free_unknowns(self) -> int:
         """Return how many unknowns are not clamped, over all processes."""
-        owned = self.V.dofmap.index_map.size_local
-        clamped = int(np.count_nonzero(self.clamped < owned))
-        return self.size * int(self.V.dofmap.index_map.size_global - self.comm.allreduce(clamped))
+        here = len(self.clamped_unknowns())
+        return self.size * int(self.V.dofmap.index_map.size_global) - int(self.comm.allreduce(here))
+
+    @property
+    def hinges(self) -> dict[int, Any]:
+        """Axis, 1 to 3, ↦ name, stiffness and damping of the turn that the root may make about it; none here."""
+        return {}
+
+    def springs(self) -> list[RootSpring]:
+        """Return what holds the hinges; none here."""
+        return []
+
+    def _held(self, components: Collection[int]) -> list[int]:
+        """Return which of these components, by their place among them, the clamp holds."""
+        free = {self.turns_of[axis] for axis in self.hinges}
+        return [place for place, i in enumerate(components) if i not in free]
+
+    def clamped_unknowns(self) -> npt.NDArray[np.int32]:
+        """Return the local numbers of the owned unknowns that the clamp holds, in order."""
+        nodes = self.clamped[self.clamped < self.V.dofmap.index_map.size_local]
+        numbers: npt.NDArray[np.int32] = (
+            nodes[:, None] * self.size + np.array(self._held(self.kept), np.int32)
+        ).ravel()
+        return numbers
+
+    def clamp_conditions(self, V: fem.FunctionSpace | None = None, others: Collection[int] | None = None) -> list[Any]:
+        """Return the boundary conditions of the clamp, in the space of the unknowns or in that of other components."""
+        V, components = V or self.V, self.kept if others is None else others
+        held = self._held(components)
+        if len(held) == len(components):
+            return [fem.dirichletbc(fem.Function(V), self.clamped)]
+        zero = default_scalar_type(0.0)
+        return [fem.dirichletbc(zero, self.clamped * len(components) + i, V.sub(i)) for i in held]
 
     def stretch(self, strains: list[Strain]) -> Any:
         """Return an expression that is 1 where the structure is undeformed and at most 0 where it is inside out."""

@@ -1,0 +1,163 @@
+"""Hinges, springs and dampers at the root, and pitch: closed forms, frequency equations, an independent Ritz code."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh, expm
+from scipy.optimize import brentq
+
+import rotfem
+
+L, RHO = 10.0, 1.2
+STILL, SPIN = {"type": "constant", "speed": 0.0}, {"type": "constant", "speed": 5.0}
+#: So stiff that the blade is rigid: its first frequency of bending is 90 Ω.
+STIFF = {"EA": 1e10, "GA": 1e10, "EI": 1e7, "mass_per_length": RHO}
+SOFT = {"EA": 1e8, "GA": 1e8, "EI": 1.4e4, "mass_per_length": RHO}
+PLANAR = {"type": "planar_beam", "length": L}
+SPATIAL_SECTION = {"EA": 1e10, "GA2": 1e10, "GA3": 1e10, "GJ": 1e7, "EI2": 1e7, "EI3": 1e7, "mass_per_length": RHO}
+SPATIAL = {"type": "spatial_beam", "length": L, "section": SPATIAL_SECTION}
+
+
+def frequencies(structure: Any, motion: Any, theory: str, count: int = 2, **mesh: Any) -> Any:
+    """Return the first frequencies, rad/s."""
+    tables = {"structure": structure, "motion": motion, "model": {"theory": theory}, "modes": {"count": count}}
+    return rotfem.modes({**tables, "mesh": {"elements": 4, **mesh}}).frequencies
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "von_karman_linear", "second_order", "reissner"])
+@pytest.mark.parametrize("where", ["hub_radius", "hinge_offset"])
+def test_lag_hinge(theory: str, where: str) -> None:
+    """ω/Ω = √(3e/2(R − e)) of the rigid blade, R = e + L; the bending of this one is 1e-6 of it."""
+    e, root = 1.0, {"lag_stiffness": 0.0}
+    blade = {**PLANAR, "section": STIFF, "hub_radius": e, "root": root}
+    if where == "hinge_offset":
+        blade = {**PLANAR, "section": STIFF, "root": {**root, "hinge_offset": e}}
+    found = frequencies(blade, SPIN, theory)[0] / SPIN["speed"]
+    assert found == pytest.approx(np.sqrt(3 * e / (2 * L)), rel=1e-5)
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+def test_flap_and_lag_hinges(theory: str) -> None:
+    """Flap √(1 + 3e/2(R − e)) and lag √(3e/2(R − e)), and with springs both grow by k/I, I = ρA L³/3."""
+    e, k = 0.6, 500.0
+    more = 3 * e / (2 * L)
+    free = {**SPATIAL, "hub_radius": e, "root": {"flap_stiffness": 0.0, "lag_stiffness": 0.0}}
+    found = frequencies(free, SPIN, theory) / SPIN["speed"]
+    np.testing.assert_allclose(found, [np.sqrt(more), np.sqrt(1 + more)], rtol=1e-5)
+    held = {**free, "root": {"flap_stiffness": k, "lag_stiffness": 2 * k}}
+    inertia = RHO * L**3 / 3 * SPIN["speed"] ** 2
+    exact = sorted([np.sqrt(1 + more + k / inertia), np.sqrt(more + 2 * k / inertia)])
+    # the blade bends beside the springs, which are softer by some k L / EI = 5e-4 then
+    np.testing.assert_allclose(frequencies(held, SPIN, theory) / SPIN["speed"], exact, rtol=1e-4)
+
+
+def test_spring_and_elastic_blade() -> None:
+    """The frequency equation of a Timoshenko beam whose root turns against k: M(0) = k ψ(0)."""
+    k, EI, GA = 3000.0, SOFT["EI"], SOFT["GA"]
+
+    def determinant(omega: float) -> float:
+        A = np.array([[0, 1, 0, 1 / GA], [0, 0, 1 / EI, 0], [0, 0, 0, -1], [-RHO * omega**2, 0, 0, 0]])
+        ends = expm(L * A) @ np.array([[0, 0], [1, 0], [k, 0], [0, 1]])
+        return float(np.linalg.det(ends[2:]))
+
+    grid = np.linspace(0.05, 120.0, 2000)
+    signs = np.sign([determinant(w) for w in grid])
+    exact = [brentq(determinant, grid[i], grid[i + 1], xtol=1e-13) for i in np.flatnonzero(np.diff(signs))]
+    blade = {**PLANAR, "section": SOFT, "root": {"lag_stiffness": k}}
+    np.testing.assert_allclose(frequencies(blade, STILL, "linear", 3, elements=16), exact[:3], rtol=2e-6)
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+def test_damped_spring_in_time_and_the_moment_of_the_hub(theory: str) -> None:
+    """I φ̈ + c φ̇ + k φ = F L after a step of the force, to the order of the step; the hub exerts −(k φ + c φ̇)."""
+    k, c, F, inertia = 300.0, 40.0, 0.1, RHO * L**3 / 3
+    omega, ratio = np.sqrt(k / inertia), c / (2 * np.sqrt(k * inertia))
+    damped, t = omega * np.sqrt(1 - ratio**2), 4.0
+    decay, slope = np.exp(-ratio * omega * t), ratio / np.sqrt(1 - ratio**2)
+    angle = F * L / k * (1 - decay * (np.cos(damped * t) + slope * np.sin(damped * t)))
+    rate = F * L / k * decay * (slope * ratio * omega + damped) * np.sin(damped * t)
+    blade = {**PLANAR, "section": STIFF, "root": {"lag_stiffness": k, "lag_damping": c}}
+    tables = {"structure": blade, "motion": STILL, "loads": {"tip_force": [0, F]}, "model": {"theory": theory}}
+    history = rotfem.run({**tables, "mesh": {"elements": 1}, "time": {"end": t, "step": 0.01}}).history
+    assert history["tip_alpha"][-1] == pytest.approx(angle, rel=5e-4)
+    assert history["root_m3"][-1] == pytest.approx(-k * angle - c * rate, rel=5e-4)
+
+
+def test_root_moment_of_a_spring_at_rest() -> None:
+    blade = {**PLANAR, "section": STIFF, "root": {"lag_stiffness": 300.0}}
+    tables = {"structure": blade, "motion": STILL, "loads": {"tip_force": [0, 0.1]}, "model": {"theory": "linear"}}
+    done = rotfem.run({**tables, "mesh": {"elements": 1}})
+    assert done.summary["root"]["root_m3"] == pytest.approx(-1.0, rel=1e-6)  # −F L
+    assert done.tip["u2"][0] == pytest.approx(0.1 * L * L / 300 + 0.1 * L**3 / 3e7 + 0.1 * L / 1e10, rel=1e-7)
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+def test_momentum_of_a_free_hub_with_a_hinged_blade(theory: str) -> None:
+    """Spring and damper act between hub and blade: the momentum is the impulse of the torque, to that of the steps."""
+    blade = {**PLANAR, "section": STIFF, "hub_radius": 0.5, "root": {"lag_stiffness": 300.0, "lag_damping": 40.0}}
+    motion = {"type": "torque", "hub_inertia": 100.0, "pulses": [[0.0, 0.5, 50.0]]}
+    tables = {"structure": blade, "motion": motion, "model": {"theory": theory}, "mesh": {"elements": 1}}
+    history = rotfem.run({**tables, "time": {"end": 1.0, "step": 0.01}}).history
+    assert history["impulse"][-1] == pytest.approx(25.0, rel=1e-12)
+    assert history["angular_momentum"][-1] == pytest.approx(25.0, rel=1e-5)
+
+
+def ritz(theta: float, flap: float, lag: float, omega: float, count: int) -> Any:
+    """Return frequencies of a pitched blade by Rayleigh–Ritz with polynomials, no shear, no axial motion.
+
+    Principal axes are turned by theta: ½∫ EI₂ (w″c − v″s)² + EI₃ (v″c + w″s)², tension ½ρΩ²(L² − x²), and −½ρΩ² v².
+    """
+    n = 9
+    x, weight = np.polynomial.legendre.leggauss(30)
+    x, weight = 0.5 * (x + 1), 0.5 * weight * L
+    powers = np.arange(2, n + 2)
+    f = x[:, None] ** powers
+    df = powers * x[:, None] ** (powers - 1) / L
+    ddf = powers * (powers - 1) * x[:, None] ** (powers - 2) / L**2
+    bending, mass = (a.T @ (weight[:, None] * a) for a in (ddf, f))
+    tension = df.T @ ((weight * 0.5 * RHO * omega**2 * L**2 * (1 - x**2))[:, None] * df)
+    c, s = np.cos(theta), np.sin(theta)
+    both = flap * np.outer([-s, c], [-s, c]) + lag * np.outer([c, s], [c, s])
+    K = np.kron(both, bending) + np.kron(np.eye(2), tension) - np.kron(np.diag([1.0, 0.0]), RHO * omega**2 * mass)
+    return np.sqrt(eigh(K, np.kron(np.eye(2), RHO * mass), eigvals_only=True)[:count])
+
+
+def test_pitch_couples_flap_and_lag() -> None:
+    """Against the Ritz code; shear (GA large) and the Coriolis force of axial motion leave 2e-4."""
+    theta, flap, lag, omega = 0.5, 1.0e4, 6.0e4, 4.0
+    section = {**SPATIAL_SECTION, "EA": 1e9, "EI2": flap, "EI3": lag, "GJ": 1e5}
+    blade = {**SPATIAL, "section": section, "root": {"pitch": theta}}
+    found = frequencies(blade, {"type": "constant", "speed": omega}, "consistent_linear", 4, elements=8)
+    np.testing.assert_allclose(found, ritz(theta, flap, lag, omega, 4), rtol=3e-4)
+    apart = ritz(0.0, flap, lag, omega, 4)
+    assert np.abs(found / apart - 1).max() > 0.01  # so that pitch matters here
+
+
+def test_a_pitched_blade_is_the_blade_that_sees_the_axis_turned() -> None:
+    """A turn of the world about the axis of the blade: the same frequencies, swept and twisted too."""
+    pitch = 0.4
+    section = {**SPATIAL_SECTION, "EA": 1e8, "EI2": 1e4, "EI3": 6e4, "GJ": 1e4, "mass_center": [0.05, 0.0]}
+    blade = {**SPATIAL, "section": section, "sweep": [[0, 0], [5, 0], [10, 0.3]], "pretwist": [[0, 0.1], [10, 0.3]]}
+    blade = {**blade, "hub_radius": 0.5}
+    pitched = frequencies({**blade, "root": {"pitch": pitch}}, SPIN, "consistent_linear", 4)
+    axis = [0.0, np.sin(pitch), np.cos(pitch)]
+    turned = frequencies(blade, {**SPIN, "axis": axis}, "consistent_linear", 4)
+    np.testing.assert_allclose(pitched, turned, rtol=1e-7)  # round-off: GA is 1e7 of EI/L²
+
+
+@pytest.mark.parametrize(
+    ("structure", "words"),
+    [
+        ({**PLANAR, "section": SOFT, "root": {"flap_stiffness": 1.0}}, "unknown key"),
+        ({**PLANAR, "section": SOFT, "root": {"lag_damping": 1.0}}, "needs lag_stiffness"),
+        ({**PLANAR, "section": SOFT, "root": {"lag_stiffness": -1.0}}, "at least 0"),
+        ({**SPATIAL, "precone": 0.1, "root": {"lag_stiffness": 1.0}}, "pitch_stiffness"),
+    ],
+)
+def test_roots_that_are_refused(structure: Any, words: str) -> None:
+    with pytest.raises(rotfem.SceneError, match=r"structure.root") as caught:
+        rotfem.Scene.from_dict({"structure": structure, "motion": STILL})
+    assert words in str(caught.value)
