@@ -9,12 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.schemes import State
+from rotfem.commands.fields import fields_writer, stations_writer
 from rotfem.commands.finite import check_finite
 from rotfem.commands.moment import hub_values
 from rotfem.commands.station_rows import StationRows
 from rotfem.results.run import RunResult, Table
 from rotfem.scene import OutputTable
-from rotfem.structures.paraview import Snapshots, writer
+from rotfem.structures.paraview import Snapshots
 
 Array = npt.NDArray[np.float64]
 
@@ -37,7 +38,8 @@ class Recorder:
         root, further = (f"root_{name}" for name in system.root.names), tuple(system.model.problem.outputs)
         self.history = Table(("t", "psi", "psi_dot", *names, "kinetic", "strain", "jacobi", *root, *free, *further))
         self._last: State | None = None
-        self.snapshots = Snapshots() if system.structure.mesh.topology.dim == 2 else None
+        self.formats = ("vtx",) if output is None else output.formats(system.structure.type)
+        self.snapshots = Snapshots() if self.formats else None
         stations = output is not None and output.stations is not None
         self.stations = StationRows(system, output) if stations and output is not None else None
 
@@ -85,6 +87,7 @@ class Recorder:
         out = RunResult(summary, history, shape, triangles=structure.surface())
         if self.stations is not None:
             out.stations = self.stations.result()
-        if self.snapshots is not None:
-            out.fields = writer(structure, "fields", self.snapshots.kept)
+            out.further.append(stations_writer(self.system, out.stations))
+        if self.snapshots is not None and self.snapshots.kept:
+            out.fields = fields_writer(self.system, self.snapshots.kept, self.formats)
         return out

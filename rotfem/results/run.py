@@ -64,6 +64,7 @@ class RunResult(Result):
         triangles: of a plate, triangles between the nodes of `shape`, (m, 3).
         fields: writes the fields for ParaView into a folder, on all ranks together; None of a beam.
         stations: section forces, strains and unknowns at the stations of a beam; None where none are asked for.
+        further: what else writes files into a folder.
     """
 
     history: dict[str, Array] = field(default_factory=dict)
@@ -71,6 +72,7 @@ class RunResult(Result):
     triangles: Any = field(default=None, repr=False)
     fields: Callable[[Path], list[Path]] | None = field(default=None, repr=False)
     stations: StationHistory | None = field(default=None, repr=False)
+    further: list[Callable[[Path], object]] = field(default_factory=list, repr=False)
 
     @property
     def t(self) -> Array:
@@ -111,11 +113,11 @@ class RunResult(Result):
         return {**texts, "summary.json": json_text(self.summary)}
 
     def large(self) -> list[Callable[[Path], object]]:
-        """Return what writes stations.h5, where that is asked for."""
+        """Return what writes stations.h5 and files for ParaView, where these are asked for."""
         stations = self.stations
         if stations is None or stations.format != "hdf5":
-            return []
-        return [lambda folder: stations.write_hdf5(folder / "stations.h5")]
+            return list(self.further)
+        return [lambda folder: stations.write_hdf5(folder / "stations.h5"), *self.further]
 
     def drawings(self) -> dict[str, Callable[[], Figure]]:
         """Return history.png of a time history, shape.png of a steady state and of plates."""

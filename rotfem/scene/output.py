@@ -31,6 +31,12 @@ class _Known(Named):
         return (*registry.outputs.names, *sections)
 
 
+class _Formats(Named):
+    """Names that `fields` may hold."""
+
+    kind, names = "format", ("vtx", "xdmf")
+
+
 def _as_quantities(value: Any) -> tuple[str, ...]:
     return as_names(value, _Known())
 
@@ -46,6 +52,10 @@ def _as_stations(value: Any) -> int | tuple[float, ...]:
     return tuple(float(x) for x in value)
 
 
+def _as_formats(value: Any) -> tuple[str, ...]:
+    return as_names(value, _Formats())
+
+
 class OutputTable(SceneModel):
     """The [output] table.
 
@@ -56,6 +66,7 @@ class OutputTable(SceneModel):
             from end to end.
         every: rows of history.csv from one record of the stations to the next.
         format: of the file that they go to.
+        fields: formats of the files for ParaView, "vtx" and "xdmf"; VTX of a plate and XDMF of a beam if not given.
         error: whether the error of what is computed is estimated.
         speed: unit in which speeds are printed and drawn.
         frequency: unit in which frequencies of modes are printed and drawn.
@@ -65,6 +76,7 @@ class OutputTable(SceneModel):
     stations: Annotated[int | tuple[float, ...] | None, PlainValidator(_as_stations)] = None
     every: Count = 1
     format: Literal["csv", "hdf5"] = "csv"
+    fields: Annotated[tuple[str, ...] | None, PlainValidator(_as_formats)] = None
     error: bool = True
     speed: AngularUnit = "rad/s"
     frequency: AngularUnit = "rad/s"
@@ -78,6 +90,12 @@ class OutputTable(SceneModel):
         """Return the quantities that a beam of a type is to have recorded at its stations: those named, or all."""
         known = (*FORCES[kind], *STRAINS[kind])
         return tuple(name for name in self.quantities if name in known) or known
+
+    def formats(self, kind: str) -> tuple[str, ...]:
+        """Return the formats of the files for ParaView of a structure of a type."""
+        if self.fields is not None:
+            return self.fields
+        return ("xdmf",) if kind in FORCES else ("vtx",)
 
     def positions(self, length: float) -> tuple[float, ...]:
         """Return the stations along a beam of a length, m; empty if there are none."""

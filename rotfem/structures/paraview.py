@@ -1,4 +1,4 @@
-"""Displacement fields of plates in files for ParaView, written by all ranks together."""
+"""Displacement fields in files for ParaView, written by all ranks together."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def write(structure: Any, name: str, states: list[tuple[float, Array]], folder: 
     """Write the displacements of local dof arrays as name.bp (VTX), or name.xdmf without ADIOS2; return the path.
 
     Args:
-        structure: the plate.
+        structure: whose mesh and unknowns it has.
         name: of the file, without ending.
         states: (time in s or number of the mode, dof array); a complex one gives the fields of both its parts.
         folder: where the file goes.
@@ -115,7 +115,7 @@ def write(structure: Any, name: str, states: list[tuple[float, Array]], folder: 
             for t, q in states:
                 for f, part in zip(out, parts, strict=True):
                     nodal = structure.whole_values(part(q[:size]).reshape(-1, V.dofmap.index_map_bs))
-                    own = nodal[:, :3].ravel()
+                    own = _displacements(structure, nodal).ravel()
                     whole.x.array[: len(own)] = own
                     whole.x.scatter_forward()
                     f.interpolate(whole)
@@ -126,3 +126,10 @@ def write(structure: Any, name: str, states: list[tuple[float, Array]], folder: 
     except (OSError, RuntimeError) as error:
         raise OutputError(path, str(error).splitlines()[0]) from None
     return [path]
+
+
+def _displacements(structure: Any, nodal: Array) -> Array:
+    """Return u1, u2, u3 of all components at nodes, (n, 3); zero where there is none."""
+    at = {name: i for i, name in enumerate(structure.components)}
+    zero = np.zeros(len(nodal))
+    return np.column_stack([nodal[:, at[name]] if name in at else zero for name in ("u1", "u2", "u3")])

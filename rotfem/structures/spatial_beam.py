@@ -135,6 +135,13 @@ class SpatialBeam(Beam):
         pairs = list(zip(components, self._triad, strict=True))
         return self._from_datum(ufl.as_vector([sum(c * t[i] for c, t in pairs) for i in range(3)]))
 
+    def places(self, coordinates: dict[str, Array]) -> Array:
+        """Return where points of the undeformed axis are in the frame, (n, 3) in m, by their coordinates."""
+        x, line = coordinates["x"], self.data.reference_line
+        c, s = np.cos(self.data.precone), np.sin(self.data.precone)
+        along = np.column_stack([x, np.zeros((len(x), 2))]) if line is None else line.at(x)[0]
+        return np.asarray(self.data.root_position + along @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]))
+
     def oriented(self, values: Array) -> Array:
         """Return components along the undeformed beam, without its pretwist, of nodal values (n, 6, …)."""
         c, s = np.cos(self.data.precone), np.sin(self.data.precone)

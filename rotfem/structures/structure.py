@@ -234,6 +234,12 @@ class Structure(LoadsOfStructure):
         """Return (coordinates by name, (n,) each in m; values (n, components)) at all nodes, in order."""
         raise NotImplementedError
 
+    def places(self, coordinates: dict[str, Array]) -> Array:
+        """Return where points of the undeformed structure are in the frame, (n, 3) in m, by their coordinates."""
+        x, zero = coordinates["x"], np.zeros(len(coordinates["x"]))
+        root = getattr(self.data, "root_position", (self.data.hub_radius, 0.0, 0.0))
+        return np.asarray(root + np.column_stack([x, coordinates.get("y", zero), zero]))
+
     def surface(self) -> npt.NDArray[np.int64] | None:
         """Return triangles between the nodes in their order, shape (m, 3), on every rank; None of a line."""
         return None

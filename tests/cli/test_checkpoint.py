@@ -274,7 +274,7 @@ def test_a_checkpoint_that_cannot_be_written_is_no_end(tmp_path: Path, monkeypat
     assert result.status == "done"
     (said,) = [w for w in result.warnings if "checkpoint" in w]
     assert "could not be written at t = 0.1 s: No space left on device" in said
-    assert sorted(os.listdir(tmp_path)) == ["history.csv", "shape.csv", "summary.json"]
+    assert sorted(os.listdir(tmp_path)) == ["fields.h5", "fields.xdmf", "history.csv", "shape.csv", "summary.json"]
 
 
 def test_numbers_learnt_are_all_in_the_checkpoint(tmp_path: Path) -> None:

@@ -152,7 +152,14 @@ def test_run_writes_its_results(rotfem: Run, here: Path) -> None:
     assert "50 steps" in done.stdout
     assert "results/beam" in done.stdout
     folder = here / "results" / "beam"
-    assert sorted(os.listdir(folder)) == ["history.csv", "history.png", "shape.csv", "summary.json"]
+    assert sorted(os.listdir(folder)) == [
+        "fields.h5",
+        "fields.xdmf",
+        "history.csv",
+        "history.png",
+        "shape.csv",
+        "summary.json",
+    ]
     history = read_csv(folder / "history.csv")
     assert list(history)[:7] == ["t", "psi", "psi_dot", "tip_u1", "tip_u2", "tip_alpha", "kinetic"]
     np.testing.assert_allclose(history["t"], np.arange(51) * 0.01, atol=1e-12)
@@ -169,7 +176,7 @@ def test_json_is_all_there_is_on_stdout(rotfem: Run, here: Path) -> None:
     assert done.returncode == 0
     summary = json.loads(done.stdout)
     assert summary == json.loads((here / "out" / "summary.json").read_text())
-    assert sorted(os.listdir(here / "out")) == ["history.csv", "shape.csv", "summary.json"]
+    assert sorted(os.listdir(here / "out")) == ["fields.h5", "fields.xdmf", "history.csv", "shape.csv", "summary.json"]
     assert done.stderr == ""
 
 
@@ -197,7 +204,14 @@ def test_steady_state_without_time(rotfem: Run, here: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "steady state" in done.stdout
     assert "0.000514317" in done.stdout
-    assert sorted(os.listdir(here / "results/beam")) == ["history.csv", "shape.csv", "shape.png", "summary.json"]
+    assert sorted(os.listdir(here / "results/beam")) == [
+        "fields.h5",
+        "fields.xdmf",
+        "history.csv",
+        "shape.csv",
+        "shape.png",
+        "summary.json",
+    ]
 
 
 DIVERGING = ("--set", "model.theory=linear", "--set", "time.end=20.0", "--set", "time.step=0.02")
@@ -210,7 +224,14 @@ def test_a_failed_computation_keeps_what_it_had(rotfem: Run, here: Path) -> None
     assert re.search(r"linear solution diverged.*3\.797\d* rad/s.*at t = (8\.9|9)\d* s.*consistent_linear", done.stderr)
     assert "Traceback" not in done.stderr
     folder = here / "results" / "beam"
-    assert sorted(os.listdir(folder)) == ["history.csv", "history.png", "shape.csv", "summary.json"]
+    assert sorted(os.listdir(folder)) == [
+        "fields.h5",
+        "fields.xdmf",
+        "history.csv",
+        "history.png",
+        "shape.csv",
+        "summary.json",
+    ]
     summary = json.loads((folder / "summary.json").read_text())
     history = read_csv(folder / "history.csv")
     assert summary["status"] == "failed"
@@ -265,7 +286,7 @@ def test_an_interrupted_run_keeps_what_it_had(rotfem: Run, here: Path, name: str
     assert done.stderr == "rotfem: interrupted\n"
     assert done.stdout == ""
     folder = here / "results" / "beam"
-    assert sorted(os.listdir(folder)) == ["history.csv", "shape.csv", "summary.json"]
+    assert sorted(os.listdir(folder)) == ["fields.h5", "fields.xdmf", "history.csv", "shape.csv", "summary.json"]
     assert json.loads((folder / "summary.json").read_text())["status"] == "interrupted"
     times = read_csv(folder / "history.csv")["t"]
     assert 0.28 < times[-1] < 0.32  # the step during which the signal came may be lost

@@ -1,0 +1,79 @@
+"""What a run writes for ParaView: the moving structure, in VTX or XDMF, and its section forces or stress resultants."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.results.stations import StationHistory
+from rotfem.results.xdmf import chain, write_xdmf
+from rotfem.structures.paraview import MOST, writer
+
+Array = npt.NDArray[np.float64]
+Writer = Callable[[Path], list[Path]]
+
+
+def fields_writer(system: Any, states: list[tuple[float, Array]], formats: tuple[str, ...]) -> Writer | None:
+    """Return what writes the fields of a run into a folder, on all ranks together; None of no format.
+
+    Args:
+        system: equations of motion.
+        states: (time in s, local dof array).
+        formats: "vtx" (fields.bp) and "xdmf" (fields.xdmf with fields.h5).
+    """
+    writers: list[Writer] = []
+    if "vtx" in formats:
+        writers.append(writer(system.structure, "fields", states))
+    if "xdmf" in formats:
+        writers.append(lambda folder: _write(system, states, folder / "fields.xdmf"))
+    return (lambda folder: [path for write in writers for path in write(folder)]) if writers else None
+
+
+def _write(system: Any, states: list[tuple[float, Array]], path: Path) -> list[Path]:
+    """Gather the displacements, and write them on rank 0."""
+    structure = system.structure
+    frames = [(t, {"displacement": displacement(system, t, q)}) for t, q in states]
+    points = structure.places(structure.nodes(system.held.zeros())[0])
+    surface = structure.surface()
+    cells = chain(len(points)) if surface is None else surface
+    return write_xdmf(path, points, cells, frames) if system.comm.rank == 0 else []
+
+
+def displacement(system: Any, t: float, q: Array) -> Array:
+    """Return the displacements (n, 3) in m of all nodes in the turning frame, on every rank."""
+    structure = system.structure
+    coordinates, values = structure.nodes(q[: len(system.held.zeros())])
+    if system.clamp is not None:
+        values = system.clamp.relative(values, coordinates["x"], t)
+    return moved(structure, values)
+
+
+def moved(structure: Any, values: Array) -> Array:
+    """Return the displacements (…, 3) among all unknowns (…, components)."""
+    out: Array = np.zeros((*values.shape[:-1], 3))
+    for i, name in enumerate(structure.components):
+        if name in ("u1", "u2", "u3"):
+            out[..., int(name[1]) - 1] = values[..., i]
+    return out
+
+
+def stations_writer(system: Any, stations: StationHistory) -> Callable[[Path], list[Path]]:
+    """Return what writes stations.xdmf: displacements, section forces and strains on the line through the stations."""
+    structure, every = system.structure, 1 + (len(stations.t) - 1) // MOST
+    points = structure.places({"x": stations.x})
+    others = [name for name in stations.values if name not in structure.components]
+
+    def frame(i: int) -> dict[str, Array]:
+        unknowns = np.stack([stations[name][i] for name in structure.components], axis=-1)
+        return {"displacement": moved(structure, unknowns), **{name: stations[name][i] for name in others}}
+
+    def write(folder: Path) -> list[Path]:
+        chosen = sorted({*range(0, len(stations.t), every), len(stations.t) - 1} - {-1})
+        frames = [(float(stations.t[i]), frame(i)) for i in chosen]
+        return write_xdmf(folder / "stations_line.xdmf", points, chain(len(points)), frames)
+
+    return write
