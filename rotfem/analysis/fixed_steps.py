@@ -47,7 +47,7 @@ def fixed_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[State]
         ComputationError: a step failed, however short.
     """
     assert steps.step is not None
-    ahead, reached = Itinerary(stepper.system.courses, *grid(steps)), state.t
+    ahead, reached = Itinerary(stepper.system.courses, *grid(steps), stepper.scheme.order), state.t
     legs = ((number, leg) for number, leg in ahead if leg.end > reached)
     wanted = None if steps.parts is None else set(np.cumsum(steps.parts).tolist())
     after: Leg | None

@@ -29,7 +29,7 @@ CLOSE, LEAST = 1e-9, 1e-3
 MOST, OUTSTANDING = 4, 10.0
 
 #: Deviation of a course from a straight line over a step, as a part of its largest value, from which knots are landed
-#: on where there are many, and from which marks are.
+#: on where there are many, and from which marks are by a scheme of second order; by one of order p a power p/2 of that.
 KINKED, CURVED = 1e-3, 5e-2
 
 
@@ -67,10 +67,12 @@ class Itinerary:
         courses: what is prescribed.
         times: ends of the steps, the first the start of the march, s.
         step: nominal length of a step, s.
+        order: of the scheme that goes there.
     """
 
-    def __init__(self, courses: Sequence[Course], times: Array, step: float):
+    def __init__(self, courses: Sequence[Course], times: Array, step: float, order: int = 2):
         self.times, self.step, self.close = times, step, CLOSE * step
+        self.curved = CURVED ** (order / 2)
         for course in courses:
             look_at(course, times)
         self._courses = [(c, p) for c in courses if len(p := self._points(np.concatenate([c.knots, c.marks, c.looks])))]
@@ -137,7 +139,7 @@ class Itinerary:
             np.maximum.at(off, self._step_of(own), each)
             np.maximum.at(weight, np.minimum(np.searchsorted(points, own), len(points) - 1), each)
         chosen = sharp if len(sharp) <= n else sharp[off[self._step_of(sharp)] > KINKED]
-        chosen = np.union1d(chosen, soft[off[self._step_of(soft)] > CURVED])
+        chosen = np.union1d(chosen, soft[off[self._step_of(soft)] > self.curved])
         landings, edges = self._spaced(self._foremost(chosen, weight[np.searchsorted(points, chosen)]))
         self._lay(landings, edges, points, np.isin(points, sharp), off)
 

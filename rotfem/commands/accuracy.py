@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from time import perf_counter
 from typing import Any, TypeVar
 
-import numpy as np
-import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.error_estimate import WORDS
-from rotfem.analysis.schemes import Scheme
+from rotfem.commands.ahead import ADAPTIVE, Ahead
 from rotfem.errors import ComputationError, SceneError
 from rotfem.mechanics.theories import theories
 from rotfem.results.result import Result
 from rotfem.results.run import RunResult
 from rotfem.scene import Scene
 from rotfem.selection.accuracy import AIM, SHARES, Settings, part, shares
-from rotfem.selection.steps_ahead import plan
-
-Array = npt.NDArray[np.float64]
 
 R = TypeVar("R", bound=Result)
 
@@ -31,14 +25,11 @@ MOST_ATTEMPTS, STALLED = 6, 0.9
 #: Error that a reduced model may add to that of its theory, as a part of the accuracy.
 PROJECTED = 0.05
 
-#: Scheme of adaptive steps, schemes whose fixed steps are chosen from, and rows of a history that does not say it.
-ADAPTIVE, SCHEMES, ROWS = "esdirk4", ("generalised_alpha", "esdirk4"), 1000
+#: Rows of a history that does not say it.
+ROWS = 1000
 
 #: Nodes along a structure to start from, and for every mode that is wanted.
 NODES, NODES_A_MODE = 18, 4
-
-#: Columns of the displacement of the tip.
-TIPS = ("tip_u1", "tip_u2", "tip_u3")
 
 
 class Missed(ComputationError):
@@ -83,7 +74,9 @@ def models_of(scene: Scene, moving: bool) -> tuple[dict[str, Any], ...]:
     return (quick, full) if linear else (full,)
 
 
-def pursue(scene: Scene, settings: Settings, attempt: Callable[[Settings], R], comm: MPI.Comm) -> R:
+def pursue(
+    scene: Scene, settings: Settings, attempt: Callable[[Settings], R], comm: MPI.Comm, ahead: Ahead | None = None
+) -> R:
     """Return the first result whose estimated error meets the accuracy of a scene.
 
     Args:
@@ -91,6 +84,7 @@ def pursue(scene: Scene, settings: Settings, attempt: Callable[[Settings], R], c
         settings: to begin with.
         attempt: settings ↦ their result, with an `error` in its summary.
         comm: of the processes that compute it, which go on together.
+        ahead: what the attempts have shown of a motion; None without one.
 
     Raises:
         Missed: it was not met; its attribute `result` holds the best that was reached.
@@ -99,7 +93,6 @@ def pursue(scene: Scene, settings: Settings, attempt: Callable[[Settings], R], c
     accuracy, started, tried = scene.accuracy, perf_counter(), list[dict[str, Any]]()
     assert accuracy is not None
     done: R | None = None
-    last: tuple[Settings, Result] | None = None
     while True:
         began = perf_counter()
         try:
@@ -109,16 +102,15 @@ def pursue(scene: Scene, settings: Settings, attempt: Callable[[Settings], R], c
             if richer is None or len(tried) == MOST_ATTEMPTS:
                 raise
             tried.append({**settings.summary(), "failed": failure.what, "seconds": perf_counter() - began})
-            settings = richer
+            settings = richer if ahead is None else comm.bcast(ahead.prepared(richer, {}))
             continue
         error = done.summary["error"]
-        if last is not None and isinstance(done, RunResult):
-            compare(done, settings, *last)
-        last = (settings, done)
+        if ahead is not None and isinstance(done, RunResult):
+            ahead.judge(done, settings)
         tried.append({**settings.summary(), "error": error["total"], "seconds": perf_counter() - began})
         is_met = known(error) and error["total"] <= accuracy
         is_over = is_met or len(tried) == MOST_ATTEMPTS or stalled(tried)
-        following = comm.bcast(None if is_over else next_of(scene, settings, done))
+        following = comm.bcast(None if is_over else next_of(scene, settings, done, ahead))
         if following is None:
             break
         settings = following
@@ -132,46 +124,14 @@ def pursue(scene: Scene, settings: Settings, attempt: Callable[[Settings], R], c
     return done
 
 
-def next_of(scene: Scene, settings: Settings, done: Result) -> Settings | None:
+def next_of(scene: Scene, settings: Settings, done: Result, ahead: Ahead | None) -> Settings | None:
     """Return the settings to follow those of a result that has missed; None where none would meet the accuracy."""
     error = done.summary["error"]
     assert scene.accuracy is not None
     following = settings.better(error, scene.accuracy)
-    if following is None or following.models == settings.models or not isinstance(done, RunResult):
+    if following is None or following.models == settings.models or ahead is None:
         return following
-    return stepped(scene, following, done, error)
-
-
-def compare(done: RunResult, settings: Settings, before: Settings, coarse: Result) -> None:
-    """Write the error of steps that two runs of one model show of the finer one, if it is the smaller estimate.
-
-    Steps of h_1 and h_2 < h_1 differ by e (1 − (h_2/h_1)^p) with e the error of the coarser one; p = 2 is on the safe
-    side for schemes of higher order.
-
-    Args:
-        done: the finer run.
-        settings: of it.
-        before: those of the run before it.
-        coarse: that run.
-    """
-    if settings.models != before.models or settings.step is None or before.step is None:
-        return
-    if not settings.step < before.step or not isinstance(coarse, RunResult) or len(done.t) != len(coarse.t):
-        return
-    fine, rough = tips_of(done), tips_of(coarse)
-    scale = float(np.linalg.norm(fine, axis=1).max())
-    if scale == 0.0:
-        return
-    found = float(np.linalg.norm(fine - rough, axis=1).max()) / scale / ((before.step / settings.step) ** 2 - 1)
-    error = done.summary["error"]
-    if error["time"] is None or found < error["time"]:
-        error["total"] += found - part(error, "time")
-        error["time"] = found
-
-
-def tips_of(done: RunResult) -> Array:
-    """Return the displacement of the tip in all rows, (n, components), m."""
-    return np.stack([done.column(name) for name in TIPS if name in done.history], axis=1)
+    return ahead.prepared(following, error)
 
 
 def stalled(tried: list[dict[str, Any]]) -> bool:
@@ -202,25 +162,6 @@ def refuse(scene: Scene, wanted: str, command: str) -> None:
 def known(error: dict[str, Any]) -> bool:
     """Return whether all parts of an error were found."""
     return all(error.get(name, 0.0) is not None for name in SHARES)
-
-
-def stepped(scene: Scene, settings: Settings, done: RunResult, error: dict[str, Any]) -> Settings:
-    """Return settings with the steps that resolve what a result of a poorer model shows.
-
-    Args:
-        scene: with an accuracy.
-        settings: of the next model.
-        done: result of the one before it.
-        error: of that.
-    """
-    assert scene.accuracy is not None
-    allowed = AIM * shares({**error, "time": 1.0, "model": 0.0}, scene.accuracy)["time"]
-    found = plan(done.t, tips_of(done), allowed, [scheme for scheme in Scheme.registry if scheme.name in SCHEMES])
-    if found is None:
-        return settings
-    if found.uneven:
-        return replace(settings, scheme=ADAPTIVE, step=None, tolerance=allowed)
-    return replace(settings, scheme=found.scheme, step=found.step, tolerance=None)
 
 
 def changes_of(scene: Scene, settings: Settings) -> dict[str, Any]:

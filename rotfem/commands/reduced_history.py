@@ -14,6 +14,7 @@ from rotfem.analysis.reduced.manifold import recover
 from rotfem.analysis.reduced.response import ACCURACY, Response, reduced_response
 from rotfem.analysis.reduced.root_forces import root_forces
 from rotfem.analysis.schemes import State
+from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
 from rotfem.structures.paraview import MOST
 from rotfem.structures.root_reaction import along_axis
@@ -52,7 +53,12 @@ def _recorded(run: Simulation, start: Array | None) -> bool:
     run.keeper.start(run)
     with run.keeper.interrupts():
         response = reduced_response(run.system, times_of(run.scene.time), start, accuracy)
+        run.response = response
         if response.projection_error > accuracy:
+            if run.settings is not None:  # a full system of this theory costs as much as one of a richer theory
+                raise ComputationError(
+                    f"the reduced model of {response.model.size} vectors is off by {response.projection_error:.2g}"
+                )
             run.warnings.append(
                 f"the reduced model of {response.model.size} vectors is off by {response.projection_error:.2g}, more "
                 f"than model.reduced allows ({accuracy:.2g}); the full system was used"

@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady
 from rotfem.commands.accuracy import changes_of, pursue, refuse, settings_of
+from rotfem.commands.ahead import Ahead
 from rotfem.commands.keeper import Interval, Keeper
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.result_folder import ResultFolder
@@ -120,13 +121,19 @@ def run_to_accuracy(
     """
     refuse(scene, "tip", "run")
 
+    assert scene.accuracy is not None
+    ahead = Ahead(scene.accuracy)
+
     def attempt(settings: Settings) -> RunResult:
         variant = scene.replace(changes_of(scene, settings))
         simulation = Simulation(variant, Problem.of(variant, terms=terms, outputs=outputs), keeper.comm, keeper=keeper)
         simulation.settings = settings
-        return simulation.run(progress)
+        try:
+            return simulation.run(progress)
+        finally:
+            ahead.look(simulation)
 
-    return pursue(scene, keeper.settings() or settings_of(scene), attempt, keeper.comm)
+    return pursue(scene, keeper.settings() or settings_of(scene), attempt, keeper.comm, ahead)
 
 
 def run_chosen(

@@ -25,6 +25,7 @@ from rotfem.analysis.stability import Stability, stability_of
 from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.theory_error import TheoryError
 from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
+from rotfem.analysis.tip_track import TipTrack
 from rotfem.commands import energy_growth
 from rotfem.commands.interrupts import Interrupted
 from rotfem.commands.keeper import Keeper
@@ -86,6 +87,7 @@ class Simulation:
         self.newton = Newton.of(scene.solver)
         self.stepper: Stepper | None = None
         self.reduced: Response | None = None
+        self.response: Response | None = None
         self.foreshortened: Foreshortened | None = None
         self.steps, self.elapsed = 0, 0.0
         self.resumed: list[dict[str, Any]] = []
@@ -97,6 +99,7 @@ class Simulation:
         self.left_out: dict[str, Any] | None = None
         self.theory_error: TheoryError | None = None
         self.watch: ErrorWatch | None = None
+        self.track: TipTrack | None = None
         self.rows: RowTimes | None = None
         self.last: State | None = None
         self.error: ErrorEstimate | None = None
@@ -162,10 +165,14 @@ class Simulation:
         self.stepper = march.stepper
         if self.scene.output.error:
             self.watch = self.stepper.watch = ErrorWatch(self.system, time.end, scheme)
+        if self.settings is not None:
+            self.track = self.stepper.watch = TipTrack(self.system, self.watch)
         march.reached = self.keeper.start(self)
         if time.output_step is not None:
             passed = max(len(self.record.history) - 1, 0)
-            self.rows = self.stepper.watch = RowTimes(time.output_step, time.end, scheme.order, self.watch, passed)
+            self.rows = self.stepper.watch = RowTimes(
+                time.output_step, time.end, scheme.order, self.stepper.watch, passed
+            )
         with self.keeper.interrupts():
             first = 0 if march.reached is None else self.steps + 1
             for self.steps, state in enumerate(march, first):

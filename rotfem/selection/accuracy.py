@@ -46,6 +46,7 @@ class Settings:
         scheme: time-stepping scheme; None without a history.
         step: its fixed step, s; None without, or where steps are adaptive.
         tolerance: of its adaptive steps; None without.
+        increment: at which Newton's method stops; None where the scene says it.
     """
 
     models: tuple[Mapping[str, Any], ...]
@@ -54,6 +55,7 @@ class Settings:
     scheme: str | None = None
     step: float | None = None
     tolerance: float | None = None
+    increment: float | None = None
 
     @property
     def moving(self) -> bool:
@@ -68,11 +70,17 @@ class Settings:
             out["mesh.elements"] = list(self.elements) if isinstance(self.elements, tuple) else self.elements
         if self.moving:
             out |= {"time.scheme": self.scheme, "time.tolerance": self.tolerance, "time.step": self.step}
+        if self.increment is not None:
+            out["solver.increment_tolerance"] = self.increment
         return out
 
     def summary(self) -> dict[str, Any]:
         """Return the settings in use, as far as there are any."""
-        unused = {"models", "scheme", "step", "tolerance"} if self.models[0].get("reduced") else {"models"}
+        unused = (
+            {"models", "scheme", "step", "tolerance", "increment"}
+            if self.models[0].get("reduced")
+            else {"models", "increment"}
+        )
         known = {key: value for key, value in asdict(self).items() if key not in unused and value is not None}
         return {**{key: value for key, value in self.models[0].items() if value is not None}, **known}
 
@@ -142,3 +150,12 @@ def finer(elements: int | tuple[int, int], growth: float) -> int | tuple[int, in
     if isinstance(elements, tuple):
         return (math.ceil(elements[0] * growth), math.ceil(elements[1] * growth))
     return math.ceil(elements * growth)
+
+
+def finest(one: Elements, other: Elements) -> Elements:
+    """Return the larger numbers of elements of two."""
+    if isinstance(one, tuple) and isinstance(other, tuple):
+        return (max(one[0], other[0]), max(one[1], other[1]))
+    assert isinstance(one, int)
+    assert isinstance(other, int)
+    return max(one, other)

@@ -1,18 +1,22 @@
-"""How long the steps of a scheme may be for an accuracy, from a first answer: its spectrum says what is to be resolved.
+"""How long the steps of a scheme may be for an accuracy, from answers that there are: their spectra say what moves.
 
 A scheme whose steps are off a vibration by C (ωh)^m of its amplitude A adds T/h of that up in T seconds, but never to
-more than the vibration itself, 2A. With the amplitudes A_k of the tip's motion at ω_k,
+more than two opposite vibrations differ, 2A, and where it damps a vibration out to no more than that, A. With the
+amplitudes A_k of the tip's motion at ω_k and a factor s for safety,
 
-    e(h) = Σ_k A_k min(2, C (ω_k h)^m T/h),
+    e(h) = Σ_k A_k min(2 or 1, s C (ω_k h)^m T/h),
 
 so what is fast but small need not be resolved. Amplitudes are those of the Fourier transform under Hann's window, which
 makes a vibration half its amplitude in two neighbours of its line, and a jump from the end to the start nearly nothing.
+The sum is above the truth, as vibrations do not all come together; damping it does not know. A mesh that puts the
+frequency ω off by ε(ω) moves a motion likewise, by Σ_k A_k min(2, s ε(ω_k) ω_k T).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -20,15 +24,21 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
+#: The factor s for safety, with which true errors have been below the sum, and ωh from which a scheme damps.
+SAFE, DAMPED = 1.2, 4.0
+
 #: Longest step, as a part of the history, and halvings that find one.
 LONGEST, HALVINGS = 1 / 20, 40
 
 #: Windows in which a motion is looked at by itself, and how many times the steps of windows of their own it may cost to
 #: go with those of the worst one through all.
-WINDOWS, UNEVEN = 8, 3.0
+WINDOWS, UNEVEN = 8, 6.0
 
 #: Fewest instants from which steps are planned.
 FEWEST = 10 * WINDOWS
+
+#: What a step costs beside its stages, in stages: rows and what is watched.
+BESIDE = 1.0
 
 
 @dataclass(frozen=True)
@@ -63,8 +73,12 @@ class Spectrum:
     def error(self, scheme: Any, h: float) -> float:
         """Return e(h) of a scheme, relative."""
         coefficient, power, _ = scheme.estimate
-        each = coefficient * (self.omega * h) ** power * self.duration / h
-        return float(self.amplitudes @ np.minimum(2.0, each))
+        each = SAFE * coefficient * (self.omega * h) ** power * self.duration / h
+        return float(self.amplitudes @ np.minimum(np.where(self.omega * h < DAMPED, 2.0, 1.0), each))
+
+    def error_of_mesh(self, off: Array) -> float:
+        """Return the relative error that frequencies which are off by so much (relative, (n,)) make."""
+        return float(self.amplitudes @ np.minimum(2.0, SAFE * off * self.omega * self.duration))
 
     def step(self, scheme: Any, allowed: float) -> float:
         """Return the longest step (s) of a scheme whose error is below what is allowed."""
@@ -83,6 +97,55 @@ class Spectrum:
 
 
 @dataclass(frozen=True)
+class Motion:
+    """Displacement of the tip in an answer.
+
+    Attributes:
+        t: times at equal distances, (n,), s.
+        tips: displacements, (n, components), m.
+    """
+
+    t: Array
+    tips: Array
+
+    @classmethod
+    def between(cls, t: Array, tips: Array) -> Motion:
+        """Return the motion through displacements (n, components) at increasing times (n,) at any distances."""
+        even = np.linspace(t[0], t[-1], len(t))
+        return cls(even, np.column_stack([np.interp(even, t, column) for column in tips.T]))
+
+    @property
+    def scale(self) -> float:
+        """Largest displacement, m."""
+        return float(np.linalg.norm(self.tips, axis=1).max(initial=0.0))
+
+    @property
+    def tells(self) -> bool:
+        """Whether there is enough of it to plan steps from."""
+        return len(self.t) >= FEWEST and 0.0 < self.scale < np.inf
+
+    @cached_property
+    def whole(self) -> Spectrum:
+        """Spectrum of all of it."""
+        return Spectrum.of(self.t, self.tips, self.scale)
+
+    @cached_property
+    def parts(self) -> list[Spectrum]:
+        """Spectra of windows."""
+        windows = np.array_split(np.arange(len(self.t)), WINDOWS)
+        return [Spectrum.of(self.t[i], self.tips[i], self.scale) for i in windows]
+
+    def plan(self, scheme: Any, allowed: float) -> Plan:
+        """Return the steps of a scheme."""
+        step = self.whole.step(scheme, allowed)
+        own = [part.step(scheme, allowed / WINDOWS) for part in self.parts]
+        worst = self.whole.duration / min(min(own), step)
+        adapted = sum(part.duration / h for part, h in zip(self.parts, own, strict=True))
+        work = (scheme.stages + BESIDE) * self.whole.duration / step
+        return Plan(scheme.name, step, worst > UNEVEN * adapted, work)
+
+
+@dataclass(frozen=True)
 class Plan:
     """Steps for an accuracy.
 
@@ -90,7 +153,7 @@ class Plan:
         scheme: its name.
         step: s.
         uneven: whether steps that adapt themselves would be much fewer.
-        work: stages of steps in all.
+        work: what they cost, in stages.
     """
 
     scheme: str
@@ -99,25 +162,21 @@ class Plan:
     work: float
 
 
-def plan(t: Array, tips: Array, allowed: float, schemes: Iterable[Any]) -> Plan | None:
-    """Return the steps of the scheme that is expected to need the fewest stages; None where nothing moves.
+def plan(motions: Sequence[Motion], allowed: float, schemes: Iterable[Any]) -> Plan | None:
+    """Return the steps of the scheme that is expected to cost least; None where nothing is known to move.
 
     Args:
-        t: times of a first answer, at equal distances, s.
-        tips: displacement of the tip then, (n, components), m.
-        allowed: error of steps, relative to its largest displacement.
+        motions: answers that there are, whose most demanding one counts.
+        allowed: error of steps, relative to the largest displacement of the tip.
         schemes: to choose from, classes of `Scheme` with an estimate of their error.
     """
-    scale = float(np.linalg.norm(tips, axis=1).max(initial=0.0))
-    if scale == 0.0 or len(t) < FEWEST:
+    motions = [motion for motion in motions if motion.tells]
+    if not motions:
         return None
-    whole = Spectrum.of(t, tips, scale)
-    parts = [Spectrum.of(t[i], tips[i], scale) for i in np.array_split(np.arange(len(t)), WINDOWS)]
-    found = []
-    for scheme in schemes:
-        step = whole.step(scheme, allowed)
-        own = [part.step(scheme, allowed / WINDOWS) for part in parts]
-        worst = whole.duration / min(min(own), step)
-        adapted = sum(part.duration / h for part, h in zip(parts, own, strict=True))
-        found.append(Plan(scheme.name, step, worst > UNEVEN * adapted, scheme.stages * whole.duration / step))
-    return min(found, key=lambda plan: plan.work, default=None)
+    each = [max((motion.plan(scheme, allowed) for motion in motions), key=lambda p: p.work) for scheme in schemes]
+    return min(each, key=lambda found: found.work, default=None)
+
+
+def error_ahead(motions: Sequence[Motion], scheme: Any, step: float) -> float | None:
+    """Return the relative error of fixed steps (s) of a scheme, of the most demanding motion; None where none tells."""
+    return max((motion.whole.error(scheme, step) for motion in motions if motion.tells), default=None)

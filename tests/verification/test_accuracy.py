@@ -14,7 +14,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from rotfem import campbell, modes, run
-from rotfem.commands.accuracy import Missed, compare
+from rotfem.commands.accuracy import Missed
+from rotfem.commands.ahead import compare
 from rotfem.results import RunResult
 from rotfem.scene import Scene
 from rotfem.selection.accuracy import Settings

@@ -52,6 +52,24 @@ def test_order_on_a_free_hub(unit_beam: Any, scheme: str, number: int, order: fl
     assert orders(unit_beam, HUB | {"model": {"theory": theory}}, scheme, number, ("tip_u2",)) > order - 0.4
 
 
+@pytest.mark.parametrize("scheme", ["esdirk4", "radau5"])
+def test_a_bend_of_the_rate_costs_nothing_anywhere_in_a_step(scheme: str) -> None:
+    """Rates of tabulated speeds are continuous, their slopes are not; steps over a bend would be off a hundred times more.
+
+    By steps that end on the bend at 2 s, and such that have it in their first or last tenth.
+    """
+    motion = {"type": "table", "table": [[0.0, 2.0], [2.0, 2.0], [2.8, 0.0], [3.0, 0.0]]}
+    tables = {"structure": STRUCTURE, "motion": motion, "mesh": {"elements": 2}, "output": {"error": False}}
+
+    def last(step: float) -> float:
+        time = {"end": 2.4, "step": step, "scheme": scheme}
+        return float(run({**tables, "model": {"theory": "consistent_linear"}, "time": time}).tip["u2"][-1])
+
+    exact = last(2.0 / 320)
+    errors = [abs(last(2.0 / (40 + share)) - exact) for share in (0.0, 0.06, 0.9)]
+    assert max(errors) < 3 * errors[0]
+
+
 def test_coefficients_of_radau() -> None:
     """Collocation, Σ_j a_ij c_jᵏ⁻¹ = c_iᵏ/k for k ≤ 3, and quadrature of fifth order by the last row."""
     for k in range(1, 4):

@@ -1,0 +1,162 @@
+"""What the answers to a scene so far say of the next one: its steps, and what these put it off."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.reduced.response import Response, tips_of
+from rotfem.analysis.schemes import Scheme
+from rotfem.results.run import RunResult
+from rotfem.selection.accuracy import AIM, Settings, finer, finest, part, shares
+from rotfem.selection.mesh_ahead import MeshAhead
+from rotfem.selection.steps_ahead import Motion, error_ahead, plan
+
+if TYPE_CHECKING:
+    from rotfem.commands.simulation import Simulation
+
+Array = npt.NDArray[np.float64]
+
+#: Scheme of adaptive steps, and schemes whose fixed steps are chosen from.
+ADAPTIVE, SCHEMES = "esdirk4", ("generalised_alpha", "esdirk4")
+
+#: Instants at which a reduced answer is looked at.
+LOOKS = 4096
+
+#: Fewest times as long as those of a run that the steps of the one before must be for their difference to tell.
+APART = 1.4
+
+#: Newton's increments: as a part of an accuracy, for a displacement of a part of the length, and for so many steps.
+NEWTON, SMALL, MANY = 1e-4, 1e-2, 2000
+
+#: Error of a model from which its motion is another one.
+POOR = 0.1
+
+#: Columns of the displacement of the tip.
+TIPS = ("tip_u1", "tip_u2", "tip_u3")
+
+
+class Ahead:
+    """Knows the motions of the answers so far.
+
+    Args:
+        accuracy: that is wanted.
+    """
+
+    def __init__(self, accuracy: float):
+        self.accuracy = accuracy
+        self.linear: Motion | None = None
+        self.own: Motion | None = None
+        self.mesh: MeshAhead | None = None
+        self.length, self.off = 1.0, np.inf
+        self._last: tuple[Settings, RunResult] | None = None
+
+    @property
+    def motions(self) -> list[Motion]:
+        """Motions that are known."""
+        return [motion for motion in (self.linear, self.own) if motion is not None]
+
+    def look(self, run: Simulation) -> None:
+        """Take note of how the tip has moved in a run."""
+        self.length = float(run.system.structure.length)
+        if run.response is not None:
+            self.linear = sampled(run.response)
+            mesh = run.scene.mesh
+            self.mesh = MeshAhead.of(run.response, mesh.elements, mesh.degree)
+        elif run.track is not None and len((path := run.track.path())[0]) > 1:
+            self.own = Motion.between(*path)
+
+    def judge(self, done: RunResult, settings: Settings) -> None:
+        """Write into the error of a result what its steps put it off, if the spectra or the run before say less.
+
+        An estimate that follows an error through a nonlinear motion has to doubt its phases; a spectrum knows how much
+        there is of each frequency.
+
+        Args:
+            done: the result.
+            settings: that it was computed with.
+        """
+        if settings.step is not None and settings.scheme is not None and not settings.models[0].get("reduced"):
+            found = error_ahead(self.motions, Scheme.registry[settings.scheme], settings.step)
+            less(done.summary["error"], found)
+        if self._last is not None:
+            compare(done, settings, *self._last)
+        self._last = (settings, done)
+
+    def prepared(self, settings: Settings, error: Mapping[str, Any]) -> Settings:
+        """Return settings with the mesh and the steps that follow what is known of the motion.
+
+        Args:
+            settings: of the next model.
+            error: of the result before it.
+        """
+        self.off = min(self.off, part(error, "model") if error else np.inf)
+        error = {**error, "time": 1.0, "model": 0.0}
+        if self.mesh is not None and settings.elements is not None:
+            allowed = AIM * shares({**error, "space": 1.0}, self.accuracy)["space"]
+            growth, off = self.mesh.growth(self.motions, allowed)
+            settings = replace(settings, elements=finest(settings.elements, finer(self.mesh.elements, growth)))
+            error["space"] = max(part(error, "space"), off)
+        # what is known by a poor model only may be less demanding than the motion is
+        trusted = self.own is not None or self.off < POOR
+        return self.stepped(settings, (1.0 if trusted else AIM) * shares(error, self.accuracy)["time"])
+
+    def stepped(self, settings: Settings, allowed: float) -> Settings:
+        """Return settings with the steps of an error that is allowed."""
+        known = [scheme for scheme in Scheme.registry if scheme.name in SCHEMES]
+        found = plan(self.motions, allowed, known)
+        if found is None:
+            return settings
+        if found.uneven:
+            return replace(settings, scheme=ADAPTIVE, step=None, tolerance=AIM * allowed, increment=None)
+        moved = max(motion.scale for motion in self.motions) / self.length
+        duration = max(motion.whole.duration for motion in self.motions)
+        increment = NEWTON * self.accuracy * min(1.0, moved / SMALL) * min(1.0, MANY * found.step / duration)
+        return replace(settings, scheme=found.scheme, step=found.step, tolerance=None, increment=increment)
+
+
+def sampled(response: Response) -> Motion:
+    """Return the motion of a reduced answer, at times that are close enough for what is fast in it."""
+    t: Array = np.linspace(response.times[0], response.times[-1], LOOKS)
+    moves = [name.startswith("u") for name in response.model.system.structure.components]
+    return Motion(t, (response.trajectory.at(t)[0] @ tips_of(response.model).T)[:, moves])
+
+
+def less(error: dict[str, Any], found: float | None) -> None:
+    """Write an estimate of the error of steps that is the smaller one, or the only one, into an error."""
+    if found is None or (error["time"] is not None and error["time"] <= found):
+        return
+    error["total"] = (error["total"] or 0.0) + found - part(error, "time")
+    error["time"] = found
+
+
+def compare(done: RunResult, settings: Settings, before: Settings, coarse: RunResult) -> None:
+    """Write the error of steps that two runs of one model show of the finer one, if it is the smaller estimate.
+
+    Steps of h_1 and h_2 < h_1 differ by e (1 − (h_2/h_1)^p) with e the error of the coarser one; p = 2 is on the safe
+    side for schemes of higher order, where the two are well apart: what neither resolves does not differ.
+
+    Args:
+        done: the finer run.
+        settings: of it.
+        before: those of the run before it.
+        coarse: that run.
+    """
+    if settings.models != before.models or settings.step is None or before.step is None:
+        return
+    if not APART * settings.step < before.step or len(done.t) != len(coarse.t):
+        return
+    fine, rough = rows_of(done), rows_of(coarse)
+    scale = float(np.linalg.norm(fine, axis=1).max())
+    if scale > 0.0:
+        apart = float(np.linalg.norm(fine - rough, axis=1).max()) / scale
+        less(done.summary["error"], apart / ((before.step / settings.step) ** 2 - 1))
+
+
+def rows_of(done: RunResult) -> Array:
+    """Return the displacement of the tip in all rows, (n, components), m."""
+    return np.stack([done.column(name) for name in TIPS if name in done.history], axis=1)

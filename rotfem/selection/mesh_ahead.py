@@ -1,0 +1,77 @@
+"""How fine a mesh has to be for an accuracy, from a reduced answer: what it puts the frequencies off that move the tip.
+
+The modes of a reduced model at rest are shapes of the structure, whose errors by the mesh are told from themselves
+(`rotfem.analysis.shape_error`). With n elements for each they fall as n^{−2k} with the degree k.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.reduced.response import Response
+from rotfem.analysis.shape_error import ShapeError
+from rotfem.selection.steps_ahead import Motion
+
+Array = npt.NDArray[np.float64]
+
+#: Modes whose errors are told, smallest error of one, and growths of the number of elements that are tried.
+MODES, LEAST, GROWTHS = 12, 1e-14, np.geomspace(1.0, 8.0, 25)
+
+
+@dataclass(frozen=True)
+class MeshAhead:
+    """What a mesh puts frequencies off.
+
+    Attributes:
+        omega: frequencies, increasing, rad/s, (n,).
+        off: relative errors, which grow with them, (n,).
+        elements: number of elements, (nx, ny) of a plate.
+        degree: of the elements.
+    """
+
+    omega: Array
+    off: Array
+    elements: int | tuple[int, int]
+    degree: int
+
+    @classmethod
+    def of(cls, response: Response, elements: int | tuple[int, int], degree: int) -> MeshAhead | None:
+        """Return what the mesh of a response does; None where it has no vibrations."""
+        model, shapes = response.model, ShapeError(response.model.system)
+        if model.size == 0:
+            return None
+        M, _, K, _ = (x[0] for x in model.operators(response.factors()[:1]))
+        squares, modes = np.linalg.eig(np.linalg.solve(M, K))
+        chosen = np.argsort(squares.real)[:MODES]
+        chosen = chosen[squares.real[chosen] > 0.0]
+        if not len(chosen):
+            return None
+        off = [max(LEAST, shapes.of_shape(model.V @ modes[:, i].real)) for i in chosen]
+        return cls(np.sqrt(squares.real[chosen]), np.maximum.accumulate(off), elements, degree)
+
+    def growth(self, motions: Sequence[Motion], allowed: float) -> tuple[float, float]:
+        """Return how many times more elements are expected to keep to an error, and what they leave.
+
+        Args:
+            motions: of the tip, whose most demanding one counts.
+            allowed: relative error.
+        """
+        left = np.inf
+        for growth in GROWTHS:
+            left = max((self.error(motion, growth) for motion in motions), default=0.0)
+            if left <= allowed:
+                break
+        return float(growth), left
+
+    def error(self, motion: Motion, growth: float = 1.0) -> float:
+        """Return the relative error that so many times more elements leave of a motion of the tip."""
+        omega = motion.whole.omega
+        slope = np.log(np.maximum(omega, self.omega[0]) / self.omega[-1])
+        inside = np.exp(np.interp(np.log(np.maximum(omega, self.omega[0])), np.log(self.omega), np.log(self.off)))
+        beyond = self.off[-1] * np.exp(self.degree * np.maximum(slope, 0.0))
+        off = np.minimum(1.0, np.where(omega > self.omega[-1], beyond, inside) / growth ** (2 * self.degree))
+        return motion.whole.error_of_mesh(off)
