@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import CubicSpline
 
 Array = npt.NDArray[np.float64]
 
@@ -112,7 +113,7 @@ class Motion:
     def between(cls, t: Array, tips: Array) -> Motion:
         """Return the motion through displacements (n, components) at increasing times (n,) at any distances."""
         even = np.linspace(t[0], t[-1], len(t))
-        return cls(even, np.column_stack([np.interp(even, t, column) for column in tips.T]))
+        return cls(even, np.asarray(CubicSpline(t, tips)(even)))  # straight lines would have frequencies of their own
 
     @property
     def scale(self) -> float:

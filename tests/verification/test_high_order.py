@@ -54,7 +54,7 @@ def test_order_on_a_free_hub(unit_beam: Any, scheme: str, number: int, order: fl
 
 @pytest.mark.parametrize("scheme", ["esdirk4", "radau5"])
 def test_a_bend_of_the_rate_costs_nothing_anywhere_in_a_step(scheme: str) -> None:
-    """Rates of tabulated speeds are continuous, their slopes are not; steps over a bend would be off a hundred times more.
+    """Rates of tabulated speeds have bends; steps over one would be off a hundred times more.
 
     By steps that end on the bend at 2 s, and such that have it in their first or last tenth.
     """

@@ -1,0 +1,63 @@
+"""Steps and meshes that are planned from the spectrum of a motion, against vibrations whose errors are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rotfem.analysis.esdirk import ESDIRK4
+from rotfem.selection.mesh_ahead import MeshAhead
+from rotfem.selection.steps_ahead import SAFE, Motion, error_ahead, plan
+
+
+def vibration(omega: float, amplitude: float = 1.0, end: float = 100.0) -> Motion:
+    """Return the motion of a tip that vibrates at 1 rad/s with amplitude 1, and at another frequency beside that."""
+    t = np.linspace(0.0, end, 8001)
+    return Motion(t, (np.cos(t) + amplitude * np.cos(omega * t))[:, None])
+
+
+def of_one(omega: float, h: float, end: float = 100.0) -> float:
+    """Return what steps put a vibration of amplitude 1 off at the end: C (ωh)^m T/h."""
+    constant, power, _ = ESDIRK4.estimate
+    return float(constant * (omega * h) ** power * end / h)
+
+
+def test_the_error_of_one_vibration_is_that_of_its_phase() -> None:
+    """Half of the motion moves at 1 rad/s twice over; the transform may be a few per cent off between its lines."""
+    found = error_ahead([vibration(1.0)], ESDIRK4, 0.5)
+    assert found == pytest.approx(SAFE * of_one(1.0, 0.5), rel=0.1)
+
+
+def test_what_is_fast_and_damped_counts_with_its_amplitude() -> None:
+    """A hundredth of the motion at 20 rad/s: long steps leave just that, and none that is allowed more resolves it."""
+    motion = vibration(20.0, 0.01)
+    assert error_ahead([motion], ESDIRK4, 0.3) == pytest.approx(0.01 / 1.01 + SAFE * of_one(1.0, 0.3) / 1.01, rel=0.1)
+    loose, tight = (plan([motion], allowed, [ESDIRK4]) for allowed in (2e-2, 5e-3))
+    assert loose is not None
+    assert tight is not None
+    assert tight.step < 0.1 < 0.4 < loose.step
+
+
+def test_steps_between_times_at_any_distances() -> None:
+    t = np.cumsum(np.random.default_rng(1).uniform(0.01, 0.04, 2000))
+    t *= 16 * np.pi / t[-1]
+    motion = Motion.between(t, np.cos(t)[:, None])
+    assert np.ptp(np.diff(motion.t)) < 1e-9
+    assert error_ahead([motion], ESDIRK4, 0.2) == pytest.approx(SAFE * of_one(1.0, 0.2, 50.0), rel=0.2)
+
+
+def test_nothing_is_planned_where_nothing_moves() -> None:
+    still = Motion(np.linspace(0.0, 1.0, 1000), np.zeros((1000, 2)))
+    assert plan([still], 1e-3, [ESDIRK4]) is None
+    assert error_ahead([], ESDIRK4, 0.1) is None
+
+
+def test_elements_grow_by_the_order_of_a_frequency() -> None:
+    """ε ω T of one vibration, which falls by 2⁶ with twice the cubic elements."""
+    mesh = MeshAhead(np.array([1.0, 5.0]), np.array([1e-4, 1e-2]), 6, 3)
+    off = mesh.error(vibration(1.0))
+    assert off == pytest.approx(SAFE * 1e-4 * 1.0 * 100.0, rel=0.1)
+    assert mesh.error(vibration(1.0), 2.0) == pytest.approx(off / 64, rel=1e-9)
+    growth, left = mesh.growth([vibration(1.0)], off / 60)
+    assert left <= off / 60
+    assert growth == pytest.approx(60 ** (1 / 6), rel=0.1)
