@@ -12,7 +12,9 @@ import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
+from petsc4py import PETSc
 
+from rotfem.equations.pieces import held
 from rotfem.numerics import compat
 from rotfem.numerics.linear import DirectSolver, Increment
 from rotfem.numerics.refinement import Refinement
@@ -42,10 +44,9 @@ class FinerEquations:
         self.q, self.v, self.a = (fem.Function(self.V) for _ in range(3))
         self._functions: dict[Any, fem.Function] = {system.q: self.q, system.v: self.v, system.a: self.a}
         self._forms: dict[str, Any] = {}
-        nodes = self._refined.clamped(system.structure.clamped)
-        size = self.V.dofmap.index_map_bs
-        self.clamped = (nodes[:, None] * size + np.arange(size)).ravel()
-        self._bcs = [fem.dirichletbc(fem.Function(self.V), nodes)]
+        nodes, structure = self._refined.clamped(system.structure.clamped), system.structure
+        self.clamped, self._hinged = structure.clamped_unknowns(nodes), structure.hinged_unknowns(nodes)
+        self._bcs = structure.clamp_conditions(self.V, nodes=nodes)
         self.tip = TipValues(self.V, _tip(system))
 
     def take(self) -> None:
@@ -61,6 +62,7 @@ class FinerEquations:
         base = self._functions.setdefault(s.prestressing, fem.Function(self.V))
         with s.of_material():
             K = self._assembled(("K",), 1.0)
+        held(K, self._hinged)
         load = compat.create_vector(self.V)
         fem_petsc.assemble_vector(load, self._form("F"))
         load.array[self.clamped] = 0.0
@@ -81,6 +83,7 @@ class FinerEquations:
         for name in names:
             fem_petsc.assemble_matrix(A, self._form(name), self._bcs, 0.0)
             A.assemble()
+        A.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)  # of a damper at the root
         d = A.getDiagonal()
         d.array[self.clamped] = diagonal
         A.setDiagonal(d)

@@ -78,11 +78,11 @@ class Pieces:
     def __init__(self, model: Model, bcs: list[Any], clamped: npt.NDArray[Any], rigid: Array):
         self.model, self.structure, self.bcs, self.clamped = model, model.structure, bcs, clamped
         self.q, self.V = model.structure.k.functions[0], model.structure.V
-        held = np.zeros(len(rigid), dtype=bool)
-        held[clamped] = True
-        self._motions = [self._vector(np.where(held, column, 0.0)) for column in rigid.T]
-        self._turns = [self._vector(np.where(held, 0.0, column)) for column in rigid.T]  # of its hinges
-        self._hinged = np.flatnonzero(np.any(rigid != 0.0, axis=1) & ~held)
+        fixed = np.zeros(len(rigid), dtype=bool)
+        fixed[clamped] = True
+        self._motions = [self._vector(np.where(fixed, column, 0.0)) for column in rigid.T]
+        self._turns = [self._vector(np.where(fixed, 0.0, column)) for column in rigid.T]  # of its hinges
+        self._hinged = self.structure.hinged_unknowns()
         self._work, self._free = compat.create_vector(self.V), compat.create_vector(self.V)
         self._free.array[:] = 1.0
         self._free.array[clamped] = 0.0
@@ -251,9 +251,7 @@ class Pieces:
         K = next(p.operator for p in self.all if p.kind == "K" and "internal" in p.of)
         if self.structure.hinges:
             K = K.copy()
-            d = K.getDiagonal()
-            d.array[self._hinged] *= 2.0
-            K.setDiagonal(d)
+            held(K, self._hinged)
         return K
 
     @cached_property
@@ -292,6 +290,13 @@ class Pieces:
             if K.norm() > 0.0:
                 self._keep("K", piece.key, K, piece.of | {PRESTRESS})
         self.assembled += perf_counter() - started
+
+
+def held(K: Any, hinged: npt.NDArray[Any]) -> None:
+    """Hold turns of the root, unknowns of these numbers, in a stiffness of the strains by springs as stiff as these."""
+    d = K.getDiagonal()
+    d.array[hinged] *= 2.0
+    K.setDiagonal(d)
 
 
 def set_diagonal(clamped: npt.NDArray[Any], A: Any, value: float) -> None:

@@ -105,7 +105,11 @@ class Refinement:
 
     def _of(self, part: int, e: Any) -> Array:
         """Return where the points of an element on a part lie in the whole reference cell."""
-        return np.asarray(self.origins[part] + e.basix_element.points @ self.axes[part].T)
+        return self._at(part, e.basix_element.points)
+
+    def _at(self, part: int, points: Array) -> Array:
+        """Return where points of a part lie in the whole reference cell."""
+        return np.asarray(self.origins[part] + points @ self.axes[part].T)
 
     # --- functions ---------------------------------------------------------------------------------------------------
 
@@ -181,6 +185,8 @@ class Refinement:
         """Return the parts of the entities that integrals of one type go over, by their numbers."""
         if data is None:
             return []
+        if name == "cell":
+            return self._points(f, dict(data))
         if name != "exterior_facet":
             raise NotRefined(name)
         ids = sorted({i for part in f.integrals() if part.integral_type() == name for i in _numbers(part)})
@@ -193,6 +199,23 @@ class Refinement:
             shape = (-1, 2) if np.ndim(entities) == 2 else -1  # flat in dolfinx 0.9
             out.append((number, np.array(cut, dtype=np.int32).reshape(shape)))
         return out
+
+    def _points(self, f: Any, cells: dict[int, Any]) -> list[tuple[int, npt.NDArray[np.int32]]]:
+        """Return the parts that hold the points that integrals of one point go over, where these are corners.
+
+        Such a point has the same reference coordinates in the cell and in its part.
+        """
+        out: dict[int, npt.NDArray[np.int32]] = {}
+        for part in f.integrals():
+            for number in _numbers(part) if part.integral_type() == "cell" else ():
+                points = np.asarray(part.metadata()["quadrature_points"])
+                same = [i for i in range(len(self.origins)) if np.allclose(self._at(i, points), points, atol=NONE)]
+                if not same:
+                    raise NotRefined("a point inside a cell")
+                mine = np.asarray(cells[number], dtype=np.int64) + self._first
+                every = np.concatenate(self._comm.allgather(mine))
+                out[number] = self._number[every * len(self.origins) + same[0]].astype(np.int32)
+        return sorted(out.items())
 
     def _on(self, side: int) -> list[tuple[int, int]]:
         """Return the (part, its facet) that lie on a facet of the whole cell."""

@@ -163,22 +163,43 @@ class Structure(LoadsOfStructure):
         free = {self.turns_of[axis] for axis in self.hinges}
         return [place for place, i in enumerate(components) if i not in free]
 
-    def clamped_unknowns(self) -> npt.NDArray[np.int32]:
-        """Return the local numbers of the owned unknowns that the clamp holds, in order."""
-        nodes = self.clamped[self.clamped < self.V.dofmap.index_map.size_local]
-        numbers: npt.NDArray[np.int32] = (
-            nodes[:, None] * self.size + np.array(self._held(self.kept), np.int32)
-        ).ravel()
-        return numbers
+    def clamped_unknowns(self, nodes: npt.NDArray[np.int32] | None = None) -> npt.NDArray[np.int32]:
+        """Return the local numbers of the unknowns that the clamp holds, in order.
 
-    def clamp_conditions(self, V: fem.FunctionSpace | None = None, others: Collection[int] | None = None) -> list[Any]:
-        """Return the boundary conditions of the clamp, in the space of the unknowns or in that of other components."""
+        Args:
+            nodes: that are clamped; the owned ones if None.
+        """
+        return self._numbers(nodes, self._held(self.kept))
+
+    def hinged_unknowns(self, nodes: npt.NDArray[np.int32] | None = None) -> npt.NDArray[np.int32]:
+        """Return the local numbers of those that turn in hinges of the clamp, in order (see `clamped_unknowns`)."""
+        held = self._held(self.kept)
+        return self._numbers(nodes, [i for i in range(self.size) if i not in held])
+
+    def _numbers(self, nodes: npt.NDArray[np.int32] | None, components: list[int]) -> npt.NDArray[np.int32]:
+        if nodes is None:
+            nodes = self.clamped[self.clamped < self.V.dofmap.index_map.size_local]
+        return np.asarray((nodes[:, None] * self.size + np.array(components, dtype=np.int32)).ravel())
+
+    def clamp_conditions(
+        self,
+        V: fem.FunctionSpace | None = None,
+        others: Collection[int] | None = None,
+        nodes: npt.NDArray[np.int32] | None = None,
+    ) -> list[Any]:
+        """Return the boundary conditions of the clamp.
+
+        Args:
+            V: space of the unknowns, or of other components; that of the structure if None.
+            others: these components; those that are kept if None.
+            nodes: clamped nodes of that space; those of the structure if None.
+        """
         V, components = V or self.V, self.kept if others is None else others
-        held = self._held(components)
+        nodes, held = self.clamped if nodes is None else nodes, self._held(components)
         if len(held) == len(components):
-            return [fem.dirichletbc(fem.Function(V), self.clamped)]
+            return [fem.dirichletbc(fem.Function(V), nodes)]
         zero = default_scalar_type(0.0)
-        return [fem.dirichletbc(zero, self.clamped * len(components) + i, V.sub(i)) for i in held]
+        return [fem.dirichletbc(zero, nodes * len(components) + i, V.sub(i)) for i in held]
 
     def stretch(self, strains: list[Strain]) -> Any:
         """Return an expression that is 1 where the structure is undeformed and at most 0 where it is inside out."""
