@@ -163,7 +163,9 @@ def check_changes(
             kept = set(effects) ^ {item.name}
             other = scene.replace({"model.effects": [name for name in trial.effects if name in kept]})
         else:
-            other = scene.replace({"model.theory": item.name, "model.effects": list(effects)})
+            prestress = scene.model.prestress if Theory.registry[item.name].prestress else None
+            said = {"model.theory": item.name, "model.prestress": prestress, "model.effects": list(effects)}
+            other = scene.replace(said)
         there = full_outputs(other, trial, comm)
         item.truth = change(own, there, trial.wanted)
         item.notes |= {f"{name}{FULL}": text for name, text in notes(there).items()}

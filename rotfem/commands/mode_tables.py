@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.modal import PURE, ModalAnalysis, Spinning, stability
-from rotfem.mechanics.theories import richest
+from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
 
 Array = npt.NDArray[Any]
 
@@ -56,7 +55,7 @@ def mode_tables(analysis: ModalAnalysis, speed: float, count: int, *, keep: bool
     rigid = int(spinning.rigid)
     spinning.pairs = spinning.pairs.select(np.arange(min(count - rigid, len(spinning.pairs.values))))
     rows = mode_rows(analysis, spinning)
-    warnings = [*advice(analysis, speed), *unstiffened(analysis, speed, rows), *instabilities(rows), *doubtful(rows)]
+    warnings = [*advice(analysis, speed), *instabilities(rows), *doubtful(rows)]
     rows = [{**row, "mode": row["mode"] + rigid} for row in rows]
     shapes = {f"mode {row['mode']}: {row['label']}": scaled_shape(analysis, spinning, i) for i, row in enumerate(rows)}
     return ModeTables(spinning, [rigid_row(rows), *rows] if rigid else rows, shapes, warnings)
@@ -136,18 +135,6 @@ def advice(analysis: ModalAnalysis, speed: float) -> list[str]:
             "come out negative"
         ]
     return []
-
-
-def unstiffened(analysis: ModalAnalysis, speed: float, rows: list[dict[str, Any]]) -> list[str]:
-    """Return a warning if modes are among the rows whose stiffening by the spin the theory does not hold."""
-    families, theory = analysis.structure.unstiffened, analysis.problem.theory
-    found = sorted({row["label"] for row in rows for f in families if row.get(f"share_{f}", 0.0) > PURE})
-    if speed == 0.0 or theory.exact or not found:
-        return []
-    return [
-        f"{', '.join(found)}: the strains of {theory.name} for this structure leave out the stiffening of such modes "
-        f'by the spin, so their frequencies are too low; model.theory = "{richest().name}" has it'
-    ]
 
 
 def scaled(comm: MPI.Comm, x: Array) -> Array:

@@ -62,6 +62,7 @@ class Problem(ProblemData):
                 effects=None if scene.model.effects == "auto" else tuple(scene.model.effects),
                 loads=loads_of(scene, motion),
                 frame=scene.model.frame,
+                prestress=scene.model.prestress,
                 terms=terms or {},
                 outputs=wanted | dict(outputs or {}),
             )

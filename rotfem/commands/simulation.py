@@ -31,7 +31,7 @@ from rotfem.commands.interrupts import Interrupted
 from rotfem.commands.keeper import Keeper
 from rotfem.commands.known_error import error_of_run, warnings_of_run
 from rotfem.commands.loads import held
-from rotfem.commands.other_models import diverged, lacking
+from rotfem.commands.other_models import diverged
 from rotfem.commands.problem import scheme_of
 from rotfem.commands.recorder import Recorder
 from rotfem.commands.reduced_history import by_reduced_model
@@ -271,8 +271,6 @@ class Simulation:
                 f"the speed is above {self.critical:.6g} rad/s, where the {self.problem.theory.name} stiffness is no "
                 f"longer definite, since t = {self._critical_since:.4g} s"
             )
-        if said := lacking(self.system, history):
-            self.warnings.append(said)
         if self.aside is not None:
             self.left_out = self.aside.summary()
             if said := self.aside.warning(self.left_out):

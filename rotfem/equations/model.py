@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -13,6 +14,7 @@ from mpi4py import MPI
 
 from rotfem.equations.hub_angle import HubAngle
 from rotfem.mechanics import work
+from rotfem.mechanics.bodies import Strain
 from rotfem.mechanics.effects import INERTIA, INTERNAL, LOADS, Effect
 from rotfem.mechanics.frame import Frame
 from rotfem.mechanics.loads import named
@@ -84,8 +86,27 @@ class Model:
             replace(b, density=self._switched(b.effect or STRUCTURE, bool(b.effect), b.density))
             for b in s.bodies(self.effects)
         ]
-        strains = s.strains(theory.measures(s.type))
+        strains = self.strains(theory.measures(s.type), first_order=theory.linear)
         return Mechanics(bodies, strains, s.loads(), s.k, self.frame, s.damping(), s)
+
+    def strains(self, measures: Callable[..., tuple[Any, ...]], first_order: bool = False) -> list[Strain]:
+        """Return the strains of a theory's measures, with what the effects that are in add to them.
+
+        Args:
+            measures: strain measures of the structure's type.
+            first_order: whether they are of first order in q.
+        """
+        return self.with_gains(self.structure.strains(measures), first_order)
+
+    def with_gains(self, strains: list[Strain], first_order: bool) -> list[Strain]:
+        """Return strains with what the effects that are in add to them, each times its switch."""
+        return [s.gaining(self.effects, lambda name, x: self._switched(name, True, x), first_order) for s in strains]
+
+    def prestresses(self, strain: Strain) -> bool:
+        """Return whether the force of a strain makes geometric stiffness in the prestressed linear theories."""
+        usual = "axial" if self.structure.hinges else self.structure.prestress  # a hinge has no moment
+        prestress = self.problem.prestress or usual
+        return prestress == "all" or strain.name in self.structure.prestressing
 
     def _switched(self, name: str, effect: bool, factor: Any) -> Any:
         """Return the switch of an effect, or of what a linear theory assembles by itself, times a factor."""

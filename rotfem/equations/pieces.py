@@ -23,9 +23,9 @@ from ufl.algorithms.analysis import extract_constants
 
 from rotfem.equations.geometric import geometric_stiffness
 from rotfem.equations.model import Model
+from rotfem.equations.prestress import geometric_pieces
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
-from rotfem.numerics.linear import DirectSolver
 
 Array = npt.NDArray[np.float64]
 
@@ -41,7 +41,7 @@ class Piece:
     """One operator (PETSc matrix, or vector for "f"), the constants whose product multiplies it, and what it is of.
 
     Attributes:
-        of: names of the switches that must be on: the term, the bodies' effect, PRESTRESS.
+        of: names of the switches that must be on: the term, the effect of the bodies or of a gain in strain, PRESTRESS.
         at_root: what it does in the unit motions of the clamp (see `RootReaction`), of this process: a row for each
             owned unknown, of "f" one number for each motion.
     """
@@ -58,7 +58,7 @@ class Pieces:
 
     With a prestressed theory the stiffness gains ∫ N⁰ D²Γ₁[δq, q] where N⁰ is the axial force of the linear structure
     under each load piece (centrifugal, base, gravity, applied) and Γ₁ the axial strain of the theory's second order:
-    Simo & Vu-Quoc 1986 eqs. (12), (23) as corrected in docs/theory.md.
+    Simo & Vu-Quoc 1986 eqs. (12), (23) as corrected in docs/theory.md; or that of all its stress resultants.
 
     Args:
         model: the terms, of a linear theory.
@@ -182,7 +182,7 @@ class Pieces:
             between = any(self.model.acting[n].at_root for n in of if n in self.model.acting)
             at_root = -self._at_root(operator, self._turns) if between else self._at_root(operator, self._motions)
             operator.diagonalScale(self._free, self._free)
-            if kind == "K" and "internal" in of and PRESTRESS not in of:
+            if kind == "K" and of == {"internal", ""}:
                 set_diagonal(self.clamped, operator, 1.0)
         self.all.append(Piece(kind, key, operator, of, at_root))
 
@@ -227,11 +227,12 @@ class Pieces:
         for (name, i), value in values.items():
             constants[name].value.flat[i] = value
         self.structure.update_loads()
-        operator = self._assemble(self._forms[kind], kind)
+        operator = self.assemble(self._forms[kind], kind)
         self._zero_constants()
         return operator
 
-    def _assemble(self, form: Any, kind: str) -> Any:
+    def assemble(self, form: Any, kind: str) -> Any:
+        """Return a compiled form as a new PETSc vector (of "f") or matrix, the clamp not held."""
         if kind == "f":
             b = compat.create_vector(self.V)
             fem_petsc.assemble_vector(b, form)
@@ -244,13 +245,18 @@ class Pieces:
 
     @cached_property
     def material(self) -> Any:
-        """Stiffness of the strains alone, clamped rows 1; hinges of the root are held by springs.
+        """Stiffness of the strains alone, clamped rows 1; hinges are held by springs, which N⁰ does not feel."""
+        return self.material_without(())
 
-        Without these it would be singular. The force N⁰ of a beam, which has one end free, does not feel them.
-        """
-        K = next(p.operator for p in self.all if p.kind == "K" and "internal" in p.of)
-        if self.structure.hinges:
+    def material_without(self, without: Collection[str]) -> Any:
+        """Return the `material` without what these effects add to the strains."""
+        parts = [p for p in self.all if p.kind == "K" and "internal" in p.of and PRESTRESS not in p.of]
+        K, *others = [p.operator for p in parts if p.of.isdisjoint(without)]
+        if others or self.structure.hinges:
             K = K.copy()
+        for other in others:
+            K.axpy(1.0, other)
+        if self.structure.hinges:
             held(K, self._hinged)
         return K
 
@@ -276,19 +282,12 @@ class Pieces:
         return self._geometric if name == "G" else self.at_rest[name], self._forms[name]
 
     def _prestress(self) -> None:
-        """Add the geometric stiffness of the axial force that each load piece causes in the linear structure."""
-        q0 = self.prestressed
-        solver, x = DirectSolver(self.material, symmetric=True), compat.wrap(q0.x)
-        self._geometric = self.geometric(ufl.TestFunction(self.V), ufl.TrialFunction(self.V), q0)
-        compiled = self._forms["G"] = forms.form(self._geometric, once=True)
+        """Add the geometric stiffness of the stresses that each load piece causes in the linear structure."""
+        self._geometric = self.geometric(ufl.TestFunction(self.V), ufl.TrialFunction(self.V), self.prestressed)
+        self._forms["G"] = forms.form(self._geometric, once=True)
         started = perf_counter()
-        for piece in [p for p in self.all if p.kind == "f"]:
-            solver.solve(piece.operator, x)
-            x.scale(-1.0)
-            q0.x.scatter_forward()
-            K = self._assemble(compiled, "K")
-            if K.norm() > 0.0:
-                self._keep("K", piece.key, K, piece.of | {PRESTRESS})
+        for load, K, added in geometric_pieces(self):
+            self._keep("K", load.key, K, load.of | {PRESTRESS} | added)
         self.assembled += perf_counter() - started
 
 

@@ -105,7 +105,7 @@ class Resultants:
     def _compile_stressed(self) -> Any:
         """Return the form of ∫ C 1·D²Γ of the strains with large stresses; None where there is none."""
         m, s, theory, du = self.model.mechanics, self.system.structure, self.model.theory, ufl.TrialFunction(self.V)
-        higher = s.strains(theory.prestress_measures(s.type)) if theory.prestress else m.strains
+        higher = self.model.strains(theory.prestress_measures(s.type)) if theory.prestress else m.strains
         out: Any = 0
         for first, strain in zip(m.strains, higher, strict=True):
             if strain.name in {*s.stiff, *s.prestressing}:

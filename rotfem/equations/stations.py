@@ -134,7 +134,8 @@ class Stations:
             k, viscosity = beam.k, model.mechanics.damping.stiffness
             strains = beam.section_strains(model.theory.measures(beam.type))
             at = ufl.variable(strains)
-            energy = sum(ufl.inner(s.force(s.value), s.value) / 2 for s in beam.stored(at))
+            stored = model.with_gains(beam.stored(at), first_order=model.theory.linear)
+            energy = sum(ufl.inner(s.force(s.value), s.value) / 2 for s in stored)
             force = ufl.diff(energy, at)
             if viscosity is not None:
                 force = force + viscosity * k.rate(force)

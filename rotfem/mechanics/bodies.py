@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import ufl
@@ -48,6 +49,19 @@ class Body:
 
 
 @dataclass(frozen=True)
+class Gain:
+    """What an effect adds to a strain, as expressions of q.
+
+    Attributes:
+        first: the part of first order in q, all that a theory of first order takes; the number 0 if there is none.
+        higher: the rest.
+    """
+
+    first: Any
+    higher: Any
+
+
+@dataclass(frozen=True)
 class Strain:
     """One strain measure with the stiffness that makes energy of it: W = ∫ ½ Γ·C Γ.
 
@@ -56,12 +70,29 @@ class Strain:
         value: Γ as an expression of q, scalar or vector.
         stiffness: C, scalar (N, N·m^2) or matrix.
         measure: UFL measure.
+        gains: effect ↦ what it adds to Γ.
     """
 
     name: str
     value: Any
     stiffness: Any
     measure: Any
+    gains: Mapping[str, Gain] = field(default_factory=dict)
+
+    def gaining(self, effects: Collection[str], switched: Callable[[str, Any], Any], first_order: bool) -> Strain:
+        """Return the strain with what these effects add to it, each times its switch.
+
+        Args:
+            effects: names of those that are in the equations.
+            switched: (effect, expression) ↦ the expression times the switch of the effect.
+            first_order: whether it is one of first order in q.
+        """
+        value = self.value
+        for name, gain in self.gains.items():
+            part = gain.first if first_order else gain.first + gain.higher
+            if name in effects and not isinstance(part, int):
+                value += switched(name, part)
+        return replace(self, value=value, gains={})
 
     def force(self, strain: Any) -> Any:
         """Return C Γ, the conjugate force (N) or moment (N·m)."""

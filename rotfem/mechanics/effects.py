@@ -1,8 +1,8 @@
 """Effects: what acts on the bodies of a structure, each in the equations or not.
 
 An effect says its virtual work for a free variation: that of the unknowns gives the equations of motion, a rigid turn
-about the axis gives the row of a free hub. Effects without work of their own bring bodies, which feel all others, or
-couple the hub. Nothing here loads UFL: what an effect computes with is loaded when a form is made of it.
+about the axis gives the row of a free hub. Effects without work of their own bring bodies, which feel all others, add
+to strains, or couple the hub. Nothing here loads UFL: what an effect computes with is loaded when a form is made of it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ class Effect:
     Attributes:
         name: what a scene calls it.
         work: (mechanics, variation) ↦ its term of the residual F = 0 for a variation of the motion: + ∫ ρ a·δx of an
-            acceleration, − ∫ f·δx of a force. None where the effect only brings bodies, or couples the hub.
+            acceleration, − ∫ f·δx of a force. None where the effect only brings bodies, adds to strains, or couples
+            the hub.
         present: problem ↦ whether there are data for it; `model.effects = "auto"` takes all that are present.
         reasons: why it is in a model, and why not, in a few words.
         constants: names of the constants ("w", "dw", "a_o", "gravity" of the frame, "loads" for those of all
@@ -171,6 +172,11 @@ for _effect in (
         internal=True,
         passive=True,
         at_root=True,
+    ),
+    Effect(
+        "trapeze",
+        present=lambda problem: problem.structure.has_fibers,
+        reasons=("fibers beside the axis of twist are stretched by it", "no section twists"),
     ),
     Effect(
         "tip_mass",

@@ -47,6 +47,16 @@ class PlateGradients:
         return ufl.as_matrix([[along(self.q[3 + i], j) for j in range(2)] for i in range(2)])
 
     @property
+    def stretch(self) -> Any:
+        """Strain of the mid-surface to second order, e + ½ (u_ρ,γ u_ρ,β − e²) + ½ u_3,γ u_3,β, shape (2, 2).
+
+        In its plane it is the stretch U − 1 = (FᵀF)^½ − 1 to that order, with e = u_(γ,β): a turn ω adds ½ ω², as it
+        does to the axial strain of a beam, but the stretch of a line is its first-order strain alone.
+        """
+        du, dw, e = self.du, self.dw, ufl.sym(self.du)
+        return e + (ufl.dot(du.T, du) - ufl.dot(e, e)) / 2 + ufl.outer(dw, dw) / 2
+
+    @property
     def dr(self) -> Any:
         """r_i,β, shape (3, 2)."""
         du, dw = self.du, self.dw

@@ -49,6 +49,8 @@ class Problem:
         frame: "rotating", or "inertial" (translates with the hub, does not rotate).
         terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form, as of an `Effect`.
         outputs: functionals that are recorded, by name, mechanics ↦ UFL form, as of an `Output`.
+        prestress: "axial" or "all", whose geometric stiffness the prestressed linear theories have; None for what is
+            usual for the structure: that of forces and moments of a spatial beam, else of axial and membrane forces.
         left_out: names of the unknowns that are zero at all times and are none (see `rotfem.selection.left_out`).
     """
 
@@ -61,6 +63,7 @@ class Problem:
     frame: str = "rotating"
     terms: Mapping[str, Work] = field(default_factory=dict)
     outputs: Mapping[str, Functional] = field(default_factory=dict)
+    prestress: str | None = None
     left_out: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -78,6 +81,8 @@ class Problem:
         if self.frame == "inertial" and not flat_and_exact:
             why = "needs a planar_beam, a theory that holds for any displacement, and a prescribed rotation"
             raise InputError("model.frame", self.frame, why)
+        if self.prestress not in (None, "axial", "all"):
+            raise InputError("model.prestress", self.prestress, "allowed: axial, all")
         for name in self.effects or ():
             if name not in Effect.registry:
                 raise InputError("model.effects", name, f"is no effect; allowed: {', '.join(Effect.registry.names)}")

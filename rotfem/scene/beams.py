@@ -215,6 +215,11 @@ class SpatialBeamStructure(StructureTable):
         """Whether the sections have rotary inertia."""
         return self.section.has_rotary_inertia
 
+    @property
+    def has_fibers(self) -> bool:
+        """Whether the sections have fibers beside the axis they twist about, as all have but where it is denied."""
+        return self.section.polar_radius != 0.0
+
     def mean_beam(self) -> MeanBeam | None:
         """Return the uniform beam with the mean of its section; None if that is given by full matrices."""
         if self.section.given.keys() & {"stiffness", "mass"}:

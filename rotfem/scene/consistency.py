@@ -53,9 +53,27 @@ def check_theory(structure: AnyStructure, model: Model) -> None:
         able = ", ".join(show(other.name) for other in registry.theories if other.holds_for(kind))
         has = ", ".join(theory.strains) or "no structure"
         raise problem("model.theory", theory.name, f"has strains for {has}, none for a {kind}; allowed there: {able}")
+    check_prestress(structure, model)
     if model.reduced and not theory.linear:
         able = ", ".join(show(other.name) for other in registry.theories if other.linear and other.holds_for(kind))
         raise problem("model.reduced", model.reduced, f'needs a linear model.theory, not "{theory.name}": {able}')
+
+
+def check_prestress(structure: AnyStructure, model: Model) -> None:
+    """Refuse to say what the prestress is of where there is none, or one kind of it only."""
+    kind = structure.type
+    if model.prestress is None:
+        return
+    if structure.hinges and model.prestress == "all":
+        why = (
+            "is for a root without hinges and springs: the linear structure, held there, has moments that they have not"
+        )
+        raise problem("model.prestress", model.prestress, why)
+    if kind == "plate":
+        raise problem("model.prestress", model.prestress, "is for beams: that of a plate is of its membrane forces")
+    if not registry.theories[model.theory].prestress and model.tolerance is None:
+        able = (show(theory.name) for theory in registry.theories if kind in theory.prestress)
+        raise problem("model.prestress", model.prestress, f"needs model.theory = {' or '.join(able)}")
 
 
 def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:

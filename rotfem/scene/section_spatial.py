@@ -54,6 +54,7 @@ Center: TypeAlias = Annotated[Point | PointTable, PlainValidator(as_point_or_tab
 
 _CENTERS = ("mass_center", "shear_center", "tension_center")
 _STIFFNESSES = ("EA", "GA2", "GA3", "GJ", "EI2", "EI3")
+_FIBERS = ("polar_radius",)
 _INERTIAS = ("mass_per_length", "rotary_inertia2", "rotary_inertia3")
 
 
@@ -78,20 +79,22 @@ class SpatialSection(Section):
         mass_center: position (y, z) in the section (m), or a table of them.
         shear_center: position (y, z) in the section (m), or a table of them.
         tension_center: position (y, z) in the section (m), or a table of them.
+        polar_radius: radius of gyration of the axial stiffness about the shear center, (∫Er² dA/∫E dA)^½ (m); if not
+            given, that of EA, EI2, EI3 and the centers. Only the effect `trapeze` has to do with it.
         stiffness: full 6×6 stiffness matrix, or a table of them.
         mass: full 6×6 mass matrix of (velocity, angular velocity) in section axes, or a table of them.
     """
 
     WAYS: ClassVar[tuple[Way, ...]] = (
-        Way("stiffness", (*_STIFFNESSES, "mass_per_length"), ("rotary_inertia2", "rotary_inertia3", *_CENTERS)),
-        Way("matrix", ("stiffness", "mass")),
+        Way("stiffness", (*_STIFFNESSES, "mass_per_length"), (*_INERTIAS[1:], *_CENTERS, *_FIBERS)),
+        Way("matrix", ("stiffness", "mass"), _FIBERS),
         Way(
             "material",
             ("E", "nu", "rho", "area", "second_moment2", "second_moment3", "torsion_constant"),
-            ("shear_correction", *_CENTERS),
+            ("shear_correction", *_CENTERS, *_FIBERS),
         ),
     )
-    WITH_SHAPE: ClassVar[tuple[str, ...]] = ("shear_correction", *_CENTERS)
+    WITH_SHAPE: ClassVar[tuple[str, ...]] = ("shear_correction", *_CENTERS, *_FIBERS)
 
     EA: PositiveProfile | None = None
     GA2: PositiveProfile | None = None
@@ -108,6 +111,7 @@ class SpatialSection(Section):
     mass_center: Center | None = None
     shear_center: Center | None = None
     tension_center: Center | None = None
+    polar_radius: NonNegativeProfile | None = None
     stiffness: Annotated[Matrix | MatrixTable, PlainValidator(_as_stiffness)] | None = None
     mass: Annotated[Matrix | MatrixTable, PlainValidator(_as_mass)] | None = None
 
@@ -155,6 +159,19 @@ class SpatialSection(Section):
         """
         x = np.asarray(x, dtype=np.float64)
         return dict(zip((*_STIFFNESSES, *_INERTIAS), self._stiffnesses_and_inertias(x), strict=True))
+
+    def polar_radius_at(self, x: npt.ArrayLike) -> Array:
+        """Return the polar radius (m) at positions along the beam (m); only where it is given."""
+        return self._at("polar_radius", np.asarray(x, dtype=np.float64))
+
+    @property
+    def has_material(self) -> bool:
+        """Whether it is given by a material, of which E/G is known."""
+        return "nu" in self.given
+
+    def modular_ratio(self, x: npt.ArrayLike) -> Array:
+        """Return E/G of the material at positions along the beam (m); only where it is given."""
+        return 2.0 * (1.0 + self._at("nu", np.asarray(x, dtype=np.float64)))
 
     def _stiffnesses_and_inertias(self, x: Array) -> tuple[Array, ...]:
         if self.way.name == "stiffness":

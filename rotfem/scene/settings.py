@@ -48,6 +48,8 @@ class Model(SceneModel):
         theory: name of a registered theory, the order of the strain measure.
         effects: "auto", or names of registered effects, those to include.
         frame: frame to which displacements refer.
+        prestress: of the prestressed linear theories of beams, what their geometric stiffness is of: "axial" forces, or
+            "all" forces and moments; None for what is usual for the structure.
         tolerance: relative model error up to which effects are left out and the theory may be poorer, or None.
         on_exceed: what a run does that leaves the range its model was chosen for.
         reduced: whether a history is that of a reduced model, of a linear theory; a number is its accuracy.
@@ -58,6 +60,7 @@ class Model(SceneModel):
     theory: Annotated[str, PlainValidator(_as_theory)] = "reissner"
     effects: Annotated[str | tuple[str, ...], PlainValidator(_as_effects)] = "auto"
     frame: Literal["rotating", "inertial"] = "rotating"
+    prestress: Literal["axial", "all"] | None = None
     tolerance: Positive | None = None
     on_exceed: Literal["upgrade", "stop", "warn"] = "upgrade"
     reduced: Annotated[bool | float, PlainValidator(_as_reduced)] = False

@@ -68,6 +68,11 @@ class StructureTable(SceneModel):
         return {}
 
     @property
+    def has_fibers(self) -> bool:
+        """Whether its sections twist about an axis, beside which they have fibers that this stretches."""
+        return False
+
+    @property
     def mesh_file(self) -> str | None:
         """Absolute path of the file that its mesh is in, None if [mesh] has numbers of elements."""
         return None

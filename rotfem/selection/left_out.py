@@ -123,11 +123,16 @@ class Driven:
             normals, others = np.eye(3)[normal], 1 - np.eye(3)[normal]
             if self._within(others, normals):
                 yield kept, {**self.polar, **self.axial}
-        if not self.linear or self.moved:
+        if not self.linear or self.moved or self._sheared(structure):
             return
         for normal, kept in structure.across.items():
             if self._within(np.eye(3)[normal], 1 - np.eye(3)[normal]):
                 yield kept, {**self.polar, **self.axial}
+
+    def _sheared(self, structure: Any) -> bool:
+        """Return whether forces across the structure make geometric stiffness, which moves it along too."""
+        problem = self.problem
+        return bool(problem.theory.prestress) and (problem.prestress or structure.prestress) == "all"
 
     def _within(self, polar: Array, axial: Array) -> bool:
         """Return whether forces have these directions only, and moments and spin those."""

@@ -62,7 +62,6 @@ class Plate(Structure):
     across: ClassVar = {2: (2, 3, 4)}
     prestressing: ClassVar = ("membrane",)
     stiff: ClassVar = ("shear",)
-    unstiffened: ClassVar = ("in-plane",)
     #: Conjugates of the tip's components: inputs of the state-space model.
     tip_inputs = ("tip_force_1", "tip_force_2", "tip_force_3", "tip_moment_alpha1", "tip_moment_alpha2")
     #: Mode families: the components whose kinetic energy counts, and the one whose shape is looked at.

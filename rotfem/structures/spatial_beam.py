@@ -61,6 +61,7 @@ class SpatialBeam(Beam):
     planes: ClassVar = {1: (0, 2, 4), 2: (0, 1, 5)}
     across: ClassVar = {1: (1, 5), 2: (2, 4)}
     dimension = 3
+    prestress = "all"
     #: Conjugates of the tip's components: inputs of the state-space model (a moment works on θ there).
     tip_inputs = ("tip_force_1", "tip_force_2", "tip_force_3", "tip_moment_1", "tip_moment_2", "tip_moment_3")
     #: Mode families: the components whose kinetic energy counts, and the one whose nodes are counted.
@@ -75,6 +76,7 @@ class SpatialBeam(Beam):
         else:
             parts = [self.scalar(f"hub_offset_{i}", x) for i, x in enumerate(s.root_position, start=1)]
             self._root = ufl.as_vector(parts)
+        self._pretwist: Any = 0
         self._triad = self._undeformed_triad()
         whole = self.size == len(self.components) and not self.hinges  # whose turns are counted from the hub
         self.turns = SectionTurns.of(self) if whole else None
@@ -113,6 +115,7 @@ class SpatialBeam(Beam):
             angle = fem.Function(fem.functionspace(self.mesh, ("Lagrange", 1)), name="pretwist")
             angle.interpolate(lambda x: np.interp(x[0], *np.array(twist).T))  # exact: the knots are nodes
             self.section["pretwist"] = angle
+            self._pretwist = angle.dx(0)
         elif isinstance(twist, float) and twist != 0.0:
             angle = self.scalar("pretwist", twist)
         else:
@@ -165,7 +168,7 @@ class SpatialBeam(Beam):
 
     def strains(self, measures: Callable[..., tuple[Any, Any]]) -> list[Strain]:
         """Return the strains (Γ, K) of one theory's measures with the section's stiffness."""
-        return self._forms.strains(*self._measured(measures), self.dx_elastic)
+        return self._forms.strains(*self._measured(measures), self.dx_elastic, self._pretwist)
 
     def section_strains(self, measures: Callable[..., tuple[Any, Any]]) -> Any:
         """Return (Γ, K) along the section's axes t_i, of the reference axis."""
@@ -173,7 +176,8 @@ class SpatialBeam(Beam):
 
     def stored(self, values: Any) -> list[Strain]:
         """Return the strains that make the stored energy of (Γ, K)."""
-        return self._forms.strains([values[i] for i in (0, 1, 2)], [values[i] for i in (3, 4, 5)], self.dx_elastic)
+        Gamma, K = [values[i] for i in (0, 1, 2)], [values[i] for i in (3, 4, 5)]
+        return self._forms.strains(Gamma, K, self.dx_elastic, self._pretwist)
 
     def _measured(self, measures: Callable[..., tuple[Any, Any]]) -> tuple[Any, Any]:
         """Return Γ and K of one theory's measures along t_i.

@@ -7,16 +7,18 @@ brought as near to that as they allow.
 
 from __future__ import annotations
 
-from functools import partial
+from dataclasses import replace
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import ufl
 
-from rotfem.mechanics.bodies import Strain
+from rotfem.mechanics.bodies import Gain, Strain
 from rotfem.structures.beam import Beam
 from rotfem.structures.structure import Array
+from rotfem.structures.trapeze import radius_of, stretch_by_twist
 
 #: Strains in the order of the section matrices, and the stiffness of each.
 STRAINS = {
@@ -82,6 +84,8 @@ class SectionForms:
 
     def __init__(self, beam: Beam, section: Any):
         self._beam, self._data = beam, section
+        if section.polar_radius is not None:
+            beam.section["polar_radius"] = beam.profile("polar_radius", section.polar_radius_at)
         if section.stiffness is None:
             self._read_central()
             return
@@ -167,11 +171,64 @@ class SectionForms:
         pairs = enumerate(components, start=1)
         return tuple(self._beam.scalar(f"{name}_{i}", c) if c != 0.0 else 0 for i, c in pairs)
 
-    def strains(self, Gamma: Any, K: Any, measure: Any) -> list[Strain]:
-        """Return the strains that make the stored energy ½ ε·C ε of ε = (Γ, K)."""
+    def strains(self, Gamma: Any, K: Any, measure: Any, pretwist: Any = 0) -> list[Strain]:
+        """Return the strains that make the stored energy ½ ε·C ε of ε = (Γ, K).
+
+        Args:
+            Gamma: along t_i⁰.
+            K: likewise (1/m).
+            measure: UFL measure.
+            pretwist: rate at which the undeformed section turns about the axis (1/m); the number 0 without.
+        """
         epsilon = [*(Gamma[i] for i in range(3)), *(K[i] for i in range(3))]
+        full = self._data.stiffness is not None
+        axial, *others = self._full_strains(epsilon, measure) if full else self._central_strains(epsilon, measure)
+        return [replace(axial, gains={"trapeze": self._trapeze(K[0], pretwist)}), *others]
+
+    def _trapeze(self, twist: Any, pretwist: Any) -> Gain:
+        """Return the stretch of fibers by twist; a full matrix with an entry (1, 4) has that of first order itself."""
+        if self._coupled or isinstance(pretwist, int):
+            return stretch_by_twist(self._radius_squared, twist, 0)
+        return stretch_by_twist(self._radius_squared, twist, pretwist, self._warping)
+
+    @cached_property
+    def _coupled(self) -> bool:
+        """Whether a full matrix couples twist with stretch anywhere."""
+        places = [0.0, *self._data.breakpoints, self._beam.length]
+        return self._data.stiffness is not None and bool(np.any(self._data.at(places)["stiffness"][:, 0, 3]))
+
+    @cached_property
+    def _warping(self) -> Any:
+        """J/A = GJ/EA · E/G (m²); the number 0 where E/G is not known."""
+        if not self._data.has_material:
+            return 0
+        ratio = self._beam.profile("modular_ratio", self._data.modular_ratio)
+        return ratio * self._beam.section["GJ"] / self._beam.section["EA"]
+
+    @cached_property
+    def _radius_squared(self) -> Any:
+        """r² (m²) about the shear center: as given, or of bending about the tension center."""
+        section = self._beam.section
+        if self._data.polar_radius is not None:
+            return section["polar_radius"] ** 2
         if self._data.stiffness is not None:
-            return self._full_strains(epsilon, measure)
+            return self._full_radius()
+        centers = (self._center("tension_center"), self._center("shear_center"))
+        apart = sum((t - s) ** 2 for t, s in zip(*centers, strict=True))
+        return (section["EI2"] + section["EI3"]) / section["EA"] + apart
+
+    def _full_radius(self) -> Any:
+        """Return r² (m²) of a full matrix; of a table of them as a field."""
+        if "stiffness" not in self._data.tapers:
+            return radius_of(self._stiffness)
+
+        def squared(x: Array) -> Array:
+            return np.asarray(radius_of(np.moveaxis(self._data.at(x)["stiffness"], 0, -1)))
+
+        return self._beam.profile("polar_radius_squared", squared)
+
+    def _central_strains(self, epsilon: list[Any], measure: Any) -> list[Strain]:
+        """Return the strains at the centers, which share no energy."""
         y, z = self._center("tension_center")
         epsilon[0] += z * epsilon[4] - y * epsilon[5]
         y, z = self._center("shear_center")

@@ -52,13 +52,12 @@ class Structure(LoadsOfStructure):
     across: ClassVar[dict[int, tuple[int, ...]]] = {}
     #: Axis of a hinge at the root, 1 to 3 ↦ the component that turns in it.
     turns_of: ClassVar[dict[int, int]] = {}
-    #: Strains whose force makes geometric stiffness in the prestressed linear theories.
+    #: Strains whose force makes geometric stiffness in the prestressed linear theories, where not those of all do.
     prestressing: ClassVar[tuple[str, ...]]
+    #: What makes geometric stiffness unless a problem says it: "axial" forces, or "all" forces and moments.
+    prestress: ClassVar[str] = "axial"
     #: Strains whose stiffness may outweigh that of the others by so much that round-off of it spoils them.
     stiff: ClassVar[tuple[str, ...]] = ()
-
-    #: Mode families that the force of the spinning structure stiffens in the exact theory only.
-    unstiffened: ClassVar[tuple[str, ...]] = ()
 
     dx: Any
     dx_elastic: Any

@@ -40,7 +40,7 @@ SCENES = Path(__file__).resolve().parents[1] / "scenes"
 SPIN = ("coriolis", "centrifugal")
 #: The example scenes, and the effects each of them has.
 EXAMPLES = {
-    "blade_modes": (*SPIN, "rotary_inertia", "tip_mass"),
+    "blade_modes": (*SPIN, "rotary_inertia", "trapeze", "tip_mass"),
     "hub_torque": (*SPIN, "euler", "rotary_inertia", "hub_coupling"),
     "iccia_hub_beam": (*SPIN, "euler", "rotary_inertia"),
     "plate_modes": (*SPIN, "rotary_inertia"),

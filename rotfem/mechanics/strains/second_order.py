@@ -32,10 +32,10 @@ def spatial_beam(du: Any, theta: Any, dtheta: Any, e: Any) -> tuple[Any, Any]:
 def plate(q: Any) -> tuple[Any, Any, Any]:
     """Return membrane strain (1), transverse shear (1) and curvature (1/m) of q = (u_1, u_2, u_3, alpha_1, alpha_2).
 
-    Simo & Vu-Quoc 1986 eq. (26), shapes (2, 2), (2,), (2, 2): u_(γ,β) + ½ u_3,γ u_3,β − ½ γ_γ γ_β with the linear shear
-    γ_β = u_3,β − alpha_β, then γ_β − alpha_γ u_γ,β, then alpha_(γ,β).
+    Simo & Vu-Quoc 1986 eq. (26) with the products of in-plane gradients that it lacks, shapes (2, 2), (2,), (2, 2):
+    e + ½ (u_ρ,γ u_ρ,β − e²) + ½ u_3,γ u_3,β − ½ γ_γ γ_β with e = u_(γ,β) and the linear shear γ_β = u_3,β − alpha_β,
+    then γ_β − alpha_γ u_γ,β, then alpha_(γ,β).
     """
     p = PlateGradients(q)
     shear = p.dw - p.alpha
-    membrane = ufl.sym(p.du) + ufl.outer(p.dw, p.dw) / 2 - ufl.outer(shear, shear) / 2
-    return membrane, shear - ufl.dot(p.alpha, p.du), ufl.sym(p.dalpha)
+    return p.stretch - ufl.outer(shear, shear) / 2, shear - ufl.dot(p.alpha, p.du), ufl.sym(p.dalpha)

@@ -35,7 +35,8 @@ def spatial_beam(du: Any, theta: Any, dtheta: Any, e: Any) -> tuple[Any, Any]:
 def plate(q: Any) -> tuple[Any, Any, Any]:
     """Return membrane strain (1), transverse shear (1) and curvature (1/m) of q = (u_1, u_2, u_3, alpha_1, alpha_2).
 
-    Simo & Vu-Quoc 1986 eq. (27), shapes (2, 2), (2,), (2, 2): u_(γ,β) + ½ u_3,γ u_3,β, then as in the linear theory.
+    Simo & Vu-Quoc 1986 eq. (27) with the products of in-plane gradients that it lacks, shapes (2, 2), (2,), (2, 2):
+    e + ½ (u_ρ,γ u_ρ,β − e²) + ½ u_3,γ u_3,β with e = u_(γ,β), then as in the linear theory.
     """
     p = PlateGradients(q)
-    return ufl.sym(p.du) + ufl.outer(p.dw, p.dw) / 2, p.dw - p.alpha, ufl.sym(p.dalpha)
+    return p.stretch, p.dw - p.alpha, ufl.sym(p.dalpha)

@@ -1,0 +1,68 @@
+"""The geometric stiffness of the stresses that each load causes in the linear structure, piece by piece.
+
+What an effect adds to the strains is apart from the rest, so that it can be left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from ufl.algorithms.analysis import extract_constants
+
+from rotfem.numerics import compat
+from rotfem.numerics.linear import DirectSolver
+
+if TYPE_CHECKING:
+    from rotfem.equations.pieces import Piece, Pieces
+
+Array = npt.NDArray[np.float64]
+
+
+def geometric_pieces(pieces: Pieces) -> list[tuple[Piece, Any, frozenset[str]]]:
+    """Return (load piece, its geometric stiffness, which is not zero, the effect that adds it or none) of all.
+
+    Args:
+        pieces: of the loads and of the strains; its switches are all on before and after.
+    """
+    switches = pieces.model.switches
+    form, compiled = pieces.known_form("G")
+    there = set(extract_constants(form))
+    adding = [name for name, switch in switches.items() if switch in there]
+    loads, displaced = [p for p in pieces.all if p.kind == "f"], list[tuple[Any, list[Array]]]()
+
+    def stiffness(without: Collection[str]) -> list[Any]:
+        material = pieces.material_without(without)
+        if not any(known is material for known, _ in displaced):
+            displaced.append((material, _displaced(pieces, material, loads)))
+        for name in adding:
+            switches[name].value = 0.0 if name in without else 1.0
+        out = []
+        for q in next(states for known, states in displaced if known is material):
+            pieces.prestressed.x.array[:] = q
+            out.append(pieces.assemble(compiled, "K"))
+        return out
+
+    plain = stiffness(adding)
+    found = [(load, K, frozenset[str]()) for load, K in zip(loads, plain, strict=True)]
+    for name in adding:
+        for load, K, bare in zip(loads, stiffness([other for other in adding if other != name]), plain, strict=True):
+            K.axpy(-1.0, bare)
+            found.append((load, K, frozenset((name,))))
+    for name in adding:
+        switches[name].value = 1.0
+    return [(load, K, added) for load, K, added in found if K.norm() > 0.0]
+
+
+def _displaced(pieces: Pieces, material: Any, loads: list[Piece]) -> list[Array]:
+    """Return what each load displaces the linear structure by, local dof arrays."""
+    q, out = pieces.prestressed, []
+    solver, x = DirectSolver(material, symmetric=True), compat.wrap(q.x)
+    for load in loads:
+        solver.solve(load.operator, x)
+        x.scale(-1.0)
+        q.x.scatter_forward()
+        out.append(q.x.array.copy())
+    return out
