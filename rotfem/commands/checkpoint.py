@@ -125,6 +125,7 @@ class Memory:
             "columns": list(run.record.history.columns),
             "rows": np.array(run.record.history.rows()).reshape(len(run.record.history), -1),
             "stations": None if run.record.stations is None else run.record.stations.kept_arrays(),
+            "resultants": None if run.record.resultants is None else run.record.resultants.kept_arrays(),
             "snapshots": None if snapshots is None else self._packed(vars(snapshots)),
             "choice": None if run.choice is None else vars(run.choice),
             "left_out": list(run.problem.left_out),
@@ -156,6 +157,8 @@ class Memory:
             run.record.history.append(row)
         if run.record.stations is not None:
             run.record.stations.put_back(tree["stations"])
+        if run.record.resultants is not None:
+            run.record.resultants.put_back(tree["resultants"])
         if run.record.snapshots is not None:
             vars(run.record.snapshots).update(self._unpacked(tree["snapshots"]))
         run.elapsed = tree["elapsed"]

@@ -14,29 +14,38 @@ from rotfem.results.xdmf import chain, write_xdmf
 from rotfem.structures.paraview import MOST, writer
 
 Array = npt.NDArray[np.float64]
+#: Names, and values (nodes, names) at times.
+Named = tuple[tuple[str, ...], list[tuple[float, Array]]]
 Writer = Callable[[Path], list[Path]]
 
 
-def fields_writer(system: Any, states: list[tuple[float, Array]], formats: tuple[str, ...]) -> Writer | None:
+def fields_writer(
+    system: Any, states: list[tuple[float, Array]], formats: tuple[str, ...], more: Named | None = None
+) -> Writer | None:
     """Return what writes the fields of a run into a folder, on all ranks together; None of no format.
 
     Args:
         system: equations of motion.
         states: (time in s, local dof array).
+        more: names of further fields of the XDMF file, and (time, values (nodes, names)) at the same times.
         formats: "vtx" (fields.bp) and "xdmf" (fields.xdmf with fields.h5).
     """
     writers: list[Writer] = []
     if "vtx" in formats:
         writers.append(writer(system.structure, "fields", states))
     if "xdmf" in formats:
-        writers.append(lambda folder: _write(system, states, folder / "fields.xdmf"))
+        writers.append(lambda folder: _write(system, states, folder / "fields.xdmf", more))
     return (lambda folder: [path for write in writers for path in write(folder)]) if writers else None
 
 
-def _write(system: Any, states: list[tuple[float, Array]], path: Path) -> list[Path]:
+def _write(system: Any, states: list[tuple[float, Array]], path: Path, more: Named | None) -> list[Path]:
     """Gather the displacements, and write them on rank 0."""
     structure = system.structure
     frames = [(t, {"displacement": displacement(system, t, q)}) for t, q in states]
+    if more is not None:
+        names, further = more
+        for (_, fields), (_, values) in zip(frames, further, strict=True):
+            fields.update(zip(names, values.T, strict=True))
     points = structure.places(structure.nodes(system.held.zeros())[0])
     surface = structure.surface()
     cells = chain(len(points)) if surface is None else surface

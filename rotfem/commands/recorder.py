@@ -12,6 +12,7 @@ from rotfem.analysis.schemes import State
 from rotfem.commands.fields import fields_writer, stations_writer
 from rotfem.commands.finite import check_finite
 from rotfem.commands.moment import hub_values
+from rotfem.commands.resultant_rows import ResultantRows
 from rotfem.commands.station_rows import StationRows
 from rotfem.results.run import RunResult, Table
 from rotfem.scene import OutputTable
@@ -36,7 +37,11 @@ class Recorder:
         names = tuple(f"tip_{c}" for c in system.structure.components)
         free = ("torque", "hub_kinetic", "angular_momentum", "impulse", "work") if system.hub is not None else ()
         root, further = (f"root_{name}" for name in system.root.names), tuple(system.model.problem.outputs)
-        self.history = Table(("t", "psi", "psi_dot", *names, "kinetic", "strain", "jacobi", *root, *free, *further))
+        named = () if output is None else output.resultants(system.structure.type)
+        self.resultants = ResultantRows(system.held, named) if named else None
+        stress = ("von_mises_max",) if named else ()
+        energies = ("kinetic", "strain", "jacobi")
+        self.history = Table(("t", "psi", "psi_dot", *names, *energies, *root, *free, *further, *stress))
         self._last: State | None = None
         self.formats = ("vtx",) if output is None else output.formats(system.structure.type)
         self.snapshots = Snapshots() if self.formats else None
@@ -58,9 +63,20 @@ class Recorder:
         row += system.root_reaction().values()
         row += hub_values(system, state).values()
         row += system.outputs().values()
+        row += self.also(t)
+        self.add(row, state)
+
+    @property
+    def needs_state(self) -> bool:
+        """Whether more than what a reduced model knows is to be recorded of the next row."""
+        due = self.stations is not None and self.stations.due
+        return due or self.resultants is not None or bool(self.system.model.problem.outputs)
+
+    def also(self, t: float) -> list[float]:
+        """Keep what stations and plates have at the state written into the system; return the last columns."""
         if self.stations is not None:
             self.stations(t)
-        self.add(row, state)
+        return [] if self.resultants is None else [self.resultants(t)]
 
     def add(self, row: Sequence[float], state: State | None) -> None:
         """Add a row, and keep the state that it is of if there is one.
@@ -75,6 +91,8 @@ class Recorder:
         self._last = state
         if self.snapshots is not None:
             self.snapshots.add(state.t, state.q)
+            if self.resultants is not None and self.resultants.last is not None:
+                self.resultants.frames.add(state.t, self.resultants.last)
 
     def result(self, summary: dict[str, Any], history: dict[str, Array]) -> RunResult:
         """Return a result with the last shape and the fields kept."""
@@ -89,5 +107,8 @@ class Recorder:
             out.stations = self.stations.result()
             out.further.append(stations_writer(self.system, out.stations))
         if self.snapshots is not None and self.snapshots.kept:
-            out.fields = fields_writer(self.system, self.snapshots.kept, self.formats)
+            more = None if self.resultants is None else (self.resultants.names, self.resultants.frames.kept)
+            out.fields = fields_writer(self.system, self.snapshots.kept, self.formats, more)
+        if self.resultants is not None:
+            out.resultants = self.resultants.columns()
         return out

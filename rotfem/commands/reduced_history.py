@@ -102,7 +102,7 @@ class Rows:
 
     def record(self) -> None:
         """Add all rows to the run's history, and look at states of it as a march does."""
-        response, system, times = self.response, self.system, self.response.times
+        response, times = self.response, self.response.times
         kept = set(range(0, len(times), stride(len(times)))) | {len(times) - 1}
         tips = response.tips if self.foreshortened is None else self.foreshortened.tips
         turn, a = self._turn(), response.accelerations()
@@ -110,14 +110,13 @@ class Rows:
         columns = np.column_stack([times, *turn[:2], tips, *energies[:3], root, *energies[3:]])
         for i, values in enumerate(columns):
             row = [float(value) for value in values]
-            stations = self.run.record.stations
-            at_stations = stations is not None and stations.due
-            state = self._state(i, a, turn) if i in kept or at_stations or system.model.problem.outputs else None
+            record = self.run.record
+            wanted = record.needs_state
+            state = self._state(i, a, turn) if i in kept or wanted else None
             if state is not None:
                 self.run.look(state)
-                row += self._outputs(state)
-            if stations is not None:
-                stations(float(times[i]))
+                row += self._outputs(state) if wanted else []
+            row += record.also(float(times[i]))
             self.run.record.add(row, self._shown(state, i) if i in kept else None)
 
     def _turn(self) -> tuple[Array, Array, Array]:
@@ -171,9 +170,6 @@ class Rows:
         return State(float(response.times[i]), *parts)
 
     def _outputs(self, state: State) -> list[float]:
-        stations = self.run.record.stations
-        if not self.system.model.problem.outputs and not (stations is not None and stations.due):
-            return []
         self.system.set_time(state.t)
         self.system.set_state(state.q, state.v, state.a)
         return list(self.system.outputs().values())

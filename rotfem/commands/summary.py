@@ -101,6 +101,8 @@ def run_summary(run: Simulation, status: str, history: dict[str, npt.NDArray[np.
     out["root"] = {"place": [float(c) for c in system.root.place]}
     if run.scene.time is None and len(history["t"]):
         out["root"] |= {name: float(x[-1]) for name, x in history.items() if name.startswith("root_")}
+    if run.record.resultants is not None:
+        out["stress"] = run.record.resultants.summary()
     if run.resumed:
         out["resumed"] = run.resumed
     if stepper is not None and stepper.rejected:

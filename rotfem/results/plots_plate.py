@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
 from rotfem.errors import OutputError, SceneError
+from rotfem.results.columns import label
 from rotfem.results.units import ShownUnits
 
 if TYPE_CHECKING:
@@ -87,6 +88,18 @@ def shape_figure(result: RunResult) -> Figure:
     for axis, name in zip(axes, ("u1", "u2", "u3"), strict=True):
         map_of(axis, mesh, s[name], name, f"{name} (m)", floor)
     figure.suptitle(result.title + ", final shape", fontsize=10)
+    return figure
+
+
+def resultants_figure(result: RunResult) -> Figure:
+    """Return maps of the stress resultants at the end."""
+    r = result.resultants
+    mesh = Triangulation(r["x"], r["y"], result.triangles)
+    names = [name for name in r if name not in ("x", "y")]
+    figure, axes = panels(len(names), float(np.ptp(r["y"]) / np.ptp(r["x"])))
+    for axis, name in zip(axes, names, strict=True):
+        map_of(axis, mesh, r[name], name, label(name))
+    figure.suptitle(result.title + ", final stress resultants", fontsize=10)
     return figure
 
 

@@ -33,9 +33,9 @@ SUMMARY = "summary.json"
 
 #: Names that are those of results in a folder with a summary of one; a set with others lists them in its summary.
 OURS = re.compile(
-    r"(history|shape|stations|modes|mode_shapes|sensitivities|unknowns|campbell|cost|check)\.csv|"
+    r"(history|shape|stations|resultants|modes|mode_shapes|sensitivities|unknowns|campbell|cost|check)\.csv|"
     r"(modes|campbell|explain|cost)\.json|mode_\d+\.gif|state_space\.npz|"
-    r"(history|shape|stations|modes|mode_\d+|campbell|travelling_waves|explain|cost|check)\.png|"
+    r"(history|shape|stations|resultants|modes|mode_\d+|campbell|travelling_waves|explain|cost|check)\.png|"
     r"[MCK]\.(mtx|npz)|(fields|modes|stations_line)\.(bp|xdmf|h5)|(checkpoint|stations)\.h5"
 )
 

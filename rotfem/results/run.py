@@ -64,6 +64,7 @@ class RunResult(Result):
         triangles: of a plate, triangles between the nodes of `shape`, (m, 3).
         fields: writes the fields for ParaView into a folder, on all ranks together; None of a beam.
         stations: section forces, strains and unknowns at the stations of a beam; None where none are asked for.
+        resultants: of a plate whose stress resultants are asked for, column ↦ values at its nodes at the end.
         further: what else writes files into a folder.
     """
 
@@ -72,6 +73,7 @@ class RunResult(Result):
     triangles: Any = field(default=None, repr=False)
     fields: Callable[[Path], list[Path]] | None = field(default=None, repr=False)
     stations: StationHistory | None = field(default=None, repr=False)
+    resultants: dict[str, Array] = field(default_factory=dict)
     further: list[Callable[[Path], object]] = field(default_factory=list, repr=False)
 
     @property
@@ -106,7 +108,7 @@ class RunResult(Result):
 
     def files(self) -> dict[str, str]:
         """Return history.csv, shape.csv and stations.csv, as far as there is one, and summary.json."""
-        tables = {"history.csv": self.history, "shape.csv": self.shape}
+        tables = {"history.csv": self.history, "shape.csv": self.shape, "resultants.csv": self.resultants}
         texts = {name: csv_text(columns) for name, columns in tables.items() if columns}
         if self.stations is not None and self.stations.format == "csv":
             texts["stations.csv"] = self.stations.text()
@@ -131,6 +133,8 @@ class RunResult(Result):
             out["shape.png"] = partial(plots_plate.shape_figure, self)
         elif self.shape and not over_time:
             out["shape.png"] = partial(plots.shape_figure, self)
+        if self.resultants:
+            out["resultants.png"] = partial(plots_plate.resultants_figure, self)
         if self.stations is not None and len(self.stations.t):
             out["stations.png"] = partial(self.stations.figure, self.title)
         return out

@@ -11,7 +11,7 @@ from pydantic import PlainValidator
 from rotfem import registry
 from rotfem.scene.names import Named, as_names
 from rotfem.scene.values import Count, SceneModel, problem
-from rotfem.section_quantities import FORCES, STRAINS
+from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
 
 AngularUnit = Literal["rad/s", "rpm", "Hz", "deg/s"]
 
@@ -27,7 +27,8 @@ class _Known(Named):
     @property
     def names(self) -> tuple[str, ...]:
         """All of them."""
-        sections = dict.fromkeys(name for table in (FORCES, STRAINS) for names in table.values() for name in names)
+        tables = (FORCES, STRAINS, RESULTANTS)
+        sections = dict.fromkeys(name for table in tables for names in table.values() for name in names)
         return (*registry.outputs.names, *sections)
 
 
@@ -86,6 +87,10 @@ class OutputTable(SceneModel):
         """The registered outputs among the quantities."""
         return tuple(name for name in self.quantities if name in registry.outputs)
 
+    def resultants(self, kind: str) -> tuple[str, ...]:
+        """Return the stress resultants of a plate among the quantities."""
+        return tuple(name for name in self.quantities if name in RESULTANTS.get(kind, ()))
+
     def sections(self, kind: str) -> tuple[str, ...]:
         """Return the quantities that a beam of a type is to have recorded at its stations: those named, or all."""
         known = (*FORCES[kind], *STRAINS[kind])
@@ -95,7 +100,9 @@ class OutputTable(SceneModel):
         """Return the formats of the files for ParaView of a structure of a type."""
         if self.fields is not None:
             return self.fields
-        return ("xdmf",) if kind in FORCES else ("vtx",)
+        if kind in FORCES:
+            return ("xdmf",)
+        return ("vtx", "xdmf") if self.resultants(kind) else ("vtx",)
 
     def positions(self, length: float) -> tuple[float, ...]:
         """Return the stations along a beam of a length, m; empty if there are none."""
@@ -113,10 +120,14 @@ class OutputTable(SceneModel):
         Raises:
             PydanticCustomError: names the key.
         """
-        sections = {name for table in (FORCES, STRAINS) for names in table.values() for name in names}
-        named = [name for name in self.quantities if name in sections and name not in registry.outputs]
+        named = [name for name in self.quantities if name not in registry.outputs]
+        known = (*FORCES.get(kind, ()), *STRAINS.get(kind, ()), *RESULTANTS.get(kind, ()))
+        for name in named:
+            if name not in known:
+                allowed = f'"{name}" is none of a {kind}; allowed: {", ".join(known)}'
+                raise problem("output.quantities", list(self.quantities), allowed)
         if self.stations is None:
-            if named:
+            if named and kind in FORCES:
                 raise problem("output.quantities", list(self.quantities), f'"{named[0]}" needs output.stations')
             for key in ("every", "format"):
                 if key in self.model_fields_set:
@@ -125,11 +136,6 @@ class OutputTable(SceneModel):
         if kind not in FORCES or length is None:
             shown = self.stations if isinstance(self.stations, int) else list(self.stations)
             raise problem("output.stations", shown, f"are places along a beam; a {kind} has none")
-        known = (*FORCES[kind], *STRAINS[kind])
-        for name in named:
-            if name not in known:
-                allowed = f'"{name}" is none of a {kind}; allowed: {", ".join(known)}'
-                raise problem("output.quantities", list(self.quantities), allowed)
         outside = [x for x in self.positions(length) if not 0.0 <= x <= length]
         if outside:
             raise problem("output.stations", outside[0], f"must be from 0 to the length {length:g} m")

@@ -251,6 +251,10 @@ class Plate(Structure):
         _, order = self._order
         return {"x": x[order, 0], "y": x[order, 1]}, q[order]
 
+    def ordered(self, values: Array) -> Array:
+        """Return values at the nodes of this process (owned, …) as those of all in the order of `nodes`."""
+        return np.asarray(np.concatenate(self.comm.allgather(values))[self._order[1]])
+
     def surface(self) -> npt.NDArray[np.int64]:
         """Return triangles between the nodes in the order of `nodes`, shape (m, 3), on every rank."""
         dofmap, tdim = self.V.dofmap, self.mesh.topology.dim
