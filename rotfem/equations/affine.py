@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.equations.clamp_rows import ClampRows
 from rotfem.equations.modal_damping import EFFECT
 from rotfem.equations.model import Model
 from rotfem.equations.pieces import PRESTRESS, Piece, Pieces, set_diagonal
@@ -190,28 +191,13 @@ class AffineSystem(System):
         return self.b
 
     @cached_property
-    def _at_root(self) -> dict[str, tuple[npt.NDArray[np.int64], Array]]:
-        """For M, C, K the unknowns that act on the clamp, and what each piece makes of them; for f its numbers."""
-        out: dict[str, tuple[npt.NDArray[np.int64], Array]] = {}
-        for kind, (index, _) in self._by_kind.items():
-            parts = [self.pieces[i].at_root for i in index]
-            if kind == "f":
-                out[kind] = np.zeros(0, dtype=np.int64), np.array(parts).reshape(len(parts), len(self.root.names))
-                continue
-            whole = np.array(parts).reshape(len(parts), *self.root.weights.shape)
-            near = np.flatnonzero(np.any(whole != 0.0, axis=(0, 2)))
-            out[kind] = near, whole[:, near].reshape(len(parts), len(near) * len(self.root.names))
-        return out
+    def _at_clamp(self) -> ClampRows:
+        return ClampRows(self.pieces, {kind: index for kind, (index, _) in self._by_kind.items()}, len(self.root.names))
 
     def clamp_forces(self) -> Array:
         """Return the part of this process in what the clamp does in its unit motions (see `System`)."""
         assert self._coefficients is not None
-        c, motions = self._coefficients, len(self.root.names)
-        out: Array = c[self._by_kind["f"][0]] @ self._at_root["f"][1]
-        for kind, x in zip("KCM", self._state, strict=True):
-            near, products = self._at_root[kind]
-            out = out + x[near] @ (c[self._by_kind[kind][0]] @ products).reshape(len(near), motions)
-        return out
+        return self._at_clamp(self._coefficients, self._state)
 
     @property
     def current(self) -> bool:

@@ -2,7 +2,7 @@
 
 Membrane forces n = h Q ε (N/m), shear forces q = k h G γ (N/m) and moments m = (h³/12) Q κ (N) are best at the points
 of the reduced rule. Every cell carries them to its nodes by the polynomial of degree k − 1 that they have there, and a
-node has the mean of its cells. The equivalent stress (von Mises) is the largest of that of both faces, σ = n/h ± 6 m/h²,
+node has the mean of its cells. The equivalent stress (von Mises) is the largest of both faces, σ = n/h ± 6 m/h²,
 and of the middle, σ = n/h with the parabola of the shear stress, 3/2 q/h.
 """
 
