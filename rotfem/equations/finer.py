@@ -6,6 +6,7 @@ and states are what they are on the coarse mesh. So nothing is compiled, and bui
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ from petsc4py import PETSc
 from rotfem.equations.pieces import held
 from rotfem.numerics import compat
 from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.low_rank import LowRank
+from rotfem.numerics.projection import times
 from rotfem.numerics.refinement import Refinement
 from rotfem.structures.tip_values import TipValues
 
@@ -92,13 +95,33 @@ class FinerEquations:
     def imbalance(self) -> Any:
         """Return −F at q, v, a as a PETSc vector, zero at clamped unknowns."""
         b = compat.create_vector(self.V)
-        fem_petsc.assemble_vector(b, self._form("F"))
+        if not self.system.linear or self.system.tangent_forms("f")[0]:  # nothing may drive a linear theory
+            fem_petsc.assemble_vector(b, self._form("F"))
         if self.system.linear:
             for kind, x in (("M", self.a), ("C", self.v), ("K", self.q)):
                 self._add(b, kind, x)
+        if self.system.by_mode is not None:
+            b.array[:] += self._by_mode.times(self.v.x.array)
         b.scale(-1.0)
         b.array[self.clamped] = 0.0
         return b
+
+    @cached_property
+    def _by_mode(self) -> LowRank:
+        """Damping by mode on the refined mesh: of the same shapes, with the mass there of the undeformed structure."""
+        shapes, function = self.system.by_mode.shapes, fem.Function(self.system.V)
+        columns: Array = np.empty((len(function.x.array), shapes.shape[1]))
+        for column, shape in zip(columns.T, shapes.T, strict=True):
+            function.x.array[: len(shape)] = shape
+            function.x.scatter_forward()
+            column[:] = function.x.array
+        state = [f.x.array.copy() for f in (self.q, self.v, self.a)]
+        for f in (self.q, self.v, self.a):
+            f.x.array[:] = 0.0
+        M = self.matrix("M")
+        for f, values in zip((self.q, self.v, self.a), state, strict=True):
+            f.x.array[:] = values
+        return LowRank(times(M, self.carried(columns)), M)
 
     def _add(self, b: Any, kind: str, x: fem.Function) -> None:
         """Add A x to a vector, A of a linear theory; it has all of one kind there is, or none."""

@@ -34,7 +34,21 @@ KEY = "structure.damping.modal"
 FIRST = 10
 
 
-def damping_by_mode(system: Any) -> LowRank | None:
+class ByMode(LowRank):
+    """C of damping by mode.
+
+    Args:
+        B: M φ_j √(2 ζ_j ω_j), owned rows, a column each.
+        shapes: φ_j √(2 ζ_j ω_j) likewise.
+        like: see `LowRank`.
+    """
+
+    def __init__(self, B: Array, shapes: Array, like: Any):
+        super().__init__(B, like)
+        self.shapes = shapes
+
+
+def damping_by_mode(system: Any) -> ByMode | None:
     """Return what damping by mode adds to C of a system; None where there is none.
 
     Raises:
@@ -50,7 +64,7 @@ def damping_by_mode(system: Any) -> LowRank | None:
     modes, zeta = of_families(system, ratios) if isinstance(ratios, Mapping) else in_order(system, ratios)
     damped = np.flatnonzero(zeta)
     weights = np.sqrt(2 * zeta[damped] * modes.omega[damped])
-    return LowRank(modes.massed[:, damped] * weights, system.A)
+    return ByMode(modes.massed[:, damped] * weights, modes.shapes[:, damped] * weights, system.A)
 
 
 def in_order(system: Any, ratios: float | tuple[float, ...]) -> tuple[ModesAtRest, Array]:

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from dolfinx import la
 
-from rotfem.equations.modal_damping import EFFECT, damping_by_mode
+from rotfem.equations.modal_damping import EFFECT, ByMode, damping_by_mode
 from rotfem.equations.model import Model
 from rotfem.equations.readings import Readings
 from rotfem.equations.solutions import Solutions
@@ -25,7 +25,6 @@ from rotfem.mechanics.motion import IDENTITY, Motion
 from rotfem.numerics import compat
 from rotfem.numerics.caching import forget
 from rotfem.numerics.linear import DirectSolver, Increment
-from rotfem.numerics.low_rank import LowRank
 from rotfem.structures.root_reaction import RootReaction
 from rotfem.structures.turning_clamp import TurningClamp
 
@@ -86,7 +85,7 @@ class System(Readings, Solutions, ABC):
         self.b = compat.wrap(self._b)
         self._solver: DirectSolver | None = None
         self._dx = Increment(self.V)
-        self._by_mode: LowRank | None = None
+        self._by_mode: ByMode | None = None
         self._damped = True
         self.A = self._compile()
         self._by_mode = damping_by_mode(self)
@@ -153,7 +152,7 @@ class System(Readings, Solutions, ABC):
         self._damped = EFFECT not in effects
 
     @property
-    def by_mode(self) -> LowRank | None:
+    def by_mode(self) -> ByMode | None:
         """What damping by mode adds to C, which has it nowhere else; None without, and where damping is left out."""
         return self._by_mode if self._damped else None
 
