@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from rotfem.commands.cost.result import CostResult
     from rotfem.commands.cost.study import cost
     from rotfem.commands.explain import explain
+    from rotfem.commands.import_blade import import_blade
     from rotfem.commands.modes import modes
     from rotfem.commands.problem import Problem
     from rotfem.commands.response import response
@@ -50,6 +51,7 @@ _HOMES = {
     "commands.check": ("check",),
     "commands.cost.study": ("cost",),
     "commands.explain": ("explain",),
+    "commands.import_blade": ("import_blade",),
     "commands.modes": ("modes",),
     "commands.problem": ("Problem",),
     "commands.response": ("response",),
@@ -112,6 +114,7 @@ __all__ = [
     "check",
     "cost",
     "explain",
+    "import_blade",
     "load_scene",
     "modes",
     "register",

@@ -1,4 +1,4 @@
-"""The registries: theories, effects, schemes, section shapes and outputs, by name.
+"""The registries: theories, effects, schemes, section shapes, outputs and formats of blade files, by name.
 
 They are the only lists. What a scene may say, the ladder of theories, the reasons of `explain`, the energies and the
 hub's row follow from their entries. The package's own entries come into being when a registry is first asked for one; a
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rotfem.mechanics.effects import Effect
     from rotfem.mechanics.outputs import Output
     from rotfem.mechanics.theories import Theory
+    from rotfem.scene.blades.formats import BladeFormat
     from rotfem.scene.section_shapes import Shape
 
 
@@ -98,6 +99,14 @@ schemes: Registry[Any] = Registry(
 )
 shapes: Registry[Shape] = Registry("section shape", "rotfem.scene.section_shapes")
 outputs: Registry[Output] = Registry("output", "rotfem.mechanics.outputs")
+blade_formats: Registry[BladeFormat] = Registry(
+    "format of blade files",
+    "rotfem.scene.blades.elastodyn",
+    "rotfem.scene.blades.beamdyn",
+    "rotfem.scene.blades.bmodes",
+    "rotfem.scene.blades.hawc2",
+    "rotfem.scene.blades.windio",
+)
 
 
 def register(entry: Entry | type[Entry]) -> None:

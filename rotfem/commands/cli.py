@@ -306,6 +306,31 @@ def cost(
         todo.session.say([f"tuned scene in {write}"])
 
 
+@app.command("import")
+def import_(
+    file: Annotated[Path, typer.Argument(metavar="FILE", parser=as_path, help="blade file", show_default=False)],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="SCENE", parser=as_path, help="scene to write")],
+    kind: Annotated[
+        str | None, typer.Option("--format", metavar="NAME", help="format, if the file does not say")
+    ] = None,
+    overrides: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="scene key beside the file, repeatable")
+    ] = None,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False,
+) -> None:
+    """Write the scene of a blade FILE of BeamDyn, ElastoDyn, BModes, HAWC2 or windIO."""
+    from rotfem.commands.import_blade import import_blade, write_imported
+
+    with Session(False, quiet, debug) as session:
+        session.check_writable("-o", output)
+        scene = import_blade(file, kind, overrides or ())
+        if session.first:
+            write_imported(scene, file, output)
+        structure = scene.structure
+        session.say([f"{output}: {structure.type} of {file.name}, rows at {len(structure.knots) + 2} places"])
+
+
 def main() -> None:
     """Run the command line."""
     arguments = sys.argv[1:]

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import ValidationInfo
 from pydantic_core import PydanticCustomError
 
+from rotfem.scene.blades.formats import Asked, keys_of
 from rotfem.scene.files import ROW_BYTES, existing_file, read_header, read_rows, read_text
 from rotfem.scene.limits import limits_in
 from rotfem.scene.problems import did_you_mean
@@ -31,13 +32,14 @@ MATRIX_ROW_BYTES = 4 * ROW_BYTES
 Rows = list[list[Any]]
 
 
-def with_tables(data: Any, info: ValidationInfo, keys: Sequence[str]) -> Any:
+def with_tables(data: Any, info: ValidationInfo, keys: Sequence[str] | None) -> Any:
     """Return the table [structure] with the rows of files in the place of their paths.
 
     Args:
         data: the table as it is given; what is no table is returned as it is.
         info: validation info; its context holds the scene's directory.
-        keys: of the table itself that may be paths; those of its section all may, but names.
+        keys: of the table itself that may be paths; those of its section all may, but names. None of a planar beam,
+            which no blade file is one of.
 
     Raises:
         PydanticCustomError: a file is not there or not such a table, naming line and column; a key is given twice.
@@ -45,12 +47,21 @@ def with_tables(data: Any, info: ValidationInfo, keys: Sequence[str]) -> Any:
     if not isinstance(data, Mapping):
         return data
     out = dict(data)
-    for key in keys:
+    for key in keys or ():
         if _is_path(out.get(key)):
             out[key] = _named(key, lambda key=key: _rows(key, out[key], info))
     section = out.get("section")
-    if isinstance(section, Mapping):
-        out["section"] = _section_tables(section, info)
+    if not isinstance(section, Mapping):
+        return out
+    out["section"] = section = _section_tables(section, info)
+    if keys is None and (given := [key for key in ("from", "format") if key in section]):
+        raise problem(f"section.{given[0]}", section[given[0]], "is only of a spatial_beam")
+    if "from" in section:
+        path = _named("section.from", lambda: existing_file(section["from"], info))
+        without = {key: value for key, value in out.items() if key != "section"}
+        return _located(lambda: keys_of(path, Asked(without, section)))
+    if "format" in section:
+        raise problem("section.format", section["format"], "has no meaning without section.from")
     return out
 
 
@@ -80,6 +91,15 @@ def _named(key: str, read: Any) -> Any:
     except PydanticCustomError as error:
         context = error.context or {}
         raise problem(key, context.get("value"), context.get("reason", error.message())) from None
+
+
+def _located(read: Any) -> Any:
+    """Return what is read; a problem that names no key is one of the file that section.from names."""
+    try:
+        return read()
+    except PydanticCustomError as error:
+        context = error.context or {}
+        raise problem(context.get("key") or "section.from", context.get("value"), context["reason"]) from None
 
 
 def _rows(key: str, value: Any, info: ValidationInfo) -> Rows:

@@ -121,7 +121,7 @@ class PlanarBeamStructure(StructureTable):
     @classmethod
     def _read_files(cls, data: Any, info: ValidationInfo) -> Any:
         """Read the files of the section."""
-        return with_tables(data, info, ())
+        return with_tables(data, info, None)
 
     @model_validator(mode="after")
     def _check_tapers(self) -> Self:

@@ -163,7 +163,7 @@ class Scene(SceneModel):
 
     def to_dict(self) -> dict[str, Any]:
         """Return tables of what was set and of all defaults, fit for JSON and TOML; functions become their names."""
-        tables: dict[str, Any] = _plain(self)
+        tables: dict[str, Any] = plain(self)
         if self.output == OutputTable():
             del tables["output"]
         if self.limits == Limits():
@@ -282,16 +282,17 @@ def as_scene(scene: Scene | str | Path | Mapping[str, Any]) -> Scene:
     return Scene.from_dict(scene) if isinstance(scene, Mapping) else load_scene(scene)
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """Return a validated value as tables, lists and numbers, fit for JSON and TOML; functions become their names."""
     if isinstance(value, BaseModel):
         fields = {name: getattr(value, name) for name in type(value).model_fields} | (value.model_extra or {})
-        return {name: _plain(entry) for name, entry in fields.items() if entry is not None}
+        return {name: plain(entry) for name, entry in fields.items() if entry is not None}
     if isinstance(value, Mapping):
-        return {key: _plain(entry) for key, entry in value.items()}
+        return {key: plain(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
         if value and isinstance(value[0], tuple):  # a table of numbers, maybe a long one
             return list(map(list, value))
-        return [_plain(entry) for entry in value]
+        return [plain(entry) for entry in value]
     if callable(value):
         return f"<callable {getattr(value, '__name__', type(value).__name__)}>"
     return value

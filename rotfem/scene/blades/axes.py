@@ -1,0 +1,79 @@
+"""From the axes of blade files to those of a spatial beam (docs/blades.md), and matrices from properties at centres."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.scene.values import Array
+
+#: Components along our axes 1, 2, 3 from those along x (flapwise, downwind), y (to the trailing edge), z (to the tip)
+#: of IEC 61400-13 and OpenFAST.
+FROM_IEC = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+
+#: The same from x (to the leading edge), y (downwind, suction side), z (to the tip) of HAWC2.
+FROM_HAWC2 = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+
+#: Part of the largest entry by which a matrix of a file may be asymmetric: its digits are those of another program.
+SYMMETRIC = 1e-6
+
+
+def turned_matrix(matrix: npt.ArrayLike, axes: Array) -> Array:
+    """Return a 6×6 matrix along our axes; axes (3, 3) gives components along ours from those of the file."""
+    both = np.kron(np.eye(2), axes)
+    return np.asarray(both @ np.asarray(matrix) @ both.T)
+
+
+def is_symmetric(matrix: Array) -> bool:
+    """Return whether a matrix is symmetric to what another program may have left."""
+    return bool(np.max(np.abs(matrix - matrix.T)) <= SYMMETRIC * np.max(np.abs(matrix)))
+
+
+def symmetric(matrix: Array) -> Array:
+    """Return a matrix with what its digits leave of asymmetry taken out."""
+    return (matrix + matrix.T) / 2
+
+
+def scaled_rows(x: npt.ArrayLike, length: float, values: npt.ArrayLike) -> list[list[Any]]:
+    """Return the table [[x, value], …] of values over fractions of the length, ended by the length exactly."""
+    places = np.asarray(x, dtype=float) * length
+    places[-1] = length
+    return rows_over(places, values)
+
+
+def rows_over(x: npt.ArrayLike, values: npt.ArrayLike) -> list[list[Any]]:
+    """Return the table [[x, value], …] of places (m) and values there, numbers, points or matrices."""
+    return [[float(place), value.tolist()] for place, value in zip(np.asarray(x), np.asarray(values), strict=True)]
+
+
+def shifted(axial: npt.ArrayLike, transverse: npt.ArrayLike) -> Array:
+    """Return B (6, 6): strains on the reference line ↦ axial strain at one point (y, z), shear strains at another.
+
+    It is Γ₁ + z K₂ − y K₃, Γ₂ − z K₁, Γ₃ + y K₁, and the curvatures themselves.
+    """
+    (y, z), (a, b) = np.asarray(axial), np.asarray(transverse)
+    B = np.eye(6)
+    B[0, 4], B[0, 5], B[1, 3], B[2, 3] = z, -y, -b, a
+    return B
+
+
+def about_axis(angle: float) -> Array:
+    """Return the 6×6 rotation by an angle (rad) about axis 1: components along fixed axes from those along turned."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.kron(np.eye(2), np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]]))
+
+
+def iec_pretwist(tangent: Array, twist: Array) -> Array:
+    """Return the pretwist (n,), rad, of a twist (n,) about −z from axes whose x has no part along y, as in BeamDyn.
+
+    It is −twist, and the angle about the tangents (n, 3) from our axis 3 without twist to that x.
+    """
+    t_2 = np.cross([0.0, 0.0, 1.0], tangent)
+    t_2 /= np.linalg.norm(t_2, axis=1)[:, None]
+    t_3 = np.cross(tangent, t_2)
+    x = np.cross([0.0, -1.0, 0.0], tangent)  # across our axis 2, which is −y
+    x /= np.linalg.norm(x, axis=1)[:, None]
+    between = np.arctan2(-np.sum(x * t_2, axis=1), np.sum(x * t_3, axis=1))
+    return np.asarray(between - np.unwrap(twist))

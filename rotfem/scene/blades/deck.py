@@ -1,0 +1,113 @@
+"""The text of a blade file, read line by line, with errors that name file, line and column."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from rotfem.scene.files import SHOWN_CELL, read_text
+from rotfem.scene.values import problem
+
+#: Bytes of a blade file, at most.
+LARGEST = 50_000_000
+
+
+class Deck:
+    """A blade file.
+
+    Args:
+        path: the file.
+
+    Attributes:
+        text: its content, lines ended by line feeds.
+        lines: without their ends; messages count them from 1.
+
+    Raises:
+        PydanticCustomError: it cannot be read as text.
+    """
+
+    def __init__(self, path: Path):
+        self.path, self.text = path, read_text(path, LARGEST)
+        self.lines = self.text.split("\n")
+
+    def fail(self, reason: str, line: int | None = None, column: int | None = None) -> NoReturn:
+        """Refuse the file.
+
+        Args:
+            reason: what is wrong and what is allowed.
+            line: from 1.
+            column: of the value, from 1.
+
+        Raises:
+            PydanticCustomError: always.
+        """
+        where = "" if line is None else f"line {line}: " if column is None else f"line {line}, column {column}: "
+        raise problem("", str(self.path), f"{where}{reason}")
+
+    def find(self, words: str, start: int = 1) -> int:
+        """Return the number of the first line, not before start, in which all words stand, whatever their case."""
+        wanted = words.lower().split()
+        for number, line in enumerate(self.lines[start - 1 :], start=start):
+            low = line.lower()
+            if all(word in low for word in wanted):
+                return number
+        self.fail(f'no line with "{words}" from line {start} on')
+
+    def named(self, name: str, start: int = 1) -> tuple[int, str]:
+        """Return (line, value) of the line `value  name …`, as input files of NREL's programs have them."""
+        for number, line in enumerate(self.lines[start - 1 :], start=start):
+            words = re.match(r"""\s*("[^"]*"|'[^']*'|\S+)\s+(\S+)""", line)
+            if words and words[2].rstrip(":-,").lower() == name.lower():
+                return number, words[1].strip("\"'")
+        self.fail(f"no line with a value of {name} from line {start} on")
+
+    def number(self, name: str, start: int = 1) -> float:
+        """Return the number of the line `value  name …`."""
+        line, text = self.named(name, start)
+        return self.value(text, line, 1)
+
+    def count(self, name: str, least: int, start: int = 1) -> int:
+        """Return the whole number of the line `value  name …`, at least so many."""
+        line, text = self.named(name, start)
+        if not text.isdecimal() or int(text) < least:
+            self.fail(f'{name} is "{text[:SHOWN_CELL]}"; must be a whole number, at least {least}', line, 1)
+        return int(text)
+
+    def value(self, text: str, line: int, column: int) -> float:
+        """Return a word as a finite number; exponents may have Fortran's D."""
+        try:
+            number = float(re.sub(r"[dD]", "e", text)) if text.isascii() and "_" not in text else math.nan
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number):
+            shown = (
+                f'"{text}"' if len(text) <= SHOWN_CELL and text.isprintable() else f"a text of {len(text)} characters"
+            )
+            self.fail(f"{shown} must be a finite number", line, column)
+        return number
+
+    def row(self, line: int, columns: int) -> list[float]:
+        """Return the numbers of a line that has so many columns; what stands behind them is refused."""
+        if line > len(self.lines):
+            self.fail(f"the file ends before line {line}, where {columns} numbers should stand")
+        words = self.lines[line - 1].split()
+        if len(words) != columns:
+            self.fail(f"has {len(words)} columns; must be {columns}", line)
+        return [self.value(word, line, column) for column, word in enumerate(words, start=1)]
+
+    def rows(self, first: int, count: int, columns: int) -> list[list[float]]:
+        """Return the numbers of successive lines."""
+        return [self.row(first + i, columns) for i in range(count)]
+
+    def increasing(self, values: Sequence[float], first: int, last: float | None = None, what: str = "x") -> None:
+        """Refuse a first column, on lines from `first` on, that does not rise from 0 strictly (up to `last`)."""
+        if values[0] != 0.0:
+            self.fail(f"{what} must start at 0, not at {values[0]:g}", first, 1)
+        for i in range(1, len(values)):
+            if values[i] <= values[i - 1]:
+                self.fail(f"{what} must increase: {values[i]:g} ≤ {values[i - 1]:g}", first + i, 1)
+        if last is not None and not math.isclose(values[-1], last, rel_tol=1e-6):
+            self.fail(f"{what} must end at {last:g}, not at {values[-1]:g}", first + len(values) - 1, 1)

@@ -1,0 +1,138 @@
+"""HAWC2's st file: sets of sections over the arc length, with centres or with full matrices (FPM).
+
+As the manual of HAWC2 has them, x_c2 to the leading edge and y_c2 to the suction side: centres from the line of c2_def;
+stiffness about the elastic centre along principal axes that are turned by `pitch`, shear and torsion about the shear
+centre, of a full matrix all about the elastic centre; order of a matrix: shear in x, y, axial, bending about x, y,
+torsion. Radii of gyration are about the mass centre along the principal axes, as in the public files of reference
+turbines, whose matrices of OpenFAST say the same (the manual speaks of the elastic centre). The line and its twist are
+not in this file but in c2_def: `line` and `pretwist` of the scene, or a straight blade.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from rotfem.registry import register
+from rotfem.scene.blades.axes import FROM_HAWC2, about_axis, rows_over, shifted, turned_matrix
+from rotfem.scene.blades.deck import Deck
+from rotfem.scene.blades.formats import Asked, BladeFormat
+from rotfem.scene.values import Array, problem
+
+#: Columns of a row with centres, and with a full matrix.
+CENTRES = [
+    *("r", "m", "x_cg", "y_cg", "ri_x", "ri_y", "x_sh", "y_sh", "E", "G", "I_x", "I_y", "I_p"),
+    *("k_x", "k_y", "A", "pitch", "x_e", "y_e"),
+]
+FULL = ["r", "m", "x_cg", "y_cg", "ri_x", "ri_y", "pitch", "x_e", "y_e"]
+FULL += [f"K{i + 1}{j + 1}" for i, j in zip(*np.triu_indices(6), strict=True)]
+
+#: Columns that must be greater than 0.
+POSITIVE = (
+    "m",
+    "ri_x",
+    "ri_y",
+    "E",
+    "G",
+    "I_x",
+    "I_y",
+    "I_p",
+    "k_x",
+    "k_y",
+    "A",
+    "K11",
+    "K22",
+    "K33",
+    "K44",
+    "K55",
+    "K66",
+)
+
+
+def recognises(deck: Deck) -> bool:
+    """Return whether there are lines of sets (#1) and of their parts ($1 with a number of rows)."""
+    return any(re.match(r"\s*#\d+", line) for line in deck.lines) and any(_part(line) for line in deck.lines)
+
+
+def _part(line: str) -> re.Match[str] | None:
+    return re.match(r"\s*\$(\d+)\s+(\d+)\s*($|\S)", line)
+
+
+def read(deck: Deck, asked: Asked) -> dict[str, Any]:
+    """Return length and section of the part that section.set names, which must be given where there are several."""
+    parts = _parts(deck)
+    wanted = asked.section.get("set")
+    names = ", ".join(f"[{number}, {part}]" for number, part in parts)
+    if wanted is None and len(parts) > 1:
+        raise problem("section.set", None, f"must say which of the sets of {deck.path.name}: {names}")
+    key = next(iter(parts)) if wanted is None else next((each for each in parts if list(each) == wanted), None)
+    if key is None:
+        raise problem("section.set", wanted, f"is not in {deck.path.name}; allowed: {names}")
+    first, count = parts[key]
+    columns = len(deck.lines[first - 1].split()) if first <= len(deck.lines) else 0
+    known = {len(names): names for names in (CENTRES, FULL)}
+    if columns not in known:
+        deck.fail(
+            f"has {columns} columns; must be {len(CENTRES)} with centres, or {len(FULL)} with a full matrix", first
+        )
+    table = dict(zip(known[columns], np.array(deck.rows(first, count, columns)).T, strict=True))
+    deck.increasing(table["r"], first, what="r")
+    for column, name in enumerate(known[columns], start=1):
+        for i in np.flatnonzero(table[name] <= 0.0) if name in POSITIVE else ():
+            deck.fail(f"{name} must be greater than 0, not {table[name][i]:g}", first + int(i), column)
+    rows = [{name: float(values[i]) for name, values in table.items()} for i in range(count)]
+    stiffness = np.array([_stiffness(row) for row in rows])
+    for i, matrix in enumerate(stiffness):
+        if np.linalg.eigvalsh(matrix / np.sqrt(np.outer(np.diag(matrix), np.diag(matrix))))[0] <= 0.0:
+            deck.fail("the stiffness matrix is not positive definite", first + i)
+    mass = np.array([_mass(row) for row in rows])
+    section = {"stiffness": rows_over(table["r"], stiffness), "mass": rows_over(table["r"], mass)}
+    return {"length": float(table["r"][-1]), "section": section}
+
+
+def _parts(deck: Deck) -> dict[tuple[int, int], tuple[int, int]]:
+    """Return (set, part) ↦ (first line, number of rows)."""
+    out: dict[tuple[int, int], tuple[int, int]] = {}
+    number = 0
+    for line, text in enumerate(deck.lines, start=1):
+        if found := re.match(r"\s*#(\d+)", text):
+            number = int(found[1])
+        elif part := _part(text):
+            if number == 0:
+                deck.fail("a part ($) before its set (#)", line)
+            if int(part[2]) < 2:
+                deck.fail(f"must have at least two rows, not {part[2]}", line, 2)
+            out[number, int(part[1])] = (line + 1, int(part[2]))
+    if not out:
+        deck.fail("has no set (#1) with a part ($1 and its number of rows)")
+    return out
+
+
+def _stiffness(row: dict[str, float]) -> Array:
+    """Return the stiffness matrix along our axes about the line of c2_def."""
+    elastic, turn = (row["x_e"], row["y_e"]), about_axis(np.radians(row["pitch"]))
+    if "K11" in row:
+        K = np.zeros((6, 6))
+        for i, j in zip(*np.triu_indices(6), strict=True):
+            K[i, j] = K[j, i] = row[f"K{i + 1}{j + 1}"]
+        principal, B = turned_matrix(K, FROM_HAWC2), shifted(elastic, elastic)
+    else:
+        E, G, A = row["E"], row["G"], row["A"]
+        shear = (row["k_x"] * G * A, row["k_y"] * G * A)
+        principal = np.diag([E * A, *shear, G * row["I_p"], E * row["I_x"], E * row["I_y"]])
+        B = shifted(elastic, (row["x_sh"], row["y_sh"]))
+    return np.asarray(B.T @ turn @ principal @ turn.T @ B)
+
+
+def _mass(row: dict[str, float]) -> Array:
+    """Return the mass matrix along our axes about the line of c2_def."""
+    m, turn = row["m"], about_axis(np.radians(row["pitch"]))
+    flap, edge = m * row["ri_x"] ** 2, m * row["ri_y"] ** 2
+    center = (row["x_cg"], row["y_cg"])
+    B = shifted(center, center)
+    return np.asarray(B.T @ turn @ np.diag([m, m, m, flap + edge, flap, edge]) @ turn.T @ B)
+
+
+register(BladeFormat("hawc2", "HAWC2's st file, with centres or full matrices", recognises, read))

@@ -1,0 +1,311 @@
+"""Blade files: one blade as five programs write it is one blade, and what is wrong in a file is said with its line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rotfem
+from rotfem.scene import Scene, SpatialBeamStructure
+from rotfem.scene.blade_profile import axes_along
+from tests import blade_decks as decks
+
+STIFF = {"GA2": 1e10, "GA3": 1e10}
+RIGID = {"EA": 1e12, "GJ": 1e12, **STIFF}
+
+
+def blade(folder: Path, text: str, name: str = "blade.dat", **more: Any) -> SpatialBeamStructure:
+    """Return the beam of a file with this text; more are keys of the section, and of the structure after structure_."""
+    (folder / name).write_text(text)
+    return read(folder, name, **more)
+
+
+def read(folder: Path, name: str, **more: Any) -> SpatialBeamStructure:
+    structure = {key.removeprefix("structure_"): value for key, value in more.items() if key.startswith("structure_")}
+    section = {"from": name} | {key: value for key, value in more.items() if not key.startswith("structure_")}
+    tables = {"structure": {"type": "spatial_beam", **structure, "section": section}}
+    scene = Scene.from_dict(tables | {"motion": {"type": "constant", "speed": 1.0}}, directory=folder)
+    assert isinstance(scene.structure, SpatialBeamStructure)
+    return scene.structure
+
+
+def along_ours(matrix: Any) -> Any:
+    """Return a matrix in axes 1, 2, 3 = z, −y, x from one in x, y, z: entry by entry."""
+    place, sign = [2, 1, 0, 5, 4, 3], np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
+    return np.asarray(matrix)[np.ix_(place, place)] * np.outer(sign, sign)
+
+
+def test_one_blade_in_four_formats(tmp_path: Path) -> None:
+    """Matrices at root and tip are those of sums over centres in IEC axes; pretwist is −twist."""
+    (tmp_path / "windio.yaml").write_text(decks.windio())
+    beams = {
+        "beamdyn": blade(tmp_path, decks.beamdyn_blade(), structure_length=decks.LENGTH),
+        "hawc2 full": blade(tmp_path, decks.hawc2(True), "full.st"),
+        "hawc2": blade(tmp_path, decks.hawc2(False), "centres.st"),
+        "windio": read(tmp_path, "windio.yaml"),
+    }
+    for name, beam in beams.items():
+        assert beam.length == pytest.approx(decks.LENGTH, rel=1e-12)
+        for x, station, angle in zip((0.0, decks.LENGTH), decks.STATIONS, decks.ANGLE, strict=True):
+            at = beam.section.at(x)
+            for key, matrix in zip(("stiffness", "mass"), decks.iec_matrices(station, angle), strict=True):
+                wanted = along_ours(matrix)
+                scale = np.sqrt(np.outer(np.diag(wanted), np.diag(wanted)))
+                assert np.max(np.abs(at[key] - wanted) / scale) < 1e-12, (name, key, x)
+    twist = np.array(beams["windio"].pretwist)
+    np.testing.assert_allclose(twist[[0, -1], 1], -np.radians(decks.TWIST), rtol=1e-12)
+
+
+def test_beamdyn_with_its_line(tmp_path: Path) -> None:
+    """x is axis 3, y −2, z 1; without sweep the sections are turned by −twist, with it by a little more."""
+    (tmp_path / "blade.dat").write_text(decks.beamdyn_blade())
+    bent = [[0.0, 0.0, 0.0, 12.0], [-0.1, 0.0, 8.0, 5.0], [-0.5, 0.0, 15.0, 1.0], [-1.2, 0.0, 20.0, -1.5]]
+    beam = blade(tmp_path, decks.beamdyn_primary(bent), "primary.dat")
+    np.testing.assert_allclose(beam.line, [[z, -y, x] for x, y, z, _ in bent], atol=1e-12)
+    np.testing.assert_allclose(
+        [a for _, a in np.array(beam.pretwist)], -np.radians([row[3] for row in bent]), atol=1e-12
+    )
+    assert np.array(beam.section.stiffness[-1][0]) == pytest.approx(beam.length, rel=1e-12)
+    swept = [[x, 0.1 * z * z / 20, z, twist] for x, _, z, twist in bent]
+    beam = blade(tmp_path, decks.beamdyn_primary(swept), "primary.dat")
+    line = beam.reference_line
+    assert line is not None
+    _, T = axes_along(beam, np.array([x for x, _ in beam.pretwist]))
+    for axes, (*_, twist) in zip(T, swept, strict=True):
+        # Turned back by the twist about −z, x (our section axis 3) has no component along y (−2).
+        back = np.radians(twist)
+        x = np.cos(back) * axes[:, 2] - np.sin(back) * axes[:, 1]
+        assert abs(x[1]) < 1e-12
+
+
+def test_elastodyn(tmp_path: Path) -> None:
+    beam = blade(tmp_path, decks.elastodyn(), structure_length=decks.LENGTH, **RIGID)
+    section = beam.section
+    np.testing.assert_allclose([v for _, v in section.mass_per_length], [1.04 * s["m"] for s in decks.STATIONS])
+    np.testing.assert_allclose([v for _, v in section.EI2], [1.1 * s["EI2"] for s in decks.STATIONS])
+    np.testing.assert_allclose([v for _, v in section.EI3], [0.9 * s["EI3"] for s in decks.STATIONS])
+    np.testing.assert_allclose(beam.pretwist, [[0.0, -np.radians(12.0)], [20.0, np.radians(1.5)]])
+    assert section.EA == 1e12
+
+
+def test_bmodes(tmp_path: Path) -> None:
+    """The line is the elastic axis: the same blade as by centres, seen from its shear centre."""
+    beam = blade(tmp_path, decks.bmodes(), structure_length=decks.LENGTH, **STIFF)
+    for x, s in zip((0.0, decks.LENGTH), decks.STATIONS, strict=True):
+        found = beam.section.central(x)
+        for key, name in (("EA", "EA"), ("EI2", "EI2"), ("EI3", "EI3"), ("GJ", "GJ"), ("mass_per_length", "m")):
+            assert found[key] == pytest.approx(s[name], rel=1e-9)
+        assert found["rotary_inertia3"] == pytest.approx(s["J3"], rel=1e-9)
+        np.testing.assert_allclose(beam.section.center("mass_center", x), [s["cg"][0], 0.0])
+        np.testing.assert_allclose(beam.section.center("tension_center", x), [s["ec"][0] - s["sc"][0], 0.0])
+    (tmp_path / "main.bmi").write_text(decks.bmodes_main())
+    main = read(tmp_path, "main.bmi", **STIFF)
+    assert (main.length, main.hub_radius) == (decks.LENGTH, 1.5)
+    assert main.precone == pytest.approx(np.radians(3.0))
+    assert main.section.central(0.0)["mass_per_length"] == pytest.approx(600.0)
+
+
+# --- what is wrong is said, with its place --------------------------------------------------------------------------
+
+LENGTH = {"structure_length": decks.LENGTH}
+BAD: list[tuple[str, str, dict[str, Any], tuple[str, str], str]] = [
+    ("elastodyn", "blade.dat", LENGTH | RIGID, ("V1.00", "V2.00"), r"line 1: the version .* is 2\.00; known: 1\.00"),
+    (
+        "elastodyn",
+        "blade.dat",
+        LENGTH | RIGID,
+        ("3.000000e+08", "3.0x8"),
+        r'line 14, column 5: "3\.0x8" must be a finite',
+    ),
+    (
+        "elastodyn",
+        "blade.dat",
+        LENGTH | RIGID,
+        ("3.000000e+08", "-3e8"),
+        "line 14, column 5: FlpStff must be greater than 0",
+    ),
+    (
+        "elastodyn",
+        "blade.dat",
+        LENGTH | RIGID,
+        ("1.000000 0.25", "0.900000 0.25"),
+        "line 15, column 1: BlFract must end at 1",
+    ),
+    (
+        "elastodyn",
+        "blade.dat",
+        LENGTH | RIGID,
+        ("EdgStff\n", "GJStff\n"),
+        r'line 12, column 6: the column "GJStff" is not',
+    ),
+    ("elastodyn", "blade.dat", LENGTH | RIGID, ("  2   NBl", "  3   NBl"), "line 16: .*must be 6"),
+    ("elastodyn", "blade.dat", LENGTH | RIGID, ("AdjBlMs", "AdjMass"), "no line with a value of AdjBlMs"),
+    ("elastodyn", "blade.dat", RIGID, ("", ""), r"structure\.length.*TipRad − HubRad"),
+    ("elastodyn", "blade.dat", LENGTH, ("", ""), r"structure\.section: must have EA, GA2, GA3, GJ"),
+    ("elastodyn", "blade.dat", LENGTH | RIGID | {"EI2": 1.0}, ("", ""), r"section\.EI2: given twice"),
+    ("beamdyn_blade", "blade.dat", LENGTH, ("V1.00", "V1.05"), r"line 1: the version .* is 1\.05; known: 1\.00"),
+    (
+        "beamdyn_blade",
+        "blade.dat",
+        LENGTH,
+        ("2   station", "3   station"),
+        "ends before the station; station_total says",
+    ),
+    ("beamdyn_blade", "blade.dat", LENGTH, (" 1.000000", " 0.900000"), "stations must end at 1; the last of 2 is 0.9"),
+    (
+        "beamdyn_blade",
+        "blade.dat",
+        LENGTH,
+        (" 0.000000", " 0.100000"),
+        "line 11, column 1: stations must increase from 0",
+    ),
+    ("beamdyn_blade", "blade.dat", LENGTH, ("5.0000", "5.0,"), "must be a finite number"),
+    (
+        "beamdyn_blade",
+        "blade.dat",
+        LENGTH,
+        ("2   station", "two   station"),
+        'line 4, column 1: station_total is "two"',
+    ),
+    ("beamdyn_blade", "blade.dat", {}, ("", ""), r"structure\.length.*primary file has the line"),
+    ("bmodes", "blade.dat", LENGTH | STIFF, ("2  n_secs", "1  n_secs"), "line 2, column 1: n_secs"),
+    ("bmodes", "blade.dat", LENGTH | STIFF, ("tc_offst", "te_offst"), "line 4: columns must be sec_loc str_tw"),
+    (
+        "bmodes",
+        "blade.dat",
+        LENGTH | STIFF,
+        ("3.000000000000e+02", "0.0"),
+        "line 6, column 4: mass_den must be greater",
+    ),
+    ("bmodes", "blade.dat", LENGTH | STIFF, ("1.000000000000e+00", "0.5"), "line 7, column 1: sec_loc must end at 1"),
+    (
+        "bmodes",
+        "blade.dat",
+        LENGTH | STIFF,
+        ("1.200000000000e+01  1.2", "1.2e+01  1.3"),
+        "line 6, column 3: tw_iner must be",
+    ),
+    ("bmodes", "blade.dat", LENGTH, ("", ""), r"structure\.section: must have GA2, GA3"),
+    ("hawc2", "blade.st", {}, ("$1 2", "$1 3"), "line 8: has 0 columns; must be 30"),
+    ("hawc2", "blade.st", {}, ("$1 2", "$1 1"), "line 5, column 2: must have at least two rows, not 1"),
+    ("hawc2", "blade.st", {}, ("3.0000000000000000e+02", "3e2 3e2"), "line 6: has 31 columns; must be 19 with centres"),
+    ("hawc2", "blade.st", {}, ("3.0000000000000000e+02", "-3e2"), "line 6, column 2: m must be greater than 0"),
+    ("hawc2", "blade.st", {}, ("2.0000000000000000e+01  4.0", "0.0  4.0"), "line 7, column 1: r must increase"),
+    ("hawc2", "blade.st", {"set": [1, 2]}, ("", ""), r"section\.set.*allowed: \[1, 1\]"),
+    (
+        "windio",
+        "blade.yaml",
+        {},
+        ("name: small", 'windIO_version: "2.0"'),
+        "line 1, column 17: windIO_version is 2.0; known",
+    ),
+    ("windio", "blade.yaml", {}, ("twist: *twist", "twist: *angle"), "not valid YAML: found undefined alias"),
+    (
+        "windio",
+        "blade.yaml",
+        {},
+        ("inertia_matrix", "mass_matrix"),
+        r"line 14, column 9: .*six_x_six has no inertia_matrix",
+    ),
+    (
+        "windio",
+        "blade.yaml",
+        {},
+        ("[0.0, 0.5, 1.0]", "[0.0, 1.5, 1.0]"),
+        "line 11, column 19: .* must rise from 0 to 1",
+    ),
+    ("windio", "blade.yaml", {}, ("[0.0, 0.5, 1.0]", "[0.0, 1.0]"), "has 2 places for 3 values"),
+    ("windio", "blade.yaml", {}, ("0.0, 10.0", "zero, 10.0"), 'line 11, column 45: "zero" must be a finite number'),
+]
+
+
+@pytest.mark.parametrize(("deck", "name", "more", "change", "message"), BAD)
+def test_bad_files(
+    tmp_path: Path, deck: str, name: str, more: dict[str, Any], change: tuple[str, str], message: str
+) -> None:
+    text = decks.hawc2(True) if deck == "hawc2" else getattr(decks, deck)()
+    assert change[0] in text
+    with pytest.raises(rotfem.SceneError, match=message) as caught:
+        blade(tmp_path, text.replace(*change, 1) if change[0] else text, name, **more)
+    assert "structure" in str(caught.value)
+
+
+PRIMARY = [[0.0, 0.0, 0.0, 12.0], [0.0, 0.0, 8.0, 5.0], [0.0, 0.0, 20.0, -1.5]]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (decks.beamdyn_primary(PRIMARY, "none.dat"), r'line 15: there is no file "none\.dat" beside it'),
+        (
+            decks.beamdyn_primary(PRIMARY).replace("1   member_total", "2   member_total"),
+            "line 6, column 1: has 2 members",
+        ),
+        (decks.beamdyn_primary([[0.0, 0.0, 1.0, 0.0], *PRIMARY[1:]]), "line 11: the first key point must be"),
+        (decks.beamdyn_primary([PRIMARY[0], *PRIMARY]), "no kink at an end|two key points"),
+        (decks.beamdyn_primary(PRIMARY).replace("kp_total", "kp_number"), "no line with a value of kp_total"),
+    ],
+)
+def test_bad_primary_files_of_beamdyn(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "blade.dat").write_text(decks.beamdyn_blade())
+    with pytest.raises(rotfem.SceneError, match=message):
+        blade(tmp_path, text, "primary.dat")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("v1.03", "v9.00"), r"line 1: the version of BModes' main file is 9\.00"),
+        (("0.        bl_thp", "2.        bl_thp"), r"line 8, column 1: bl_thp = 2 is not known; only 0"),
+        (("0.        tip_mass", "5.        tip_mass"), "line 10, column 1: tip_mass is not read"),
+        (("1.5       hub_rad", "30       hub_rad"), "line 6, column 1: hub_rad = 30 must be"),
+        (("sec_props_file", "properties"), "no line with a value of sec_props_file"),
+        (("'blade.dat'", "'none.dat'"), 'there is no file "none.dat" beside it'),
+    ],
+)
+def test_bad_main_files_of_bmodes(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+    (tmp_path / "blade.dat").write_text(decks.bmodes())
+    assert change[0] in decks.bmodes_main()
+    with pytest.raises(rotfem.SceneError, match=message):
+        blade(tmp_path, decks.bmodes_main().replace(*change), "main.bmi", **STIFF)
+
+
+def test_a_format_is_not_guessed(tmp_path: Path) -> None:
+    with pytest.raises(
+        rotfem.SceneError, match=r"section\.from.*does not say which format it has; give section\.format"
+    ):
+        blade(tmp_path, "1 2 3\n4 5 6\n", "x.dat", structure_length=1.0)
+    with pytest.raises(rotfem.SceneError, match=r'section\.format = "hawk2": did you mean "hawc2"'):
+        blade(tmp_path, decks.hawc2(True), "x.st", format="hawk2")
+    with pytest.raises(rotfem.SceneError, match="the version of ElastoDyn's blade file is missing"):
+        blade(tmp_path, "1 2 3\n", "x.dat", format="elastodyn", structure_length=1.0)
+    with pytest.raises(rotfem.SceneError, match=r"section\.format.*no meaning without section\.from"):
+        Scene.from_dict(
+            {
+                "structure": {"type": "spatial_beam", "length": 1.0, "section": {"format": "hawc2"}},
+                "motion": {"type": "constant", "speed": 0.0},
+            }
+        )
+    with pytest.raises(rotfem.SceneError, match=r"section\.from.*only of a spatial_beam"):
+        Scene.from_dict(
+            {
+                "structure": {"type": "planar_beam", "length": 1.0, "section": {"from": "x.dat"}},
+                "motion": {"type": "constant", "speed": 0.0},
+            }
+        )
+
+
+def test_import_writes_a_scene_that_is_the_blade(tmp_path: Path) -> None:
+    (tmp_path / "blade.dat").write_text(decks.beamdyn_blade())
+    (tmp_path / "primary.dat").write_text(decks.beamdyn_primary(PRIMARY))
+    from rotfem.commands.import_blade import write_imported
+
+    scene = rotfem.import_blade(tmp_path / "primary.dat", changes=["structure.tip_mass=3.0", "motion.speed=1.2"])
+    write_imported(scene, tmp_path / "primary.dat", tmp_path / "out.toml")
+    again = rotfem.load_scene(tmp_path / "out.toml")
+    assert again.structure == scene.structure == read(tmp_path, "primary.dat", structure_tip_mass=3.0)
+    assert (tmp_path / "out.toml").read_text().startswith("# imported from primary.dat;")
+    assert again.motion.speed == 1.2
