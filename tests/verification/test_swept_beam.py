@@ -159,7 +159,7 @@ def test_swept_tip_of_epps_and_chandra_at_rest() -> None:
         assert row["frequency"] == pytest.approx(exact, rel=1e-6)
 
 
-# GXBeam 0.5 (its example "Rotating Beam with a Swept Tip", the same exact beam theory), flap 1 at 750 rpm to four digits.
+# GXBeam 0.5 (its example "Rotating Beam with a Swept Tip", the same exact beam theory), flap 1 at 750 rpm, four digits.
 @pytest.mark.slow
 @pytest.mark.parametrize(("angle", "gxbeam"), [(0.0, 13.55), (45.0, 13.56)])
 def test_swept_tip_of_epps_and_chandra_spinning(angle: float, gxbeam: float) -> None:
