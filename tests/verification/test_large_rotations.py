@@ -41,8 +41,12 @@ def final(result: Any, names: tuple[str, ...]) -> Array:
 
 
 def helix(m: Array) -> Array:
-    """Return the tip of a unit beam that is turned by Λ = exp(X m)."""
-    return np.array([quad(lambda X, i=i: Rotation.from_rotvec(X * m).as_matrix()[i, 0], 0, 1)[0] for i in range(3)])
+    """Return the tip of a unit beam that is turned by Λ = exp(X m).
+
+    Without an axial force fibers keep their mean length, so that the axis is shorter by ½ r² m_1², r² = 2 EI/EA.
+    """
+    r = [quad(lambda X, i=i: Rotation.from_rotvec(X * m).as_matrix()[i, 0], 0, 1)[0] for i in range(3)]
+    return (1 - 1e-4 * m[0] ** 2) * np.array(r)
 
 
 # --- rolled up ------------------------------------------------------------------------------------------------------
