@@ -24,7 +24,7 @@ from rotfem.scene.span_tables import (
     evaluate_table,
     is_table,
 )
-from rotfem.scene.values import Array, Matrix, NonNegativeProfile, PositiveProfile, problem
+from rotfem.scene.values import AnyProfile, Array, Matrix, NonNegativeProfile, PositiveProfile, problem
 
 #: Part of the largest entry of a mass matrix by which it may differ from one that rigid mass has.
 MASS_SLACK = 1e-9
@@ -52,7 +52,8 @@ def _as_mass(value: Any) -> Matrix | MatrixTable:
 
 Center: TypeAlias = Annotated[Point | PointTable, PlainValidator(as_point_or_table)]
 
-_CENTERS = ("mass_center", "shear_center", "tension_center")
+#: What says where in a section its properties belong to.
+_CENTERS = ("mass_center", "shear_center", "tension_center", "principal_angle")
 _STIFFNESSES = ("EA", "GA2", "GA3", "GJ", "EI2", "EI3")
 _FIBERS = ("polar_radius",)
 _INERTIAS = ("mass_per_length", "rotary_inertia2", "rotary_inertia3")
@@ -81,6 +82,8 @@ class SpatialSection(Section):
         tension_center: position (y, z) in the section (m), or a table of them.
         polar_radius: radius of gyration of the axial stiffness about the shear center, (∫Er² dA/∫E dA)^½ (m); if not
             given, that of EA, EI2, EI3 and the centers. Only the effect `trapeze` has to do with it.
+        principal_angle: angle (rad) about axis 1 from the section axes to those that GA2, GA3, EI2, EI3 and the rotary
+            inertias belong to; the centers do not turn with it.
         stiffness: full 6×6 stiffness matrix, or a table of them.
         mass: full 6×6 mass matrix of (velocity, angular velocity) in section axes, or a table of them.
     """
@@ -112,6 +115,7 @@ class SpatialSection(Section):
     shear_center: Center | None = None
     tension_center: Center | None = None
     polar_radius: NonNegativeProfile | None = None
+    principal_angle: AnyProfile | None = None
     stiffness: Annotated[Matrix | MatrixTable, PlainValidator(_as_stiffness)] | None = None
     mass: Annotated[Matrix | MatrixTable, PlainValidator(_as_mass)] | None = None
 
@@ -136,8 +140,9 @@ class SpatialSection(Section):
         stiffnesses = np.stack([central[key] for key in _STIFFNESSES], axis=-1)
         m, J2, J3 = (central[key] for key in _INERTIAS)
         mass_center = self.center("mass_center", x)
-        B = _offset(axial=self.center("tension_center", x), transverse=self.center("shear_center", x))
-        B_mass = _offset(axial=mass_center, transverse=mass_center)
+        turned = np.swapaxes(_turn(self.angle_at(x)), -1, -2)
+        B = turned @ _offset(axial=self.center("tension_center", x), transverse=self.center("shear_center", x))
+        B_mass = turned @ _offset(axial=mass_center, transverse=mass_center)
         masses = np.stack([m, m, m, J2 + J3, J2, J3], axis=-1)
         return {
             "stiffness": np.swapaxes(B, -1, -2) @ (stiffnesses[..., None] * B),
@@ -147,6 +152,11 @@ class SpatialSection(Section):
     def center(self, name: str, x: npt.ArrayLike) -> Array:
         """Return a centre, `mass_center`, `shear_center` or `tension_center`, at positions x (m): (…, 2) in m."""
         return evaluate_table(getattr(self, name) or (0.0, 0.0), x)
+
+    def angle_at(self, x: npt.ArrayLike) -> Array:
+        """Return the principal angle (rad) at positions along the beam (m)."""
+        places = np.asarray(x, dtype=np.float64)
+        return np.zeros(places.shape) if self.principal_angle is None else self._at("principal_angle", places)
 
     def central(self, x: npt.ArrayLike) -> dict[str, Array]:
         """Return the section properties about their own centers, each of the shape of x; not for full matrices.
@@ -191,6 +201,15 @@ class SpatialSection(Section):
         E, rho = self._at("E", x), self._at("rho", x)
         G = E / (2.0 * (1.0 + self._at("nu", x)))
         return E * area, k * G * area, k * G * area, G * J, E * I2, E * I3, rho * area, rho * I2, rho * I3
+
+
+def _turn(angle: Array) -> Array:
+    """Return R (…, 6, 6): components along the section axes from those along axes turned by an angle (rad) about 1."""
+    c, s = np.cos(angle), np.sin(angle)
+    R = np.broadcast_to(np.eye(6), (*angle.shape, 6, 6)).copy()
+    for i in (1, 4):
+        R[..., i, i], R[..., i, i + 1], R[..., i + 1, i], R[..., i + 1, i + 1] = c, -s, s, c
+    return R
 
 
 def _offset(axial: Array, transverse: Array) -> Array:

@@ -28,13 +28,16 @@ UNITS: dict[str, Unit] = {
     "structure.tip_mass": "kg",
     "structure.tip_inertia": ("kg*m**2",),
     **{f"structure.{key}": "rad" for key in ("pretwist", "sweep", "precone")},
-    **{f"structure.section.{key}": "rad" for key in ("pretwist", "precone")},
+    **{f"structure.section.{key}": "rad" for key in ("pretwist", "precone", "principal_angle")},
     **{f"structure.{key}": unit for key, unit in _MODULI.items()},
     "structure.rho": "kg/m**3",
     "structure.point_masses": ("m", "m", "kg"),
     "structure.line_masses": "kg/m",
     **{f"structure.section.{key}": unit for key, unit in (_STIFFNESS | _INERTIAS | _MOMENTS_OF_AREA).items()},
-    **{f"structure.section.{key}": "m" for key in (*_LENGTHS, "mass_center", "shear_center", "tension_center")},
+    **{
+        f"structure.section.{key}": "m"
+        for key in (*_LENGTHS, "mass_center", "shear_center", "tension_center", "polar_radius")
+    },
     "structure.section.mass_per_length": "kg/m",
     "structure.section.E": "Pa",
     "structure.section.rho": "kg/m**3",

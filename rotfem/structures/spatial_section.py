@@ -98,10 +98,21 @@ class SectionForms:
             beam.section[name] = beam.profile(name, partial(self._central, name))
         self.mass = beam.section["mass_per_length"]
         self.mass_center = (0, *self._center("mass_center"))
+        self._turned = None
+        if data.principal_angle is not None:
+            angle = beam.section["principal_angle"] = beam.profile("principal_angle", data.angle_at)
+            self._turned = ufl.cos(angle), ufl.sin(angle)
         self.directors = [
-            ((0, 1, 0), beam.section["rotary_inertia3"]),
-            ((0, 0, 1), beam.section["rotary_inertia2"]),
+            ((0, *self._principal(1, 0)), beam.section["rotary_inertia3"]),
+            ((0, *self._principal(0, 1)), beam.section["rotary_inertia2"]),
         ]
+
+    def _principal(self, y: Any, z: Any) -> tuple[Any, Any]:
+        """Return the components along section axes 2 and 3 of what has these along the principal axes."""
+        if self._turned is None:
+            return y, z
+        c, s = self._turned
+        return c * y - s * z, s * y + c * z
 
     def _central(self, name: str, x: Array) -> Array:
         central: dict[str, Array] = self._data.central(x)
@@ -234,6 +245,10 @@ class SectionForms:
         y, z = self._center("shear_center")
         epsilon[1] -= z * epsilon[3]
         epsilon[2] += y * epsilon[3]
+        if self._turned is not None:
+            c, s = self._turned
+            for i in (1, 4):
+                epsilon[i : i + 2] = [c * epsilon[i] + s * epsilon[i + 1], c * epsilon[i + 1] - s * epsilon[i]]
         stiffness = (self._beam.section[name] for name in STRAINS.values())
         return [Strain(n, e, c, measure) for n, e, c in zip(STRAINS, epsilon, stiffness, strict=True)]
 

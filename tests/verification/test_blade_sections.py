@@ -103,6 +103,20 @@ def test_same_blade_in_both_ways_spins_alike() -> None:
     np.testing.assert_allclose(found(blade(tables, spinning)), found(by_numbers), rtol=1e-9)
 
 
+def test_principal_axes_turned_in_the_section() -> None:
+    # With centres on the axis that is pretwist; with centres beside it they stay where they are, as the matrices say.
+    bare = {key: value for key, value in CENTRES.items() if not key.endswith("center")}
+    still = {"motion": {"type": "constant", "speed": 3.0}}
+    angle = [[x, value - 0.3] for x, value in TWIST]
+    turned = blade(bare | {"principal_angle": angle}, still | {"structure.pretwist": 0.3})
+    np.testing.assert_allclose(found(turned), found(blade(bare, still)), rtol=1e-9)
+    angle = [[0.0, 0.4], [1.0, -0.2]]
+    scene = blade(CENTRES | {"principal_angle": angle})
+    at, _ = matrices_of(scene)
+    exact = frequencies([0.0, 0.4, 0.7, 1.0], lambda x: tuple(at(x).values()), twisted)[:6]
+    np.testing.assert_allclose(found(scene), exact, rtol=2e-5)
+
+
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
