@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
-from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from rotfem.commands.console import Session
-from rotfem.commands.options import as_path, folder_name, listed
+from rotfem.commands.job import Job, app, command
+from rotfem.commands.options import as_path, listed
 from rotfem.commands.printed import (
     campbell_report,
     check_report,
@@ -23,111 +20,8 @@ from rotfem.commands.printed import (
     response_report,
     run_report,
 )
-from rotfem.commands.result_folder import ResultFolder, Writer
+from rotfem.commands.result_folder import Writer
 from rotfem.errors import ComputationError, input_of
-from rotfem.scene import Scene, load_scene
-
-app = typer.Typer(
-    name="rotfem",
-    help="Rotating beams and plates with FEniCSx. A scene is a TOML file; docs/scene.md lists its keys.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
-
-
-@app.callback()
-def _root() -> None:
-    """Rotating beams and plates with FEniCSx."""
-
-
-@dataclass
-class Job:
-    """What every command works on.
-
-    Attributes:
-        scene: the scene, with the changes of --set.
-        results: folder where its results go.
-        session: who speaks.
-        plots: whether figures are wanted.
-        hint: what tells advice; None where none is wanted.
-    """
-
-    scene: Scene
-    results: ResultFolder
-    session: Session
-    plots: bool
-    hint: Callable[[str], None] | None
-
-    def progress(self, what: str = "") -> Any:
-        """Return the progress bar of the computation."""
-        return self.session.progress(f"{self.scene.name}: {what or self.scene.model.theory}")
-
-    def finish(
-        self, result: Any, lines: Callable[[dict[str, Any], Path], list[str]], further: Sequence[Writer] = ()
-    ) -> None:
-        """Write a result, and what else is wanted, and print its report."""
-        self.session.write(result, self.plots, further)
-        self.session.say(lines(result.summary, self.results.path))
-
-
-@contextmanager
-def job(
-    command: str,
-    scene: Annotated[
-        Path, typer.Argument(metavar="SCENE", parser=as_path, help="scene file (TOML)", show_default=False)
-    ],
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="DIR", parser=as_path, help="result folder [results/<scene name>]"),
-    ] = None,
-    overrides: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="change a scene key, repeatable")
-    ] = None,
-    accuracy: Annotated[
-        float | None, typer.Option("--accuracy", metavar="E", help="relative error wanted: the rest follows from it")
-    ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="print the summary as JSON, and nothing else, on stdout")
-    ] = False,
-    no_plots: Annotated[bool, typer.Option("--no-plots", help="write no figures")] = False,
-    no_advice: Annotated[bool, typer.Option("--no-advice", help="give no hints at the start")] = False,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False,
-) -> Iterator[Job]:
-    """Give a command its job; these are, but for its name, the options of all commands."""
-    with Session(as_json, quiet, debug) as session:
-        wanted = [] if accuracy is None else [f"accuracy={accuracy!r}"]
-        loaded = load_scene(scene, [*(overrides or ()), *wanted])
-        folder = session.folder(output or Path("results") / folder_name(loaded.name), command)
-        yield Job(loaded, folder, session, not no_plots, session.hint(no_advice))
-
-
-def command(computes: bool = True) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Make a command of a function of a job and its own options.
-
-    Args:
-        computes: whether it computes the scene, with advice, to an accuracy, and does not compare ways to.
-    """
-
-    def decorate(work: Callable[..., None]) -> Callable[..., None]:
-        options_of_all = list(signature(job, eval_str=True).parameters.values())[1:]
-        shared = [p for p in options_of_all if computes or p.name not in ("no_advice", "accuracy")]
-        own = list(signature(work, eval_str=True).parameters.values())[1:]
-
-        def call(**given: Any) -> None:
-            options = {p.name: given.pop(p.name) for p in own}
-            with job(work.__name__, **given) as todo:
-                work(todo, **options)
-
-        ordered = [shared[0], *own, *shared[1:]]
-        call.__name__, call.__doc__ = work.__name__, work.__doc__
-        vars(call)["__signature__"] = Signature([p.replace(kind=Parameter.KEYWORD_ONLY) for p in ordered])
-        app.command()(call)
-        return work
-
-    return decorate
 
 
 @command()
