@@ -29,13 +29,12 @@ from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms import expand_derivatives
 
 from rotfem.equations.geometric import geometric_stiffness
-from rotfem.equations.pieces import set_diagonal
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.theories import richest, theories
 from rotfem.numerics import forms
 from rotfem.numerics.eigenproblem import Pencil
 from rotfem.numerics.inertia import negative_eigenvalues
-from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.linear import DirectSolver, Increment, set_diagonal
 
 Array = npt.NDArray[np.float64]
 

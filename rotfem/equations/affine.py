@@ -16,12 +16,12 @@ import numpy.typing as npt
 from rotfem.equations.clamp_rows import ClampRows
 from rotfem.equations.modal_damping import EFFECT
 from rotfem.equations.model import Model
-from rotfem.equations.pieces import PRESTRESS, Piece, Pieces, set_diagonal
+from rotfem.equations.pieces import PRESTRESS, Piece, Pieces
 from rotfem.equations.system import System
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
-from rotfem.numerics.linear import DirectSolver, Increment, combine
+from rotfem.numerics.linear import DirectSolver, Increment, combine, set_diagonal
 
 __all__ = ["PRESTRESS", "AffineSystem"]
 

@@ -15,9 +15,8 @@ from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
-from rotfem.equations.pieces import held
 from rotfem.numerics import compat
-from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.linear import DirectSolver, Increment, held
 from rotfem.numerics.low_rank import LowRank
 from rotfem.numerics.projection import times
 from rotfem.numerics.refinement import Refinement

@@ -26,6 +26,7 @@ from rotfem.equations.model import Model
 from rotfem.equations.prestress import geometric_pieces
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
+from rotfem.numerics.linear import held, set_diagonal
 
 Array = npt.NDArray[np.float64]
 
@@ -289,17 +290,3 @@ class Pieces:
         for load, K, added in geometric_pieces(self):
             self._keep("K", load.key, K, load.of | {PRESTRESS} | added)
         self.assembled += perf_counter() - started
-
-
-def held(K: Any, hinged: npt.NDArray[Any]) -> None:
-    """Hold turns of the root, unknowns of these numbers, in a stiffness of the strains by springs as stiff as these."""
-    d = K.getDiagonal()
-    d.array[hinged] *= 2.0
-    K.setDiagonal(d)
-
-
-def set_diagonal(clamped: npt.NDArray[Any], A: Any, value: float) -> None:
-    """Write a value to the diagonal of a matrix at the clamped unknowns."""
-    d = A.getDiagonal()
-    d.array[clamped] = value
-    A.setDiagonal(d)

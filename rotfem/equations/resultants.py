@@ -24,10 +24,10 @@ from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from rotfem.equations.pieces import set_diagonal
 from rotfem.mechanics import work
 from rotfem.mechanics.work import Variation
 from rotfem.numerics import forms
+from rotfem.numerics.linear import set_diagonal
 
 Array = npt.NDArray[np.float64]
 

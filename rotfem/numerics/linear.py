@@ -27,6 +27,20 @@ def combine(target: Any, matrices: list[Any], weights: Array) -> None:
             target.axpy(weight, A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
 
 
+def held(K: Any, numbers: npt.NDArray[Any]) -> None:
+    """Hold unknowns of these numbers in a stiffness matrix, by springs as stiff as it is there."""
+    d = K.getDiagonal()
+    d.array[numbers] *= 2.0
+    K.setDiagonal(d)
+
+
+def set_diagonal(numbers: npt.NDArray[Any], A: Any, value: float) -> None:
+    """Write a value to the diagonal of a matrix at unknowns of these numbers."""
+    d = A.getDiagonal()
+    d.array[numbers] = value
+    A.setDiagonal(d)
+
+
 def transposed(A: Any) -> Any:
     """Return Aᵀ as a new matrix (without an argument PETSc would transpose A itself)."""
     return A.transpose(PETSc.Mat())
