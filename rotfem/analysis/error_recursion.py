@@ -22,8 +22,12 @@ Index = npt.NDArray[np.int64]
 #: |λh| up to which integrals are summed by Gauss points, and how many.
 SMALL, POINTS = 1.0, 8
 
-#: Samples after the first of a piece by which it is judged, and how many times their bends its own are if it jumps.
-AFTER, JUMP = 5, 4.0
+#: Samples at the start of a piece that may jump, those after its first that are looked at, and how many times the bends
+#: of these theirs are then.
+EARLY, AFTER, JUMP = 3, 8, 4.0
+
+#: Difference of places of samples, in steps, up to which they are alike.
+ALIKE = 1e-6
 
 #: Steps on either side in which samples show whether they are smooth.
 NEAR = 3
@@ -138,9 +142,9 @@ class Spans:
 
 
 def settled(times: Array, values: Array, first: Index) -> Array:
-    """Return samples (N, r); where those that smooth pieces start with jump, they are put on the line of the next two.
+    """Return samples (N, r); the first ones of smooth pieces are put on the line of the next two where they jump.
 
-    What a piece starts with may not be what goes on: stress comes up within a step that does not resolve how.
+    What a piece starts with may not be what goes on: stress comes up within a step or two that do not resolve how.
 
     Args:
         times: of the samples, s, (N,).
@@ -153,8 +157,11 @@ def settled(times: Array, values: Array, first: Index) -> Array:
         t, x = times[i : i + AFTER + 1], values[i : i + AFTER + 1]
         slopes = np.diff(x, axis=0) / np.diff(t)[:, None]
         bends = np.abs(np.diff(slopes, axis=0)) * np.diff(t)[1:, None]
-        jumps = bends[0] > JUMP * bends[1:].max(axis=0)
-        out[i, jumps] = (x[1] - (t[1] - t[0]) * slopes[1])[jumps]
+        jumps = bends[:EARLY] > JUMP * bends[EARLY:].max(axis=0)
+        for j in range(EARLY):  # those up to j are off if the last jump is there
+            off = jumps[j] & ~jumps[j + 1 :].any(axis=0)
+            line = x[j + 1] + (t[: j + 1, None] - t[j + 1]) * slopes[j + 1]
+            out[i : i + j + 1, off] = line[:, off]
     return out
 
 
@@ -200,5 +207,7 @@ def _through(times: Array, values: Array, spans: Spans, m: int) -> tuple[Array, 
     lowest = np.clip(spans.near - (m - 1) // 2, spans.first, spans.last - m + 1)
     index = lowest[:, None] + np.arange(m)
     theta = (times[index] - spans.starts[:, None]) / spans.lengths[:, None]
-    polynomials: Array = np.asarray(np.linalg.solve(theta[:, :, None] ** np.arange(m), values[index]))
-    return polynomials, values[index]
+    _, one, of = np.unique(np.rint(theta / ALIKE), axis=0, return_index=True, return_inverse=True)
+    inverse = np.linalg.inv(theta[one][:, :, None] ** np.arange(m))
+    sampled = values[index]
+    return np.asarray(inverse[of.ravel()] @ sampled), sampled

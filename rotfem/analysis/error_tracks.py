@@ -26,7 +26,8 @@ BEYOND = 2
 #: the lowest shapes whose phases count, and the most that squares of frequencies are tried above and below.
 WIDTH, UNSURE, LOWEST, MOST = 1.5, 0.3, 3, 0.3
 
-#: By what the largest of several tracks is multiplied: the true frequencies lie between them, or vary.
+#: By what the largest of several tracks is multiplied: the true frequencies lie between them, or vary. Motions as large
+#: as the structure feed errors by more than a tangent knows, even where all tracks agree: by as much again.
 MARGIN = 1.3
 
 #: Tracks: in which part of their scatter frequencies are tried, and the relative error below which none is.
@@ -34,7 +35,7 @@ FACTORS, SMALL = (0.0, -1.0, 1.0), 1e-3
 
 
 def largest_errors(
-    windows: Sequence[Window], scheme: Any, linear: bool, scale: float
+    windows: Sequence[Window], scheme: Any, linear: bool, scale: float, length: float
 ) -> dict[str, tuple[float, float]]:
     """Return the largest errors of the tip, `time` and `space`: size (m) and when (s).
 
@@ -43,11 +44,13 @@ def largest_errors(
         scheme: that made it.
         linear: whether the tangents are those of a linear theory, known as they are.
         scale: largest displacement of the tip, m.
+        length: of the structure, m.
     """
     if linear:
         return Track(scheme, linear).errors(windows, [window.K for window in windows])
     (changes, spreads), phase = smoothed(windows)
     best: dict[str, tuple[float, float]] = {}
+    least = np.inf
     for factor in FACTORS:
         if factor != 0.0 and (phase < UNSURE or best["time"][0] < SMALL * scale):
             break
@@ -55,8 +58,11 @@ def largest_errors(
         stiffness = [window.K + np.diag(change) for window, change in zip(windows, moved, strict=True)]
         found = Track(scheme, linear, factor == 0.0).errors(windows, stiffness)
         best = {"space": found["space"], **best, "time": max(best.get("time", (0.0, 0.0)), found["time"])}
+        least = min(least, found["time"][0])
     else:
-        best["time"] = (MARGIN * best["time"][0], best["time"][1])
+        fed = 1.0 + scale / length
+        best["time"] = (MARGIN * max(best["time"][0], fed * least), best["time"][1])
+        best["space"] = (MARGIN * fed * best["space"][0], best["space"][1])
     return best
 
 

@@ -23,12 +23,13 @@ from rotfem.analysis.error_window import MeshErrors, Samples, Window
 from rotfem.analysis.refined_mesh import RefinedMesh
 from rotfem.analysis.schemes import State
 from rotfem.analysis.shape_error import ShapeError
+from rotfem.analysis.turning_view import TurningView
 from rotfem.errors import ComputationError
 
 Array = npt.NDArray[np.float64]
 
 #: Windows of a history, fewest steps in one by unknowns, and most bytes of states that are kept.
-WINDOWS, FEWEST, LARGE, MEMORY = 8, (25, 100), 2000, 64_000_000
+WINDOWS, FEWEST, LARGE, MEMORY = 8, (40, 100), 2000, 64_000_000
 
 
 @dataclass(frozen=True)
@@ -55,40 +56,45 @@ class ErrorWatch:
         system: equations of motion.
         end: length of the history, s; 0 of a steady state.
         scheme: that steps it; None of a steady state.
-
-    Attributes:
-        since: from when on (s) it has looked; None before the first step.
     """
 
     def __init__(self, system: Any, end: float = 0.0, scheme: Any = None):
-        self.system, self.end, self.scheme = system, end, scheme
-        self.since: float | None = None
-        self._mesh = MeshErrors(ShapeError(system.held), RefinedMesh(system))
+        self._view = None if system.clamp is None else TurningView(system)
+        self.system: Any = system if self._view is None else self._view.system
+        self.end, self.scheme = end, scheme
+        self._mesh = MeshErrors(ShapeError(self.system.held), RefinedMesh(self.system))
         self._fewest = FEWEST[system.A.getSize()[0] > LARGE]
         self._now = Samples([], [], [])
         self._windows: list[Window] = []
         self._bytes = self._closed = 0
         self._landed = False
-        #: Whether all windows could be solved, and there were equations to solve them by.
-        self._sound = system.clamp is None
+        #: The state that the last step has led to, as the march has it.
+        self._reached: State | None = None
+        #: Whether all windows could be solved.
+        self._sound = True
         self._farthest: tuple[float, State | None] = (0.0, None)
         self._roughest: tuple[float, State | None] = (0.0, None)
 
     def __call__(self, old: Any, new: Any) -> None:
         """Look at a step from an old to a new state."""
         states, now = self._now.states, self._now
-        if self.since is None:
-            self.since = old.t
-        if self._landed or not states or states[-1][3] is not old.a or states[-1][1] is not old.q:
+        reached = self._reached
+        if self._landed or not states or reached is None or reached.a is not old.a or reached.q is not old.q:
             self._landed = False
             now.pieces.append(len(states))
-            states.append((old.t, old.q, old.v, old.a, old.datum))
-        states.append((new.t, new.q, new.v, new.a, new.datum))
+            states.append(self._seen(old))
+        states.append(self._seen(new))
+        self._reached = new
         now.steps.append((len(states) - 2, len(states) - 1))
         self._bytes += 3 * new.q.nbytes
         due = new.t >= (self._closed + 1) * self.end / WINDOWS and len(now.steps) >= self._fewest
         if due or self._bytes > MEMORY:
             self._close(new)
+
+    def _seen(self, state: State) -> tuple[float, Array, Array, Array, Any]:
+        """Return t, q, v, a of a state in the frame that turns, and what rotations are counted from."""
+        s = state if self._view is None else self._view.state(state)
+        return s.t, s.q, s.v, s.a, s.datum
 
     def landed(self) -> None:
         """Take note that what drives the motion is not smooth where the last step has ended."""
@@ -100,12 +106,14 @@ class ErrorWatch:
             self._close(last)
         size, state = self._farthest
         if state is None:
-            size, state = float(self._tip_sizes([last.q])[0]), last
+            state = last if self._view is None else self._view.state(last)
+            size = float(self._tip_sizes([state.q])[0])
         shape = max(self._shape(s, size) for s in (state, self._roughest[1]) if s is not None)
         found: dict[str, tuple[float, float]] = {"time": (0.0, 0.0), "space": (0.0, 0.0)}
         if self._windows and self._sound:
+            held = self.system.held
             with np.errstate(all="ignore"):  # where damping or growth is beyond numbers nothing is known
-                found = largest_errors(self._windows, self.scheme, self.system.held.linear, size)
+                found = largest_errors(self._windows, self.scheme, held.linear, size, held.structure.length)
             self._sound = bool(np.isfinite([found["time"], found["space"]]).all())
             found = found if self._sound else {"time": (0.0, 0.0), "space": (0.0, 0.0)}
         return TipErrors(found["time"] if self._sound else None, found["space"], shape, size)
@@ -126,10 +134,11 @@ class ErrorWatch:
         i = int(np.argmax(sizes))
         if sizes[i] > self._farthest[0]:
             self._farthest = (float(sizes[i]), now.state(i))
-        n = len(self.system.held.zeros())
-        i, rough = self._mesh.shape.roughest(np.array([state[1][:n] for state in now.states]))
-        if rough > self._roughest[0]:
-            self._roughest = (rough, now.state(i))
+        if not self.system.held.linear:
+            n = len(self.system.held.zeros())
+            i, rough = self._mesh.shape.roughest(np.array([state[1][:n] for state in now.states]))
+            if rough > self._roughest[0]:
+                self._roughest = (rough, now.state(i))
         if self._sound:
             before = self._windows[-1] if self._windows else None
             try:

@@ -25,7 +25,7 @@ PERIODS, SLOW = 2.0, 0.7
 HELD = 0.01
 
 #: Factor of the squares of the LOWEST frequencies up to which the errors that the mesh makes of them are kept.
-LIKE, LOWEST = 2.0, 3
+LIKE, LOWEST = 4.0, 3
 
 #: Product of two shapes from which they are one, and a square of a frequency that is none, 1/s².
 SAME, TINY = 0.5, 1e-300
@@ -209,7 +209,8 @@ class Window:
             return shapes, tangents
         q, v, a = (_without(x, moved) for x, moved in zip((state.q, state.v, state.a), quick, strict=True))
         tangents = Tangents(system, state.changed(q=q, v=v, a=a))
-        return tangents.shapes(), tangents
+        shapes.turn_to(tangents.matrices["M"], tangents.matrices["K"])
+        return shapes, tangents
 
     def _vibrating(self, shapes: RitzVectors, bends: Any, number: int, h: float) -> Array:
         """Return q, v and a (owned) of quick vibrations in the state of a number, with steps of h (s) around it.

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import scipy.linalg
 
 from rotfem.numerics.linear import DirectSolver
 
@@ -38,10 +39,12 @@ class RitzVectors:
         squares: diagonal of Vᵀ K V, 1/s², increasing.
         tip: displacement of the tip of each column, shape (d, r), on every rank.
         shift: as it was given.
+        block: number of unknowns of a node.
     """
 
     def __init__(self, system: Any, M: Any, K: Any, shift: float):
         self.comm: Any = system.comm
+        self.block = int(system.V.dofmap.index_map_bs)
         self._x, self._y = M.createVecs()
         A = K.copy()
         A.axpy(shift, M)
@@ -58,12 +61,19 @@ class RitzVectors:
                 columns.append(new[0])
                 massed.append(new[1])
                 x = self._solved(new[1])
-        V, W = np.array(columns).T, np.array(massed).T
+        V = np.array(columns).T
         KV = np.stack([self.times(K, x) for x in columns], axis=1)
         self.squares, turn = np.linalg.eigh(_symmetric(self.sum(V.T @ KV)))
-        self.V, self.massed = V @ turn, W @ turn
+        self.V, self.massed = V @ turn, np.array(massed).T @ turn
         values = [system.structure.tip_values(_local(system, x)) for x in self.V.T]
         self.tip = np.array(values).T[moves]
+
+    def turn_to(self, M: Any, K: Any) -> None:
+        """Combine the columns so that those of another M and K near by are diagonal."""
+        MV, KV = (np.stack([self.times(A, x) for x in self.V.T], axis=1) for A in (M, K))
+        stiffness, mass = (_symmetric(self.sum(self.V.T @ AV)) for AV in (KV, MV))
+        self.squares, turn = scipy.linalg.eigh(stiffness, mass)
+        self.V, self.massed, self.tip = self.V @ turn, MV @ turn, self.tip @ turn
 
     def sum(self, local: Array) -> Array:
         """Return the sum over all ranks."""

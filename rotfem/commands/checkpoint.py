@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotfem.analysis import error_memory
 from rotfem.analysis.schemes import State
 from rotfem.errors import SceneError
 from rotfem.scene import Scene
@@ -120,6 +121,7 @@ class Memory:
             "newton": plain(run.stepper.newton),
             "run": {name: getattr(run, name) for name in CHANGING},
             "seen": self._packed({"farthest": run.farthest.seen, "stability": run.stability}),
+            "watch": None if run.watch is None else self._packed(error_memory.kept(run.watch, state)),
             "elapsed": run.elapsed + perf_counter() - run.started,
             "factorisations": run.system.factorisations,
             "columns": list(run.record.history.columns),
@@ -153,6 +155,8 @@ class Memory:
             vars(target).update(values)
         seen = self._unpacked(tree["seen"])
         run.farthest.seen, run.stability = seen["farthest"], seen["stability"]
+        if run.watch is not None:
+            error_memory.put_back(run.watch, self._unpacked(tree["watch"]), state)
         for row in tree["rows"]:
             run.record.history.append(row)
         if run.record.stations is not None:

@@ -47,8 +47,6 @@ def error_of_run(run: Simulation) -> ErrorEstimate | None:
     found: dict[str, Any] = {"scale": tip.scale}
     if tip.time is not None and run.watch is not None:
         found["time_at"] = tip.time[1]
-    if watch.since:
-        found["since"] = watch.since
     return ErrorEstimate(shares, found)
 
 

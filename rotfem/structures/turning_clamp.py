@@ -69,9 +69,17 @@ class TurningClamp:
 
     def relative(self, q: Array, X: Any, t: float) -> Array:
         """Return (u_1, u_2, alpha), shape (n, 3), in the turning frame from inertial q (n, 3) of points at X (m)."""
-        reach = self.structure.hub_radius + X
+        reach = self.reach(X)
         x, y = self._turn(reach + q[:, 0], q[:, 1], -self.angle(t))
         return np.column_stack([x - reach, y, q[:, 2] - self.angle(t)])
+
+    def reach(self, X: Any) -> Any:
+        """Return the distance of points at X (m) from the axis of rotation, undeformed."""
+        return self.structure.hub_radius + X
+
+    def turned_back(self, vectors: Array, t: float) -> Array:
+        """Return inertial components (n, 2) of vectors in the turning frame."""
+        return np.column_stack(self._turn(vectors[:, 0], vectors[:, 1], -self.angle(t)))
 
     @staticmethod
     def _turn(x: Any, y: Any, angle: float) -> tuple[Any, Any]:
