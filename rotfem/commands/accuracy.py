@@ -143,7 +143,7 @@ def stalled(tried: list[dict[str, Any]]) -> bool:
     return is_same and None not in (now["error"], before["error"]) and now["error"] >= STALLED * before["error"]
 
 
-def refuse(scene: Scene, wanted: str, command: str) -> None:
+def refuse(scene: Scene, wanted: tuple[str, ...], command: str) -> None:
     """Refuse an accuracy of something that a command does not compute.
 
     Args:
@@ -154,8 +154,9 @@ def refuse(scene: Scene, wanted: str, command: str) -> None:
     Raises:
         SceneError: the scene asks for another.
     """
-    if scene.accuracy_of not in (None, wanted):
-        reason = f'is not what "{command}" computes; it must be "{wanted}", or not given'
+    if scene.accuracy_of not in (None, *wanted):
+        able = " or ".join(f'"{name}"' for name in wanted)
+        reason = f'is not what "{command}" computes; it must be {able}, or not given'
         raise SceneError(scene.file, "accuracy_of", scene.accuracy_of, reason)
 
 

@@ -114,7 +114,7 @@ def campbell(
     with input_of(scene.file):
         if scene.accuracy is None:
             return attempt()
-        refuse(scene, "frequencies", "campbell")
+        refuse(scene, ("frequencies",), "campbell")
         return pursue(scene, settings_of(scene, scene.modes.count), attempt, comm)
 
 

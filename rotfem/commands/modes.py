@@ -89,7 +89,7 @@ def modes(
     with input_of(scene.file):
         if scene.accuracy is None:
             return attempt()
-        refuse(scene, "frequencies", "modes")
+        refuse(scene, ("frequencies",), "modes")
         return pursue(scene, settings_of(scene, scene.modes.count), attempt, comm)
 
 

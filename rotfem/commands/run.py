@@ -16,6 +16,7 @@ from rotfem.commands.ahead import Ahead
 from rotfem.commands.keeper import Interval, Keeper
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.result_folder import ResultFolder
+from rotfem.commands.root_accuracy import ROOT_MOMENT, first_settings, judged
 from rotfem.commands.simulation import Simulation
 from rotfem.errors import ComputationError, input_of
 from rotfem.listeners import Hint, Progress, silent
@@ -119,7 +120,7 @@ def run_to_accuracy(
         Missed: it was not met.
         ComputationError: the richest model failed.
     """
-    refuse(scene, "tip", "run")
+    refuse(scene, ("tip", ROOT_MOMENT), "run")
 
     assert scene.accuracy is not None
     ahead = Ahead(scene.accuracy)
@@ -133,6 +134,13 @@ def run_to_accuracy(
         finally:
             ahead.look(simulation)
 
+    def aside(settings: Settings) -> RunResult:
+        variant = scene.replace(changes_of(scene, settings))
+        return Simulation(variant, Problem.of(variant, terms=terms, outputs=outputs), keeper.comm).run()
+
+    if scene.accuracy_of == ROOT_MOMENT:
+        first = keeper.settings() or first_settings(scene)
+        return pursue(scene, first, lambda settings: judged(settings, attempt, aside), keeper.comm)
     return pursue(scene, keeper.settings() or settings_of(scene), attempt, keeper.comm, ahead)
 
 

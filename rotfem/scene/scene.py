@@ -93,7 +93,7 @@ class Scene(SceneModel):
     output: OutputTable = OutputTable()
     limits: Limits = Limits()
     accuracy: Accuracy | None = None
-    accuracy_of: Literal["tip", "frequencies"] | None = None
+    accuracy_of: Literal["tip", "root_moment", "frequencies"] | None = None
 
     _name: str = PrivateAttr("scene")
     _file: str = PrivateAttr("scene")
