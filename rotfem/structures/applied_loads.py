@@ -101,7 +101,7 @@ class LoadsOfStructure:
         else:
             field, at = SpanField.of_shapes(self, tuple(span.shapes), size), load.at
         self.load_constants[name] = (field, at)
-        return field.function
+        return field.vector
 
     def add_load(self, name: str, size: int, at: Callable[[float], Array]) -> fem.Constant:
         """Return the amplitude constant (size,) of a load and remember at(t), its value at time t (s)."""

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
+import ufl
 from dolfinx import fem
 
 from rotfem.mechanics.span import Shapes, Span
@@ -16,6 +17,11 @@ Array = npt.NDArray[np.float64]
 
 #: Degree of the fields of shapes, which are linear between stations that are nodes of the mesh.
 LINEAR = 1
+
+
+def blocked(n: int) -> tuple[int, ...]:
+    """Return the shape of fields with n components; that of one is a scalar field."""
+    return (n,) if n > 1 else ()
 
 
 class Amplitude(ABC):
@@ -86,7 +92,7 @@ class SpanField(Amplitude):
     def of_shapes(cls, structure: Any, shapes: tuple[Shapes, ...], n: int) -> SpanField:
         """Return the field of shapes with n components, as many amplitudes as shapes."""
         mesh = structure.mesh
-        f = fem.Function(fem.functionspace(mesh, ("DG", LINEAR, (n,))))
+        f = fem.Function(fem.functionspace(mesh, ("DG", LINEAR, blocked(n))))
         cells = f.function_space.dofmap.list
         x = f.function_space.tabulate_dof_coordinates()[:, 0]
         middles = np.empty(len(x))
@@ -107,7 +113,7 @@ class SpanField(Amplitude):
         """Return (the field through the nodes of the structure, time (s) ↦ its amplitudes) of a function of place."""
         mesh, comm = structure.mesh, structure.comm
         degree = structure.V.element.basix_element.degree
-        f = fem.Function(fem.functionspace(mesh, ("Lagrange", degree, (n,))))
+        f = fem.Function(fem.functionspace(mesh, ("Lagrange", degree, blocked(n))))
         index, x = f.function_space.dofmap.index_map, f.function_space.tabulate_dof_coordinates()
         points = np.concatenate(comm.allgather(x[: index.size_local]))
         places = index.local_to_global(np.arange(len(x), dtype=np.int32))
@@ -117,6 +123,11 @@ class SpanField(Amplitude):
             return np.ravel(at(t).reshape(size, -1)[:, :n])
 
         return cls(f, None, places, size * n), amplitudes
+
+    @property
+    def vector(self) -> Any:
+        """The field as a vector of the forms."""
+        return self.function if self.function.ufl_shape else ufl.as_vector([self.function])
 
     def update(self, turn: Array | None = None) -> None:
         """Make the field of the amplitudes; its vectors turned by a matrix (3, 3) if that is given."""
