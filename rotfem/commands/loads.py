@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -233,4 +233,6 @@ def _shown(argument: Any) -> str:
     """Return an argument of a function as errors show it."""
     if isinstance(argument, tuple):
         return f"({', '.join(map(_shown, argument))})"
+    if isinstance(argument, Mapping):
+        return "{" + ", ".join(f"{name}: {_shown(value)}" for name, value in argument.items()) + "}"
     return f"{argument if abs(argument) > TINY else 0.0:g}"

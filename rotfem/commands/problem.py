@@ -12,13 +12,13 @@ from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import Array, Scheme, State
 from rotfem.analysis.time_loop import March, Steps
-from rotfem.commands.loads import loads_of
+from rotfem.commands.loads import checked, loads_of
 from rotfem.commands.mode_tables import mode_tables
 from rotfem.commands.moment import Moment, first_shape
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import InputError, SceneError, input_of
 from rotfem.mechanics.effects import Work
-from rotfem.mechanics.free_hub import FreeHub, Torque
+from rotfem.mechanics.free_hub import ControlledTorque, FreeHub, Torque
 from rotfem.mechanics.motion import Motion, no_acceleration
 from rotfem.mechanics.outputs import Functional, Output
 from rotfem.mechanics.problem import Problem as ProblemData
@@ -224,6 +224,9 @@ def motion_of(scene: Scene) -> Motion:
 
 def _torque(m: Any, more: dict[str, Any]) -> Motion:
     torque = Torque(m.pulses or (), m.table)
+    if m.function is not None:
+        one = checked(m.function, "motion.function", 1, "t, psi, psi_dot and tip")
+        torque = ControlledTorque(controller=lambda *state: float(one(*state)[0]))
     return Motion.free(FreeHub(m.hub_inertia, torque, m.hub_damping, m.coupled, m.speed), **more)
 
 

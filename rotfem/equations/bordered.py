@@ -114,12 +114,12 @@ class BorderedSystem:
 
     def correction(self, shifts: tuple[float, float, float], before: Array | None = None) -> Array:
         """Return Newton's correction of (q, psi): A y = R, A z = b, dpsi = (r − c·y)/(d − c·z)."""
-        s, row, (_, c_v, c_m) = self.inner, self.row, shifts
+        s, row, (c_k, c_v, c_m) = self.inner, self.row, shifts
         started = perf_counter()
         R = s.residual()
         A, changed = s.tangent(*shifts, None if before is None else before[:-1])
         b, c = s.spin_derivative(c_v, c_m), row.row(shifts)
-        r, d = -row.residual(s.time), row.diagonal(c_v, c_m)
+        r, d = -row.residual(s.time), row.diagonal(c_v, c_m) + row.torque_slope(c_k, c_v)
         assembled_at = perf_counter()
         out = self._eliminated(s.factor(A, c_v, changed), (R, b), c, r, d)
         s.seconds["assemble"] += assembled_at - started
@@ -220,7 +220,7 @@ class BorderedSystem:
     def given(self, new: Any, old: Any = None) -> Array:
         """Return (work, impulse, moment) at the end of a step, by the trapezoidal rule over it, or of a first state.
 
-        The impulse of the torque is exact.
+        The impulse of a torque that is prescribed is exact.
 
         Work (J) is that of torque and brake; the angular impulse (N·m·s) has the moment (N·m) of all forces from
         outside in it too, which is kept for the next step.
@@ -229,11 +229,22 @@ class BorderedSystem:
             return np.array([0.0, 0.0, self.moment(new)])
         turn, h = new.q[-1] - old.q[-1], new.t - old.t
         speed, before = 0.5 * (new.v[-1] + old.v[-1]), old.given
-        impulse = self.hub.torque.impulse(old.t, new.t)
+        impulse = self._impulse(old, new)
         brake, moment = self.hub.damping, self.moment(new)
         work_done = before[0] + impulse / h * turn - brake * speed**2 * h
         impulse += before[1] + 0.5 * (before[2] + moment) * h - brake * turn
         return np.array([work_done, impulse, moment])
+
+    def _impulse(self, old: Any, new: Any) -> float:
+        """Return ∫ M dt from one state to another, exact or, of a controller, by the trapezoidal rule, N·m·s."""
+        torque, mean = self.hub.torque, 0.0
+        if not torque.controlled:
+            return float(torque.impulse(old.t, new.t))
+        for state in (old, new):
+            self.set_time(state.t)
+            self.set_state(state.q, state.v, state.a)
+            mean += 0.5 * torque.at(state.t)
+        return float((new.t - old.t) * mean)
 
     def moment(self, state: Any) -> float:
         """Return the moment of all forces from outside but torque and brake at a state (N·m)."""

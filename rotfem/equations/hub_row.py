@@ -32,6 +32,7 @@ class HubRow:
         self._outside = forms.form(sum(outside)) if outside else None
         self._work = sum(moments.values())
         self._vector = compat.create_vector(system.V)
+        self.hub.torque.attach(self._seen)
 
     @cached_property
     def _momentum(self) -> Any:
@@ -64,6 +65,17 @@ class HubRow:
         _, speed, rate = self.angle.values
         own = self.hub.inertia * rate + self.hub.damping * speed
         return float(own + self.work() - self.hub.torque.at(t))
+
+    def _seen(self) -> tuple[float, float, dict[str, float]]:
+        """Return psi (rad), psi' (rad/s) and the tip at the state, by the names of its components."""
+        system, (psi, speed, _) = self.system, self.angle.values
+        tip = system.tip(system.q.x.array, system.time)
+        return float(psi), float(speed), dict(zip(system.structure.components, map(float, tip), strict=True))
+
+    def torque_slope(self, c_k: float, c_v: float) -> float:
+        """Return −∂M/∂psi c_k − ∂M/∂psi' c_v of a torque that answers to the motion; 0 of others."""
+        by_angle, by_speed = self.hub.torque.slopes(self.system.time)
+        return -c_k * by_angle - c_v * by_speed
 
     def work(self) -> float:
         """Return the work of the structure in the rigid turn, N·m."""

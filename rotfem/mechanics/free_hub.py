@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +25,9 @@ class Torque:
         pulses: rows (start, end, torque) in s, s, N·m.
         table: rows (t, torque); None if there is none.
     """
+
+    #: Whether it answers to the motion.
+    controlled: ClassVar[bool] = False
 
     pulses: Rows = ()
     table: Rows | None = None
@@ -75,6 +80,17 @@ class Torque:
         """Return M(t): the limit from the left, or from the right with `after` (they differ at a jump)."""
         return float(self.many(np.array([t]), after)[0])
 
+    def attach(self, state: Callable[[], tuple[float, float, Mapping[str, float]]]) -> None:
+        """Do nothing: it does not answer to the state of the motion."""
+
+    def slopes(self, t: float) -> tuple[float, float]:
+        """Return ∂M/∂psi and ∂M/∂psi': it does not depend on them."""
+        return 0.0, 0.0
+
+    def on_rigid(self, t: Array, psi: float, speed: float) -> Array:
+        """Return M at times (n,), shape (n,)."""
+        return self.many(t)
+
     def impulse(self, start: float, end: float) -> float:
         """Return ∫ M dt from start to end (s), N·m·s."""
         knots, M, area = self._columns
@@ -88,6 +104,61 @@ class Torque:
         held = np.zeros(2) if self.table is None else np.where(outside < 0.0, M[0], M[-1])
         first, last = area[k] + (M[k] + 0.5 * slope * s) * s + held * outside
         return float(last - first)
+
+
+#: (t, psi, psi', tip) ↦ torque, N·m; the tip by the names of its components.
+Controller = Callable[[float, float, float, Mapping[str, float]], float]
+
+#: Changes of angle (rad) and speed (rad/s) over which the derivative of a controller is taken.
+SLIGHT = 1e-6
+
+
+@dataclass(frozen=True)
+class ControlledTorque(Torque):
+    """A torque that answers to the motion.
+
+    Attributes:
+        controller: what gives it.
+    """
+
+    controlled: ClassVar[bool] = True
+
+    controller: Controller = field(kw_only=True)
+    _state: list[Callable[[], tuple[float, float, Mapping[str, float]]]] = field(default_factory=list, init=False)
+
+    def attach(self, state: Callable[[], tuple[float, float, Mapping[str, float]]]) -> None:
+        """Say where psi (rad), psi' (rad/s) and the tip are read."""
+        self._state[:] = [state]
+
+    def at(self, t: float, after: bool = False) -> float:
+        """Return M at time t (s) and the state that is read; 0 where none is."""
+        return self.controller(t, *self._state[0]()) if self._state else 0.0
+
+    def many(self, t: Array, after: bool = False) -> Array:
+        """Return M at times (n,), shape (n,), and the state that is read."""
+        return np.array([self.at(float(s)) for s in t])
+
+    def impulse(self, start: float, end: float) -> float:
+        """Return M times the time from start to end (s), at the state that is read."""
+        return self.at(end) * (end - start)
+
+    def slopes(self, t: float) -> tuple[float, float]:
+        """Return ∂M/∂psi and ∂M/∂psi' at time t (s) and the state that is read."""
+        psi, speed, tip = self._state[0]()
+        here = self.controller(t, psi, speed, tip)
+        by_angle = self.controller(t, psi + SLIGHT, speed, tip) - here
+        return by_angle / SLIGHT, (self.controller(t, psi, speed + SLIGHT, tip) - here) / SLIGHT
+
+    def on_rigid(self, t: Array, psi: float, speed: float) -> Array:
+        """Return M at times (n,) with a structure that does not move in the frame, shape (n,)."""
+        return np.array([self.controller(float(s), psi, speed, Nowhere()) for s in t])
+
+
+class Nowhere(dict[str, float]):
+    """The tip of a structure that does not move: all its components are zero."""
+
+    def __missing__(self, name: str) -> float:
+        return 0.0
 
 
 @dataclass(frozen=True)
@@ -115,8 +186,11 @@ class FreeHub:
             times: increasing, the first the start; the torque is taken in the middle between two.
             inertia: of hub and structure about the axis, kg·m².
         """
-        h, torque = np.diff(times), self.torque.many(0.5 * (times[:-1] + times[1:]))
-        speeds, decay = np.full(len(times), self.speed), self.damping / inertia
-        for k, M in enumerate(torque):
+        h, middle = np.diff(times), 0.5 * (times[:-1] + times[1:])
+        given = None if self.torque.controlled else self.torque.many(middle)
+        speeds, decay, psi = np.full(len(times), self.speed), self.damping / inertia, 0.0
+        for k in range(len(h)):
+            M = self.torque.on_rigid(middle[k : k + 1], psi, speeds[k])[0] if given is None else given[k]
             speeds[k + 1] = (speeds[k] + h[k] * M / inertia) / (1 + h[k] * decay)
+            psi += h[k] * speeds[k + 1]
         return speeds

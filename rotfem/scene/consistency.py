@@ -76,6 +76,12 @@ def check_prestress(structure: AnyStructure, model: Model) -> None:
         raise problem("model.prestress", model.prestress, f"needs model.theory = {' or '.join(able)}")
 
 
+def check_controller(motion: Motion, model: Model) -> None:
+    """Refuse a torque that answers to the motion where the whole motion is solved for at once."""
+    if model.reduced and isinstance(motion, TorqueMotion) and motion.function is not None:
+        raise problem("model.reduced", model.reduced, "needs a torque over time, not motion.function")
+
+
 def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:
     """Refuse the inertial-frame form where there is none."""
     if model.frame != "inertial":

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from rotfem.scene.files import as_time_table
+from rotfem.scene.load_tables import arguments
 from rotfem.scene.signals import Signal, as_function
 from rotfem.scene.values import Matrix, NonNegative, Number, Positive, SceneModel, Vector3, as_rows, as_vector3, problem
 
@@ -34,6 +35,13 @@ def _as_pulses(value: Any) -> Matrix:
         if end <= start:
             raise problem("", value, f"pulse {i} must end after it starts; it runs from {start:g} to {end:g} s")
     return rows
+
+
+def _as_controller(value: Any) -> Callable[..., float]:
+    if not callable(value) or arguments(value) != 4:
+        raise problem("", value, "must be a Python function of (t, psi, psi_dot, tip)")
+    function: Callable[..., float] = value
+    return function
 
 
 class Motion(SceneModel):
@@ -190,6 +198,8 @@ class TorqueMotion(Motion):
         hub_inertia: I_R (kg·m²).
         pulses: rows (start, end, torque) in s, s, N·m; they add up where they overlap. None if not given.
         table: rows (t, torque), instead of pulses, or None.
+        function: Python function (t, psi, psi_dot, tip) ↦ torque, instead of them, or None: a controller. The tip is a
+            dictionary of its displacements and rotations, as the columns of results name them: u1, u2, …
         coupled: whether the hub feels the structure's elastic motion.
         hub_damping: viscous damping of the hub (N·m·s).
         speed: initial speed of the hub (rad/s).
@@ -199,6 +209,7 @@ class TorqueMotion(Motion):
     hub_inertia: Positive = Field(description="a number greater than 0 (kg·m²)")
     pulses: Annotated[Matrix, PlainValidator(_as_pulses)] | None = None
     table: Annotated[Matrix, PlainValidator(_as_torque_table)] | None = None
+    function: Annotated[Callable[..., float], PlainValidator(_as_controller)] | None = None
     coupled: Annotated[bool, Field(strict=True)] = True
     hub_damping: NonNegative = 0.0
     speed: Number = 0.0
@@ -217,6 +228,8 @@ class TorqueMotion(Motion):
     def _check_one(self) -> Self:
         if self.pulses is not None and self.table is not None:
             raise problem("table", self.table, "give either pulses or table")
+        if self.function is not None and (self.pulses is not None or self.table is not None):
+            raise problem("function", None, "give either a function, which may have pulses in it, or pulses or table")
         return self
 
 

@@ -26,6 +26,7 @@ from rotfem.errors import SceneError
 from rotfem.scene.beams import Structure
 from rotfem.scene.consistency import (
     check_accuracy,
+    check_controller,
     check_frame,
     check_initial,
     check_limits,
@@ -255,6 +256,7 @@ class Scene(SceneModel):
         check_initial(self.structure, self.motion, self.initial)
         check_limits(self.limits, self.time, self.modes)
         check_accuracy(self.model, self.accuracy)
+        check_controller(self.motion, self.model)
         self.output.check(self.structure.type, self.structure.length)
         return self
 

@@ -26,6 +26,11 @@ kelvin_voigt = 1e-3
 type = "spin_up"
 speed = 6.0
 duration = 2.0
+[loads]
+distributed = {{ over_span = [[0.0, 0.0, 0.5], [6.0, 0.0, 0.0]] }}
+[[loads.at]]
+x = 3.0
+force = [0.0, 1.0]
 [mesh]
 elements = 8
 degree = 3
