@@ -48,7 +48,7 @@ def with_tables(data: Any, info: ValidationInfo, keys: Sequence[str] | None) -> 
         return data
     out = dict(data)
     for key in keys or ():
-        if _is_path(out.get(key)):
+        if is_path(out.get(key)):
             out[key] = _named(key, lambda key=key: _rows(key, out[key], info))
     section = out.get("section")
     if not isinstance(section, Mapping):
@@ -68,7 +68,7 @@ def with_tables(data: Any, info: ValidationInfo, keys: Sequence[str] | None) -> 
 def _section_tables(section: Mapping[str, Any], info: ValidationInfo) -> dict[str, Any]:
     out = {key: value for key, value in section.items() if key != "file"}
     for key, value in out.items():
-        if key not in NO_TABLES and _is_path(value):
+        if key not in NO_TABLES and is_path(value):
             out[key] = _named(f"section.{key}", lambda key=key, value=value: _rows(key, value, info))
     if "file" not in section:
         return out
@@ -79,7 +79,7 @@ def _section_tables(section: Mapping[str, Any], info: ValidationInfo) -> dict[st
     return columns | out
 
 
-def _is_path(value: Any) -> bool:
+def is_path(value: Any) -> bool:
     """Return whether a value names a file: any text that is no name of a file is left to who wants a number."""
     return isinstance(value, Path) or (isinstance(value, str) and _ENDING.search(value) is not None)
 

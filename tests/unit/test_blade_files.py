@@ -309,3 +309,12 @@ def test_import_writes_a_scene_that_is_the_blade(tmp_path: Path) -> None:
     assert again.structure == scene.structure == read(tmp_path, "primary.dat", structure_tip_mass=3.0)
     assert (tmp_path / "out.toml").read_text().startswith("# imported from primary.dat;")
     assert again.motion.speed == 1.2
+
+
+def test_paths_of_blades_move_with_a_tuned_scene(tmp_path: Path) -> None:
+    from rotfem.commands.cost.tuned import _moved
+
+    structure = {"line": "line.csv", "section": {"from": "blade", "EA": "EA.csv", "shape": "circle", "GJ": 1.0}}
+    found = _moved({"structure": structure}, tmp_path, tmp_path / "deeper")["structure"]
+    assert found["line"] == "../line.csv"
+    assert found["section"] == {"from": "../blade", "EA": "../EA.csv", "shape": "circle", "GJ": 1.0}

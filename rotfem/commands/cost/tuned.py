@@ -13,9 +13,10 @@ from rotfem.commands.cost.settings import Setting, own_setting, sample_interval
 from rotfem.errors import SceneError
 from rotfem.results.files import write_text
 from rotfem.scene import Scene
+from rotfem.scene.beam_files import is_path
 
-#: Keys whose value, where it is a string, is the path of a file.
-FILE_KEYS = {"table", "base_acceleration", "tip_force", "tip_moment", "distributed", "mesh"}
+#: Keys whose value, where it is a string, is the path of a file, whatever it ends with.
+FILE_KEYS = {"table", "base_acceleration", "tip_force", "tip_moment", "distributed", "mesh", "from", "file"}
 
 
 def tuned(scene: Scene, setting: Setting) -> Scene:
@@ -58,7 +59,7 @@ def _moved(tables: Mapping[str, Any], start: Path, goal: Path) -> dict[str, Any]
     for key, value in tables.items():
         if isinstance(value, Mapping):
             out[key] = _moved(value, start, goal)
-        elif key in FILE_KEYS and isinstance(value, str | Path) and not Path(value).is_absolute():
+        elif isinstance(value, str | Path) and (key in FILE_KEYS or is_path(value)) and not Path(value).is_absolute():
             out[key] = os.path.relpath(start / value, goal) if start != goal else str(value)
         else:
             out[key] = value
