@@ -27,18 +27,22 @@ class March:
         scheme: time-stepping scheme.
         steps: end and length of the steps.
         newton: iteration control of the steps.
-        q: shape at t = 0, at rest in the turning frame, local dof array of the structure; undeformed if None.
+        q: shape at t = 0 in the turning frame, local dof array of the structure; undeformed if None.
+        v: velocities there, relative to the turning frame; it is at rest if None.
 
     Attributes:
         stepper: what advances the system, with its counts.
         reached: state that an earlier march has yielded, to go on from; its stepper's numbers must be this one's.
     """
 
-    def __init__(self, system: Any, scheme: Scheme, steps: Steps, newton: Newton, q: Array | None = None):
+    def __init__(
+        self, system: Any, scheme: Scheme, steps: Steps, newton: Newton, q: Array | None = None, v: Array | None = None
+    ):
         self.system, self.steps = system, steps
         self.stepper = Stepper(system, scheme, newton)
         self.reached: State | None = None
         self._q = np.zeros_like(system.q.x.array) if q is None else q
+        self._v = v
 
     def __iter__(self) -> Iterator[State]:
         """Yield the state at t = 0, unless it goes on from a later one, and at the end of every step.
@@ -48,7 +52,10 @@ class March:
         """
         state = self.reached
         if state is None:
-            state = self.stepper.start(0.0, *self.system.start(self._q))
+            q, v = self.system.start(self._q)
+            if self._v is not None:
+                v[: len(self._v)] += self._v
+            state = self.stepper.start(0.0, q, v)
             yield state
         steps = fixed_steps if self.steps.step is not None else AdaptiveSteps
         yield from steps(self.stepper, state, self.steps)

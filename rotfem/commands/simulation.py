@@ -9,10 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.constant_conditions import stability_ahead
 from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.dense_output import RowTimes
-from rotfem.analysis.equilibrium import static_tip_shape, steady_state
+from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.error_estimate import ErrorEstimate
 from rotfem.analysis.error_watch import ErrorWatch
 from rotfem.analysis.farthest_state import Farthest
@@ -27,6 +26,7 @@ from rotfem.analysis.theory_error import TheoryError
 from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
 from rotfem.analysis.tip_track import TipTrack
 from rotfem.commands import energy_growth
+from rotfem.commands.first_state import first_state
 from rotfem.commands.interrupts import Interrupted
 from rotfem.commands.keeper import Keeper
 from rotfem.commands.known_error import error_of_run, warnings_of_run
@@ -44,7 +44,7 @@ from rotfem.numerics.newton import Newton
 from rotfem.results.run import RunResult
 from rotfem.scene import Scene, Time
 from rotfem.selection.accuracy import Settings
-from rotfem.selection.left_out import leave_out, with_all, without, worth_a_look
+from rotfem.selection.left_out import leave_out, without, worth_a_look
 from rotfem.selection.model_choice import Choice, RangeExceeded
 
 Array = npt.NDArray[np.float64]
@@ -113,7 +113,7 @@ class Simulation:
             return without(problem, known, self.comm)
         if scene.time is None or self.choice is not None or model.all_unknowns or model.reduced:
             return problem, None
-        if scene.initial.state == "steady" or not worth_a_look(problem, scene.time):
+        if scene.initial.state == "steady" or scene.initial.moves or not worth_a_look(problem, scene.time):
             return problem, None
         return leave_out(problem, self.comm, scene.initial.tip_displacement is not None)
 
@@ -158,10 +158,11 @@ class Simulation:
         time = self.scene.time
         assert time is not None
         newton = Newton.of(self.scene.solver)
-        scheme, steps, start = scheme_of(time), Steps.of(time), None if self.keeper.goes_on else self._initial()
+        scheme, steps = scheme_of(time), Steps.of(time)
+        start, rates = (None, None) if self.keeper.goes_on else first_state(self)
         if self.scene.model.reduced and by_reduced_model(self, start, progress):
             return
-        march = March(self.system, scheme, steps, newton, start)
+        march = March(self.system, scheme, steps, newton, start, rates)
         self.stepper = march.stepper
         if self.scene.output.error:
             self.watch = self.stepper.watch = ErrorWatch(self.system, time.end, scheme)
@@ -198,28 +199,6 @@ class Simulation:
             progress(row.t / time.end)
         self.last = state
         self.keeper.stepped(self, state)
-
-    def _initial(self) -> Array | None:
-        """Return q at t = 0 in the turning frame; None where it is undeformed."""
-        initial = self.scene.initial
-        if initial.state != "steady":
-            self.stability = stability_ahead(with_all(self.system), Newton.of(self.scene.solver))
-            if self.stability is not None and (said := self.stability.warning()):
-                self.warnings.append(f"what constant conditions hold in balance: {said}")
-        if initial.tip_displacement is not None:
-            return static_tip_shape(self.problem, initial.tip_displacement, Newton.of(self.scene.solver), self.comm)
-        if initial.state != "steady":
-            return None
-        system = self.system
-        if self.problem.frame == "inertial":
-            system = compile_system(self.problem.replace(frame="rotating"), self.comm, moving=False)
-        speed = self.problem.motion.speed(0.0)
-        solver = self.scene.solver
-        q = steady_state(system, speed, Newton.of(solver), past_limits=solver.past_limits, notes=self.warnings)
-        self.stability = stability_of(system, q, speed)
-        if said := self.stability.warning():
-            self.warnings.append(f"the motion starts from an equilibrium of its own: {said}")
-        return q
 
     # --- what is watched ---------------------------------------------------------------------------------------------
 

@@ -76,14 +76,10 @@ def check_prestress(structure: AnyStructure, model: Model) -> None:
         raise problem("model.prestress", model.prestress, f"needs model.theory = {' or '.join(able)}")
 
 
-def check_controller(motion: Motion, model: Model) -> None:
-    """Refuse a torque that answers to the motion where the whole motion is solved for at once."""
+def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:
+    """Refuse the inertial-frame form where there is none, and a controller where the motion is solved for at once."""
     if model.reduced and isinstance(motion, TorqueMotion) and motion.function is not None:
         raise problem("model.reduced", model.reduced, "needs a torque over time, not motion.function")
-
-
-def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:
-    """Refuse the inertial-frame form where there is none."""
     if model.frame != "inertial":
         return
     if not structure.is_planar or not registry.theories[model.theory].exact:
@@ -126,8 +122,40 @@ def check_initial(structure: AnyStructure, motion: Motion, initial: Initial) -> 
         if abs(displacement) >= limit:
             reason = f"must be less than the length {limit:g} in size"
             raise problem("initial.tip_displacement", displacement, reason)
+    _check_moving(structure, motion, initial)
     if initial.state == "steady" and isinstance(motion, TorqueMotion):
         raise problem("initial.state", initial.state, 'needs a speed that is prescribed, not motion.type = "torque"')
+
+
+def _check_moving(structure: AnyStructure, motion: Motion, initial: Initial) -> None:
+    """Refuse a mode or velocities to start with that the scene cannot have."""
+    if initial.mode is not None and motion.is_free:
+        raise problem("initial.mode", initial.mode, 'needs a speed that is prescribed, not motion.type = "torque"')
+    if initial.velocity is None:
+        return
+    rows, length = initial.velocity, structure.length
+    if structure.type == "plate" or length is None:
+        raise problem("initial.velocity", None, "is available for beams only; a plate may start in a mode")
+    if rows[0][0] != 0.0 or abs(rows[-1][0] - length) > 1e-9 * length:
+        raise problem("initial.velocity", None, f"the table must run from x = 0 to the length {length:g}")
+    if any(rows[0][1:]):
+        raise problem("initial.velocity", None, "must be zero at x = 0, where the root is held")
+    if structure.is_planar and any(row[3] for row in rows):
+        raise problem("initial.velocity", None, "the third component must be 0 for a planar_beam")
+
+
+def check_first_state(model: Model, initial: Initial, accuracy: float | None) -> None:
+    """Refuse a mode or velocities to start with where the history is one that starts at rest."""
+    if not initial.moves:
+        return
+    key, value = ("initial.mode", initial.mode) if initial.mode is not None else ("initial.velocity", None)
+    for name, given in (("accuracy", accuracy), ("model.tolerance", model.tolerance)):
+        if given is not None:
+            raise problem(key, value, f"cannot be combined with {name}, whose trials start at rest")
+    if model.reduced:
+        raise problem(key, value, "cannot be combined with model.reduced, which starts at rest")
+    if model.frame == "inertial":
+        raise problem(key, value, 'is relative to the turning frame: it needs model.frame = "rotating"')
 
 
 def check_accuracy(model: Model, accuracy: float | None) -> None:

@@ -26,7 +26,7 @@ from rotfem.errors import SceneError
 from rotfem.scene.beams import Structure
 from rotfem.scene.consistency import (
     check_accuracy,
-    check_controller,
+    check_first_state,
     check_frame,
     check_initial,
     check_limits,
@@ -256,7 +256,7 @@ class Scene(SceneModel):
         check_initial(self.structure, self.motion, self.initial)
         check_limits(self.limits, self.time, self.modes)
         check_accuracy(self.model, self.accuracy)
-        check_controller(self.motion, self.model)
+        check_first_state(self.model, self.initial, self.accuracy)
         self.output.check(self.structure.type, self.structure.length)
         return self
 

@@ -6,12 +6,13 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import PlainValidator, model_validator
+from pydantic import PlainValidator, ValidationInfo, model_validator
 
 from rotfem import registry
+from rotfem.scene.files import as_table
 from rotfem.scene.names import as_name, as_names
 from rotfem.scene.plates import locking
-from rotfem.scene.values import Bounds, Count, Number, Positive, SceneModel, problem
+from rotfem.scene.values import Bounds, Count, Matrix, Number, Positive, SceneModel, as_increasing_rows, problem
 
 
 def _as_theory(value: Any) -> str:
@@ -84,19 +85,45 @@ class Model(SceneModel):
         return self
 
 
+def _as_velocities(value: Any, info: ValidationInfo) -> Matrix:
+    rows = as_table(value, info, (3, 4), "a table [[x, v1, v2, v3], …] (v3 may be left out)", as_increasing_rows)
+    return tuple((*row, 0.0)[:4] for row in rows)
+
+
 class Initial(SceneModel):
     """The [initial] table.
 
     Attributes:
         tip_displacement: u₂ of the tip (m) of the static shape from which a planar beam is released, or None.
         state: "undeformed", or "steady" to start from the equilibrium at the initial speed.
+        mode: number of a mode about that state which the motion starts in, or None.
+        amplitude: largest displacement of the tip in it (m).
+        phase: of the mode (rad): at 0 the tip is displaced, at π/2 it moves.
+        velocity: rows (x, v1, v2, v3) of a beam's axis relative to the turning frame (m, m/s), or None.
     """
 
     tip_displacement: Number | None = None
     state: Literal["undeformed", "steady"] = "undeformed"
+    mode: Count | None = None
+    amplitude: Number | None = None
+    phase: Number = 0.0
+    velocity: Annotated[Matrix, PlainValidator(_as_velocities)] | None = None
+
+    @property
+    def moves(self) -> bool:
+        """Whether the structure does not start at rest, or in a mode."""
+        return self.mode is not None or self.velocity is not None
 
     @model_validator(mode="after")
     def _check_one(self) -> Self:
+        if (self.mode is None) != (self.amplitude is None):
+            raise problem("amplitude", self.amplitude, "mode and amplitude are given together")
+        if self.phase != 0.0 and self.mode is None:
+            raise problem("phase", self.phase, "needs a mode")
+        if self.moves and self.tip_displacement is not None:
+            raise problem("tip_displacement", self.tip_displacement, "cannot be combined with mode or velocity")
+        if self.mode is not None and self.velocity is not None:
+            raise problem("velocity", None, "cannot be combined with mode, which has velocities")
         if self.state == "steady" and self.tip_displacement is not None:
             raise problem("tip_displacement", self.tip_displacement, 'cannot be combined with state = "steady"')
         return self

@@ -1,0 +1,68 @@
+"""Histories that start in a mode, or with velocities: they are that mode, and a pendulum."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rotfem
+
+L = 10.0
+SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2}
+SPIN = {"type": "constant", "speed": 3.0}
+
+
+def scene(initial: Any, **more: Any) -> dict[str, Any]:
+    """Return tables of a beam that starts so."""
+    return {
+        "structure": {"type": "planar_beam", "length": L, "section": SECTION},
+        "motion": SPIN,
+        "mesh": {"elements": 4},
+        "model": {"theory": "consistent_linear"},
+        "initial": initial,
+        "time": {"end": 0.5, "step": 1e-3},
+        "output": {"error": False},
+        **more,
+    }
+
+
+@pytest.mark.parametrize("phase", [0.0, np.pi / 2])
+def test_a_mode_goes_on_as_itself(phase: float) -> None:
+    """u₂ = u₂(steady) + a cos(ωt + φ) at the tip: modes of M, C, K are motions of them; steps: (ωh)²/12 ωt, 1e-4."""
+    tables = scene({"mode": 2, "amplitude": 0.01, "phase": phase, "state": "steady"})
+    found = rotfem.run(tables).history
+    omega = rotfem.modes({**tables, "initial": {}}).frequencies[1]
+    np.testing.assert_allclose(found["tip_u2"], 0.01 * np.cos(omega * found["t"] + phase), rtol=0, atol=2e-5)
+
+
+def test_a_hinged_blade_that_is_pushed() -> None:
+    """φ = (w/ω) sin ωt of the rigid blade, ω² = 3k/ρAL³, with velocities w x; it bends by k L/EI = 3e-4 beside."""
+    stiff, k, w = {"EA": 1e10, "GA": 1e10, "EI": 1e7, "mass_per_length": 1.2}, 300.0, 0.01
+    structure = {"type": "planar_beam", "length": L, "section": stiff, "root": {"lag_stiffness": k}}
+    rest = {"type": "constant", "speed": 0.0}
+    tables = scene({"velocity": [[0, 0, 0], [L, 0, w * L]]}, structure=structure, motion=rest, mesh={"elements": 1})
+    found = rotfem.run({**tables, "time": {"end": 4.0, "step": 0.01}}).history
+    omega = np.sqrt(3 * k / (1.2 * L**3))
+    np.testing.assert_allclose(
+        found["tip_alpha"], w / omega * np.sin(omega * found["t"]), rtol=0, atol=3e-4 * w / omega
+    )
+
+
+@pytest.mark.parametrize(
+    ("initial", "more", "words"),
+    [
+        ({"mode": 1}, {}, "given together"),
+        ({"phase": 1.0}, {}, "needs a mode"),
+        ({"mode": 1, "amplitude": 0.1, "tip_displacement": 0.1}, {}, "cannot be combined"),
+        ({"velocity": [[0, 0, 1], [L, 0, 1]]}, {}, "zero at x = 0"),
+        ({"velocity": [[0, 0, 0], [5, 0, 1]]}, {}, "to the length"),
+        ({"mode": 1, "amplitude": 0.1}, {"accuracy": 1e-2}, "accuracy"),
+        ({"mode": 1, "amplitude": 0.1}, {"motion": {"type": "torque", "hub_inertia": 1.0}}, "prescribed"),
+    ],
+)
+def test_refused(initial: Any, more: Any, words: str) -> None:
+    with pytest.raises(rotfem.SceneError, match="initial") as caught:
+        rotfem.Scene.from_dict(scene(initial, **more))
+    assert words in str(caught.value)
