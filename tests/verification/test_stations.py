@@ -148,3 +148,13 @@ def test_a_spatial_beam_in_a_plane_is_a_planar_one() -> None:
 def test_refused(output: dict[str, Any], key: str) -> None:
     with pytest.raises(rotfem.SceneError, match=key):
         rotfem.Scene.from_dict({**SPIN_UP, "output": output})
+
+
+def test_a_resumed_run_has_the_same_rows(tmp_path: Path) -> None:
+    scene = {**SPIN_UP, "time": {"end": 0.4, "step": 0.02}, "output": {"stations": 3, "every": 3, "error": False}}
+    whole = rotfem.run(scene)
+    rotfem.run({**scene, "time": {"end": 0.2, "step": 0.02}}, folder=tmp_path, checkpoint=4)
+    resumed = rotfem.run(scene, folder=tmp_path, resume=True)
+    assert whole.stations is not None
+    assert resumed.stations is not None
+    assert resumed.stations.text() == whole.stations.text()
