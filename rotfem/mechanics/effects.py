@@ -175,7 +175,7 @@ for _effect in (
     ),
     Effect(
         "trapeze",
-        present=lambda problem: problem.structure.has_fibers,
+        present=lambda problem: getattr(problem.structure, "has_fibers", False),
         reasons=("fibers beside the axis of twist are stretched by it", "no section twists"),
     ),
     Effect(
