@@ -14,13 +14,14 @@ from rotfem.mechanics.courses import View, watched
 from rotfem.mechanics.problem import Problem
 
 
-def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bool = True) -> Any:
+def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bool = True, parted: bool = False) -> Any:
     """Return the system of a problem: affine for a linear theory, bordered where the hub is free.
 
     Args:
         problem: what is to be computed.
         comm: communicator the structure is distributed over.
         moving: whether it will be stepped in time; a steady state and its modes do without what only that needs.
+        parted: whether forms are to be shared with other nonlinear theories of the problem (see `NonlinearSystem`).
 
     Raises:
         InputError: a mesh or a section that cannot be computed with.
@@ -28,6 +29,7 @@ def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bo
     view = View()
     seen, courses = watched(problem, view) if moving else (problem, [])
     model = Model(seen, comm)
-    system = (AffineSystem if problem.theory.linear else NonlinearSystem)(model, moving)
+    linear = problem.theory.linear
+    system = AffineSystem(model, moving) if linear else NonlinearSystem(model, moving, parted)
     system.view, system.courses = view, tuple(courses)
     return system if model.hub is None else BorderedSystem(system)

@@ -130,6 +130,12 @@ class Model:
         """F(q, v, a; δq), a UFL form."""
         return added(self.terms.values())
 
+    def by_strains(self) -> list[Any]:
+        """Return the residual in two parts, the first with all terms that have strains; UFL forms."""
+        within = [term for name, term in self.terms.items() if self.acting[name].internal]
+        rest = [term for name, term in self.terms.items() if not self.acting[name].internal]
+        return [added(part) for part in (within, rest) if part]
+
     @cached_property
     def turn(self) -> RigidTurn:
         """A rigid turn about the axis of the motion."""

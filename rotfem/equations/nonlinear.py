@@ -13,6 +13,7 @@ from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms import expand_derivatives
 
 from rotfem.equations.energy_balance import EnergyBalance
+from rotfem.equations.model import Model
 from rotfem.equations.point_stresses import PointStresses
 from rotfem.equations.system import System
 from rotfem.mechanics.sums import added
@@ -22,22 +23,38 @@ Array = npt.NDArray[np.float64]
 
 
 class NonlinearSystem(System):
-    """Residual F and tangent J = c_k K + c_v C + c_m M of a history; at rest F(q, 0, 0), K, C and M one by one."""
+    """Residual F and tangent J = c_k K + c_v C + c_m M of a history; at rest F(q, 0, 0), K, C and M one by one.
+
+    Args:
+        model: the terms.
+        moving: see `System`.
+        parted: whether what has the theory's strains is compiled by itself in a history. The rest, inertia and loads, is
+            most of the work, and that of another theory, too.
+    """
+
+    def __init__(self, model: Model, moving: bool = True, parted: bool = False):
+        self._parted = parted
+        super().__init__(model, moving)
 
     def _compile(self) -> Any:
         self._shift_values: tuple[float, ...] = (1.0, 0.0, 1.0)
         self._shifts = [self.structure.constant(c) for c in self._shift_values]
         if self.moving:
-            self._F = forms.form(self.model.residual)
-            self._pattern = self._J = forms.form(self._tangent_form)
+            parts = self.model.by_strains() if self._parted else [self.model.residual]
+            self._F = [forms.form(F) for F in parts]
+            self._J = [forms.form(self._tangent_of(F)) for F in parts]
+            self._pattern = self._J[0]
         else:
-            self._F = forms.form(self._at_rest["f"], once=True)
+            self._F = [forms.form(self._at_rest["f"], once=True)]
             self._pattern = self._parts["K"]
         return fem_petsc.create_matrix(self._pattern)
 
     @cached_property
     def _tangent_form(self) -> Any:
-        F, du = self.model.residual, ufl.TrialFunction(self.V)
+        return self._tangent_of(self.model.residual)
+
+    def _tangent_of(self, F: Any) -> Any:
+        du = ufl.TrialFunction(self.V)
         parts = (ufl.derivative(F, x, du) for x in (self.q, self.v, self.a))
         return added(c * form for c, form in zip(self._shifts, parts, strict=True))
 
@@ -96,11 +113,11 @@ class NonlinearSystem(System):
         return self._negative(self._F_in_motion, True)
 
     @cached_property
-    def _F_in_motion(self) -> Any:
-        return self._F if self.moving else forms.form(self.model.residual, once=True)
+    def _F_in_motion(self) -> list[Any]:
+        return self._F if self.moving else [forms.form(self.model.residual, once=True)]
 
-    def _negative(self, form: Any, moving: bool) -> Any:
-        b = self._assembled(form)
+    def _negative(self, parts: list[Any], moving: bool) -> Any:
+        b = self._assembled(parts)
         np.negative(b, out=b)
         b[self.clamped] = 0.0
         if moving and self.by_mode is not None:
@@ -108,10 +125,11 @@ class NonlinearSystem(System):
             owned -= self.by_mode.times(self._state[1][: len(owned)])
         return self.b
 
-    def _assembled(self, form: Any) -> Array:
+    def _assembled(self, parts: list[Any]) -> Array:
         b: Array = self._b_array
         b[:] = 0.0
-        fem.assemble_vector(b, form)
+        for form in parts:
+            fem.assemble_vector(b, form)
         if self.comm.size > 1:
             self._b.scatter_reverse(la.InsertMode.add)
         return b
@@ -181,8 +199,9 @@ class NonlinearSystem(System):
     def _assemble(self, A: Any, shifts: tuple[float, float, float], diagonal: float) -> None:
         if self.moving:
             self.shift(shifts)
-            fem_petsc.assemble_matrix(A, self._J, self.bcs, diagonal)
-            A.assemble()
+            for form in self._J:
+                fem_petsc.assemble_matrix(A, form, self.bcs, diagonal)
+                A.assemble()
             return
         wanted = [name for name, c in zip("KCM", shifts, strict=True) if c != 0.0]
         assert shifts == tuple(float(name in wanted) for name in "KCM")

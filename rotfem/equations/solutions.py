@@ -11,8 +11,7 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from rotfem.equations.linearised import Linearised
-from rotfem.errors import ComputationError
-from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.linear import DirectSolver, Increment, SingularSolver, is_regular
 from rotfem.numerics.low_rank import LowRank
 
 Array = npt.NDArray[np.float64]
@@ -158,10 +157,10 @@ class Solutions:
         b.array[massless] = 0.0
         return self._dx.solve(solver, b)
 
-    def mass_solver(self) -> tuple[DirectSolver, Array]:
+    def mass_solver(self) -> tuple[DirectSolver | SingularSolver, Array]:
         """Return a solver with M, where it has to be completed with K, and which owned unknowns have no inertia.
 
-        A tip mass beside the axis can leave a rotation without inertia in a direction that is no unknown of its own;
+        A mass beside the axis can leave a rotation without inertia in a direction that is no unknown of its own;
         then so little of K is added to all of M that no motion with inertia feels it.
         """
         M = self.matrix(0.0, 0.0, 1.0, 1.0)
@@ -173,10 +172,8 @@ class Solutions:
             K.diagonalScale(none)
             M.axpy(1.0, K, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         solver = DirectSolver(M)
-        try:
-            self._dx.solve(solver, self.residual())
-        except ComputationError:
-            K = self.matrix(1.0, 0.0, 0.0, 1.0)
-            M.axpy(TRACE * M.norm() / K.norm(), K, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-            solver = DirectSolver(M)
-        return solver, massless
+        if is_regular(M, solver):
+            return solver, massless
+        K = self.matrix(1.0, 0.0, 0.0, 1.0)
+        K.scale(TRACE * M.norm() / K.norm())
+        return SingularSolver(M, K), massless

@@ -18,6 +18,9 @@ Array = npt.NDArray[np.float64]
 #: Up to this size, on one process, PETSc's own LU is quicker than MUMPS (findings: 43 against 377 µs at 603 dofs).
 SMALL = 5000
 
+#: Relative difference of two solutions from which a matrix is singular.
+LOST = 1e-2
+
 
 def combine(target: Any, matrices: list[Any], weights: Array) -> None:
     """Write Σ weight · matrix into target; all share one non-zero pattern."""
@@ -125,6 +128,42 @@ class DirectSolver:
         return np.array(x.array)
 
 
+class SingularSolver:
+    """Solver of A x = b with a singular A and a small K beside it; what A does not feel, A n = 0, follows: n·K x = 0.
+
+    x = (A + K)⁻¹ A (A + K)⁻¹ b, so that round-off of b in these directions, large over a small K, is in no x.
+
+    Args:
+        A: symmetric PETSc matrix.
+        K: symmetric, regular where A is not.
+    """
+
+    def __init__(self, A: Any, K: Any):
+        self._A, both = A, A.copy()
+        both.axpy(1.0, K, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        self._solver, self._felt = DirectSolver(both), A.createVecs()[0]
+
+    def solve(self, b: Any, x: Any) -> None:
+        """Write the solution for b into x."""
+        self._solver.solve(b, x)
+        self._A.mult(x, self._felt)
+        self._solver.solve(self._felt, x)
+
+
+def is_regular(A: Any, solver: DirectSolver) -> bool:
+    """Return whether a solver gives back what A was multiplied with, as it does unless A is singular to round-off."""
+    (x, b), found = A.createVecs(), A.createVecs()[0]
+    b.array[:] = np.cos(np.arange(b.getLocalSize()))
+    try:
+        solver.solve(b, x)
+        A.mult(x, b)
+        solver.solve(b, found)
+    except ComputationError:
+        return False
+    found.axpy(-1.0, x)
+    return bool(found.norm() <= LOST * x.norm())
+
+
 class Increment:
     """A vector over the dofs of a space that receives solutions.
 
@@ -138,7 +177,7 @@ class Increment:
         self._array: Array = self.function.x.array
         self._shared = V.mesh.comm.size > 1
 
-    def solve(self, solver: DirectSolver, b: Any) -> Array:
+    def solve(self, solver: DirectSolver | SingularSolver, b: Any) -> Array:
         """Return the local array (owned and ghosts) of the solution of A x = b; it is overwritten by the next call."""
         solver.solve(b, self._x)
         if self._shared:

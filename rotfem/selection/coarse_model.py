@@ -208,7 +208,7 @@ class Trial:
     def compiled(self, problem: Problem, theory: str) -> Any:
         """Return the system that a theory of a problem is tried out on; the mesh may be another one."""
         own, _ = stand_in(self.theories[theory], self.theories, problem.structure.type)
-        return compile_system(problem.replace(theory=own), self.comm, HISTORY in self.wanted)
+        return compile_system(problem.replace(theory=own), self.comm, HISTORY in self.wanted, parted=True)
 
     def _frequencies_at_rest(self) -> Array:
         """Return the frequencies (rad/s) of the resting structure, its hub held."""

@@ -11,6 +11,9 @@ from rotfem.numerics.linear import DirectSolver, Increment, combine
 from rotfem.numerics.projection import orthonormal, summed, times
 
 Array = npt.NDArray[np.float64]
+
+#: Condition of the masses from which some motion has none to speak of: its frequency is 3e4 times the lowest.
+SINGULAR = 1e9
 Index = npt.NDArray[np.int64]
 
 #: Part of its energy that a shape must have beside those of the basis, to be told from round-off.
@@ -107,6 +110,8 @@ class ReducedModel:
         """Return the accelerations (n, m) that keep the reduced equations at coordinates and rates (n, m)."""
         M, C, K, f = self.operators(c)
         force = f + np.einsum("nij,nj->ni", C, v) + np.einsum("nij,nj->ni", K, q)
+        if self.size and np.linalg.cond(M[0]) > SINGULAR:  # what has no mass has no force of inertia either
+            return np.asarray(-np.einsum("nij,nj->ni", np.linalg.pinv(M, 1 / SINGULAR, hermitian=True), force))
         return -np.linalg.solve(M, force[:, :, None])[:, :, 0]
 
     def residual(self, c: Array, q: Array, v: Array, a: Array) -> Array:

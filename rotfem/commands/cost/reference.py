@@ -198,7 +198,19 @@ def _known(value: float) -> float:
     return value if np.isfinite(value) else np.inf
 
 
-def combined(time: Limit, base: Samples, mesh: Limit, mesh_step: float, each: bool) -> Reference:
+def unlike(one: tuple[Samples, Samples], other: tuple[Samples, Samples], each: bool) -> float:
+    """Return the distance of two changes (from, to), relative to what one of them is a change to."""
+    changes = []
+    for before, after in (one, other):
+        fine, coarse = aligned(after, before)
+        changes.append(Samples(fine - coarse, min(before.times, after.times, key=len)))
+    a, b = aligned(*changes)
+    difference = np.linalg.norm(a - b, axis=1)
+    sizes = np.linalg.norm(one[1].values, axis=1) if each else size(one[1])
+    return float(np.max(difference / np.maximum(sizes, 1e-300), initial=0.0))
+
+
+def combined(time: Limit, base: Samples, mesh: Limit, mesh_step: float, each: bool, mixed: float = 0.0) -> Reference:
     """Return the reference of a history refined in time on one mesh, and in space at one step.
 
     What the refinement in space changes at that step is added to the limit in time. Both errors together change each
@@ -210,9 +222,10 @@ def combined(time: Limit, base: Samples, mesh: Limit, mesh_step: float, each: bo
         mesh: limit of the meshes at that step.
         mesh_step: about the error of that step.
         each: see `distance`.
+        mixed: what both errors make of each other at least, where it was looked at.
     """
     fine, coarse = aligned(mesh.samples, base)
     change = Samples(fine - coarse, mesh.samples.times)
-    mixed = distance(base, mesh.samples, each) * min(mesh_step, 1.0)
+    mixed = max(mixed, distance(base, mesh.samples, each) * min(mesh_step, 1.0))
     parts = {"time": time.uncertainty, "mesh": mesh.uncertainty, "mixed": mixed}
     return Reference(shifted(time.samples, change), sum(parts.values()), time.order, parts)

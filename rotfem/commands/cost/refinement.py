@@ -6,29 +6,19 @@ schemes the one is refined that promises to get there soonest: a reference costs
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from math import ceil, log2
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
+from rotfem.commands.cost.chain import MOST_FAILURES, MOST_LEVELS, Chain, Get
 from rotfem.commands.cost.prediction import order
-from rotfem.commands.cost.record import Measurement
-from rotfem.commands.cost.reference import Limit, Reference, Samples, combined, distance, limit
+from rotfem.commands.cost.reference import Limit, Reference, combined, distance, unlike
 from rotfem.commands.cost.settings import HIGHEST_DEGREE, Elements, Setting, cells, samples_every, scaled
-
-#: Returns the measurement of a setting that may take a share of the time left; None where the budget refuses it.
-Get = Callable[[Setting, float], Measurement | None]
 
 #: A step whose error is below this is fine enough to refine meshes with.
 FINE_ENOUGH = 0.03
 
 #: A scheme of no higher order is refined too if its error is below this part of the other's.
 MORE_EXACT = 0.3
-
-#: Differences below this are round-off where they do not shrink.
-ROUND_OFF = 1e-6
-
-#: Failures in a row after which a chain is given up, and levels that it has at most.
-MOST_FAILURES, MOST_LEVELS = 3, 14
 
 #: Part of the wanted uncertainty that the product of both errors may have for a coarser mesh to serve in time.
 MIXED_SHARE = 0.25
@@ -55,80 +45,6 @@ class Plan:
     least_step: float | None = None
     least_mesh: Elements = None
     schemes: Sequence[str] = ()
-
-
-@dataclass
-class Chain:
-    """Settings that were refined one after the other.
-
-    Attributes:
-        ahead: the settings to come.
-        each: see `distance`.
-        settings, samples: of the levels that could be computed.
-        costs: their CPU times, s.
-        reason: why the last one that failed did.
-        ended: no further level is to be had.
-        doubt: uncertainty at least, for what others say.
-    """
-
-    ahead: Iterator[Setting]
-    each: bool
-    settings: list[Setting] = field(default_factory=list)
-    samples: list[Samples] = field(default_factory=list)
-    costs: list[float] = field(default_factory=list)
-    reason: str = ""
-    ended: bool = False
-    doubt: float = 0.0
-    _failures: int = 0
-
-    def extend(self, get: Get, share: float) -> None:
-        """Add the next level, if it is to be had."""
-        setting = next(self.ahead, None)
-        found = None if setting is None or len(self.samples) >= MOST_LEVELS else get(setting, share)
-        if setting is None or found is None:
-            self.ended = True
-            self.reason = self.reason or "the budget is too small for it"
-            return
-        if found.samples is None:
-            self.reason = found.reason
-            self._failures += 1
-            self.ended = self._failures >= MOST_FAILURES
-            return
-        self._failures = 0
-        self.settings.append(setting)
-        self.samples.append(found.samples)
-        self.costs.append(found.median("cpu"))
-        self.ended = self._at_round_off()
-
-    def _at_round_off(self) -> bool:
-        """Return whether levels differ by so little that the differences do not shrink any more."""
-        if len(self.samples) < 4:
-            return False
-        before, last = (distance(self.samples[i], self.samples[i + 1], self.each) for i in (-3, -2))
-        return last < ROUND_OFF and last > 0.7 * before
-
-    def limit(self) -> Limit:
-        """Return what the levels tend to."""
-        found = limit(self.samples, self.each, self.highest)
-        return replace(found, uncertainty=max(found.uncertainty, self.doubt))
-
-    @property
-    def highest(self) -> float:
-        """Order of the method that is refined."""
-        first = self.settings[0]
-        return float(order(first)) if len(self.settings) > 1 and first.step != self.settings[1].step else float("inf")
-
-    def to_go(self, goal: float) -> float:
-        """Return about how long (s) it will take until the limit is known to a goal; infinite where it never is."""
-        if self.ended or not self.samples:
-            return float("inf")
-        found = self.limit()
-        p = found.order or self.highest
-        uncertain = found.uncertainty if len(self.samples) > 1 else 1.0
-        further = (
-            1 if uncertain <= goal or p == float("inf") else max(1, ceil(log2(uncertain / goal) / min(p, self.highest)))
-        )
-        return self.costs[-1] * 2.0 ** (further + 1)
 
 
 class Refinement:
@@ -189,11 +105,42 @@ class Refinement:
         chain = self._cheaper(scout, meshes, space, goal, error)
         others = [self._steps(replace(chain.settings[0] if chain.settings else own, scheme=s)) for s in schemes]
         best = self._refined([chain, *others], goal / 2, share)
+        mixed = self._unlike(best, meshes, share)
+        for finer in (self._close(best, MIXED_SHARE * goal), best.settings[-1]):
+            if mixed <= MIXED_SHARE * goal:
+                break
+            again = self._meshes(replace(finer, elements=base.elements), goal / 2, share)
+            if len(again.samples) < 2:
+                break
+            meshes, space, base, error = again, again.limit(), finer, min(error, goal)
+            mixed = self._unlike(best, meshes, share)
         at = replace(base, elements=best.settings[0].elements)
         there = self.get(at, share)
         if there is None or there.samples is None:
             return None
-        return combined(best.limit(), there.samples, space, error, self.plan.each)
+        return combined(best.limit(), there.samples, space, error, self.plan.each, mixed)
+
+    def _close(self, chain: Chain, goal: float) -> Setting:
+        """Return the longest of a chain's steps whose error is within a goal, the shortest if none is."""
+        known, levels = chain.limit().samples, zip(chain.settings, chain.samples, strict=True)
+        near = (s for s, samples in levels if distance(samples, known, self.plan.each) <= goal)
+        return next(near, chain.settings[-1])
+
+    def _unlike(self, chain: Chain, meshes: Chain, share: float) -> float:
+        """Return by how much a finer mesh changes less or more in a chain's shortest steps than in those of meshes.
+
+        What steps do not resolve moves otherwise on every mesh, by more than the product of both errors says. 0 where
+        it cannot be known.
+        """
+        fine, pairs = chain.settings[-1], list(zip(meshes.settings, meshes.samples, strict=True))
+        rough = next((x for s, x in pairs if s.elements == fine.elements), None)
+        finer = next(((s, x) for s, x in pairs if cells(s.elements) > cells(fine.elements)), None)
+        if rough is None or finer is None or (fine.scheme, fine.step) == (finer[0].scheme, finer[0].step):
+            return 0.0
+        here = self.get(replace(fine, elements=finer[0].elements), share)
+        if here is None or here.samples is None:
+            return 0.0
+        return unlike((chain.samples[-1], here.samples), (rough, finer[1]), self.plan.each)
 
     def _refined(self, chains: list[Chain], goal: float, share: float) -> Chain:
         """Refine whatever chain promises to reach the goal soonest; return the one whose limit is known best."""

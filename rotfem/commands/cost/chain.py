@@ -1,0 +1,95 @@
+"""A chain of settings that are refined one after the other, and what it tends to. No dolfinx in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from math import ceil, log2
+
+from rotfem.commands.cost.prediction import order
+from rotfem.commands.cost.record import Measurement
+from rotfem.commands.cost.reference import Limit, Samples, distance, limit
+from rotfem.commands.cost.settings import Setting
+
+#: Returns the measurement of a setting that may take a share of the time left; None where the budget refuses it.
+Get = Callable[[Setting, float], Measurement | None]
+
+#: Differences below this are round-off where they do not shrink.
+ROUND_OFF = 1e-6
+
+#: Failures in a row after which a chain is given up, and levels that it has at most.
+MOST_FAILURES, MOST_LEVELS = 3, 14
+
+
+@dataclass
+class Chain:
+    """Settings that were refined one after the other.
+
+    Attributes:
+        ahead: the settings to come.
+        each: see `distance`.
+        settings, samples: of the levels that could be computed.
+        costs: their CPU times, s.
+        reason: why the last one that failed did.
+        ended: no further level is to be had.
+        doubt: uncertainty at least, for what others say.
+    """
+
+    ahead: Iterator[Setting]
+    each: bool
+    settings: list[Setting] = field(default_factory=list)
+    samples: list[Samples] = field(default_factory=list)
+    costs: list[float] = field(default_factory=list)
+    reason: str = ""
+    ended: bool = False
+    doubt: float = 0.0
+    _failures: int = 0
+
+    def extend(self, get: Get, share: float) -> None:
+        """Add the next level, if it is to be had."""
+        setting = next(self.ahead, None)
+        found = None if setting is None or len(self.samples) >= MOST_LEVELS else get(setting, share)
+        if setting is None or found is None:
+            self.ended = True
+            self.reason = self.reason or "the budget is too small for it"
+            return
+        if found.samples is None:
+            self.reason = found.reason
+            self._failures += 1
+            self.ended = self._failures >= MOST_FAILURES
+            return
+        self._failures = 0
+        self.settings.append(setting)
+        self.samples.append(found.samples)
+        self.costs.append(found.median("cpu"))
+        self.ended = self._at_round_off()
+
+    def _at_round_off(self) -> bool:
+        """Return whether levels differ by so little that the differences do not shrink any more."""
+        if len(self.samples) < 4:
+            return False
+        before, last = (distance(self.samples[i], self.samples[i + 1], self.each) for i in (-3, -2))
+        return last < ROUND_OFF and last > 0.7 * before
+
+    def limit(self) -> Limit:
+        """Return what the levels tend to."""
+        found = limit(self.samples, self.each, self.highest)
+        return replace(found, uncertainty=max(found.uncertainty, self.doubt))
+
+    @property
+    def highest(self) -> float:
+        """Order of the method that is refined."""
+        first = self.settings[0]
+        return float(order(first)) if len(self.settings) > 1 and first.step != self.settings[1].step else float("inf")
+
+    def to_go(self, goal: float) -> float:
+        """Return about how long (s) it will take until the limit is known to a goal; infinite where it never is."""
+        if self.ended or not self.samples:
+            return float("inf")
+        found = self.limit()
+        p = found.order or self.highest
+        uncertain = found.uncertainty if len(self.samples) > 1 else 1.0
+        further = (
+            1 if uncertain <= goal or p == float("inf") else max(1, ceil(log2(uncertain / goal) / min(p, self.highest)))
+        )
+        return self.costs[-1] * 2.0 ** (further + 1)
