@@ -95,7 +95,8 @@ class FinerEquations:
         """Return −F at q, v, a as a PETSc vector, zero at clamped unknowns."""
         b = compat.create_vector(self.V)
         if not self.system.linear or self.system.tangent_forms("f")[0]:  # nothing may drive a linear theory
-            fem_petsc.assemble_vector(b, self._form("F"))
+            for name in self.system.residual_forms:
+                fem_petsc.assemble_vector(b, self._form(name))
         if self.system.linear:
             for kind, x in (("M", self.a), ("C", self.v), ("K", self.q)):
                 self._add(b, kind, x)

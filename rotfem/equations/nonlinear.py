@@ -28,8 +28,8 @@ class NonlinearSystem(System):
     Args:
         model: the terms.
         moving: see `System`.
-        parted: whether what has the theory's strains is compiled by itself in a history. The rest, inertia and loads, is
-            most of the work, and that of another theory, too.
+        parted: whether what has the theory's strains is compiled by itself in a history. The rest, inertia and loads,
+            is most of the work, and that of another theory, too.
     """
 
     def __init__(self, model: Model, moving: bool = True, parted: bool = False):
@@ -40,9 +40,9 @@ class NonlinearSystem(System):
         self._shift_values: tuple[float, ...] = (1.0, 0.0, 1.0)
         self._shifts = [self.structure.constant(c) for c in self._shift_values]
         if self.moving:
-            parts = self.model.by_strains() if self._parted else [self.model.residual]
-            self._F = [forms.form(F) for F in parts]
-            self._J = [forms.form(self._tangent_of(F)) for F in parts]
+            self._residuals = self.model.by_strains() if self._parted else [self.model.residual]
+            self._F = [forms.form(F) for F in self._residuals]
+            self._J = [forms.form(self._tangent_of(F)) for F in self._residuals]
             self._pattern = self._J[0]
         else:
             self._F = [forms.form(self._at_rest["f"], once=True)]
@@ -88,15 +88,26 @@ class NonlinearSystem(System):
         return {name: None if form.empty() else forms.form(form, once=True) for name, form in found.items()}
 
     def known_form(self, name: str) -> tuple[Any, Any]:
-        """Return a form, UFL and compiled: F, and J of a moving system or else K, C, M (see `tangent_forms`)."""
+        """Return a form, UFL and compiled: parts of F, and of J of a moving system or else K, C, M."""
         if self.moving:
-            return (self.model.residual, self._F) if name == "F" else (self._tangent_form, self._J)
-        return (self._at_rest["f"], self._F) if name == "F" else (self._at_rest[name], self._parts[name])
+            kind, i = name[0], int(name[1:])
+            F = self._residuals[i]
+            return (F, self._F[i]) if kind == "F" else (self._tangent_of(F), self._J[i])
+        return (self._at_rest["f"], self._F[0]) if name == "F" else (self._at_rest[name], self._parts[name])
+
+    @property
+    def residual_forms(self) -> tuple[str, ...]:
+        """Names of the forms that F is the sum of."""
+        return tuple(f"F{i}" for i in range(len(self._F))) if self.moving else ("F",)
 
     def tangent_forms(self, kind: str) -> tuple[tuple[str, ...], tuple[float, ...]]:
         """Return the names of the forms that M, C or K is the sum of, and the shifts to be set before."""
         if self.moving:
-            return ("J",), (float(kind == "K"), float(kind == "C"), float(kind == "M"))
+            return tuple(f"J{i}" for i in range(len(self._J))), (
+                float(kind == "K"),
+                float(kind == "C"),
+                float(kind == "M"),
+            )
         return () if self._parts[kind] is None else (kind,), self._shift_values
 
     @property

@@ -264,7 +264,7 @@ def test_row_of_the_mesh_is_what_a_run_says_of_it(time: dict[str, Any]) -> None:
     row = Estimates(trial, "reissner", trial.effects).discretisations()[-1]
     assert row.name == "mesh.elements"
     assert trial.case.problem.mesh.elements == 6
-    assert row.estimate[trial.wanted[0]] == pytest.approx(rotfem.run(scene).summary["error"]["space"], rel=0.2)
+    assert 1 / 3 < row.estimate[trial.wanted[0]] / rotfem.run(scene).summary["error"]["space"] < 3
     finer = (scene, scene.replace({"mesh.elements": 20}))
     rough, fine = (np.array([row["frequency"] for row in rotfem.modes(s).rows]) for s in finer)
     assert 1 / 3 < row.estimate[MODES] / np.max(np.abs(rough / fine - 1)) < 3
