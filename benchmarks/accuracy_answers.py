@@ -31,7 +31,7 @@ ACCURACIES = (1e-2, 1e-3, 1e-4)
 
 #: Steps, elements along every edge and further degree of the truth, of beams and of plates, and of what says how good
 #: that is.
-TRUTHS = {False: ((32, 2, 1), (16, 2, 0)), True: ((8, 4, 0), (4, 3, 0))}
+TRUTHS = {False: ((32, 2, 1), (16, 2, 0)), True: ((2, 2, 1), (2, 2, 0))}
 
 #: How many times more steps scenes need whose motion is quicker than their own steps are; increments of Newton's method
 #: in truths, whose errors add up over many steps, and fewest elements of a beam there.
@@ -44,6 +44,9 @@ INCREMENT, ELEMENTS = 1e-12, 16
 STEPS = (4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 1 / 16)
 SCHEMES, THEORIES = ("generalised_alpha", "esdirk4"), ("consistent_linear", "reissner")
 
+
+#: Error beside that of twice the step from which shorter steps of a row are not tried.
+STALLED = 0.9
 
 #: CPU seconds from which a run of the full model is a long one.
 LONG = 2.0
@@ -104,8 +107,8 @@ def finest(tables: Tables, steps: int, mesh: int, further: int) -> Tables:
     return out
 
 
-def grid(tables: Tables) -> list[Tables]:
-    """Return fixed settings of a scene."""
+def grid(tables: Tables) -> list[list[Tables]]:
+    """Return fixed settings of a scene, in rows whose steps become shorter."""
     out = []
     for theory, factor in itertools.product(THEORIES, (0.5, 1)):
         coarse = finer(tables, theory=theory)
@@ -113,13 +116,32 @@ def grid(tables: Tables) -> list[Tables]:
         part = [max(1, int(n * factor)) for n in number] if isinstance(number, list) else max(1, int(number * factor))
         coarse["mesh"] = {**tables["mesh"], "elements": part}
         if "time" not in tables:
-            out.append(coarse)
+            out.append([coarse])
             continue
         end = tables["time"]["end"]
         step = tables["time"].get("step", end / 500)
-        for scheme, share in itertools.product(SCHEMES, STEPS):
-            time = {"end": end, "step": min(step * share, end / 10), "scheme": scheme, "output_step": step}
-            out.append({**coarse, "time": time, "output": {"error": False}})
+        for scheme in SCHEMES:
+            times = (
+                {"end": end, "step": min(step * s, end / 10), "scheme": scheme, "output_step": step} for s in STEPS
+            )
+            out.append([{**coarse, "time": time, "output": {"error": False}} for time in times])
+    return out
+
+
+def tried_out(judge: Judge, tables: Tables, least: float) -> list[tuple[Tables, Answer]]:
+    """Return the settings of a grid that were tried, with their answers.
+
+    A row ends where it is good enough for the least accuracy, or where half the step has not made it better.
+    """
+    out = []
+    for row in grid(tables):
+        before = np.inf
+        for setting in row:
+            answer = judge(setting)
+            out.append((setting, answer))
+            if answer.error <= least or STALLED * before < answer.error < 1.0:
+                break
+            before = answer.error
     return out
 
 
@@ -145,7 +167,7 @@ def main() -> None:
         default = judge(tables)
         print(f"{name}: its own setting {default.error:.1e} in {default.seconds:.2f} s", end="")
         print(f" (truth known to {judge.unsure:.0e})", flush=True)
-        tried = [(setting, judge(setting)) for setting in grid(tables)] if arguments.grid else []
+        tried = tried_out(judge, tables, min(arguments.accuracy)) if arguments.grid else []
         for accuracy in arguments.accuracy:
             asked = {**tables, "accuracy": accuracy}
             judge(asked)  # compiles

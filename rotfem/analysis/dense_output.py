@@ -2,7 +2,9 @@
 
 Between two states the unknowns are the polynomial through what is known at both: through q and q̇ a cubic, of order 4,
 and through q, q̇ and q̈ a quintic, of order 6 (Hermite). So what is between is as good as the ends are: the cubic for
-schemes up to order 2, whose accelerations of vibrations that they do not resolve are noise, the quintic above.
+schemes up to order 2, whose accelerations of vibrations that they do not resolve are noise, the quintic above. There
+too an acceleration that the cubic knows nothing of is that of such a vibration, as of a rod that is spun at once, which
+would throw the quintic far off: it gives way to the cubic's, and where it is beyond all that, both to a straight line.
 """
 
 from __future__ import annotations
@@ -10,10 +12,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import BPoly
 
-from rotfem.analysis.schemes import State, Watch
+from rotfem.analysis.schemes import Array, State, Watch
 
 #: Order of a scheme up to which accelerations are left out.
 LOW = 2
+
+#: Part of the cubic's accelerations by which those of a state may differ from them, and from which on neither counts.
+KNOWN, BEYOND = 0.5, 20.0
 
 #: Distance of two instants, as a part of the interval between rows, at which they are one.
 CLOSE = 1e-9
@@ -68,7 +73,7 @@ def between(old: State, new: State, times: list[float], order: int) -> list[Stat
     """
     if not times:
         return []
-    known = [[s.q, s.v] if order <= LOW else [s.q, s.v, s.a] for s in (old, new)]
+    known = [[s.q, s.v] for s in (old, new)] if order <= LOW else resolved(old, new)
     q = BPoly.from_derivatives([old.t, new.t], known)
     v, a = q.derivative(1), q.derivative(2)
     out = []
@@ -77,4 +82,18 @@ def between(old: State, new: State, times: list[float], order: int) -> list[Stat
         if old.given is not None and new.given is not None:
             given = np.asarray(old.given + share * (new.given - old.given))
         out.append(new.changed(t=t, q=q(t), v=v(t), a=a(t), memory=None, given=given))
+    return out
+
+
+def resolved(old: State, new: State) -> list[list[Array]]:
+    """Return q, v and a of two states, as far as steps resolve the unknowns; those of a cubic or a line elsewhere."""
+    h, mean = new.t - old.t, (new.q - old.q) / (new.t - old.t)
+    cubic = [(6 * mean - 4 * old.v - 2 * new.v) / h, (2 * old.v + 4 * new.v - 6 * mean) / h]
+    most = np.maximum(*np.abs(cubic))
+    off = [np.abs(s.a - c) for s, c in zip((old, new), cubic, strict=True)]
+    line = np.maximum(*off) > BEYOND * most
+    out = []
+    for s, c, o in zip((old, new), cubic, off, strict=True):
+        a = np.where(o <= KNOWN * most, s.a, c)
+        out.append([s.q, np.where(line, mean, s.v), np.where(line, 0.0, a)])
     return out

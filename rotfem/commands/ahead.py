@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.reduced.response import Response, tips_of
+from rotfem.analysis.reduced.struck import struck
 from rotfem.analysis.schemes import Scheme
 from rotfem.results.run import RunResult
 from rotfem.selection.accuracy import AIM, Settings, finer, finest, part, shares
@@ -123,7 +124,7 @@ def sampled(response: Response) -> Motion:
     """Return the motion of a reduced answer, at times that are close enough for what is fast in it."""
     t: Array = np.linspace(response.times[0], response.times[-1], LOOKS)
     moves = [name.startswith("u") for name in response.model.system.structure.components]
-    return Motion(t, (response.trajectory.at(t)[0] @ tips_of(response.model).T)[:, moves])
+    return Motion(t, (response.trajectory.at(t)[0] @ tips_of(response.model).T)[:, moves], struck(response))
 
 
 def less(error: dict[str, Any], found: float | None) -> None:

@@ -14,9 +14,9 @@ frequency ω off by ε(ω) moves a motion likewise, by Σ_k A_k min(2, s ε(ω_k
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -28,12 +28,19 @@ Array = npt.NDArray[np.float64]
 #: The factor s for safety, with which true errors have been below the sum, and ωh from which a scheme damps.
 SAFE, DAMPED = 1.2, 4.0
 
+#: Part of its amplitude that a vibration which is damped out counts with: all of it is missing from then on, and a
+#: little more in the step that damps it.
+LOST = 1.25
+
 #: Longest step, as a part of the history, and halvings that find one.
 LONGEST, HALVINGS = 1 / 20, 40
 
 #: Windows in which a motion is looked at by itself, and how many times the steps of windows of their own it may cost to
 #: go with those of the worst one through all.
 WINDOWS, UNEVEN = 8, 6.0
+
+#: Power of Hann's window in these, which have few periods of what is slow.
+SHARP = 3
 
 #: Fewest instants from which steps are planned.
 FEWEST = 10 * WINDOWS
@@ -57,44 +64,52 @@ class Spectrum:
     duration: float
 
     @classmethod
-    def of(cls, t: Array, motion: Array, scale: float) -> Spectrum:
+    def of(cls, t: Array, motion: Array, scale: float, power: int = 1) -> Spectrum:
         """Return the spectrum of a motion at equal distances of time.
 
         Args:
             t: times (n,), s.
             motion: of the tip, (n, components), m.
             scale: its largest displacement, m.
+            power: of Hann's window; what a slow motion leaves at high frequencies falls with it.
         """
         n, step = len(t), float(t[1] - t[0])
-        window = np.hanning(n)[:, None]
+        window = np.hanning(n)[:, None] ** power
         lines = np.fft.rfft(window * (motion - motion.mean(axis=0)), axis=0)
-        amplitudes = np.linalg.norm(lines, axis=1) * 2 / window.sum() / scale / 2  # halved: a line has neighbours
+        beside = np.abs(np.fft.fft(window[:, 0])).sum() / window.sum()  # a line has neighbours
+        amplitudes = np.linalg.norm(lines, axis=1) * 2 / window.sum() / scale / beside
         return cls(2 * np.pi * np.fft.rfftfreq(n, step), amplitudes, n * step)
+
+    def lost(self, h: float) -> float:
+        """Return the error by what steps of h (s) damp out, with all amplitudes together."""
+        return LOST * float(self.amplitudes[self.omega * h >= DAMPED].sum())
 
     def error(self, scheme: Any, h: float) -> float:
         """Return e(h) of a scheme, relative."""
         coefficient, power, _ = scheme.estimate
-        each = SAFE * coefficient * (self.omega * h) ** power * self.duration / h
-        return float(self.amplitudes @ np.minimum(np.where(self.omega * h < DAMPED, 2.0, 1.0), each))
+        moves = self.omega * h < DAMPED
+        each = SAFE * coefficient * (self.omega[moves] * h) ** power * self.duration / h
+        return float(self.amplitudes[moves] @ np.minimum(2.0, each)) + self.lost(h)
 
     def error_of_mesh(self, off: Array) -> float:
         """Return the relative error that frequencies which are off by so much (relative, (n,)) make."""
         return float(self.amplitudes @ np.minimum(2.0, SAFE * off * self.omega * self.duration))
 
-    def step(self, scheme: Any, allowed: float) -> float:
-        """Return the longest step (s) of a scheme whose error is below what is allowed."""
-        long, short = LONGEST * self.duration, 0.0
-        if self.error(scheme, long) <= allowed:
-            return long
-        for _ in range(HALVINGS):
-            middle = 0.5 * (long + short) if short > 0.0 else 0.5 * long
-            if self.error(scheme, middle) <= allowed:
-                short = middle
-                if long < 1.05 * short:
-                    break
-            else:
-                long = middle
-        return short or long
+
+def longest(error: Callable[[float], float], duration: float, allowed: float) -> float:
+    """Return the longest step (s) whose error is below what is allowed, as far as it falls with the step."""
+    long, short = LONGEST * duration, 0.0
+    if error(long) <= allowed:
+        return long
+    for _ in range(HALVINGS):
+        middle = 0.5 * (long + short) if short > 0.0 else 0.5 * long
+        if error(middle) <= allowed:
+            short = middle
+            if long < 1.05 * short:
+                break
+        else:
+            long = middle
+    return short or long
 
 
 @dataclass(frozen=True)
@@ -104,10 +119,13 @@ class Motion:
     Attributes:
         t: times at equal distances, (n,), s.
         tips: displacements, (n, components), m.
+        struck: vibrations that jumps of what drives the motion start, (frequency in rad/s, amplitude in m) each, where
+            the answer itself has not resolved them.
     """
 
     t: Array
     tips: Array
+    struck: tuple[tuple[float, float], ...] = ()
 
     @classmethod
     def between(cls, t: Array, tips: Array) -> Motion:
@@ -134,12 +152,19 @@ class Motion:
     def parts(self) -> list[Spectrum]:
         """Spectra of windows."""
         windows = np.array_split(np.arange(len(self.t)), WINDOWS)
-        return [Spectrum.of(self.t[i], self.tips[i], self.scale) for i in windows]
+        return [Spectrum.of(self.t[i], self.tips[i], self.scale, SHARP) for i in windows]
+
+    def error(self, scheme: Any, h: float) -> float:
+        """Return the relative error of steps of h (s): what they damp out counts where there is most of it."""
+        omega, amplitudes = np.array(self.struck).reshape(-1, 2).T
+        struck = Spectrum(omega, amplitudes / self.scale, self.whole.duration)
+        lost = max(struck.lost(h), *(part.lost(h) for part in self.parts)) - self.whole.lost(h)
+        return self.whole.error(scheme, h) + struck.error(scheme, h) - struck.lost(h) + max(0.0, lost)
 
     def plan(self, scheme: Any, allowed: float) -> Plan:
         """Return the steps of a scheme."""
-        step = self.whole.step(scheme, allowed)
-        own = [part.step(scheme, allowed / WINDOWS) for part in self.parts]
+        step = longest(partial(self.error, scheme), self.whole.duration, allowed)
+        own = [longest(partial(part.error, scheme), part.duration, allowed / WINDOWS) for part in self.parts]
         worst = self.whole.duration / min(min(own), step)
         adapted = sum(part.duration / h for part, h in zip(self.parts, own, strict=True))
         work = (scheme.stages + BESIDE) * self.whole.duration / step
@@ -180,4 +205,4 @@ def plan(motions: Sequence[Motion], allowed: float, schemes: Iterable[Any]) -> P
 
 def error_ahead(motions: Sequence[Motion], scheme: Any, step: float) -> float | None:
     """Return the relative error of fixed steps (s) of a scheme, of the most demanding motion; None where none tells."""
-    return max((motion.whole.error(scheme, step) for motion in motions if motion.tells), default=None)
+    return max((motion.error(scheme, step) for motion in motions if motion.tells), default=None)

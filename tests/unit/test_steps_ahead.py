@@ -7,7 +7,7 @@ import pytest
 
 from rotfem.analysis.esdirk import ESDIRK4
 from rotfem.selection.mesh_ahead import MeshAhead
-from rotfem.selection.steps_ahead import SAFE, Motion, error_ahead, plan
+from rotfem.selection.steps_ahead import LOST, SAFE, Motion, error_ahead, plan
 
 
 def vibration(omega: float, amplitude: float = 1.0, end: float = 100.0) -> Motion:
@@ -31,7 +31,9 @@ def test_the_error_of_one_vibration_is_that_of_its_phase() -> None:
 def test_what_is_fast_and_damped_counts_with_its_amplitude() -> None:
     """A hundredth of the motion at 20 rad/s: long steps leave just that, and none that is allowed more resolves it."""
     motion = vibration(20.0, 0.01)
-    assert error_ahead([motion], ESDIRK4, 0.3) == pytest.approx(0.01 / 1.01 + SAFE * of_one(1.0, 0.3) / 1.01, rel=0.1)
+    assert error_ahead([motion], ESDIRK4, 0.3) == pytest.approx(
+        LOST * 0.01 / 1.01 + SAFE * of_one(1.0, 0.3) / 1.01, rel=0.1
+    )
     loose, tight = (plan([motion], allowed, [ESDIRK4]) for allowed in (2e-2, 5e-3))
     assert loose is not None
     assert tight is not None
@@ -62,3 +64,12 @@ def test_elements_grow_by_the_order_of_a_frequency() -> None:
     growth, left = mesh.growth([vibration(1.0)], off / 60)
     assert left <= off / 60
     assert growth == pytest.approx(60 ** (1 / 6), rel=0.1)
+
+
+def test_what_a_jump_has_struck_counts_unseen() -> None:
+    """A vibration that the motion itself does not show: resolved by short steps, lost by long ones."""
+    t = np.linspace(0.0, 100.0, 2001)
+    motion = Motion(t, np.cos(t)[:, None], ((500.0, 0.01),))
+    short, long = (motion.error(ESDIRK4, h) - Motion(t, motion.tips).error(ESDIRK4, h) for h in (1e-4, 0.1))
+    assert long == pytest.approx(LOST * 0.01, rel=1e-6)
+    assert short == pytest.approx(0.01 * SAFE * of_one(500.0, 1e-4, 100.05), rel=1e-2)
