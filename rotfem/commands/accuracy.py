@@ -168,9 +168,11 @@ def known(error: dict[str, Any]) -> bool:
 def changes_of(scene: Scene, settings: Settings) -> dict[str, Any]:
     """Return the keys ↦ values that make a scene one with these settings; None removes what it says."""
     out: dict[str, Any] = settings.changes()
-    time = scene.time
+    time, key = scene.time, "increment_tolerance"
+    if key in scene.solver.model_fields_set:
+        out.pop(f"solver.{key}", None)
     if settings.moving and time is not None:
-        out |= {f"time.{key}": None for key in time.parameters}
+        out |= {f"time.{name}": None for name in time.parameters}
         out |= {"time.output_every": None, "time.output_step": time.output_step or time.end / ROWS}
         if time.output_step is None and time.step is not None:
             out["time.output_step"] = time.step * time.output_every

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from rotfem.analysis.reduced.response import Response, tips_of
 from rotfem.analysis.reduced.struck import struck
 from rotfem.analysis.schemes import Scheme
+from rotfem.numerics.newton import SMALLEST
 from rotfem.results.run import RunResult
 from rotfem.selection.accuracy import AIM, Settings, finer, finest, part, shares
 from rotfem.selection.mesh_ahead import MeshAhead
@@ -117,6 +118,7 @@ class Ahead:
         moved = max(motion.scale for motion in self.motions) / self.length
         duration = max(motion.whole.duration for motion in self.motions)
         increment = NEWTON * self.accuracy * min(1.0, moved / SMALL) * min(1.0, MANY * found.step / duration)
+        increment = max(increment, SMALLEST)
         return replace(settings, scheme=found.scheme, step=found.step, tolerance=None, increment=increment)
 
 

@@ -71,5 +71,5 @@ def test_what_a_jump_has_struck_counts_unseen() -> None:
     t = np.linspace(0.0, 100.0, 2001)
     motion = Motion(t, np.cos(t)[:, None], ((500.0, 0.01),))
     short, long = (motion.error(ESDIRK4, h) - Motion(t, motion.tips).error(ESDIRK4, h) for h in (1e-4, 0.1))
-    assert long == pytest.approx(LOST * 0.01, rel=1e-6)
+    assert long == pytest.approx(LOST * 0.01, rel=1e-2)
     assert short == pytest.approx(0.01 * SAFE * of_one(500.0, 1e-4, 100.05), rel=1e-2)

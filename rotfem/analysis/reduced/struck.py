@@ -22,7 +22,7 @@ TOLD = 1e-7
 
 
 def struck(response: Response) -> tuple[tuple[float, float], ...]:
-    """Return frequency (rad/s) and amplitude of the tip (m), at the largest jump, of modes that a response passes over."""
+    """Return frequency (rad/s) and largest amplitude of the tip (m) of the modes that a response passes over."""
     model, drive = response.model, response.solution.drive
     if model.size == 0 or response.trajectory.exact:
         return ()
