@@ -45,9 +45,10 @@ PLATE: dict[str, Any] = {
 PLATE_MESH = {"elements": [4, 2]}
 PULSE = [[0.0, 0.0], [0.4, 0.0], [0.5, 200.0], [0.7, 200.0], [0.8, 0.0]]
 KINKS = [[0.0, 0.0], [1.0, 2.0], [2.0, 1.0], [3.0, 4.0], [5.0, 4.0]]
-GUST = [[0.5 * i, 0.0, 0.3 * np.sin(1.7 * i * i)] for i in range(41)]
+GUST = [[0.5 * i, 0.0, 0.3 * np.sin(1.7 * i * i)] for i in range(9)]
 STILL = {"type": "constant", "speed": 0.0}
 SPIN_UP = {"type": "spin_up", "speed": 6.0, "duration": 15.0}
+SWUNG = {"type": "spin_up", "speed": 20.0, "duration": 0.5, "axis": [0, 1, 0]}
 HUB = {"type": "torque", "hub_inertia": 100.0, "table": [[0.0, 0.0], [1.0, 80.0], [2.0, -80.0], [3.0, 0.0], [4.0, 0.0]]}
 
 #: Scene ↦ (tables, end in s).
@@ -66,16 +67,15 @@ SCENES: dict[str, tuple[dict[str, Any], float]] = {
     "free hub": ({"structure": KANE, "motion": HUB}, 4.0),
     "gust": (
         {"structure": KANE, "motion": {"type": "constant", "speed": 3.0}, "loads": {"distributed": {"table": GUST}}},
-        20.0,
+        4.0,
     ),
     "tip release": ({"structure": KANE, "motion": STILL, "initial": {"tip_displacement": 1.0}}, 2.0),
     "plate": (
-        {"structure": PLATE, "mesh": PLATE_MESH, "motion": {"type": "spin_up", "speed": 20.0, "duration": 0.5}},
+        {"structure": PLATE, "mesh": PLATE_MESH, "motion": SWUNG},
         0.6,
     ),
     "plate, linear": (
-        {"structure": PLATE, "mesh": PLATE_MESH, "motion": {"type": "spin_up", "speed": 20.0, "duration": 0.5}}
-        | {"model": {"theory": "consistent_linear"}},
+        {"structure": PLATE, "mesh": PLATE_MESH, "motion": SWUNG} | {"model": {"theory": "consistent_linear"}},
         0.6,
     ),
 }

@@ -25,7 +25,7 @@ PERIODS, SLOW = 2.0, 0.7
 HELD = 0.01
 
 #: Factor of the squares of the LOWEST frequencies up to which the errors that the mesh makes of them are kept.
-LIKE, LOWEST = 4.0, 3
+LIKE, LOWEST = 9.0, 3
 
 #: Product of two shapes from which they are one, and a square of a frequency that is none, 1/s².
 SAME, TINY = 0.5, 1e-300

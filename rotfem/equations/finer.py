@@ -46,6 +46,9 @@ class FinerEquations:
         self.q, self.v, self.a = (fem.Function(self.V) for _ in range(3))
         self._functions: dict[Any, fem.Function] = {system.q: self.q, system.v: self.v, system.a: self.a}
         self._forms: dict[str, Any] = {}
+        #: Of a linear theory: matrices at the time that was taken, and the factor of the strains' stiffness.
+        self._matrices: dict[str, Any] = {}
+        self._material: DirectSolver | None = None
         nodes, structure = self._refined.clamped(system.structure.clamped), system.structure
         self.clamped, self._hinged = structure.clamped_unknowns(nodes), structure.hinged_unknowns(nodes)
         self._bcs = structure.clamp_conditions(self.V, nodes=nodes)
@@ -53,6 +56,7 @@ class FinerEquations:
 
     def take(self) -> None:
         """Take the state, and all fields, that are set in the system."""
+        self._matrices.clear()
         for f, g in self._functions.items():
             g.x.array[:] = self._refined.carried(f.function_space, f.x.array, g.function_space)
         if self.system.linear and self.system.prestressed:
@@ -62,23 +66,32 @@ class FinerEquations:
         """Set the displacement that stresses a linear theory to that of the finer mesh."""
         s = self.system
         base = self._functions.setdefault(s.prestressing, fem.Function(self.V))
-        with s.of_material():
-            K = self._assembled(("K",), 1.0)
-        held(K, self._hinged)
+        if self._material is None:
+            with s.of_material():
+                K = self._assembled(("K",), 1.0)
+            held(K, self._hinged)
+            self._material = DirectSolver(K, symmetric=True)
         load = compat.create_vector(self.V)
         fem_petsc.assemble_vector(load, self._form("F"))
         load.array[self.clamped] = 0.0
-        base.x.array[:] = -Increment(self.V).solve(DirectSolver(K, symmetric=True), load)
+        base.x.array[:] = -Increment(self.V).solve(self._material, load)
 
     def carried(self, columns: Array) -> Array:
         """Return columns (n, r) of local dof arrays of the system on the refined mesh."""
         return self._refined.carried(self.system.V, columns, self.V)
 
     def matrix(self, kind: str, diagonal: float = 0.0) -> Any:
-        """Return M, C or K at the state that was taken, a new PETSc matrix with `diagonal` at clamped unknowns."""
+        """Return M, C or K at the state that was taken, a PETSc matrix with `diagonal` at clamped unknowns.
+
+        Of a linear theory it is the same one until another state is taken.
+        """
         names, shifts = self.system.tangent_forms(kind)
-        self.system.shift(shifts)
-        return self._assembled(names, diagonal)
+        if not self.system.linear:
+            self.system.shift(shifts)
+            return self._assembled(names, diagonal)
+        if kind not in self._matrices:
+            self._matrices[kind] = self._assembled(names, diagonal)
+        return self._matrices[kind]
 
     def _assembled(self, names: tuple[str, ...], diagonal: float) -> Any:
         A = fem_petsc.create_matrix(self._form(names[0]))
@@ -125,8 +138,8 @@ class FinerEquations:
 
     def _add(self, b: Any, kind: str, x: fem.Function) -> None:
         """Add A x to a vector, A of a linear theory; it has all of one kind there is, or none."""
-        if self.system.tangent_forms(kind)[0]:
-            A = self.matrix(kind)
+        if self.system.tangent_forms(kind)[0]:  # what is clamped is zero, whatever is on the diagonal there
+            A = self.matrix(kind, float(kind == "K"))
             A.multAdd(compat.wrap(x.x), b, b)
 
     def _form(self, name: str) -> Any:

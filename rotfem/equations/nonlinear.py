@@ -40,9 +40,10 @@ class NonlinearSystem(System):
         self._shift_values: tuple[float, ...] = (1.0, 0.0, 1.0)
         self._shifts = [self.structure.constant(c) for c in self._shift_values]
         if self.moving:
-            self._residuals = self.model.by_strains() if self._parted else [self.model.residual]
+            self._residuals = self.model.by_strains() if self._parted else [self._residual_form]
             self._F = [forms.form(F) for F in self._residuals]
-            self._J = [forms.form(self._tangent_of(F)) for F in self._residuals]
+            self._tangents = [self._tangent_of(F) for F in self._residuals] if self._parted else [self._tangent_form]
+            self._J = [forms.form(J) for J in self._tangents]
             self._pattern = self._J[0]
         else:
             self._F = [forms.form(self._at_rest["f"], once=True)]
@@ -50,8 +51,12 @@ class NonlinearSystem(System):
         return fem_petsc.create_matrix(self._pattern)
 
     @cached_property
+    def _residual_form(self) -> Any:
+        return self.model.residual
+
+    @cached_property
     def _tangent_form(self) -> Any:
-        return self._tangent_of(self.model.residual)
+        return self._tangent_of(self._residual_form)
 
     def _tangent_of(self, F: Any) -> Any:
         du = ufl.TrialFunction(self.V)
@@ -79,7 +84,7 @@ class NonlinearSystem(System):
 
     @cached_property
     def _at_rest(self) -> dict[str, Any]:
-        return forms.at_rest(self.model.residual, self.q, self.v, self.a)
+        return forms.at_rest(self._residual_form, self.q, self.v, self.a)
 
     @cached_property
     def _parts(self) -> dict[str, Any]:
@@ -91,8 +96,7 @@ class NonlinearSystem(System):
         """Return a form, UFL and compiled: parts of F, and of J of a moving system or else K, C, M."""
         if self.moving:
             kind, i = name[0], int(name[1:])
-            F = self._residuals[i]
-            return (F, self._F[i]) if kind == "F" else (self._tangent_of(F), self._J[i])
+            return (self._residuals[i], self._F[i]) if kind == "F" else (self._tangents[i], self._J[i])
         return (self._at_rest["f"], self._F[0]) if name == "F" else (self._at_rest[name], self._parts[name])
 
     @property
@@ -113,7 +117,7 @@ class NonlinearSystem(System):
     @property
     def integrals(self) -> dict[str, int]:
         """Number of integrals in F and J."""
-        return {"F": forms.integral_count(self.model.residual), "J": forms.integral_count(self._tangent_form)}
+        return {"F": forms.integral_count(self._residual_form), "J": forms.integral_count(self._tangent_form)}
 
     def residual(self) -> Any:
         """Return −F at the state in q, v, a as a PETSc vector (reused), zero at clamped unknowns."""
@@ -125,7 +129,7 @@ class NonlinearSystem(System):
 
     @cached_property
     def _F_in_motion(self) -> list[Any]:
-        return self._F if self.moving else [forms.form(self.model.residual, once=True)]
+        return self._F if self.moving else [forms.form(self._residual_form, once=True)]
 
     def _negative(self, parts: list[Any], moving: bool) -> Any:
         b = self._assembled(parts)
@@ -226,7 +230,7 @@ class NonlinearSystem(System):
 
     @cached_property
     def _by_spin(self) -> list[Any]:
-        return [by_spin(self.model, self.model.residual, name) for name in ("w", "dw")]
+        return [by_spin(self.model, self._residual_form, name) for name in ("w", "dw")]
 
     def spin_derivative(self, c_v: float, c_m: float) -> Any:
         """Return c_v ∂F/∂Omega + c_m ∂F/∂Omega' at the state, a PETSc vector, zero at clamped unknowns."""
