@@ -18,6 +18,9 @@ from rotfem.errors import ComputationError
 
 Array = npt.NDArray[np.float64]
 
+#: Largest part of the tip's displacement that the answer to second-order forces may be.
+MOST = 0.5
+
 
 def effect_sizes(response: Response, effects: Collection[str] | None = None) -> dict[str, float]:
     """Return effect ↦ relative change of the displacement of the tip without it; infinite where nothing holds then.
@@ -25,12 +28,17 @@ def effect_sizes(response: Response, effects: Collection[str] | None = None) -> 
     Args:
         response: history of a linear theory with all effects.
         effects: those that are asked for; all of the model if None.
+
+    Raises:
+        ComputationError: the answer to second-order forces is no small part of the motion, so that it is none.
     """
     model, manifold = response.model, Manifold(response)
     system = response.solution.drive.whole
     wanted = system.model.effects if effects is None else effects
     whole = _tips(response, manifold)
     size = largest(model, whole)
+    if largest(model, whole - response.tips) > MOST * largest(model, response.tips):
+        raise ComputationError("the answer to second-order forces is as large as the motion")
     out = {}
     try:
         for name in wanted:
