@@ -68,6 +68,27 @@ SCENES: dict[str, tuple[Any, float, str | None]] = {
         1e-3,
         None,
     ),
+    "moment pulse": (
+        {
+            "structure": {"type": "planar_beam", "length": 2.0, "hub_radius": 0.3, "section": THIN | {"EI": 3.0e3}},
+            "motion": {"type": "table", "table": [[0.0, 0.0], [0.5, 20.0], [1.5, 20.0]]},
+            "loads": {"tip_moment": [[0, 0], [0.6, 0], [0.7, 40.0], [0.8, 0]]},
+            "mesh": {"elements": 8},
+            "time": {"end": 1.5, "step": 0.002},
+        },
+        1e-3,
+        None,
+    ),
+    "steady blade": (
+        {
+            "structure": {"type": "spatial_beam", "length": 10.0, "section": BLADE, "precone": 0.1},
+            "motion": {"type": "constant", "speed": 8.0},
+            "loads": {"distributed": [0.0, 0.0, 12.0]},
+            "mesh": {"elements": 8},
+        },
+        1e-5,
+        None,
+    ),
     "modes of a plate": (ROOT / "tests" / "scenes" / "plate_modes.toml", 1e-4, None),
     "Campbell of a blade": (ROOT / "demos" / "pretwisted_blade.toml", 1e-4, "campbell"),
     "disk": (ROOT / "demos" / "disk_campbell.toml", 1e-3, "frequencies"),
