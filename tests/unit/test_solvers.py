@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics.left_vectors import mirror_error
-from rotfem.numerics.linear import DirectSolver, combine
+from rotfem.numerics.linear import DirectSolver, SingularSolver, combine, is_regular
 from rotfem.numerics.newton import Newton
 
 
@@ -139,3 +139,21 @@ def test_a_zero_eigenvalue_is_its_own_mirror() -> None:
     assert mirror_error(np.array([0.0, 1j, -1j, 2j, -2j])) == 0.0
     lopsided = np.array([0.0, 0.1 + 1j, -0.11 + 1j, 9j, -9j])
     assert mirror_error(lopsided) == pytest.approx(0.01 / abs(0.1 + 1j), rel=1e-9)
+
+
+def test_what_a_singular_matrix_does_not_feel_follows_the_other() -> None:
+    """A n = 0 for n = (1, 1): x has the part of b that A feels, n·K x = 0, and nothing of round-off along n."""
+    A, K = (
+        PETSc.Mat().createAIJ((2, 2), csr=([0, 2, 4], [0, 1, 0, 1], values))
+        for values in ([1.0, -1.0, -1.0, 1.0], [2.0, 0.0, 0.0, 3.0])
+    )
+    for matrix in (A, K):
+        matrix.assemble()
+    assert is_regular(K, DirectSolver(K))
+    assert not is_regular(A, DirectSolver(A))
+    K.scale(1e-9)
+    x, b = A.createVecs()
+    b.array[:] = [1.0, -1.0 + 1e-14]
+    SingularSolver(A, K).solve(b, x)
+    # A x = b and 2 x₁ + 3 x₂ = 0; to what K is beside A
+    np.testing.assert_allclose(x.array, [0.6, -0.4], rtol=1e-7)
