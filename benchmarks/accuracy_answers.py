@@ -194,7 +194,8 @@ def main() -> None:
                 faster.append((min(full), answer.seconds))
                 line += f", of the full model {min(full):.2f} s"
             print(line, flush=True)
-    print(f"true/asked: median {np.median(ratios):.2f}, largest {max(ratios):.2f} of {len(ratios)} that met it")
+    if ratios:
+        print(f"true/asked: median {np.median(ratios):.2f}, largest {max(ratios):.2f} of {len(ratios)} that met it")
     print(f"time of the scenes' own settings / time: median {np.median(own):.2f}")
     if faster:
         gains = np.array([full / seconds for full, seconds in faster])
