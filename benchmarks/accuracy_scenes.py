@@ -5,7 +5,7 @@
 prints, for every scene, estimated and true error of steps, mesh and in all, and the median and the worst of their
 ratios. The truth is computed once and kept in the folder: of the steps from eight times as many, of the mesh from
 twice the elements (of a mesh file from one degree more), in all from both together with the exact theory. `SCENES`
-is for others too: name ↦ tables. The scenes of held_out_scenes.py are those that no estimate was fitted to.
+is for others too: name ↦ tables. Those of held_out_scenes.py are of other kinds.
 """
 
 from __future__ import annotations
