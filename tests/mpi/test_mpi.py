@@ -66,7 +66,9 @@ def test_history_is_that_of_one_process(tmp_path: Path, theory: str, frame: str)
         for column, values in serial.items():  # sums in another order, and what that does to Newton's last increments
             scale = float(np.max(np.abs(values)))
             assert scale > 0.0, f"{column} says nothing"
-            np.testing.assert_allclose(parallel[column], values, rtol=0, atol=1e-8 * scale, err_msg=column)
+            # Forces at the root are stiffnesses times what Newton leaves of displacements.
+            close = 1e-6 if column.startswith("root_") else 1e-8
+            np.testing.assert_allclose(parallel[column], values, rtol=0, atol=close * scale, err_msg=column)
 
 
 @pytest.mark.parametrize("scheme", ["esdirk4", "radau5"])
