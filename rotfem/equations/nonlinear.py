@@ -157,18 +157,18 @@ class NonlinearSystem(System):
     def clamp_forces(self) -> Array:
         """Return the part of this process in what the clamp does in its unit motions (see `System`)."""
         held = np.asarray(self._assembled(self._F)[self.clamped] @ self._motions)
-        if self._F_at_root is None:
+        if not self._F_at_root:
             return held
         forces = self._assembled(self._F_at_root)[: len(self.root.weights)].copy()
         forces[self.clamped] = 0.0  # what is left works on the turns of hinges, against which the root is held
         return np.asarray(held - forces @ self.root.weights)
 
     @cached_property
-    def _F_at_root(self) -> Any:
-        """The work of springs and dampers of the root, compiled; None where it has none."""
+    def _F_at_root(self) -> list[Any]:
+        """The work of springs and dampers of the root, compiled; empty where it has none."""
         acting = self.model.acting
         terms = [term for name, term in self.model.terms.items() if acting[name].at_root]
-        return forms.form(added(terms), once=True) if terms else None
+        return [forms.form(added(terms), once=True)] if terms else []
 
     def tangent(self, c_k: float, c_v: float, c_m: float, before: Array | None = None) -> tuple[Any, bool]:
         """Return (c_k K + c_v C + c_m M at the state, True); clamped rows are identity rows.
