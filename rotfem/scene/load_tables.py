@@ -74,26 +74,25 @@ def as_over_span(sizes: Sequence[int], to: int) -> Callable[[Any, ValidationInfo
         sizes: numbers of components that are allowed.
         to: number that they are filled up to with zeros.
     """
-
-    def read(value: Any, info: ValidationInfo) -> Over:
-        if callable(value):
-            return _function(value, 1, "f(x)")
-        shape = f"a table [[x, {_names(sizes)}], …]"
-        rows = as_table(value, info, [1 + n for n in sizes], shape, span_rows)
-        return tuple((*row, *(0.0,) * (1 + to - len(row))) for row in rows)
-
-    return read
+    return _reader(("x",), span_rows, sizes, to)
 
 
 def as_over_both(sizes: Sequence[int], to: int) -> Callable[[Any, ValidationInfo], Over]:
-    """Return what reads rows (x, t, components), or a function f(x, t) in their place (see `over_span`)."""
+    """Return what reads rows (x, t, components), or a function f(x, t) in their place (see `as_over_span`)."""
+    return _reader(("x", "t"), grid_rows, sizes, to)
+
+
+def _reader(
+    over: tuple[str, ...], rows_of: Callable[..., Matrix], sizes: Sequence[int], to: int
+) -> Callable[[Any, ValidationInfo], Over]:
+    """Return what reads rows (what they are over, components), checked by `rows_of`, or a function of the same."""
+    n, names = len(over), ", ".join(over)
 
     def read(value: Any, info: ValidationInfo) -> Over:
         if callable(value):
-            return _function(value, 2, "f(x, t)")
-        shape = f"a table [[x, t, {_names(sizes)}], …]"
-        rows = as_table(value, info, [2 + n for n in sizes], shape, grid_rows)
-        return tuple((*row, *(0.0,) * (2 + to - len(row))) for row in rows)
+            return _function(value, n, f"f({names})")
+        rows = as_table(value, info, [n + size for size in sizes], f"a table [[{names}, {_names(sizes)}], …]", rows_of)
+        return tuple((*row, *(0.0,) * (n + to - len(row))) for row in rows)
 
     return read
 

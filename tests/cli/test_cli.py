@@ -19,6 +19,8 @@ from tests.beams import SECTION
 
 ROOT = Path(__file__).resolve().parents[2]
 
+FILES_OF_A_HISTORY = ["fields.h5", "fields.xdmf", "history.csv", "history.png", "shape.csv", "summary.json"]
+
 SCENE = f"""\
 [structure]
 type = "planar_beam"
@@ -152,14 +154,7 @@ def test_run_writes_its_results(rotfem: Run, here: Path) -> None:
     assert "50 steps" in done.stdout
     assert "results/beam" in done.stdout
     folder = here / "results" / "beam"
-    assert sorted(os.listdir(folder)) == [
-        "fields.h5",
-        "fields.xdmf",
-        "history.csv",
-        "history.png",
-        "shape.csv",
-        "summary.json",
-    ]
+    assert sorted(os.listdir(folder)) == FILES_OF_A_HISTORY
     history = read_csv(folder / "history.csv")
     assert list(history)[:7] == ["t", "psi", "psi_dot", "tip_u1", "tip_u2", "tip_alpha", "kinetic"]
     np.testing.assert_allclose(history["t"], np.arange(51) * 0.01, atol=1e-12)
@@ -224,14 +219,7 @@ def test_a_failed_computation_keeps_what_it_had(rotfem: Run, here: Path) -> None
     assert re.search(r"linear solution diverged.*3\.797\d* rad/s.*at t = (8\.9|9)\d* s.*consistent_linear", done.stderr)
     assert "Traceback" not in done.stderr
     folder = here / "results" / "beam"
-    assert sorted(os.listdir(folder)) == [
-        "fields.h5",
-        "fields.xdmf",
-        "history.csv",
-        "history.png",
-        "shape.csv",
-        "summary.json",
-    ]
+    assert sorted(os.listdir(folder)) == FILES_OF_A_HISTORY
     summary = json.loads((folder / "summary.json").read_text())
     history = read_csv(folder / "history.csv")
     assert summary["status"] == "failed"

@@ -8,7 +8,6 @@ has none along 3: where a blade has both sweep and prebend the twist makes up fo
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 import numpy as np
@@ -48,10 +47,7 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
 
 def _section(deck: Deck, length: float) -> dict[str, Any]:
     """Return the tables of matrices of a blade file."""
-    version = re.search(r"BEAMDYN\s+V(\d+\.\d+)", deck.lines[0], re.IGNORECASE)
-    if version is None or version[1] not in VERSIONS:
-        shown = version[1] if version else "missing"
-        deck.fail(f"the version of BeamDyn's blade file is {shown}; known: {', '.join(VERSIONS)}", 1)
+    deck.check_version("BeamDyn", VERSIONS)
     count = deck.count("station_total", 2)
     line = deck.find("DISTRIBUTED PROPERTIES") + 1
     stations: list[float] = []

@@ -7,7 +7,6 @@ sc_offst`, and inertias and bending stiffness are about that line, not about cen
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 import numpy as np
@@ -67,10 +66,7 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
     if not _is_main(deck):
         length = asked.length(deck, "sec_loc is a part of radius − hub_rad of BModes' main file")
         return _keys(deck, asked, length, {})
-    version = re.search(r"BMODES\s+V(\d+\.\d+)", deck.lines[0], re.IGNORECASE)
-    if version is None or version[1] not in VERSIONS:
-        shown = version[1] if version else "missing"
-        deck.fail(f"the version of BModes' main file is {shown}; known: {', '.join(VERSIONS)}", 1)
+    deck.check_version("BModes", VERSIONS, "main")
     for name, value in ONLY.items():
         if (found := deck.number(name)) != value:
             deck.fail(f"{name} = {found:g} is not known; only {value:g}", deck.named(name)[0], 1)

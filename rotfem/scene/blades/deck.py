@@ -47,6 +47,23 @@ class Deck:
         where = "" if line is None else f"line {line}: " if column is None else f"line {line}, column {column}: "
         raise problem("", str(self.path), f"{where}{reason}")
 
+    def check_version(self, program: str, known: Sequence[str], kind: str = "blade") -> None:
+        """Refuse a file whose first line does not name a version that is known.
+
+        Args:
+            program: whose file it is, which stands before the version.
+            known: versions, such as "1.00".
+            kind: which of its files it is.
+
+        Raises:
+            PydanticCustomError: it names another one, or none.
+        """
+        found = re.search(rf"{program}\s+V(\d+\.\d+)", self.lines[0], re.IGNORECASE)
+        if found is None or found[1] not in known:
+            shown = found[1] if found else "missing"
+            possessive = f"{program}'" if program.endswith("s") else f"{program}'s"
+            self.fail(f"the version of {possessive} {kind} file is {shown}; known: {', '.join(known)}", 1)
+
     def find(self, words: str, start: int = 1) -> int:
         """Return the number of the first line, not before start, in which all words stand, whatever their case."""
         wanted = words.lower().split()

@@ -5,7 +5,6 @@ Columns as the documentation of OpenFAST and its templates have them; others, as
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 import numpy as np
@@ -29,10 +28,7 @@ def recognises(deck: Deck) -> bool:
 
 def read(deck: Deck, asked: Asked) -> dict[str, Any]:
     """Return section and pretwist; axial, shear and torsional stiffness are the scene's, as ElastoDyn has none."""
-    version = re.search(r"ELASTODYN\s+V(\d+\.\d+)", deck.lines[0], re.IGNORECASE)
-    if version is None or version[1] not in VERSIONS:
-        shown = version[1] if version else "missing"
-        deck.fail(f"the version of ElastoDyn's blade file is {shown}; known: {', '.join(VERSIONS)}", 1)
+    deck.check_version("ElastoDyn", VERSIONS)
     count = deck.count("NBlInpSt", 2)
     factors = {name: deck.number(name) for name in ("AdjBlMs", "AdjFlSt", "AdjEdSt")}
     head = deck.find("DISTRIBUTED BLADE PROPERTIES") + 1
