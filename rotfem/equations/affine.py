@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.equations.affine_energies import AffineEnergies
 from rotfem.equations.clamp_rows import ClampRows
 from rotfem.equations.modal_damping import EFFECT
 from rotfem.equations.model import Model
 from rotfem.equations.pieces import PRESTRESS, Piece, Pieces
-from rotfem.equations.system import System
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
@@ -30,7 +30,7 @@ Array = npt.NDArray[np.float64]
 ONE = np.ones(1)
 
 
-class AffineSystem(System):
+class AffineSystem(AffineEnergies):
     """System of a linear theory, about the undeformed state: sums of its pieces."""
 
     linear = True
@@ -279,33 +279,3 @@ class AffineSystem(System):
             weights = [np.prod([axis[i] for _, i in p.key]) if p.key else 1.0 for p in chosen]
             combine(part, [p.operator for p in chosen], np.array(weights))
         return parts
-
-    def energies(self) -> dict[str, float]:
-        """Return kinetic and strain energy and the Jacobi integral ½ v·Mv + ½ q·Kq + f·q − T0(0), J."""
-        e = super().energies()
-        q, v, _ = self._qva
-        half = [self._quadratic(self._operators[k], x) / 2 for k, x in (("M", v), ("K", q))]
-        e["jacobi"] = sum(half) + self._load.dot(q) - self._rest_energy()
-        return e
-
-    def _quadratic(self, A: Any, x: Any) -> float:
-        A.mult(x, self._work)
-        return float(self._work.dot(x))
-
-    def _rest_energy(self) -> float:
-        """Return T0 of the undeformed structure at the present speed, J: the constant of the Jacobi integral."""
-        spin = self.model.frame.constants.get("w")
-        if spin is None or "T0" not in self._energies.names:
-            return 0.0
-        return self.rest_inertia * float(np.dot(spin.value, spin.value))
-
-    @cached_property
-    def rest_inertia(self) -> float:
-        """T0 of the undeformed structure at unit speed, kg·m²: half its moment of inertia about the axis."""
-        spin = self.model.frame.constants["w"]
-        state, w = self.q.x.array.copy(), spin.value.copy()
-        self.q.x.array[:] = 0.0
-        spin.value[...] = self.motion.axis[-spin.value.size :]
-        inertia = self._energies()["T0"]
-        self.q.x.array[:], spin.value[...] = state, w
-        return inertia
