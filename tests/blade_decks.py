@@ -249,3 +249,43 @@ components:
             - {mass[0]}
             - {mass[1]}
 """
+
+
+def windio_2() -> str:
+    """Return a windIO file of version 2: the same blade, on a hub that is coned upwind."""
+    stiffness, mass = [], []
+    for s, angle in zip(STATIONS, ANGLE, strict=True):
+        K, M = iec_matrices(s, angle)
+        stiffness.append(K)
+        x, y = M[1, 5] / s["m"], -M[0, 5] / s["m"]
+        mass.append([s["m"], x, y, M[3, 3], M[4, 4], M[5, 5], -M[3, 4]])
+    rows = [(f"K{i + 1}{j + 1}", [K[i, j] for K in stiffness]) for i, j in zip(*np.triu_indices(6), strict=True)]
+    inertias = zip(("mass", "cm_x", "cm_y", "i_edge", "i_flap", "i_plr", "i_cp"), zip(*mass, strict=True), strict=True)
+
+    def lines(named: Any) -> str:
+        return "\n".join(f"          {name}: [{', '.join(f'{v:.16e}' for v in values)}]" for name, values in named)
+
+    return f"""windIO_version: '2.0'
+assembly:
+  rotor_orientation: Upwind
+components:
+  hub:
+    diameter: 3.0
+    cone_angle: 4.0
+  blade:
+    reference_axis:
+      x: {{grid: [0.0, 1.0], values: [0.0, 0.0]}}
+      y: {{grid: [0.0, 1.0], values: [0.0, 0.0]}}
+      z: {{grid: [0.0, 0.5, 1.0], values: [0.0, {LENGTH / 2}, {LENGTH}]}}
+    outer_shape:
+      twist: {{grid: [0.0, 1.0], values: [{TWIST[0]}, {TWIST[1]}]}}
+    structure:
+      elastic_properties:
+        stiffness_matrix:
+          grid: [0.0, 1.0]
+{lines(rows)}
+        inertia_matrix:
+          grid: [0.0, 1.0]
+{lines(inertias)}
+        # no masses
+"""

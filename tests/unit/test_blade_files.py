@@ -41,11 +41,13 @@ def along_ours(matrix: Any) -> Any:
 def test_one_blade_in_four_formats(tmp_path: Path) -> None:
     """Matrices at root and tip are those of sums over centres in IEC axes; pretwist is −twist."""
     (tmp_path / "windio.yaml").write_text(decks.windio())
+    (tmp_path / "windio2.yaml").write_text(decks.windio_2())
     beams = {
         "beamdyn": blade(tmp_path, decks.beamdyn_blade(), structure_length=decks.LENGTH),
         "hawc2 full": blade(tmp_path, decks.hawc2(True), "full.st"),
         "hawc2": blade(tmp_path, decks.hawc2(False), "centres.st"),
         "windio": read(tmp_path, "windio.yaml"),
+        "windio 2": read(tmp_path, "windio2.yaml"),
     }
     for name, beam in beams.items():
         assert beam.length == pytest.approx(decks.LENGTH, rel=1e-12)
@@ -55,8 +57,9 @@ def test_one_blade_in_four_formats(tmp_path: Path) -> None:
                 wanted = along_ours(matrix)
                 scale = np.sqrt(np.outer(np.diag(wanted), np.diag(wanted)))
                 assert np.max(np.abs(at[key] - wanted) / scale) < 1e-12, (name, key, x)
-    twist = np.array(beams["windio"].pretwist)
-    np.testing.assert_allclose(twist[[0, -1], 1], -np.radians(decks.TWIST), rtol=1e-12)
+    for name in ("windio", "windio 2"):
+        twist = np.array(beams[name].pretwist)
+        np.testing.assert_allclose(twist[[0, -1], 1], -np.radians(decks.TWIST), rtol=1e-12)
 
 
 def test_beamdyn_with_its_line(tmp_path: Path) -> None:
@@ -103,8 +106,10 @@ def test_bmodes(tmp_path: Path) -> None:
         np.testing.assert_allclose(beam.section.center("tension_center", x), [s["ec"][0] - s["sc"][0], 0.0])
     (tmp_path / "main.bmi").write_text(decks.bmodes_main())
     main = read(tmp_path, "main.bmi", **STIFF)
-    assert (main.length, main.hub_radius) == (decks.LENGTH, 1.5)
+    assert main.length == decks.LENGTH
     assert main.precone == pytest.approx(np.radians(3.0))
+    # hub_rad is measured along the coned axis
+    assert main.root_position == pytest.approx((1.5 * np.cos(main.precone), 0.0, 1.5 * np.sin(main.precone)))
     assert main.section.central(0.0)["mass_per_length"] == pytest.approx(600.0)
 
 
@@ -199,8 +204,8 @@ BAD: list[tuple[str, str, dict[str, Any], tuple[str, str], str]] = [
         "windio",
         "blade.yaml",
         {},
-        ("name: small", 'windIO_version: "2.0"'),
-        "line 1, column 17: windIO_version is 2.0; known",
+        ("name: small", 'windIO_version: "3.0"'),
+        r"line 1, column 17: windIO_version is 3\.0; known are 2\.0 and 2\.1",
     ),
     ("windio", "blade.yaml", {}, ("twist: *twist", "twist: *angle"), "not valid YAML: found undefined alias"),
     (
@@ -219,6 +224,41 @@ BAD: list[tuple[str, str, dict[str, Any], tuple[str, str], str]] = [
     ),
     ("windio", "blade.yaml", {}, ("[0.0, 0.5, 1.0]", "[0.0, 1.0]"), "has 2 places for 3 values"),
     ("windio", "blade.yaml", {}, ("0.0, 10.0", "zero, 10.0"), 'line 11, column 45: "zero" must be a finite number'),
+    ("windio_2", "blade.yaml", {}, ("'2.0'", "'1.9'"), r"line 1, column 17: windIO_version is 1\.9; known are 2\.0"),
+    ("windio_2", "blade.yaml", {}, ("Upwind", "Up"), 'line 3, column 22: assembly.rotor_orientation is "up"; must be'),
+    ("windio_2", "blade.yaml", {}, ("cone_angle", "cone"), "line 6, column 5: components.hub has no cone_angle"),
+    ("windio_2", "blade.yaml", {}, ("K22: [", "K22: [1.0, "), "line 19, column 13: .* has 2 places for 3 values|has 3"),
+    (
+        "windio_2",
+        "blade.yaml",
+        {},
+        ("K11: [", "K11: [0.0]  # ["),
+        r"line 19, column 17: .*K11\[0\] is 0; must be greater",
+    ),
+    ("windio_2", "blade.yaml", {}, ("i_plr", "i_polar"), "inertia_matrix has no i_plr"),
+    (
+        "windio_2",
+        "blade.yaml",
+        {},
+        ("elastic_prop", "elastic_mb"),
+        "components.blade.structure has no elastic_properties",
+    ),
+    (
+        "windio_2",
+        "blade.yaml",
+        {},
+        ("mass: [", "mass: [-"),
+        r"inertia_matrix\.mass\[0\] is -300; must be greater than 0",
+    ),
+    ("windio_2", "blade.yaml", {}, ("K44: ", "K55: "), "has no K44"),
+    (
+        "windio_2",
+        "blade.yaml",
+        {},
+        ("# no masses", "point_mass: {grid: [0.0, 1.0], mass: [1.0, 0.0]}"),
+        "is not read; take",
+    ),
+    ("windio_2", "blade.yaml", {"structure_hub_offset": [1.0, 0.0, 0.0]}, ("", ""), "hub_offset: given twice"),
 ]
 
 
@@ -318,3 +358,27 @@ def test_paths_of_blades_move_with_a_tuned_scene(tmp_path: Path) -> None:
     found = _moved({"structure": structure}, tmp_path, tmp_path / "deeper")["structure"]
     assert found["line"] == "../line.csv"
     assert found["section"] == {"from": "../blade", "EA": "../EA.csv", "shape": "circle", "GJ": 1.0}
+
+
+def test_windio_2(tmp_path: Path) -> None:
+    """The hub gives root and precone, upwind against axis 3; a coordinate may have more points than the others."""
+    (tmp_path / "blade.yaml").write_text(decks.windio_2())
+    beam = read(tmp_path, "blade.yaml")
+    assert beam.precone == pytest.approx(-np.radians(4.0))
+    assert beam.root_position == pytest.approx((1.5 * np.cos(beam.precone), 0.0, 1.5 * np.sin(beam.precone)))
+    bent = decks.windio_2().replace(
+        "x: {grid: [0.0, 1.0], values: [0.0, 0.0]}", "x: {grid: [0.0, 0.25, 1], values: [0, 0, 3]}"
+    )
+    (tmp_path / "bent.yaml").write_text(bent.replace("Upwind", "downwind"))
+    beam = read(tmp_path, "bent.yaml")
+    assert beam.precone == pytest.approx(np.radians(4.0))
+    np.testing.assert_allclose(np.array(beam.line)[:, 2], [0.0, 0.0, 1.0, 3.0])
+    assert "hub_radius" not in beam.model_fields_set
+
+
+def test_windio_2_with_axes_exchanged(tmp_path: Path) -> None:
+    """Axis x along the chord, as comments of the schema have it, is seen by what is stiffer, and refused."""
+    text = decks.windio_2().replace("K44", "K_").replace("K55", "K44").replace("K_", "K55")
+    (tmp_path / "blade.yaml").write_text(text)
+    with pytest.raises(rotfem.SceneError, match=r"K44 is less than K55 on the outer half.*x flapwise"):
+        read(tmp_path, "blade.yaml")

@@ -77,3 +77,11 @@ def iec_pretwist(tangent: Array, twist: Array) -> Array:
     x /= np.linalg.norm(x, axis=1)[:, None]
     between = np.arctan2(-np.sum(x * t_2, axis=1), np.sum(x * t_3, axis=1))
     return np.asarray(between - np.unwrap(twist))
+
+
+def coned_root(radius: float, precone: float) -> dict[str, Any]:
+    """Return the keys of a hub radius along the coned axis (m) and a precone (rad, towards axis 3)."""
+    if precone == 0.0:
+        return {"hub_radius": radius}
+    offset = [radius * float(np.cos(precone)), 0.0, radius * float(np.sin(precone))]
+    return {"hub_offset": offset, "precone": precone}

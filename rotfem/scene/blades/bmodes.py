@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from rotfem.registry import register
-from rotfem.scene.blades.axes import scaled_rows
+from rotfem.scene.blades.axes import coned_root, scaled_rows
 from rotfem.scene.blades.deck import Deck
 from rotfem.scene.blades.formats import Asked, BladeFormat
 from rotfem.scene.files import existing_file_beside
@@ -83,7 +83,7 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
     factors = {column: deck.number(factor) for factor, column in FACTORS.items()}
     properties = Deck(existing_file_beside(deck.path, name, line))
     keys = _keys(properties, asked, radius - hub, factors)
-    return {"length": radius - hub, "hub_radius": hub, "precone": float(np.radians(deck.number("precone"))), **keys}
+    return {"length": radius - hub, **coned_root(hub, float(np.radians(deck.number("precone")))), **keys}
 
 
 def _keys(deck: Deck, asked: Asked, length: float, factors: dict[str, float]) -> dict[str, Any]:

@@ -1,138 +1,181 @@
-"""A blade in a windIO file (YAML): reference axis, twist and the 6×6 matrices of `elastic_properties_mb`.
+"""A blade in a windIO file (YAML): reference axis, twist, 6×6 matrices, and of the rotor hub radius and precone.
 
-It is windIO of the first version, in which the ontology of IEA Wind Task 37 has its reference turbines and angles are
-in radians; files that name a later version are refused. `grid` is a part of the arc length; x, y and z are the axes of
-OpenFAST, and so is the order of the matrices, of which a row holds the upper triangle.
+Version 1 is the ontology of IEA Wind Task 37, without a version in it: `elastic_properties_mb.six_x_six` has axis,
+twist and matrices as rows of the upper triangle, angles are in radians. Version 2 has one axis for the blade, the twist
+of `outer_shape`, the elements of the matrices by name in `structure.elastic_properties`, and degrees. In both `grid` is
+a part of the arc length, and axes and order of the matrices are those of BeamDyn: x flapwise, y edgewise, z along the
+blade. Comments in the schema of version 2 have x along the chord; its example blades and its converter from version 1
+have not, nor has the reference axis beside them, so a blade that would be stiffer flapwise than edgewise is refused.
 """
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
 
 from rotfem.registry import register
-from rotfem.scene.blades.axes import FROM_IEC, iec_pretwist, rows_over, scaled_rows, turned_matrix
+from rotfem.scene.blades.axes import FROM_IEC, coned_root, iec_pretwist, rows_over, scaled_rows, turned_matrix
 from rotfem.scene.blades.deck import Deck
 from rotfem.scene.blades.formats import Asked, BladeFormat
+from rotfem.scene.blades.yaml_tree import YamlNode, yaml_tree
 from rotfem.scene.reference_line import as_line, line_through
 from rotfem.scene.values import Array
 
-#: Where the matrices are, below the components.
-PLACE = ("components", "blade", "elastic_properties_mb", "six_x_six")
+#: Key that later versions have, and those that are known.
+VERSION, KNOWN = "windIO_version", re.compile(r"2\.[01](\.\d+)?")
 
-#: Key that later versions have.
-VERSION = "windIO_version"
+#: Parts of the length that are one place where axes have grids of their own.
+SAME = 1e-6
+
+UPPER = np.triu_indices(6)
+
+#: Elements of a stiffness matrix of version 2, those on the diagonal among them; others are 0 where they are not given.
+ELEMENTS = [f"K{i + 1}{j + 1}" for i, j in zip(*UPPER, strict=True)]
+DIAGONAL = [f"K{i}{i}" for i in range(1, 7)]
 
 
 def recognises(deck: Deck) -> bool:
     """Return whether it is a YAML file with a blade among its components."""
-    return deck.path.suffix.lower() in (".yaml", ".yml") and all(f"{word}:" in deck.text for word in PLACE[:2])
+    return deck.path.suffix.lower() in (".yaml", ".yml") and all(
+        f"{word}:" in deck.text for word in ("components", "blade")
+    )
 
 
 def read(deck: Deck, asked: Asked) -> dict[str, Any]:
-    """Return line, pretwist and section."""
-    tree = _Node(deck, _composed(deck))
-    if (version := tree.get(VERSION)) is not None:
-        version.fail(f"is {version.node.value}; known are files of the first version, without it")
-    properties = tree
-    for key in PLACE:
-        properties = properties[key]
-    axis = {name: properties["reference_axis"][name] for name in "xyz"}
-    for part in axis.values():
-        part["grid"].check_grid(len(part["values"].numbers()))
-    grid = axis["z"]["grid"].numbers()
-    values = [np.interp(grid, part["grid"].numbers(), part["values"].numbers()) for part in axis.values()]
-    line = np.stack(values, axis=-1) @ FROM_IEC.T
+    """Return line, pretwist and section, and where the file has a hub its radius and precone."""
+    tree = yaml_tree(deck)
+    if (version := tree.get(VERSION)) is None:
+        return _blade_1(tree) | _hub(tree, degrees=False)
+    if not KNOWN.fullmatch(version.text()):
+        version.fail(f"is {version.text()}; known are 2.0 and 2.1, and files of the first version, without it")
+    return _blade_2(tree["components.blade"]) | _hub(tree, degrees=True)
+
+
+def _blade_1(tree: YamlNode) -> dict[str, Any]:
+    """Return line, pretwist and section of a file of the first version."""
+    properties = tree["components.blade.elastic_properties_mb.six_x_six"]
+    line, length, pretwist = _axis(properties["reference_axis"], properties["twist"], degrees=False)
+    section = {
+        "stiffness": _rows_of_21(properties["stiff_matrix"], length),
+        "mass": _rows_of_21(properties["inertia_matrix"], length),
+    }
+    return {"line": line, "pretwist": pretwist, "section": section}
+
+
+def _blade_2(blade: YamlNode) -> dict[str, Any]:
+    """Return line, pretwist and section of a file of version 2."""
+    properties = blade["structure.elastic_properties"]
+    if (point_mass := properties.get("point_mass")) is not None and np.any(point_mass["mass"].numbers() != 0.0):
+        point_mass.fail("is not read; take it out and give structure.masses in the scene")
+    line, length, pretwist = _axis(blade["reference_axis"], blade["outer_shape.twist"], degrees=True)
+    section = {"stiffness": _stiffness(properties["stiffness_matrix"], length)}
+    section["mass"] = _mass(properties["inertia_matrix"], length)
+    return {"line": line, "pretwist": pretwist, "section": section}
+
+
+def _axis(axis: YamlNode, twist: YamlNode, degrees: bool) -> tuple[list[Any], float, list[list[Any]]]:
+    """Return points of the line, its length and rows of pretwist there; each coordinate has a grid of its own."""
+    parts = []
+    for name in "xyz":
+        values = axis[name]["values"].numbers()
+        parts.append((axis[name]["grid"].grid(len(values)), values))
+    grid = np.unique(np.concatenate([places for places, _ in parts]))
+    grid = grid[np.concatenate([[True], np.diff(grid) > SAME])]
+    line = np.stack([np.interp(grid, *part) for part in parts], axis=-1) @ FROM_IEC.T
     line -= line[0]
     through = line_through(as_line(line.tolist()))
     at = np.array([0.0, *through.knots, through.length])
-    twist = properties["twist"]
-    twist["grid"].check_grid(len(twist["values"].numbers()))
-    angles = np.interp(at / through.length, twist["grid"].numbers(), twist["values"].numbers())
-    section = {
-        "stiffness": _matrices(properties["stiff_matrix"], through.length),
-        "mass": _matrices(properties["inertia_matrix"], through.length),
-    }
-    pretwist = iec_pretwist(through.at(at)[1], angles)
-    return {"line": line.tolist(), "pretwist": rows_over(at, pretwist), "section": section}
+    angles = twist["values"].numbers()
+    angles = np.interp(at / through.length, twist["grid"].grid(len(angles)), angles)
+    pretwist = iec_pretwist(through.at(at)[1], np.radians(angles) if degrees else angles)
+    return line.tolist(), through.length, rows_over(at, pretwist)
 
 
-def _matrices(table: _Node, length: float) -> list[list[Any]]:
+def _hub(tree: YamlNode, degrees: bool) -> dict[str, Any]:
+    """Return place and precone of the root, none if there is no hub; the file's cone is positive on either side."""
+    hub = tree["components"].get("hub")
+    if hub is None:
+        return {}
+    diameter, cone = hub["diameter"], hub["cone_angle"].number()
+    if diameter.number() < 0.0:
+        diameter.fail("must be at least 0")
+    if cone == 0.0:
+        return coned_root(diameter.number() / 2, 0.0)
+    orientation = tree["assembly.rotor_orientation"]
+    if (side := orientation.text().lower()) not in ("upwind", "downwind"):
+        orientation.fail(f'is "{side}"; must be upwind or downwind, which is the sign of the precone')
+    precone = (np.radians(cone) if degrees else cone) * (-1.0 if side == "upwind" else 1.0)
+    return coned_root(diameter.number() / 2, float(precone))
+
+
+def _rows_of_21(table: YamlNode, length: float) -> list[list[Any]]:
     """Return the table of matrices from rows of 21 entries."""
     rows = table["values"].entries()
-    table["grid"].check_grid(len(rows))
-    upper, out = np.triu_indices(6), []
-    for row in rows:
-        entries = row.numbers()
-        if len(entries) != 21:
+    grid = table["grid"].grid(len(rows))
+    upper = [row.numbers() for row in rows]
+    for row, entries in zip(rows, upper, strict=True):
+        if len(entries) != len(ELEMENTS):
             row.fail(f"has {len(entries)} entries; must be the 21 of the upper triangle")
-        M = np.zeros((6, 6))
-        M[upper] = entries
-        out.append(turned_matrix(M + np.triu(M, 1).T, FROM_IEC))
-    return scaled_rows(table["grid"].numbers(), length, np.array(out))
+    return scaled_rows(grid, length, _along_ours(np.array(upper)))
 
 
-def _composed(deck: Deck) -> Any:
-    """Return the root node of the file, which knows where each value stands."""
-    import yaml
+def _stiffness(table: YamlNode, length: float) -> list[list[Any]]:
+    """Return the table of stiffness matrices from their elements, each over the grid."""
+    diagonal = {name: _column(table, name) for name in DIAGONAL}
+    count = len(diagonal["K44"])
+    grid = table["grid"].grid(count)
+    for name, values in diagonal.items():
+        for i in np.flatnonzero(values <= 0.0):
+            table[name].entries()[i].fail(f"is {values[i]:g}; must be greater than 0")
+    outer = grid >= 0.5
+    if np.all(diagonal["K44"][outer] < diagonal["K55"][outer]):
+        table["K44"].fail(
+            "is less than K55 on the outer half of the blade: x and y of the matrices must be those of the reference "
+            "axis, x flapwise, so that K44 is edgewise and K55 flapwise bending"
+        )
+    upper = np.zeros((count, len(ELEMENTS)))
+    for column, name in enumerate(ELEMENTS):
+        upper[:, column] = _column(table, name, count)
+    return scaled_rows(grid, length, _along_ours(upper))
 
-    try:
-        root = yaml.compose(deck.text, Loader=yaml.SafeLoader)
-    except RecursionError:
-        deck.fail("is nested too deeply")
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        what = getattr(error, "problem", None) or "no YAML"
-        deck.fail(f"not valid YAML: {what}", *((mark.line + 1, mark.column + 1) if mark else ()))
-    if root is None:
-        deck.fail("is empty")
-    return root
+
+def _mass(table: YamlNode, length: float) -> list[list[Any]]:
+    """Return the table of mass matrices from mass, centre and inertias about the reference axis."""
+    mass = _column(table, "mass")
+    count = len(mass)
+    grid = table["grid"].grid(count)
+    for i in np.flatnonzero(mass <= 0.0):
+        table["mass"].entries()[i].fail(f"is {mass[i]:g}; must be greater than 0")
+    x, y, cross = (_column(table, name, count) for name in ("cm_x", "cm_y", "i_cp"))
+    edge, flap, polar = (_column(table, name) for name in ("i_edge", "i_flap", "i_plr"))
+    for name, values in (("i_edge", edge), ("i_flap", flap), ("i_plr", polar)):
+        if len(values) != count:
+            table[name].fail(f"has {len(values)} values for {count} places")
+    M = {"K11": mass, "K16": -mass * y, "K22": mass, "K26": mass * x, "K33": mass, "K34": mass * y, "K35": -mass * x}
+    M |= {"K44": edge, "K45": -cross, "K55": flap, "K66": polar}
+    return scaled_rows(grid, length, _along_ours(np.stack([M.get(e, np.zeros(count)) for e in ELEMENTS], axis=-1)))
 
 
-class _Node:
-    """A value of a YAML file and its place."""
+def _column(table: YamlNode, name: str, zeros: int | None = None) -> Array:
+    """Return the values of an element; so many zeros, where that is allowed, if it is not given."""
+    if zeros is None:
+        return table[name].numbers()
+    found = table.get(name)
+    if found is None:
+        return np.zeros(zeros)
+    values = found.numbers()
+    if len(values) != zeros:
+        found.fail(f"has {len(values)} values for {zeros} places")
+    return values
 
-    def __init__(self, deck: Deck, node: Any, path: str = ""):
-        self.deck, self.node, self.path = deck, node, path
-        self.line, self.column = node.start_mark.line + 1, node.start_mark.column + 1
 
-    def fail(self, reason: str) -> Any:
-        """Refuse the file here."""
-        return self.deck.fail(f"{self.path or 'the file'} {reason}", self.line, self.column)
-
-    def get(self, key: str) -> _Node | None:
-        """Return what stands at a key; None if nothing does."""
-        if self.node.id != "mapping":
-            self.fail("must be a mapping of keys to values")
-        pairs = {name.value: value for name, value in self.node.value if name.id == "scalar"}
-        return _Node(self.deck, pairs[key], f"{self.path}.{key}".lstrip(".")) if key in pairs else None
-
-    def __getitem__(self, key: str) -> _Node:
-        found = self.get(key)
-        return self.fail(f"has no {key}") if found is None else found
-
-    def entries(self) -> list[_Node]:
-        """Return the entries of a list."""
-        if self.node.id != "sequence" or not self.node.value:
-            self.fail("must be a list that is not empty")
-        return [_Node(self.deck, entry, f"{self.path}[{i}]") for i, entry in enumerate(self.node.value)]
-
-    def numbers(self) -> Array:
-        """Return the numbers of a list, (n,)."""
-        entries = self.entries()
-        for entry in entries:
-            if entry.node.id != "scalar":
-                entry.fail("must be a number")
-        return np.array([self.deck.value(e.node.value, e.line, e.column) for e in entries])
-
-    def check_grid(self, count: int) -> None:
-        """Refuse a grid that does not run from 0 to 1 with one place for each value."""
-        grid = self.numbers()
-        if len(grid) != count or len(grid) < 2:
-            self.fail(f"has {len(grid)} places for {count} values")
-        if grid[0] != 0.0 or not np.isclose(grid[-1], 1.0, rtol=1e-6) or np.any(np.diff(grid) <= 0.0):
-            self.fail("must rise from 0 to 1")
+def _along_ours(upper: Array) -> Array:
+    """Return matrices (n, 6, 6) along our axes from the upper triangles (n, 21) along x, y, z."""
+    out = np.zeros((len(upper), 6, 6))
+    out[:, *UPPER] = upper
+    return np.array([turned_matrix(M + np.triu(M, 1).T, FROM_IEC) for M in out])
 
 
 register(BladeFormat("windio", "windIO, a YAML file with components.blade", recognises, read))
