@@ -177,7 +177,11 @@ FRESH: dict[str, dict[str, Any]] = {
             **{"pretwist": [[0.0, 0.4], [2.0, 0.1]], "damping": {"kelvin_voigt": 1e-4}},
         },
         "motion": {"type": "constant", "speed": 40.0},
-        "loads": {"distributed": [[0, 0, 0, 0], [0.1, 0, 20.0, 150.0], [0.3, 0, 20.0, 150.0], [0.35, 0, 0, 40.0]]},
+        "loads": {
+            "distributed": {
+                "over_time": [[0, 0, 0, 0], [0.1, 0, 20.0, 150.0], [0.3, 0, 20.0, 150.0], [0.35, 0, 0, 40.0]]
+            }
+        },
         "mesh": {"elements": 6},
         "time": {"end": 0.6, "step": 0.001},
     },

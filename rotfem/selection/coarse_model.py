@@ -17,6 +17,7 @@ from rotfem.analysis.equilibrium import check_steady, static_tip_shape
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
+from rotfem.mechanics.theories import Theory
 from rotfem.numerics.eigenproblem import Pencil
 from rotfem.selection.candidate import HALVED, Candidate, Watch, stand_in, theories_of
 from rotfem.selection.case import Case
@@ -128,7 +129,7 @@ class Trial:
         self.effects, self.theories = problem.effective_effects(), theories_of(problem)
         self._systems: dict[str, Any] = {}
         self._done: dict[tuple[str, frozenset[str], frozenset[str]], Outputs] = {}
-        self._released: dict[str, Array] = {}
+        self._released: dict[tuple[str, str], Array] = {}
         self.unknown = ""
         self.at_rest: Array = np.empty(0)
         try:
@@ -200,15 +201,30 @@ class Trial:
     def candidate(self, theory: str, without: Collection[str] = ()) -> Candidate:
         """Return a model to be tried out; the compiled system is one for all of a theory."""
         problem = self.case.problem
-        own, left_out = stand_in(self.theories[theory], self.theories, problem.structure.type)
+        own, left_out = self._stand_in(theory)
         if own.name not in self._systems:
             self._systems[own.name] = self.compiled(problem, own.name)
         return Candidate(self.case, self._systems[own.name], left_out.union(without))
 
+    def _stand_in(self, theory: str) -> tuple[Theory, frozenset[str]]:
+        return stand_in(self.theories[theory], self.theories, self.case.problem.structure.type)
+
     def compiled(self, problem: Problem, theory: str) -> Any:
         """Return the system that a theory of a problem is tried out on; the mesh may be another one."""
-        own, _ = stand_in(self.theories[theory], self.theories, problem.structure.type)
+        own, _ = self._stand_in(theory)
         return compile_system(problem.replace(theory=own), self.comm, HISTORY in self.wanted, parted=True)
+
+    def on_mesh(self, mesh: Any, theory: str, without: Collection[str] = ()) -> Candidate:
+        """Return a model on another mesh; a new one every time, where that is not the coarse one.
+
+        Raises:
+            InputError: a mesh that cannot be computed with.
+        """
+        if mesh == self.case.problem.mesh:
+            return self.candidate(theory, without)
+        case = self.case.replace(problem=self.case.problem.replace(mesh=mesh))
+        _, left_out = self._stand_in(theory)
+        return Candidate(case, self.compiled(case.problem, theory), left_out.union(without))
 
     def _frequencies_at_rest(self) -> Array:
         """Return the frequencies (rad/s) of the resting structure, its hub held."""
@@ -265,8 +281,9 @@ class Trial:
         """Return the shape at t = 0 of a model; None if it is undeformed."""
         case = self.case
         if case.tip_displacement is not None:
-            if theory not in self._released:
-                problem = case.problem.replace(theory=self.theories[theory])
-                self._released[theory] = static_tip_shape(problem, case.tip_displacement, case.newton(), self.comm)
-            return self._released[theory].copy()
+            problem = candidate.case.problem.replace(theory=self.theories[theory])
+            key = theory, repr(problem.mesh)
+            if key not in self._released:
+                self._released[key] = static_tip_shape(problem, case.tip_displacement, case.newton(), self.comm)
+            return self._released[key].copy()
         return candidate.equilibrium() if case.from_steady else None

@@ -1,9 +1,8 @@
-"""What steps and mesh of a case put its outputs off, told by the coarse model and the case's own mesh at rest.
+"""What steps and mesh of a case put its outputs off, told as every run tells it.
 
-A march of the coarse model with the case's own steps is watched (`rotfem.analysis.error_watch`). Where there are very
-many steps it takes longer ones, and the error is scaled by the order of the scheme. What the coarse mesh puts off is
-scaled to the case's own by what both make of the same shapes, those that unit forces at the tip excite. The modes are
-solved on the case's own mesh, by the poorest theory.
+A march on the case's own mesh with its own steps is watched (`rotfem.analysis.error_watch`). Where there are very many
+steps it takes longer ones, and the error is scaled by the order of the scheme. Where the mesh makes that dear, the
+coarse model marches, and what its mesh puts off is scaled (`rotfem.selection.mesh_share`), which also tells the modes.
 """
 
 from __future__ import annotations
@@ -12,29 +11,26 @@ from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import ceil
-from typing import Any
 
 import numpy as np
 
 from rotfem.analysis.error_watch import ErrorWatch, TipErrors
-from rotfem.analysis.mesh_estimate import SAFE
-from rotfem.analysis.modal import ModalAnalysis
-from rotfem.analysis.ritz_vectors import RitzVectors
 from rotfem.analysis.schemes import State
-from rotfem.analysis.shape_error import LIKELY, ShapeError
-from rotfem.analysis.time_loop import March
+from rotfem.analysis.time_loop import March, Steps
 from rotfem.errors import ComputationError, InputError
+from rotfem.selection.candidate import Candidate
 from rotfem.selection.coarse_model import Trial
 from rotfem.selection.distance import HISTORY, MODES, STEADY
+from rotfem.selection.mesh_share import error_of_modes, share_of_mesh
 
-#: Steps of a march at most; beyond, one stands for several.
-MOST_STEPS = 800
+#: Steps of a march at most, beyond which one stands for several, and corrections of an equilibrium.
+MOST_STEPS, CORRECTIONS = 800, 20
 
-#: Shapes, the lowest first, by which two meshes are compared.
-COMPARED = 3
+#: Most steps (or corrections) times unknowns of what is computed on the mesh of the case.
+AFFORDABLE = 1e6
 
-#: Error of a frequency that is round-off.
-ROUND_OFF = 1e-14
+#: Error of the steps with which that of the mesh can be seen beside it, and most steps for one that see it.
+SEEING, MOST_FINER = 1e-2, 4
 
 
 @dataclass(frozen=True)
@@ -60,40 +56,69 @@ def discretisation(trial: Trial, theory: str, without: Collection[str] = ()) -> 
     """
     out = Discretisation()
     try:
-        own = own_mesh(trial)
-        share = _share(own, trial.poorest)
+        own = trial.on_mesh(trial.full.problem.mesh, next(iter(trial.theories)))
     except (ComputationError, InputError, np.linalg.LinAlgError):
-        own, share = None, None
-    for name, errors in (
-        (HISTORY, _marched(trial, theory, without) if HISTORY in trial.wanted else None),
-        (STEADY, _resting(trial, theory, without) if STEADY in trial.wanted else None),
-    ):
+        return out
+    for name in (HISTORY, STEADY):
+        if name not in trial.wanted:
+            continue
+        unknowns = len(own.system.held.zeros())
+        number = CORRECTIONS if name == STEADY else min(_number(trial), MOST_STEPS)
+        near = number * unknowns <= AFFORDABLE
+        candidate = (
+            trial.on_mesh(trial.full.problem.mesh, theory, without) if near else trial.candidate(theory, without)
+        )
+        errors = _resting(candidate) if name == STEADY else _marched(trial, candidate, theory)
         if errors is None or not errors.scale > 0.0:
             continue
         if name == HISTORY and errors.time is not None:
             out.steps[name] = errors.time[0] / errors.scale
+            errors = _in_finer_steps(trial, candidate, theory, out.steps[name]) or errors
+        share = 1.0 if near else share_of_mesh(own.switched(), trial.poorest)
         if share is not None:
             out.mesh[name] = min(1.0, share * (errors.shape + errors.space[0] / errors.scale))
-    if MODES in trial.wanted and own is not None:
+    if MODES in trial.wanted:
         with suppress(ComputationError):
-            out.mesh[MODES] = _of_modes(trial, own)
+            out.mesh[MODES] = error_of_modes(trial, own)
     return out
 
 
-def _marched(trial: Trial, theory: str, without: Collection[str]) -> TipErrors | None:
-    """Return the errors of a history; None where it fails."""
-    steps, scheme, thinned = trial.full.steps, trial.full.scheme, 1
+def _number(trial: Trial) -> int:
+    """Return the number of steps of a case; that of a march at most where they are adaptive."""
+    steps = trial.full.steps
+    assert steps is not None
+    return MOST_STEPS if steps.step is None else ceil(steps.end / steps.step - 1e-9)
+
+
+def _in_finer_steps(trial: Trial, candidate: Candidate, theory: str, off: float) -> TipErrors | None:
+    """Return the errors of a history whose steps are off by so much, in shorter ones; None where they do not help.
+
+    What long steps damp out or never excite the mesh cannot be seen to put off.
+    """
+    steps, scheme = trial.full.steps, trial.full.scheme
     assert steps is not None
     assert scheme is not None
-    if steps.step is not None:
-        thinned = ceil(steps.end / steps.step / MOST_STEPS - 1e-9)
-        steps = replace(steps, step=thinned * steps.step)
-    candidate = trial.candidate(theory, without)
+    if steps.step is None or off <= SEEING:
+        return None
+    finer = min(MOST_FINER, ceil((off / SEEING) ** (1 / scheme.order)))
+    if finer * _number(trial) * len(candidate.system.held.zeros()) > AFFORDABLE:
+        return None
+    found = _marched(trial, candidate, theory, finer)
+    return found if found is not None and found.scale > 0.0 else None
+
+
+def _marched(trial: Trial, candidate: Candidate, theory: str, finer: int = 1) -> TipErrors | None:
+    """Return the errors of a history, in so many steps for one; None where it fails."""
+    steps, scheme = trial.full.steps, trial.full.scheme
+    assert steps is not None
+    assert scheme is not None
+    thinned = ceil(_number(trial) / MOST_STEPS) / finer
+    longer: Steps = steps if steps.step is None else replace(steps, step=thinned * steps.step)
     system = candidate.switched()
 
     def march() -> TipErrors | None:
-        states = March(system, scheme, steps, trial.case.newton(), trial.start(candidate, theory))
-        watch = states.stepper.watch = ErrorWatch(system, steps.end, scheme)
+        states = March(system, scheme, longer, trial.case.newton(), trial.start(candidate, theory))
+        watch = states.stepper.watch = ErrorWatch(system, longer.end, scheme)
         last = None
         for last in states:
             if system.linear and not system.size(last.q) <= 1.0:
@@ -109,47 +134,11 @@ def _marched(trial: Trial, theory: str, without: Collection[str]) -> TipErrors |
     return replace(errors, time=(errors.time[0] / thinned**scheme.order, errors.time[1]))
 
 
-def _resting(trial: Trial, theory: str, without: Collection[str]) -> TipErrors | None:
+def _resting(candidate: Candidate) -> TipErrors | None:
     """Return the errors of a steady state; None where there is none."""
-    candidate = trial.candidate(theory, without)
     try:
         q = candidate.equilibrium()
         zero = np.zeros_like(q)
         return ErrorWatch(candidate.system).errors(State(0.0, q, zero, zero, datum=candidate.system.datum))
     except ComputationError:
         return None
-
-
-# --- the mesh ---------------------------------------------------------------------------------------------------------
-
-
-def own_mesh(trial: Trial) -> Any:
-    """Return the system of the poorest theory on the mesh of the case itself."""
-    if trial.full.problem.mesh == trial.case.problem.mesh:
-        return trial.poorest
-    return trial.compiled(trial.case.problem.replace(mesh=trial.full.problem.mesh), next(iter(trial.theories)))
-
-
-def _share(own: Any, coarse: Any) -> float:
-    """Return by what errors of the coarse mesh are multiplied for those of another one."""
-    if own is coarse:
-        return 1.0
-    fine, rough = (float(_errors_at_rest(system).sum()) for system in (own, coarse))
-    return fine / rough if rough > ROUND_OFF else 1.0
-
-
-def _errors_at_rest(system: Any) -> Any:
-    """Return the relative errors of the lowest frequencies that move the tip, the structure at rest."""
-    held = system.held
-    held.set_time(0.0, held.motion.at_speed(0.0))
-    held.set_state(held.zeros())
-    M, _, K = held.mass_damping_stiffness()
-    return ShapeError(held).of_modes(RitzVectors(held, M, K, 0.0))[:COMPARED]
-
-
-def _of_modes(trial: Trial, own: Any) -> float:
-    """Return the largest relative error of the wanted frequencies by the mesh."""
-    case = trial.case
-    analysis = ModalAnalysis(own.model.problem, case.about, case.newton(), trial.comm, own)
-    found = [analysis.mesh_errors(analysis.at(speed, case.mode_count))[: case.mode_count] for speed in trial.speeds]
-    return LIKELY / SAFE * max(map(max, found))
