@@ -93,25 +93,6 @@ def beamdyn_blade() -> str:
     )
 
 
-def beamdyn_primary(points: list[list[float]], blade: str = "blade.dat") -> str:
-    """Return BeamDyn's primary file with key points x, y, z (m) and twist (degrees)."""
-    rows = "\n".join(" ".join(f"{value:.10e}" for value in row) for row in points)
-    return f"""--------- BEAMDYN with OpenFAST INPUT FILE -------------------------------------------
-a small blade
----------------------- SIMULATION CONTROL --------------------------------------
-False          Echo            - Echo input data (flag)
----------------------- GEOMETRY PARAMETER --------------------------------------
-          1   member_total    - Total number of members (-)
-         {len(points)}   kp_total        - Total number of key points (-) [must be at least 3]
-     1     {len(points)}                 - Member number; Number of key points in this member
-     kp_xr            kp_yr            kp_zr           initial_twist
-      (m)              (m)              (m)              (deg)
-{rows}
----------------------- MATERIAL PARAMETER --------------------------------------
-"{blade}"    BldFile - Name of file containing properties for blade (quoted string)
-"""
-
-
 def elastodyn() -> str:
     """Return ElastoDyn's blade file: no centres in it."""
     rows = "\n".join(
@@ -191,30 +172,6 @@ def bmodes() -> str:
         "str_tw tw_iner mass_den flp_iner edge_iner flp_stff edge_stff tor_stff axial_stff cg_offst sc_offst tc_offst"
     )
     return "\n".join(["a small blade", "2  n_secs: number of sections", "", f"sec_loc {names}", "(-)", *rows, ""])
-
-
-def bmodes_main(properties: str = "blade.dat") -> str:
-    """Return BModes' main file."""
-    factors = ["sec_mass", "flp_iner", "lag_iner", "flp_stff", "edge_stff", "tor_stff", "axial_stff"]
-    factors += [f"{center}_offst" for center in ("cg", "sc", "tc")]
-    tip = ["tip_mass", "cm_loc", *(f"i{axes}_tip" for axes in ("xx", "yy", "zz", "xy", "zx", "yz"))]
-    return "\n".join(
-        [
-            "======================   BModes v1.03 Main Input File  ==================",
-            "a small blade",
-            "1         beam_type   1: blade, 2: tower (-)",
-            "60.0      romg:       rotor speed",
-            f"{LENGTH + 1.5}      radius:     rotor tip radius",
-            "1.5       hub_rad:    hub radius",
-            "3.0        precone:    built-in precone angle (deg)",
-            "0.        bl_thp:     blade pitch setting (deg)",
-            "1         hub_conn:   hub-to-blade connection",
-            *(f"0.        {name}    of the tip" for name in tip),
-            "1         id_mat:     material_type",
-            f"'{properties}' sec_props_file   name of beam section properties file (-)",
-            *(f"{2.0 if name == 'sec_mass' else 1.0}       {name}_mult:   multiplier" for name in factors),
-        ]
-    )
 
 
 def windio() -> str:

@@ -21,7 +21,7 @@ from rotfem.scene.values import problem
 MATRICES, POINTS = ("stiffness", "mass"), ("mass_center", "shear_center", "tension_center")
 
 #: Keys of a section that are texts, or numbers that cannot vary.
-NO_TABLES = ("shape", "from", "format", "precone")
+NO_TABLES = ("shape", "from", "format", "body", "precone")
 
 #: What the name of a file ends with.
 _ENDING = re.compile(r"\.[A-Za-z]\w*$")

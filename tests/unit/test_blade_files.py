@@ -1,4 +1,4 @@
-"""Blade files: one blade as five programs write it is one blade, and what is wrong in a file is said with its line."""
+"""Blade files: one blade as programs write it is one blade, and what is wrong in a file is said with its line."""
 
 from __future__ import annotations
 
@@ -9,27 +9,10 @@ import numpy as np
 import pytest
 
 import rotfem
-from rotfem.scene import Scene, SpatialBeamStructure
-from rotfem.scene.blade_profile import axes_along
+from rotfem.scene import Scene
 from tests import blade_decks as decks
-
-STIFF = {"GA2": 1e10, "GA3": 1e10}
-RIGID = {"EA": 1e12, "GJ": 1e12, **STIFF}
-
-
-def blade(folder: Path, text: str, name: str = "blade.dat", **more: Any) -> SpatialBeamStructure:
-    """Return the beam of a file with this text; more are keys of the section, and of the structure after structure_."""
-    (folder / name).write_text(text)
-    return read(folder, name, **more)
-
-
-def read(folder: Path, name: str, **more: Any) -> SpatialBeamStructure:
-    structure = {key.removeprefix("structure_"): value for key, value in more.items() if key.startswith("structure_")}
-    section = {"from": name} | {key: value for key, value in more.items() if not key.startswith("structure_")}
-    tables = {"structure": {"type": "spatial_beam", **structure, "section": section}}
-    scene = Scene.from_dict(tables | {"motion": {"type": "constant", "speed": 1.0}}, directory=folder)
-    assert isinstance(scene.structure, SpatialBeamStructure)
-    return scene.structure
+from tests import blade_main_decks as mains
+from tests.blade_scenes import RIGID, STIFF, blade, read
 
 
 def along_ours(matrix: Any) -> Any:
@@ -62,28 +45,6 @@ def test_one_blade_in_four_formats(tmp_path: Path) -> None:
         np.testing.assert_allclose(twist[[0, -1], 1], -np.radians(decks.TWIST), rtol=1e-12)
 
 
-def test_beamdyn_with_its_line(tmp_path: Path) -> None:
-    """x is axis 3, y −2, z 1; without sweep the sections are turned by −twist, with it by a little more."""
-    (tmp_path / "blade.dat").write_text(decks.beamdyn_blade())
-    bent = [[0.0, 0.0, 0.0, 12.0], [-0.1, 0.0, 8.0, 5.0], [-0.5, 0.0, 15.0, 1.0], [-1.2, 0.0, 20.0, -1.5]]
-    beam = blade(tmp_path, decks.beamdyn_primary(bent), "primary.dat")
-    np.testing.assert_allclose(beam.line, [[z, -y, x] for x, y, z, _ in bent], atol=1e-12)
-    np.testing.assert_allclose(
-        [a for _, a in np.array(beam.pretwist)], -np.radians([row[3] for row in bent]), atol=1e-12
-    )
-    assert np.array(beam.section.stiffness[-1][0]) == pytest.approx(beam.length, rel=1e-12)
-    swept = [[x, 0.1 * z * z / 20, z, twist] for x, _, z, twist in bent]
-    beam = blade(tmp_path, decks.beamdyn_primary(swept), "primary.dat")
-    line = beam.reference_line
-    assert line is not None
-    _, T = axes_along(beam, np.array([x for x, _ in beam.pretwist]))
-    for axes, (*_, twist) in zip(T, swept, strict=True):
-        # Turned back by the twist about −z, x (our section axis 3) has no component along y (−2).
-        back = np.radians(twist)
-        x = np.cos(back) * axes[:, 2] - np.sin(back) * axes[:, 1]
-        assert abs(x[1]) < 1e-12
-
-
 def test_elastodyn(tmp_path: Path) -> None:
     beam = blade(tmp_path, decks.elastodyn(), structure_length=decks.LENGTH, **RIGID)
     section = beam.section
@@ -104,7 +65,7 @@ def test_bmodes(tmp_path: Path) -> None:
         assert found["rotary_inertia3"] == pytest.approx(s["J3"], rel=1e-9)
         np.testing.assert_allclose(beam.section.center("mass_center", x), [s["cg"][0], 0.0])
         np.testing.assert_allclose(beam.section.center("tension_center", x), [s["ec"][0] - s["sc"][0], 0.0])
-    (tmp_path / "main.bmi").write_text(decks.bmodes_main())
+    (tmp_path / "main.bmi").write_text(mains.bmodes_main())
     main = read(tmp_path, "main.bmi", **STIFF)
     assert main.length == decks.LENGTH
     assert main.precone == pytest.approx(np.radians(3.0))
@@ -273,46 +234,6 @@ def test_bad_files(
     assert "structure" in str(caught.value)
 
 
-PRIMARY = [[0.0, 0.0, 0.0, 12.0], [0.0, 0.0, 8.0, 5.0], [0.0, 0.0, 20.0, -1.5]]
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (decks.beamdyn_primary(PRIMARY, "none.dat"), r'line 15: there is no file "none\.dat" beside it'),
-        (
-            decks.beamdyn_primary(PRIMARY).replace("1   member_total", "2   member_total"),
-            "line 6, column 1: has 2 members",
-        ),
-        (decks.beamdyn_primary([[0.0, 0.0, 1.0, 0.0], *PRIMARY[1:]]), "line 11: the first key point must be"),
-        (decks.beamdyn_primary([PRIMARY[0], *PRIMARY]), "no kink at an end|two key points"),
-        (decks.beamdyn_primary(PRIMARY).replace("kp_total", "kp_number"), "no line with a value of kp_total"),
-    ],
-)
-def test_bad_primary_files_of_beamdyn(tmp_path: Path, text: str, message: str) -> None:
-    (tmp_path / "blade.dat").write_text(decks.beamdyn_blade())
-    with pytest.raises(rotfem.SceneError, match=message):
-        blade(tmp_path, text, "primary.dat")
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (("v1.03", "v9.00"), r"line 1: the version of BModes' main file is 9\.00"),
-        (("0.        bl_thp", "2.        bl_thp"), r"line 8, column 1: bl_thp = 2 is not known; only 0"),
-        (("0.        tip_mass", "5.        tip_mass"), "line 10, column 1: tip_mass is not read"),
-        (("1.5       hub_rad", "30       hub_rad"), "line 6, column 1: hub_rad = 30 must be"),
-        (("sec_props_file", "properties"), "no line with a value of sec_props_file"),
-        (("'blade.dat'", "'none.dat'"), 'there is no file "none.dat" beside it'),
-    ],
-)
-def test_bad_main_files_of_bmodes(tmp_path: Path, change: tuple[str, str], message: str) -> None:
-    (tmp_path / "blade.dat").write_text(decks.bmodes())
-    assert change[0] in decks.bmodes_main()
-    with pytest.raises(rotfem.SceneError, match=message):
-        blade(tmp_path, decks.bmodes_main().replace(*change), "main.bmi", **STIFF)
-
-
 def test_a_format_is_not_guessed(tmp_path: Path) -> None:
     with pytest.raises(
         rotfem.SceneError, match=r"section\.from.*does not say which format it has; give section\.format"
@@ -336,19 +257,6 @@ def test_a_format_is_not_guessed(tmp_path: Path) -> None:
                 "motion": {"type": "constant", "speed": 0.0},
             }
         )
-
-
-def test_import_writes_a_scene_that_is_the_blade(tmp_path: Path) -> None:
-    (tmp_path / "blade.dat").write_text(decks.beamdyn_blade())
-    (tmp_path / "primary.dat").write_text(decks.beamdyn_primary(PRIMARY))
-    from rotfem.commands.import_blade import write_imported
-
-    scene = rotfem.import_blade(tmp_path / "primary.dat", changes=["structure.tip_mass=3.0", "motion.speed=1.2"])
-    write_imported(scene, tmp_path / "primary.dat", tmp_path / "out.toml")
-    again = rotfem.load_scene(tmp_path / "out.toml")
-    assert again.structure == scene.structure == read(tmp_path, "primary.dat", structure_tip_mass=3.0)
-    assert (tmp_path / "out.toml").read_text().startswith("# imported from primary.dat;")
-    assert again.motion.speed == 1.2
 
 
 def test_paths_of_blades_move_with_a_tuned_scene(tmp_path: Path) -> None:

@@ -1,13 +1,15 @@
 """BeamDyn's files (OpenFAST): the blade file with 6×6 matrices, and the primary file with the reference line.
 
 Matrices are about the reference axis in the order of x (flapwise), y (edgewise) and z (along the blade), displacements
-before rotations. The primary file has key points with the initial twist, about −z, and names the blade file. Its axes
+before rotations. The primary file has key points with the initial twist, about −z, and names the blade file; a driver's
+input file names the primary file; where it has the root and how it moves that is not read. BeamDyn's axes
 of a section without twist are those whose x has no component along y (`BD_ComputeIniNodalCrv`), not ours, whose axis 2
 has none along 3: where a blade has both sweep and prebend the twist makes up for it.
 """
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -31,6 +33,9 @@ from rotfem.scene.values import Array
 #: Versions of the blade file in its first line that are known.
 VERSIONS = ("1.00",)
 
+#: The same of the primary file, which need not say any.
+PRIMARY_VERSIONS = ("1.00", "1.01")
+
 
 def recognises(deck: Deck) -> bool:
     """Return whether the first line says so."""
@@ -38,10 +43,13 @@ def recognises(deck: Deck) -> bool:
 
 
 def read(deck: Deck, asked: Asked) -> dict[str, Any]:
-    """Return the section of a blade file, or line, pretwist and section of a primary file."""
+    """Return the section of a blade file, or line, pretwist and section of a primary file or of a driver's."""
     if "BLADE" in deck.lines[0].upper():
         length = asked.length(deck, "stations are parts of the arc length; BeamDyn's primary file has the line")
         return {"section": _section(deck, length)}
+    if "DRIVER" in deck.lines[0].upper():
+        line, name = deck.named("InputFile")
+        return _primary(Deck(existing_file_beside(deck.path, name, line)))
     return _primary(deck)
 
 
@@ -82,6 +90,8 @@ def _next(deck: Deck, line: int, what: str) -> int:
 
 def _primary(deck: Deck) -> dict[str, Any]:
     """Return line, length, pretwist and section of a primary file."""
+    if re.search(r"BeamDyn\s+V\d", deck.lines[0], re.IGNORECASE):
+        deck.check_version("BeamDyn", PRIMARY_VERSIONS, "primary")
     members, count = deck.count("member_total", 1), deck.count("kp_total", 3)
     if members != 1:
         line, _ = deck.named("member_total")
@@ -105,4 +115,8 @@ def _primary(deck: Deck) -> dict[str, Any]:
     }
 
 
-register(BladeFormat("beamdyn", "BeamDyn's blade file, or its primary file with the line", recognises, read))
+register(
+    BladeFormat(
+        "beamdyn", "BeamDyn's blade file, its primary file with the line, or its driver's file", recognises, read
+    )
+)

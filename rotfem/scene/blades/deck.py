@@ -75,11 +75,20 @@ class Deck:
 
     def named(self, name: str, start: int = 1) -> tuple[int, str]:
         """Return (line, value) of the line `value  name …`, as input files of NREL's programs have them."""
+        if (found := self._named(name, start)) is None:
+            self.fail(f"no line with a value of {name} from line {start} on")
+        return found
+
+    def has(self, name: str) -> bool:
+        """Return whether there is a line `value  name …`."""
+        return self._named(name, 1) is not None
+
+    def _named(self, name: str, start: int) -> tuple[int, str] | None:
         for number, line in enumerate(self.lines[start - 1 :], start=start):
             words = re.match(r"""\s*("[^"]*"|'[^']*'|\S+)\s+(\S+)""", line)
             if words and words[2].rstrip(":-,").lower() == name.lower():
                 return number, words[1].strip("\"'")
-        self.fail(f"no line with a value of {name} from line {start} on")
+        return None
 
     def number(self, name: str, start: int = 1) -> float:
         """Return the number of the line `value  name …`."""

@@ -1,6 +1,7 @@
-"""ElastoDyn's blade file (OpenFAST): mass, flap and edge stiffness, and twist over the fraction of the span.
+"""ElastoDyn's blade file (OpenFAST): mass, flap and edge stiffness, twist over the span; and its main file.
 
-Columns as the documentation of OpenFAST and its templates have them; others, as FAST 7 had, are refused by name.
+Columns as the documentation of OpenFAST and its templates have them; others, as FAST 7 had, are refused by name. The
+main file has length, hub radius, precone and tip mass of blade 1, and names its blade file.
 """
 
 from __future__ import annotations
@@ -10,12 +11,16 @@ from typing import Any
 import numpy as np
 
 from rotfem.registry import register
-from rotfem.scene.blades.axes import scaled_rows
+from rotfem.scene.blades.axes import coned_root, scaled_rows
 from rotfem.scene.blades.deck import Deck
 from rotfem.scene.blades.formats import Asked, BladeFormat
+from rotfem.scene.files import existing_file_beside
 
 #: Versions in the first line that are known.
 VERSIONS = ("1.00",)
+
+#: The same of the main file, and what newer ones say instead of a version.
+MAIN_VERSIONS, WITHOUT = ("1.01", "1.03"), "ELASTODYN FOR OPENFAST"
 
 #: Columns that must be there, and those that the motion does not depend on.
 NEEDED, PASSED_OVER = ("BlFract", "StrcTwst", "BMassDen", "FlpStff", "EdgStff"), ("PitchAxis",)
@@ -23,10 +28,38 @@ NEEDED, PASSED_OVER = ("BlFract", "StrcTwst", "BMassDen", "FlpStff", "EdgStff"),
 
 def recognises(deck: Deck) -> bool:
     """Return whether the first line says so."""
-    return "ELASTODYN" in deck.lines[0].upper() and "BLADE" in deck.lines[0].upper()
+    first = deck.lines[0].upper()
+    return "ELASTODYN" in first and ("BLADE" in first or _is_main(deck))
+
+
+def _is_main(deck: Deck) -> bool:
+    first = deck.lines[0].upper()
+    return "ELASTODYN" in first and "INPUT FILE" in first and "BLADE" not in first and "TOWER" not in first
 
 
 def read(deck: Deck, asked: Asked) -> dict[str, Any]:
+    """Return section and pretwist, of a main file length, root and tip mass too."""
+    if _is_main(deck):
+        return _main(deck, asked)
+    return _blade(deck, asked, asked.length(deck, "BlFract is a part of TipRad − HubRad of ElastoDyn's main file"))
+
+
+def _main(deck: Deck, asked: Asked) -> dict[str, Any]:
+    """Return what a main file has of blade 1, and its blade file."""
+    if WITHOUT not in deck.lines[0].upper():
+        deck.check_version("ElastoDyn", MAIN_VERSIONS, "main")
+    tip, hub, mass = deck.number("TipRad"), deck.number("HubRad"), deck.number("TipMass(1)")
+    if not 0.0 <= hub < tip:
+        deck.fail(f"HubRad = {hub:g} must be at least 0 and less than TipRad = {tip:g}", deck.named("HubRad")[0], 1)
+    if mass < 0.0:
+        deck.fail(f"TipMass(1) = {mass:g} must be at least 0", deck.named("TipMass(1)")[0], 1)
+    line, name = deck.named("BldFile1" if deck.has("BldFile1") else "BldFile(1)")
+    blade = Deck(existing_file_beside(deck.path, name, line))
+    root = coned_root(hub, float(np.radians(deck.number("PreCone(1)"))))
+    return {"length": tip - hub, **root, "tip_mass": mass, **_blade(blade, asked, tip - hub)}
+
+
+def _blade(deck: Deck, asked: Asked, length: float) -> dict[str, Any]:
     """Return section and pretwist; axial, shear and torsional stiffness are the scene's, as ElastoDyn has none."""
     deck.check_version("ElastoDyn", VERSIONS)
     count = deck.count("NBlInpSt", 2)
@@ -46,7 +79,6 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
         for i in np.flatnonzero(table[name] <= 0.0):
             deck.fail(f"{name} must be greater than 0, not {table[name][i]:g}", first + int(i), names.index(name) + 1)
     asked.needs(deck, ("EA", "GA2", "GA3", "GJ"), "blades of ElastoDyn do not stretch, shear or twist")
-    length = asked.length(deck, "BlFract is a part of TipRad − HubRad of ElastoDyn's main file")
 
     def rows(values: Any) -> Any:
         return scaled_rows(table["BlFract"], length, values)
@@ -61,4 +93,4 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
     }
 
 
-register(BladeFormat("elastodyn", "ElastoDyn's blade file", recognises, read))
+register(BladeFormat("elastodyn", "ElastoDyn's blade file, or its main file", recognises, read))

@@ -96,7 +96,7 @@ def keys_of(path: Path, asked: Asked) -> dict[str, Any]:
     deck = Deck(path)
     kind = format_of(deck, asked.section.get("format"))
     read = kind.read(deck, asked)
-    own = {key: value for key, value in asked.section.items() if key not in ("from", "format", "set")}
+    own = {key: value for key, value in asked.section.items() if key not in ("from", "format", "set", "body")}
     for where, given, there in (("section.", own, read["section"]), ("", asked.structure, read)):
         for key in there:
             if key in given and key != "section":

@@ -1,0 +1,202 @@
+"""Main files of other programs: line, root and tip of a blade, and the files that they name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rotfem
+from rotfem.scene.blade_profile import axes_along
+from tests import blade_decks as decks
+from tests import blade_main_decks as mains
+from tests.blade_main_decks import PRIMARY
+from tests.blade_scenes import RIGID, STIFF, blade, read
+
+
+def test_beamdyn_with_its_line(tmp_path: Path) -> None:
+    """x is axis 3, y −2, z 1; without sweep the sections are turned by −twist, with it by a little more."""
+    (tmp_path / "blade.dat").write_text(decks.beamdyn_blade())
+    bent = [[0.0, 0.0, 0.0, 12.0], [-0.1, 0.0, 8.0, 5.0], [-0.5, 0.0, 15.0, 1.0], [-1.2, 0.0, 20.0, -1.5]]
+    beam = blade(tmp_path, mains.beamdyn_primary(bent), "primary.dat")
+    np.testing.assert_allclose(beam.line, [[z, -y, x] for x, y, z, _ in bent], atol=1e-12)
+    np.testing.assert_allclose(
+        [a for _, a in np.array(beam.pretwist)], -np.radians([row[3] for row in bent]), atol=1e-12
+    )
+    assert np.array(beam.section.stiffness[-1][0]) == pytest.approx(beam.length, rel=1e-12)
+    swept = [[x, 0.1 * z * z / 20, z, twist] for x, _, z, twist in bent]
+    beam = blade(tmp_path, mains.beamdyn_primary(swept), "primary.dat")
+    line = beam.reference_line
+    assert line is not None
+    _, T = axes_along(beam, np.array([x for x, _ in beam.pretwist]))
+    for axes, (*_, twist) in zip(T, swept, strict=True):
+        # Turned back by the twist about −z, x (our section axis 3) has no component along y (−2).
+        back = np.radians(twist)
+        x = np.cos(back) * axes[:, 2] - np.sin(back) * axes[:, 1]
+        assert abs(x[1]) < 1e-12
+
+
+def test_main_file_of_elastodyn(tmp_path: Path) -> None:
+    """Length, root, precone and tip mass of blade 1, and its blade file."""
+    (tmp_path / "blade.dat").write_text(decks.elastodyn())
+    alone = read(tmp_path, "blade.dat", structure_length=decks.LENGTH, **RIGID)
+    for change in (("", ""), ("BldFile1", "BldFile(1)"), ("v1.03.* INPUT", "for OpenFAST INPUT")):
+        beam = blade(tmp_path, mains.elastodyn_main().replace(*change, 1), "main.dat", **RIGID)
+        assert (beam.section, beam.pretwist, beam.length) == (alone.section, alone.pretwist, decks.LENGTH)
+        assert (beam.precone, beam.tip_mass) == (pytest.approx(-np.radians(4.0)), 7.0)
+        assert beam.root_position == pytest.approx((1.5 * np.cos(beam.precone), 0.0, 1.5 * np.sin(beam.precone)))
+
+
+def test_driver_of_beamdyn(tmp_path: Path) -> None:
+    (tmp_path / "blade.dat").write_text(decks.beamdyn_blade())
+    primary = blade(tmp_path, mains.beamdyn_primary(PRIMARY), "primary.dat")
+    assert blade(tmp_path, mains.beamdyn_driver(), "driver.inp") == primary
+
+
+def test_main_body_of_hawc2(tmp_path: Path) -> None:
+    """A body, or a copy of it, has the st file's sections on its own line with its own twist."""
+    (tmp_path / "blade.st").write_text(decks.hawc2(True))
+    alone = read(tmp_path, "blade.st")
+    text = mains.hawc2_htc()
+    for body in ("blade1", "blade2"):
+        beam = blade(tmp_path, text, "main.htc", body=body)
+        for x in (0.0, 10.0):
+            np.testing.assert_allclose(beam.section.at(x)["stiffness"], alone.section.at(x)["stiffness"], rtol=1e-12)
+        np.testing.assert_allclose(beam.line, [[0.0, 0.0, 0.0], [decks.LENGTH, 0.0, 0.0]])
+        np.testing.assert_allclose([v for _, v in np.array(beam.pretwist)], -np.radians(decks.TWIST), rtol=1e-7)
+    # x to the leading edge is axis 2, y downwind axis 3; r are arc lengths of the line, to what its spline differs.
+    curved = text.replace("nsec 2", "nsec 3").replace("sec 2 0.02 -0.01", "sec 2 0.12 0.39 10.0 0.0\n sec 3 0.02 -0.01")
+    with pytest.raises(rotfem.SceneError, match=r"line 15: its sections end at r = 20 m, and the line .* at 20\.0"):
+        blade(tmp_path, curved, "main.htc", body="blade1")
+    longer = decks.hawc2(True).replace("2.0000000000000000e+01", "2.00215e+01", 1)
+    (tmp_path / "blade.st").write_text(longer)
+    beam = blade(tmp_path, curved, "main.htc", body="blade1")
+    np.testing.assert_allclose(np.array(beam.line)[1], [10.0, 0.1, 0.4], atol=1e-12)
+    assert np.array(beam.section.stiffness[-1][0]) == pytest.approx(beam.length, rel=1e-12)
+
+
+def test_bodies_of_hawc2_in_another_file(tmp_path: Path) -> None:
+    """Paths start at the folder of the main file or at the one above, but not at both."""
+    (tmp_path / "htc").mkdir()
+    (tmp_path / "blade.st").write_text(decks.hawc2(True))
+    (tmp_path / "bodies.htc").write_text(mains.hawc2_htc() + "exit ;\nbegin nothing\n")
+    main = "continue_in_file ./bodies.htc ;\n"
+    beam = blade(tmp_path / "htc", main, "main.htc", body="blade1")
+    assert beam.length == pytest.approx(decks.LENGTH, rel=1e-12)
+    (tmp_path / "htc" / "blade.st").write_text(decks.hawc2(True))
+    with pytest.raises(rotfem.SceneError, match=r"line 13, column 2: there are two files"):
+        blade(tmp_path / "htc", main, "main.htc", body="blade1")
+    with pytest.raises(rotfem.SceneError, match="continues in more than 8 files"):
+        blade(tmp_path, "continue_in_file main.htc ;\n", "main.htc")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (mains.beamdyn_primary(PRIMARY, "none.dat"), r'line 15: there is no file "none\.dat" beside it'),
+        (
+            mains.beamdyn_primary(PRIMARY).replace("1   member_total", "2   member_total"),
+            "line 6, column 1: has 2 members",
+        ),
+        (mains.beamdyn_primary([[0.0, 0.0, 1.0, 0.0], *PRIMARY[1:]]), "line 11: the first key point must be"),
+        (mains.beamdyn_primary([PRIMARY[0], *PRIMARY]), "no kink at an end|two key points"),
+        (mains.beamdyn_primary(PRIMARY).replace("kp_total", "kp_number"), "no line with a value of kp_total"),
+        (
+            mains.beamdyn_primary(PRIMARY).replace("with OpenFAST", "V7.00"),
+            r"BeamDyn's primary file is 7\.00; known",
+        ),
+        (mains.beamdyn_primary([[*PRIMARY[0][:3], 1e400], *PRIMARY[1:]]), 'line 11, column 4: "inf" must be a finite'),
+        (mains.beamdyn_driver("none.dat"), 'line 4: there is no file "none.dat" beside it'),
+    ],
+)
+def test_bad_primary_files_of_beamdyn(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "blade.dat").write_text(decks.beamdyn_blade())
+    with pytest.raises(rotfem.SceneError, match=message):
+        blade(tmp_path, text, "primary.dat")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("v1.03", "v9.00"), r"line 1: the version of BModes' main file is 9\.00"),
+        (("0.        bl_thp", "2.        bl_thp"), r"line 8, column 1: bl_thp = 2 is not known; only 0"),
+        (("0.        tip_mass", "5.        tip_mass"), "line 10, column 1: tip_mass is not read"),
+        (("1.5       hub_rad", "30       hub_rad"), "line 6, column 1: hub_rad = 30 must be"),
+        (("sec_props_file", "properties"), "no line with a value of sec_props_file"),
+        (("'blade.dat'", "'none.dat'"), 'there is no file "none.dat" beside it'),
+    ],
+)
+def test_bad_main_files_of_bmodes(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+    (tmp_path / "blade.dat").write_text(decks.bmodes())
+    assert change[0] in mains.bmodes_main()
+    with pytest.raises(rotfem.SceneError, match=message):
+        blade(tmp_path, mains.bmodes_main().replace(*change), "main.bmi", **STIFF)
+
+
+@pytest.mark.parametrize(
+    ("body", "change", "message"),
+    [
+        (None, ("", ""), r'section\.body: must say which of the main bodies of main\.htc: "tower", "blade1", "blade2"'),
+        ("blade3", ("", ""), r'section\.body = "blade3": is not in main\.htc; allowed: "tower"'),
+        (3, ("", ""), r"section\.body = 3: must be the name of a main body"),
+        ("tower", ("", ""), "line 6: concentrated_mass is not read; take it out"),
+        (
+            "blade1",
+            ("type        timo", "type        notimo"),
+            "line 10, column 2: the type notimoschenko is not",
+        ),
+        ("blade1", ("FPM 1", "FPM 0"), "line 6: has 30 columns; must be 19 with centres, as FPM 0"),
+        ("blade1", ("nsec 2", "nsec 3"), "line 18, column 2: nsec is 3, at least 2, and there are 2 lines of sec"),
+        ("blade1", ("sec 2 0.02", "sec 3 0.02"), "line 20, column 2: must be section 2, not 3"),
+        ("blade1", ("sec 2 0.02", "sec 2 0.x2"), 'line 20, column 3: "0.x2" must be a finite number'),
+        ("blade1", ("-0.01 20.000000", "20.000000"), "line 20: has 5 columns; must be sec, its number"),
+        ("blade1", ("blade.st", "none.st"), r'line 13, column 2: there is no file "\./none\.st"'),
+        ("blade1", ("set 1 1", "set 1 2"), r"section\.set = \[1, 2\].*allowed: \[1, 1\]"),
+        ("blade1", ("set 1 1 ;", ""), "line 12: begin timoschenko_input has no set"),
+        ("blade1", ("end new_htc_structure;", ""), "line 2: begin new_htc_structure has no end"),
+        ("blade1", ("begin c2_def;", ""), "line 27: an end without a begin"),
+        ("blade2", ("copy_main_body blade1", "copy_main_body blade2"), "copy each other in a circle"),
+    ],
+)
+def test_bad_input_files_of_hawc2(tmp_path: Path, body: Any, change: tuple[str, str], message: str) -> None:
+    (tmp_path / "blade.st").write_text(decks.hawc2(True))
+    assert change[0] in mains.hawc2_htc()
+    with pytest.raises(rotfem.SceneError, match=message):
+        blade(tmp_path, mains.hawc2_htc().replace(*change, 1), "main.htc", **({} if body is None else {"body": body}))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("v1.03", "v9.00"), r"line 1: the version of ElastoDyn's main file is 9\.00; known: 1\.01, 1\.03"),
+        (("HubRad ", "HubRadius "), "no line with a value of HubRad"),
+        (
+            ("\n1.5 ", "\n31.5 "),
+            "line 6, column 1: HubRad = 31.5 must be at least 0 and less than TipRad = 21.5",
+        ),
+        (("-4.0", "four"), 'line 7, column 1: "four" must be a finite number'),
+        (("7.0 ", "-7.0 "), r"line 10, column 1: TipMass\(1\) = -7 must be at least 0"),
+        (("blade.dat", "none.dat"), 'line 12: there is no file "none.dat" beside it'),
+        (("BldFile1", "BldFile"), r"no line with a value of BldFile\(1\)"),
+    ],
+)
+def test_bad_main_files_of_elastodyn(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+    (tmp_path / "blade.dat").write_text(decks.elastodyn())
+    assert change[0] in mains.elastodyn_main()
+    with pytest.raises(rotfem.SceneError, match=message):
+        blade(tmp_path, mains.elastodyn_main().replace(*change, 1), "main.dat", **RIGID)
+
+
+def test_import_writes_a_scene_that_is_the_blade(tmp_path: Path) -> None:
+    (tmp_path / "blade.dat").write_text(decks.beamdyn_blade())
+    (tmp_path / "primary.dat").write_text(mains.beamdyn_primary(PRIMARY))
+    from rotfem.commands.import_blade import write_imported
+
+    scene = rotfem.import_blade(tmp_path / "primary.dat", changes=["structure.tip_mass=3.0", "motion.speed=1.2"])
+    write_imported(scene, tmp_path / "primary.dat", tmp_path / "out.toml")
+    again = rotfem.load_scene(tmp_path / "out.toml")
+    assert again.structure == scene.structure == read(tmp_path, "primary.dat", structure_tip_mass=3.0)
+    assert (tmp_path / "out.toml").read_text().startswith("# imported from primary.dat;")
+    assert again.motion.speed == 1.2
