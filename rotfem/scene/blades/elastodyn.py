@@ -39,12 +39,16 @@ def _is_main(deck: Deck) -> bool:
 
 def read(deck: Deck, asked: Asked) -> dict[str, Any]:
     """Return section and pretwist, of a main file length, root and tip mass too."""
-    if _is_main(deck):
-        return _main(deck, asked)
-    return _blade(deck, asked, asked.length(deck, "BlFract is a part of TipRad − HubRad of ElastoDyn's main file"))
+    main = _is_main(deck)
+    if not main:
+        deck.check_version("ElastoDyn", VERSIONS)
+    asked.needs(deck, ("EA", "GA2", "GA3", "GJ"), "blades of ElastoDyn do not stretch, shear or twist")
+    if main:
+        return _main(deck)
+    return _blade(deck, asked.length(deck, "BlFract is a part of TipRad − HubRad of ElastoDyn's main file"))
 
 
-def _main(deck: Deck, asked: Asked) -> dict[str, Any]:
+def _main(deck: Deck) -> dict[str, Any]:
     """Return what a main file has of blade 1, and its blade file."""
     if WITHOUT not in deck.lines[0].upper():
         deck.check_version("ElastoDyn", MAIN_VERSIONS, "main")
@@ -55,13 +59,13 @@ def _main(deck: Deck, asked: Asked) -> dict[str, Any]:
         deck.fail(f"TipMass(1) = {mass:g} must be at least 0", deck.named("TipMass(1)")[0], 1)
     line, name = deck.named("BldFile1" if deck.has("BldFile1") else "BldFile(1)")
     blade = Deck(existing_file_beside(deck.path, name, line))
+    blade.check_version("ElastoDyn", VERSIONS)
     root = coned_root(hub, float(np.radians(deck.number("PreCone(1)"))))
-    return {"length": tip - hub, **root, "tip_mass": mass, **_blade(blade, asked, tip - hub)}
+    return {"length": tip - hub, **root, "tip_mass": mass, **_blade(blade, tip - hub)}
 
 
-def _blade(deck: Deck, asked: Asked, length: float) -> dict[str, Any]:
-    """Return section and pretwist; axial, shear and torsional stiffness are the scene's, as ElastoDyn has none."""
-    deck.check_version("ElastoDyn", VERSIONS)
+def _blade(deck: Deck, length: float) -> dict[str, Any]:
+    """Return section and pretwist of a blade file of a known version; other stiffness is the scene's."""
     count = deck.count("NBlInpSt", 2)
     factors = {name: deck.number(name) for name in ("AdjBlMs", "AdjFlSt", "AdjEdSt")}
     head = deck.find("DISTRIBUTED BLADE PROPERTIES") + 1
@@ -78,7 +82,6 @@ def _blade(deck: Deck, asked: Asked, length: float) -> dict[str, Any]:
     for name in ("BMassDen", "FlpStff", "EdgStff"):
         for i in np.flatnonzero(table[name] <= 0.0):
             deck.fail(f"{name} must be greater than 0, not {table[name][i]:g}", first + int(i), names.index(name) + 1)
-    asked.needs(deck, ("EA", "GA2", "GA3", "GJ"), "blades of ElastoDyn do not stretch, shear or twist")
 
     def rows(values: Any) -> Any:
         return scaled_rows(table["BlFract"], length, values)
