@@ -33,7 +33,7 @@ class EnergyConserving(Scheme):
         """Return the end of the step; its acceleration is that of the middle."""
         (s,) = done
         assert s.over is not None
-        return State(s.over.end, 2 * s.q - state.q, 2 * s.v - state.v, s.a, s.memory)
+        return State(s.over.end, 2 * s.q - state.q, 2 * s.v - state.v, s.a, s.memory, balanced=False)
 
 
 register(EnergyConserving)

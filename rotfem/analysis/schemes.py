@@ -37,6 +37,7 @@ class State:
         given: work (J) and angular impulse (N·m·s) that a free hub and its structure were given since t = 0, and the
             moment (N·m) of the forces from outside now; None where the hub is not free.
         datum: what the rotations in q are counted from; None for the undeformed structure.
+        balanced: whether the equations hold with q, v and a; otherwise a is that of another instant.
     """
 
     t: float
@@ -46,6 +47,7 @@ class State:
     memory: Any = None
     given: Array | None = None
     datum: Any = None
+    balanced: bool = True
 
     @classmethod
     def at_rest(cls, system: Any, q: Array, v: Array | None = None) -> State:

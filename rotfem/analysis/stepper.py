@@ -87,7 +87,7 @@ class Stepper(StageSolver):
         with seen(s, after):
             if np.allclose(s.driven(t), old, rtol=STEADY, atol=0.0):
                 return self.scheme.kinked(state)
-            new = state.changed(q=state.q.copy(), v=state.v.copy(), a=state.a.copy())
+            new = state.changed(q=state.q.copy(), v=state.v.copy(), a=state.a.copy(), balanced=True)
             s.prescribe(t, new.q, new.v, new.a)
             s.set_time(t)
             s.set_state(new.q, new.v, new.a)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from rotfem.analysis.end_acceleration import end_acceleration
 from rotfem.analysis.schemes import Array, State
 from rotfem.analysis.stability import Stability, stability_of
 from rotfem.errors import InputError
@@ -77,8 +78,16 @@ class Moment:
         """Write the state into the system."""
         self.system.count_rotations_from(self.state.datum)
         self.system.set_time(self.t)
-        self.system.set_state(self.state.q, self.state.v, self.state.a)
+        write_state(self.system, self.state)
         return self.system
+
+
+def write_state(system: Any, state: State) -> None:
+    """Write a state into a system whose time is set, with the acceleration that the equations give at it.
+
+    Forces at the root take it; without it they would not balance what the structure is accelerated by.
+    """
+    system.set_state(state.q, state.v, state.a if state.balanced else end_acceleration(system, state))
 
 
 def hub_values(system: Any, state: State) -> dict[str, float]:

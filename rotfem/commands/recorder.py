@@ -11,7 +11,7 @@ import numpy.typing as npt
 from rotfem.analysis.schemes import State
 from rotfem.commands.fields import fields_writer, stations_writer
 from rotfem.commands.finite import check_finite
-from rotfem.commands.moment import hub_values
+from rotfem.commands.moment import hub_values, write_state
 from rotfem.commands.resultant_rows import ResultantRows
 from rotfem.commands.station_rows import StationRows
 from rotfem.results.run import RunResult, Table
@@ -56,7 +56,7 @@ class Recorder:
         """
         system, t = self.system, state.t
         system.set_time(t)
-        system.set_state(state.q, state.v, state.a)
+        write_state(system, state)
         energy, motion = system.energies(), system.motion
         row = [t, motion.angle(t), motion.speed(t), *system.tip(state.q, t)]
         row += [energy[name] for name in ("kinetic", "strain", "jacobi")]

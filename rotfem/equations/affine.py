@@ -40,15 +40,13 @@ class AffineSystem(AffineEnergies):
     def __init__(self, model: Model, moving: bool = True):
         super().__init__(model, moving)
         if self._by_mode is not None:  # to those who project the pieces it is one like others
-            self.pieces = [
-                *self.pieces,
-                Piece("C", (), self._by_mode, frozenset((EFFECT, "")), np.zeros_like(self.root.weights)),
-            ]
+            taken_up = -self._by_mode.B @ self._by_mode.along(self.root.carried())  # by the hub, see `hub_damping`
+            self.pieces = [*self.pieces, Piece("C", (), self._by_mode, frozenset((EFFECT, "")), taken_up)]
             self._factors = self._factor_indices()
             self.leave_out(())
 
     def _compile(self) -> Any:
-        self._decomposed = Pieces(self.model, self.bcs, self.clamped, self.root.weights)
+        self._decomposed = Pieces(self.model, self.bcs, self.clamped, self.root)
         self.pieces = self._decomposed.all
         self._constants = self._decomposed.constants
         self.assembled = self._decomposed.assembled
@@ -192,7 +190,7 @@ class AffineSystem(AffineEnergies):
 
     @cached_property
     def _at_clamp(self) -> ClampRows:
-        return ClampRows(self.pieces, {kind: index for kind, (index, _) in self._by_kind.items()}, len(self.root.names))
+        return ClampRows(self.pieces, len(self.root.names))
 
     def clamp_forces(self) -> Array:
         """Return the part of this process in what the clamp does in its unit motions (see `System`)."""

@@ -2,15 +2,73 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.equations.pieces import Piece
+from rotfem.equations.modal_damping import EFFECT as DAMPING
+from rotfem.equations.model import Model
+from rotfem.numerics import compat
+from rotfem.structures.root_reaction import RootReaction
+
+if TYPE_CHECKING:
+    from rotfem.equations.pieces import Piece
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
+
+
+class AtClamp:
+    """Says what an operator, its clamp not held, does in the unit motions of the clamp, of this process.
+
+    Args:
+        model: the terms that operators are of.
+        clamped: local numbers of the clamped unknowns.
+        root: unit motions of the clamp.
+    """
+
+    def __init__(self, model: Model, clamped: npt.NDArray[Any], root: RootReaction):
+        self._model, self._V = model, model.structure.V
+        self._work = compat.create_vector(self._V)
+        fixed = np.zeros((len(root.weights), 1), dtype=bool)
+        fixed[clamped] = True
+        self._motions = self._vectors(np.where(fixed, root.weights, 0.0))
+        self._turns = self._vectors(np.where(fixed, 0.0, root.weights))  # of its hinges
+        by_mass = model.mechanics.damping.mass is not None
+        self._others = self._vectors(np.where(fixed, 0.0, root.carried())) if by_mass else []
+
+    def _vectors(self, columns: Array) -> list[Any]:
+        out = [compat.create_vector(self._V) for _ in columns.T]
+        for vector, column in zip(out, columns.T, strict=True):
+            vector.array[:] = column
+        return out
+
+    def of_vector(self, b: Any) -> Array:
+        """Return one number for each motion."""
+        return np.array([b.array @ motion.array for motion in self._motions])
+
+    def of_matrix(self, A: Any, of: Collection[str]) -> Array:
+        """Return a row for each owned unknown.
+
+        Args:
+            A: PETSc matrix.
+            of: terms that it is of (see `Piece`).
+        """
+        if any(self._model.acting[n].at_root for n in of if n in self._model.acting):
+            return -self._times(A, self._turns)
+        if DAMPING in of and self._others:  # the hub takes up what strains do not (see `hub_damping`)
+            return -self._times(A, self._others)
+        return self._times(A, self._motions)
+
+    def _times(self, A: Any, motions: list[Any]) -> Array:
+        """Return Aᵀ times motions, owned rows."""
+        out = np.zeros((len(self._work.array), len(motions)))
+        for column, motion in zip(out.T, motions, strict=True):
+            A.multTranspose(motion, self._work)
+            column[:] = self._work.array
+        return out
 
 
 class ClampRows:
@@ -18,12 +76,12 @@ class ClampRows:
 
     Args:
         pieces: all of them.
-        kinds: "M", "C", "K", "f" ↦ numbers of the pieces of that kind.
         motions: number of unit motions.
     """
 
-    def __init__(self, pieces: Sequence[Piece], kinds: Mapping[str, Sequence[int]], motions: int):
+    def __init__(self, pieces: Sequence[Piece], motions: int):
         self._motions = motions
+        kinds = {kind: [i for i, p in enumerate(pieces) if p.kind == kind] for kind in "MCKf"}
         self._kinds: dict[str, Index] = {kind: np.array(index, dtype=np.int64) for kind, index in kinds.items()}
         parts = [pieces[i].at_root for i in self._kinds["f"]]
         self._loads = np.array(parts).reshape(len(parts), motions)

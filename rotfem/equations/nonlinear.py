@@ -13,6 +13,7 @@ from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms import expand_derivatives
 
 from rotfem.equations.energy_balance import EnergyBalance
+from rotfem.equations.hub_damping import HubDamping
 from rotfem.equations.model import Model
 from rotfem.equations.point_stresses import PointStresses
 from rotfem.equations.system import System
@@ -132,7 +133,7 @@ class NonlinearSystem(System):
         return self._F if self.moving else [forms.form(self._residual_form, once=True)]
 
     def _negative(self, parts: list[Any], moving: bool) -> Any:
-        b = self._assembled(parts)
+        b = self.sum_of(parts)
         np.negative(b, out=b)
         b[self.clamped] = 0.0
         if moving and self.by_mode is not None:
@@ -140,7 +141,8 @@ class NonlinearSystem(System):
             owned -= self.by_mode.times(self._state[1][: len(owned)])
         return self.b
 
-    def _assembled(self, parts: list[Any]) -> Array:
+    def sum_of(self, parts: list[Any]) -> Array:
+        """Return compiled linear forms added up, on the owned unknowns; the array is reused."""
         b: Array = self._b_array
         b[:] = 0.0
         for form in parts:
@@ -156,12 +158,16 @@ class NonlinearSystem(System):
 
     def clamp_forces(self) -> Array:
         """Return the part of this process in what the clamp does in its unit motions (see `System`)."""
-        held = np.asarray(self._assembled(self._F)[self.clamped] @ self._motions)
+        held = np.asarray(self.sum_of(self._F)[self.clamped] @ self._motions) - self._hub_damping()
         if not self._F_at_root:
             return held
-        forces = self._assembled(self._F_at_root)[: len(self.root.weights)].copy()
+        forces = self.sum_of(self._F_at_root)[: len(self.root.weights)].copy()
         forces[self.clamped] = 0.0  # what is left works on the turns of hinges, against which the root is held
         return np.asarray(held - forces @ self.root.weights)
+
+    @cached_property
+    def _hub_damping(self) -> HubDamping:
+        return HubDamping(self)
 
     @cached_property
     def _F_at_root(self) -> list[Any]:

@@ -21,12 +21,14 @@ from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms.analysis import extract_constants
 
+from rotfem.equations.clamp_rows import AtClamp
 from rotfem.equations.geometric import geometric_stiffness
 from rotfem.equations.model import Model
 from rotfem.equations.prestress import geometric_pieces
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
 from rotfem.numerics.linear import held, set_diagonal
+from rotfem.structures.root_reaction import RootReaction
 
 Array = npt.NDArray[np.float64]
 
@@ -65,7 +67,7 @@ class Pieces:
         model: the terms, of a linear theory.
         bcs: the clamp.
         clamped: local numbers of the clamped unknowns.
-        rigid: change of the owned unknowns in the unit motions of the clamp, (unknowns, motions).
+        root: unit motions of the clamp.
 
     Attributes:
         at_rest: "f", "K", "C", "M" ↦ UFL form at q = v = a = 0; those that vanish are left out.
@@ -76,15 +78,12 @@ class Pieces:
         assembled: time spent on assembly, s.
     """
 
-    def __init__(self, model: Model, bcs: list[Any], clamped: npt.NDArray[Any], rigid: Array):
+    def __init__(self, model: Model, bcs: list[Any], clamped: npt.NDArray[Any], root: RootReaction):
         self.model, self.structure, self.bcs, self.clamped = model, model.structure, bcs, clamped
         self.q, self.V = model.structure.k.functions[0], model.structure.V
-        fixed = np.zeros(len(rigid), dtype=bool)
-        fixed[clamped] = True
-        self._motions = [self._vector(np.where(fixed, column, 0.0)) for column in rigid.T]
-        self._turns = [self._vector(np.where(fixed, 0.0, column)) for column in rigid.T]  # of its hinges
+        self._at_clamp = AtClamp(model, clamped, root)
         self._hinged = self.structure.hinged_unknowns()
-        self._work, self._free = compat.create_vector(self.V), compat.create_vector(self.V)
+        self._free = compat.create_vector(self.V)
         self._free.array[:] = 1.0
         self._free.array[clamped] = 0.0
         self.assembled = 0.0
@@ -99,14 +98,9 @@ class Pieces:
         self.all: list[Piece] = []
         for kind in self.at_rest:
             self._decompose(kind)
-        self._set_switches(None)
+        self._set_switches(model.switches)
         if model.theory.prestress:
             self._prestress()
-
-    def _vector(self, values: Array) -> Any:
-        out = compat.create_vector(self.V)
-        out.array[:] = values
-        return out
 
     def _forms_at_rest(self) -> dict[str, Any]:
         """Return f, K, C and M at q = v = a = 0 as UFL forms; those that vanish are left out."""
@@ -118,10 +112,10 @@ class Pieces:
         for constant in self.constants.values():
             constant.value[...] = 0.0
 
-    def _set_switches(self, on: Collection[str] | None) -> None:
-        """Switch these on and all others off; all on if None."""
+    def _set_switches(self, on: Collection[str]) -> None:
+        """Switch these on and all others off."""
         for name, switch in self.model.switches.items():
-            switch.value = 1.0 if on is None or name in on else 0.0
+            switch.value = float(name in on)
 
     def _entries(self, name: str) -> list[tuple[str, int]]:
         """Return the components of a constant that are ever there: w and dw keep to the axis, which is fixed."""
@@ -177,23 +171,14 @@ class Pieces:
     def _keep(self, kind: str, key: Key, operator: Any, of: frozenset[str]) -> None:
         """Add a piece: what it does at the clamp apart, clamped rows and columns zero, or 1 in those of the strains."""
         if kind == "f":
-            at_root = np.array([operator.array @ motion.array for motion in self._motions])
+            at_root = self._at_clamp.of_vector(operator)
             operator.array[self.clamped] = 0.0
         else:
-            between = any(self.model.acting[n].at_root for n in of if n in self.model.acting)
-            at_root = -self._at_root(operator, self._turns) if between else self._at_root(operator, self._motions)
+            at_root = self._at_clamp.of_matrix(operator, of)
             operator.diagonalScale(self._free, self._free)
             if kind == "K" and of == {"internal", ""}:
                 set_diagonal(self.clamped, operator, 1.0)
         self.all.append(Piece(kind, key, operator, of, at_root))
-
-    def _at_root(self, operator: Any, motions: list[Any]) -> Array:
-        """Return Aᵀ times unit motions of the clamp, owned rows."""
-        out, product = np.zeros((len(self._work.array), len(motions))), self._work
-        for column, motion in zip(out.T, motions, strict=True):
-            operator.multTranspose(motion, product)
-            column[:] = product.array
-        return out
 
     def _polarised(self, kind: str, key: Key, declared: bool) -> Any:
         """Assemble what belongs to the product `key` of constants.

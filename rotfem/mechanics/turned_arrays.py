@@ -53,6 +53,18 @@ def spins(theta: Array, v: Array, a: Array) -> tuple[Array, Array]:
     return w, dw
 
 
+def turned_vectors(theta: Array, turn: Array) -> Array:
+    """Return by how much rotation vectors (…, 3), rad, change in a small turn (3,), fixed axes: T⁻¹(θ) δφ.
+
+    Of ω = T(θ) θ̇ (see `spins`): T⁻¹(θ) δφ = δφ − ½ θ×δφ + (1 − ½|θ| cot ½|θ|)/|θ|² θ×(θ×δφ).
+    """
+    a, b, *_ = (factor[..., None] for factor in _factors(np.sum(theta * theta, axis=-1)))
+    s = np.sum(theta * theta, axis=-1)[..., None]
+    across = np.where(s > NO_TURN, (1 - a / (2 * b)) / np.maximum(s, NO_TURN), 1 / 12)
+    first = np.cross(theta, turn)
+    return np.asarray(turn - first / 2 + across * np.cross(theta, first))
+
+
 def rotation_vectors(Lambda: Array, guess: Array) -> Array:
     """Return rotation vectors (…, 3), rad, of matrices (…, 3, 3): of all that they have those nearest to a guess."""
     quaternion = _quaternions(Lambda)

@@ -20,6 +20,8 @@ import numpy as np
 import numpy.typing as npt
 from dolfinx import mesh as dolfinx_mesh
 
+from rotfem.mechanics.turned_arrays import turned_vectors
+
 if TYPE_CHECKING:
     from rotfem.structures.structure import Structure
 
@@ -84,6 +86,34 @@ class RootReaction:
         for out, values in zip(self.weights.T, columns.values(), strict=True):
             out[rows] = values
 
+    def carried(self, q: Array | None = None) -> Array:
+        """Return what all owned unknowns change by in the unit motions if the whole structure goes along.
+
+        Rotation vectors are turned as such, ∂θ/∂φ = T⁻¹(θ); the angles of plates as small ones.
+
+        Args:
+            q: local dof array of the displaced structure, which turns with its displacements; undeformed if None.
+
+        Returns:
+            Shape (unknowns, components of names).
+        """
+        structure, owned = self._structure, self._structure.V.dofmap.index_map.size_local
+        values: Array = np.zeros((owned, structure.size))
+        if q is not None:
+            values[:] = q[: values.size].reshape(values.shape)
+        arms = structure.V.tabulate_dof_coordinates()[:owned] - self.point
+        places, theta = arms.copy(), np.zeros((owned, 3))
+        for column, name in zip(values.T, structure.unknowns, strict=True):
+            if name in ("u1", "u2", "u3"):
+                places[:, int(name[1]) - 1] += column
+            elif name in ("theta1", "theta2", "theta3"):
+                theta[:, int(name[-1]) - 1] = column
+        out = np.zeros((values.size, len(self.names)))
+        for moved, name in zip(out.T, self.names, strict=True):
+            axis = np.eye(3)[int(name[1]) - 1]
+            moved[:] = (self._moved(arms, axis) if name[0] == "f" else self._turned(places, axis, theta)).ravel()
+        return out
+
     def _middle(self) -> Array:
         """Return the middle of what is clamped, of edges weighed by their length, (3,) in m."""
         s, grid = self._structure, getattr(self._structure, "grid", None)
@@ -105,13 +135,20 @@ class RootReaction:
         parts = {f"u{i + 1}": direction[i] for i in range(3)}
         return np.tile([parts.get(name, 0.0) for name in self._structure.unknowns], (len(arms), 1))
 
-    def _turned(self, arms: Array, axis: Array) -> Array:
-        """Return what they change by in a unit turn about an axis through the point, (nodes, unknowns)."""
+    def _turned(self, arms: Array, axis: Array, theta: Array | None = None) -> Array:
+        """Return what they change by in a unit turn about an axis through the point, (nodes, unknowns).
+
+        Args:
+            arms: of the nodes, from the point, (nodes, 3) in m.
+            axis: of the turn, (3,).
+            theta: rotation vectors there, (nodes, 3); zero if None.
+        """
         moved = np.cross(axis, arms)
+        vectors = axis if theta is None else turned_vectors(theta, axis)
         out: Array = np.zeros((len(arms), self._structure.size))
         for column, name in zip(out.T, self._structure.unknowns, strict=True):
             if name in TURNS:
-                column[:] = np.dot(TURNS[name], axis)
+                column[:] = vectors @ np.array(TURNS[name])
             elif name in ("u1", "u2", "u3"):
                 column[:] = moved[:, int(name[1]) - 1]
         return out

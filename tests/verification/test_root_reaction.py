@@ -53,14 +53,23 @@ BALANCES = {
 }
 
 
+#: Schemes, and how far what they end in is off: Newton's last increment, 1e-9 times EA; two of them times 1/h.
+DIGITS = {"generalised_alpha": 1e-10, "newmark": 1e-10, "energy_conserving": 1e-10, "esdirk4": 1e-5, "radau5": 1e-6}
+#: Damping that stresses carry, and that the hub takes up.
+LAST = ("generalised_alpha", "energy_conserving")
+DAMPING: dict[str, Any] = {"none": {}, "rayleigh": {"rayleigh": [0.8, 2e-3]}, "modal": {"modal": [0.02, 0.03, 0.05]}}
+
+
 @pytest.mark.parametrize(
-    ("scheme", "digits"), [("generalised_alpha", 1e-10), ("newmark", 1e-10), ("esdirk4", 1e-5), ("radau5", 1e-6)]
+    ("scheme", "damping"),
+    [*((scheme, "none") for scheme in DIGITS), *((name, kind) for name in LAST for kind in ("rayleigh", "modal"))],
 )
-def test_balance_of_momentum_and_its_moment(scheme: str, digits: float) -> None:
-    # F(q, v, a) = 0 in a rigid motion of the whole beam, which strains of the exact theory do not feel. What is left is
-    # Newton's last increment, 1e-9 times EA; stages of the last two schemes end in it, times 1/h.
-    time = {"end": 1.6, "step": 0.02, "scheme": scheme}
-    result = rotfem.run({**SCENE, "loads": ACTING, "time": time}, outputs={f"b_{n}": b for n, b in BALANCES.items()})
+def test_balance_of_momentum_and_its_moment(scheme: str, damping: str) -> None:
+    # F(q, v, a) = 0 in a rigid motion of the whole beam, which strains of the exact theory do not feel; no damping
+    # acts on its momentum from outside.
+    time, digits = {"end": 1.6, "step": 0.02, "scheme": scheme}, DIGITS[scheme]
+    scene = {**SCENE, "structure": {**BEAM, "damping": DAMPING[damping]}, "loads": ACTING, "time": time}
+    result = rotfem.run(scene, outputs={f"b_{n}": b for n, b in BALANCES.items()})
     for name in BALANCES:
         root, whole = result.history[name], result.history[f"b_{name}"]
         assert np.max(np.abs(root - whole)) < digits * np.max(np.abs(root)), name
@@ -94,6 +103,18 @@ def test_spinning_rod() -> None:
     root = rotfem.run(scene).summary["root"]
     assert root["root_f1"] == pytest.approx(-EA * (B * k - 1), rel=1e-9)
     assert root["root_f2"] == pytest.approx(0.0, abs=1e-9 * abs(root["root_f1"]))
+
+
+@pytest.mark.parametrize("damping", ["rayleigh", "modal"])
+def test_damping_takes_nothing_from_the_force_at_the_root(damping: str) -> None:
+    # Balance of momentum in the linear theory, whose loads are dead: to round-off of EA/EI · L² = 2e5.
+    loads = {"tip_force": [0.0, 3.0]}
+    scene = {**SCENE, "loads": loads, "model": {"theory": "consistent_linear"}, "time": {"end": 0.4, "step": 0.02}}
+    scene["structure"] = {**BEAM, "damping": DAMPING[damping]}
+    history = rotfem.run(scene, outputs={f"b_{n}": BALANCES[n] for n in ("root_f1", "root_f2")}).history
+    for name in ("root_f1", "root_f2"):
+        root, whole = history[name], history[f"b_{name}"]
+        assert np.max(np.abs(root - whole)) < 1e-10 * np.max(np.abs(root)), name
 
 
 @pytest.mark.parametrize("theory", ["linear", "consistent_linear", "second_order", "reissner"])
