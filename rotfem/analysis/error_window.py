@@ -124,6 +124,7 @@ class Window:
         """Return whether the matrices are those of the window before: a linear theory at the same constant speed."""
         motion, t = system.motion, 0.5 * (self.t[0] + self.t[-1])
         same = system.hub is None and motion.rate(t) == 0.0 and abs(motion.speed(t)) == before.speed
+        same = same and motion.pitch is None
         return bool(system.held.linear and same)
 
     def _reduce(self, system: Any, mesh: MeshErrors, end: float, before: Window | None) -> None:

@@ -26,7 +26,8 @@ class LeftAside:
         self._kept: list[tuple[float, Array, dict[str, Array]]] = []
         self._every, self._count = 1, 0
         #: Whether the stiffness is the same in all states: of a linear theory without spin.
-        self._once = self.system.linear and not self.system.motion.is_spinning
+        motion = self.system.motion
+        self._once = self.system.linear and not motion.is_spinning and motion.pitch is None
 
     def __call__(self, q: Array, t: float) -> None:
         """Keep a state (local dof array) of the time that is set, or pass it by."""

@@ -22,6 +22,12 @@ LOOKS, FEWEST, MOST = 200_000, 4, 64
 #: halvings that find one, and part of the change that is left then if it is one.
 STEEP, JUMPS, HALVINGS, LEFT = 1e-3, 1000, 60, 0.5
 
+#: Changes of the slope that are followed, parts that an interval is divided into, and how often, to find a kink.
+BENDS, PARTS, REFINEMENTS = 20, 8, 6
+
+#: Part of the first change of a slope that is left at a kink, refinements at least, and round-off of a value.
+BENT, SURE, ROUND_OFF = 0.4, 3, 4e-16
+
 #: Part of the largest value by which a function is off a straight line in a step that has to be gone in parts.
 CURVED = 5e-2
 
@@ -35,6 +41,9 @@ def look_at(course: Course, times: Array) -> None:
     if course.known:
         return
     course.known = True
+    if course.name == "pitch.angle":
+        check_bends(course, times)
+        return
     number = int(np.clip(LOOKS // (len(times) - 1), FEWEST, MOST))
     shares = np.arange(number) / number
     t = np.append((times[:-1, None] + np.diff(times)[:, None] * shares).ravel(), times[-1])
@@ -51,6 +60,46 @@ def look_at(course: Course, times: Array) -> None:
         )
     course.knots = np.union1d(course.knots, knots)
     course.marks = np.union1d(course.marks, _fast(t, f, number, size))
+
+
+def check_bends(course: Course, times: Array) -> None:
+    """Refuse a course with a kink or a jump, looked for between the ends of steps (s).
+
+    Where the slope changes much between two looks, it is followed to ever shorter intervals: that of a smooth course
+    changes by a part of it there, at a kink by all of it, at a jump by more.
+
+    Raises:
+        InputError: there is one; says when.
+    """
+    number = int(np.clip(LOOKS // (len(times) - 1), FEWEST, MOST))
+    t = np.linspace(times[0], times[-1], number * (len(times) - 1) + 1)
+    values = course.values(t)[:, 0]
+    slopes, noise = np.diff(values) / np.diff(t), ROUND_OFF * float(np.abs(values).max())
+    changes, size = np.abs(np.diff(slopes)), float(np.abs(slopes).max())
+    steep = np.flatnonzero(changes > STEEP * size)
+    for i in steep[np.argsort(-changes[steep])][:BENDS]:
+        where, depth = _followed(course, (float(t[i]), float(t[i + 2])), float(changes[i]), noise)
+        if depth >= SURE:
+            raise InputError(
+                "structure.root.pitch",
+                None,
+                f"its rate jumps at t = {where:.9g} s, which takes a moment without bound: round it off",
+            )
+
+
+def _followed(course: Course, interval: tuple[float, float], change: float, noise: float) -> tuple[float, int]:
+    """Return where a change of slope in an interval (s) is, and how often that can be refined; 0 where it is none."""
+    first, last = interval
+    for depth in range(REFINEMENTS):
+        inner = np.asarray(np.linspace(first, last, PARTS + 1))
+        if noise > 0.1 * change * (inner[1] - inner[0]):
+            return 0.5 * (first + last), depth
+        bends = np.abs(np.diff(np.diff(course.values(inner)[:, 0]) / np.diff(inner)))
+        k = int(np.argmax(bends))
+        if bends[k] < BENT * change:
+            return 0.5 * (first + last), 0
+        first, last = float(inner[k]), float(inner[k + 2])
+    return 0.5 * (first + last), REFINEMENTS
 
 
 def _jumps(course: Course, t: Array, f: Array, size: float) -> Array:

@@ -32,7 +32,9 @@ def fields_writer(
     """
     writers: list[Writer] = []
     if "vtx" in formats:
-        writers.append(writer(system.structure, "fields", states))
+        pitch = system.motion.pitch
+        seen = states if pitch is None else [(t, pitch.in_hub_axes(q, t)) for t, q in states]
+        writers.append(writer(system.structure, "fields", seen))
     if "xdmf" in formats:
         writers.append(lambda folder: _write(system, states, folder / "fields.xdmf", more))
     return (lambda folder: [path for write in writers for path in write(folder)]) if writers else None
@@ -56,9 +58,7 @@ def displacement(system: Any, t: float, q: Array) -> Array:
     """Return the displacements (n, 3) in m of all nodes in the turning frame, on every rank."""
     structure = system.structure
     coordinates, values = structure.nodes(q[: len(system.held.zeros())])
-    if system.clamp is not None:
-        values = system.clamp.relative(values, coordinates["x"], t)
-    return moved(structure, values)
+    return moved(structure, system.held.seen_from_hub(values, coordinates["x"], t))
 
 
 def moved(structure: Any, values: Array) -> Array:

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from rotfem.errors import InputError
 from rotfem.mechanics.composed_loads import ComposedLoad, LoadOfPlace, Part
 from rotfem.mechanics.courses import TINY
-from rotfem.mechanics.loads import Applied, Load, Loads, PointLoads, named
+from rotfem.mechanics.loads import Load, Loads, PointLoads, named
 from rotfem.mechanics.motion import Motion
+from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.span import FunctionOfPlace, Shapes
 from rotfem.scene import Scene
 
@@ -37,9 +38,11 @@ def loads_of(scene: Scene, motion: Motion, maker: type[LoadsMaker] | None = None
     return Loads(gravity=given.gravity, at=tuple(points), **whole)
 
 
-def held(loads: Applied) -> list[str]:
-    """Return a warning where what is computed at one time, as modes are, takes loads for those of t = 0."""
-    names = [f"loads.{name}" for name, load in named(loads).items() if not (load.constant or load.is_zero)]
+def held(problem: Problem) -> list[str]:
+    """Return a warning where what is computed at one time, as modes are, takes pitch and loads for those of t = 0."""
+    given = {name: getattr(load, "unpitched", load) for name, load in named(problem.loads).items()}
+    names = [f"loads.{name}" for name, load in given.items() if not (load.constant or load.is_zero)]
+    names += ["structure.root.pitch"] if problem.motion.pitch is not None else []
     if not names:
         return []
     return [f"{', '.join(names)} {'change' if len(names) > 1 else 'changes'} with time: taken as at t = 0"]

@@ -110,7 +110,7 @@ def _modes(
     spinning, warnings = found.spinning, found.warnings
     if choice is not None:  # a choice knows what it left out
         warnings = [line for line in warnings if line not in advice(analysis, speed)]
-    warnings = [*held(problem.loads), *analysis.notes, *warnings]
+    warnings = [*held(problem), *analysis.notes, *warnings]
     stability = stability_of_pencil(spinning.pencil, spinning.clamped)
     known = GROWS_AS_SAID * max(row["growth"] for row in found.rows if row["stability"] != "neutral")
     if stability.stable is None or stability.held_by_spin or stability.growth > max(known, 0.0):

@@ -15,12 +15,14 @@ from rotfem.analysis.time_loop import March, Steps
 from rotfem.commands.loads import checked, loads_of
 from rotfem.commands.mode_tables import mode_tables
 from rotfem.commands.moment import Moment, first_shape
+from rotfem.commands.pitch import with_pitch
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import InputError, SceneError, input_of
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.free_hub import ControlledTorque, FreeHub, Torque
 from rotfem.mechanics.motion import Motion, no_acceleration
 from rotfem.mechanics.outputs import Functional, Output
+from rotfem.mechanics.pitched_loads import pitched
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
 from rotfem.results import ModesResult
@@ -53,14 +55,14 @@ class Problem(ProblemData):
         scene = as_scene(scene)
         wanted = {name: Output.registry[name].form for name in scene.output.functionals}
         with input_of(scene.file):
-            motion = motion_of(scene)
+            motion = with_pitch(scene, motion_of(scene))
             return cls(
                 structure=scene.structure,
                 motion=motion,
                 mesh=scene.mesh,
                 theory=scene.model.theory,
                 effects=None if scene.model.effects == "auto" else tuple(scene.model.effects),
-                loads=loads_of(scene, motion),
+                loads=pitched(loads_of(scene, motion), motion.pitch),
                 frame=scene.model.frame,
                 prestress=scene.model.prestress,
                 terms=terms or {},

@@ -41,7 +41,8 @@ class Recorder:
         self.resultants = ResultantRows(system.held, named) if named else None
         stress = ("von_mises_max",) if named else ()
         energies = ("kinetic", "strain", "jacobi")
-        self.history = Table(("t", "psi", "psi_dot", *names, *energies, *root, *free, *further, *stress))
+        pitch = () if system.motion.pitch is None else ("pitch",)
+        self.history = Table(("t", "psi", "psi_dot", *names, *energies, *root, *free, *pitch, *further, *stress))
         self._last: State | None = None
         self.formats = ("vtx",) if output is None else output.formats(system.structure.type)
         self.snapshots = Snapshots() if self.formats else None
@@ -62,6 +63,7 @@ class Recorder:
         row += [energy[name] for name in ("kinetic", "strain", "jacobi")]
         row += system.root_reaction().values()
         row += hub_values(system, state).values()
+        row += [] if motion.pitch is None else [motion.pitch.angle(t)]
         row += system.outputs().values()
         row += self.also(t)
         self.add(row, state)

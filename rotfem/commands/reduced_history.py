@@ -39,7 +39,12 @@ def by_reduced_model(run: Simulation, start: Array | None, progress: Progress) -
     Raises:
         ComputationError: it failed.
     """
-    if _recorded(run, start):
+    if run.problem.motion.pitch is not None:
+        why = "a reduced model does not hold under a pitch over time"
+        if run.settings is not None:
+            raise ComputationError(why)
+        run.warnings.append(f"{why}; the full system was used")
+    elif _recorded(run, start):
         progress(1.0)
         return True
     run.critical = critical_speed(run.system)

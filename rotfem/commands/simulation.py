@@ -141,7 +141,7 @@ class Simulation:
     def _steady(self) -> None:
         omega = self.problem.motion.speed(0.0)
         past = self.scene.solver.past_limits
-        self.warnings += held(self.problem.loads)
+        self.warnings += held(self.problem)
         q = steady_state(self.system, omega, self.newton, past_limits=past, notes=self.warnings)
         self.stability = stability_of(self.system, q, omega)
         q, v = self.system.start(q)

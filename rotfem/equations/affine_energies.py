@@ -36,15 +36,23 @@ class AffineEnergies(System, ABC):
         spin = self.model.frame.constants.get("w")
         if spin is None or "T0" not in self._energies.names:
             return 0.0
+        if self.motion.pitch is not None:
+            return self._undeformed_rest_energy()
         return self.rest_inertia * float(np.dot(spin.value, spin.value))
+
+    def _undeformed_rest_energy(self) -> float:
+        state = self.q.x.array.copy()
+        self.q.x.array[:] = 0.0
+        energy = self._energies()["T0"]
+        self.q.x.array[:] = state
+        return energy
 
     @cached_property
     def rest_inertia(self) -> float:
         """T0 of the undeformed structure at unit speed, kg·m²: half its moment of inertia about the axis."""
         spin = self.model.frame.constants["w"]
-        state, w = self.q.x.array.copy(), spin.value.copy()
-        self.q.x.array[:] = 0.0
+        w = spin.value.copy()
         spin.value[...] = self.motion.axis[-spin.value.size :]
-        inertia = self._energies()["T0"]
-        self.q.x.array[:], spin.value[...] = state, w
+        inertia = self._undeformed_rest_energy()
+        spin.value[...] = w
         return inertia

@@ -60,11 +60,12 @@ class Model:
         self.hub = HubAngle(problem.motion) if problem.motion.hub is not None else None
         self.motion: Motion = problem.motion if self.hub is None else self.hub.motion
         self.structure: Structure = build(problem, comm)
-        self.frame = Frame(
-            self.structure.mesh, self.structure.planar, problem.frame == "inertial", problem.loads.gravity
-        )
+        fixed, pitching = problem.frame == "inertial", problem.motion.pitch is not None
+        self.frame = Frame(self.structure.mesh, self.structure.planar, fixed, problem.loads.gravity, pitching)
         self.switches: dict[str, fem.Constant] = {}
         chosen = [Effect.registry[name] for name in self.effects]
+        if pitching:  # springs of axes that the frame turns about
+            chosen = [replace(effect, constants=None) if effect.at_root else effect for effect in chosen]
         further = [Effect(name, term) for name, term in problem.terms.items()]
         self.acting = {effect.name: effect for effect in (INTERNAL, INERTIA, *chosen, *further, LOADS)}
         self.compose()
@@ -153,6 +154,9 @@ class Model:
         if self.fixed:
             out["momentum"] = work.momentum(m, RigidTurn(ufl.as_vector((0.0, 0.0, 1.0))))
         out |= {effect.kinetic: kinetic[effect.kinetic]() for effect in acting if effect.kinetic}
+        pitch = self.problem.motion.pitch
+        if pitch is not None and pitch.moves_origin:
+            out["origin"] = kinetic["origin"]()
         potentials = [resolved(effect.potential)(m) for effect in acting if effect.potential is not None]
         potentials = [potential for potential in potentials if not isinstance(potential, int)]
         if potentials:

@@ -118,11 +118,11 @@ class Pieces:
             switch.value = float(name in on)
 
     def _entries(self, name: str) -> list[tuple[str, int]]:
-        """Return the components of a constant that are ever there: w and dw keep to the axis, which is fixed."""
+        """Return the components of a constant that are ever there: w and dw keep to the axis if nothing pitches."""
         if name == "loads":
             return [entry for load in self.structure.load_constants for entry in self._entries(load)]
         n = self.constants[name].value.size
-        if name in ("w", "dw"):
+        if name in ("w", "dw") and self.model.motion.pitch is None:
             return [(name, i) for i, c in enumerate(self.axis) if c != 0.0]
         return [(name, i) for i in range(n)]
 

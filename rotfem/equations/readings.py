@@ -74,7 +74,17 @@ class Readings:
     def tip(self, q: Array, t: float) -> Array:
         """Return the values of the unknowns at the tip, relative to the turning frame, shape (components,)."""
         tip = self.structure.whole_values(self.structure.tip_values(self.structure.total(q)))
-        return tip if self.clamp is None else self.clamp.relative(tip[None, :], self.structure.length, t)[0]
+        return np.asarray(self.seen_from_hub(tip[None, :], self.structure.length, t)[0])
+
+    def seen_from_hub(self, values: Array, x: Any, t: float) -> Array:
+        """Return all components (n, components) of points at x (m) at time t (s) in the frame that turns with the hub.
+
+        That is the frame of the unknowns but in the inertial form, and under a pitch over time.
+        """
+        if self.clamp is not None:
+            return self.clamp.relative(values, x, t)
+        pitch = self.motion.pitch
+        return values if pitch is None else pitch.in_hub_axes(values, t)
 
     def root_reaction(self) -> dict[str, float]:
         """Return force (N) and moment (N·m) of the hub on the structure at the state and time set, axes of the hub.
@@ -87,13 +97,15 @@ class Readings:
         if self.clamp is not None:
             c, s = np.cos(self.clamp.angle(self.time)), np.sin(self.clamp.angle(self.time))
             found |= {"f1": c * found["f1"] + s * found["f2"], "f2": c * found["f2"] - s * found["f1"]}
+        if self.motion.pitch is not None:
+            turned = self.motion.pitch.in_hub_axes(np.array(list(found.values())), self.time)
+            found = dict(zip(found, map(float, turned), strict=True))
         return found
 
     def shape(self) -> dict[str, Array]:
         """Return the deflected structure at the state: position x (m), u1, u2 (m), alpha, … in the turning frame."""
         coordinates, q = self.structure.nodes(self.structure.total(self.q.x.array))
-        if self.clamp is not None:
-            q = self.clamp.relative(q, coordinates["x"], self.time)
+        q = self.seen_from_hub(q, coordinates["x"], self.time)
         return {**coordinates, **{name: q[:, i] for i, name in enumerate(self.structure.components)}}
 
     @cached_property
@@ -126,7 +138,7 @@ class Readings:
         spin are constant in the frame and nothing dissipates.
         """
         e = self._energies()
-        kinetic = e["T2"] + e.get("T1", 0.0) + e.get("T0", 0.0)
+        kinetic = e["T2"] + e.get("T1", 0.0) + e.get("T0", 0.0) + e.get("origin", 0.0)
         if "momentum" in e:
             spin = self.motion.speed(self.time) * float(self.motion.axis[2])
             jacobi = kinetic - spin * e["momentum"] + e["strain"]

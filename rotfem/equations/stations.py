@@ -157,7 +157,6 @@ class Stations:
             out[row, self._order.stop :] = self.beam.whole_values(factors @ total[nodes])
         if self.comm.size > 1:
             out = self.comm.allreduce(out)
-        if self.system.clamp is not None:
-            u = out[:, self._order.stop :]
-            out[:, self._order.stop :] = self.system.clamp.relative(u, self.positions, self.system.time)
+        unknowns = out[:, self._order.stop :]
+        out[:, self._order.stop :] = self.system.seen_from_hub(unknowns, self.positions, self.system.time)
         return out

@@ -142,12 +142,16 @@ class RootSpring:
         stiffness: N·m/rad, a constant.
         damping: N·m·s/rad, a constant.
         measure: UFL measure of the root.
+        axis: that it turns about, 1 to 3.
+        drift: rate of the angle at rest in the frame (rad/s), where the frame pitches and the axis does not.
     """
 
     turn: Any
     stiffness: Any
     damping: Any
     measure: Any
+    axis: int
+    drift: Any = 0
 
 
 @dataclass(frozen=True)

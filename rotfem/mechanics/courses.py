@@ -21,6 +21,7 @@ import numpy.typing as npt
 from rotfem.mechanics.free_hub import FreeHub, Torque
 from rotfem.mechanics.loads import Load, named, replaced
 from rotfem.mechanics.motion import Motion
+from rotfem.mechanics.pitch import Pitch
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.span import Span
 
@@ -183,7 +184,18 @@ def _watched_motion(motion: Motion, see: Callable[[Course], Callable[[float], An
             course = Course(f"motion.{name}", f, _times(motion.sharp), _times(motion.knots), many, known)
             course.looks = 0.5 * (course.marks[1:] + course.marks[:-1])
             changes[name] = see(course)
+    if motion.pitch is not None:
+        changes["pitch"] = _watched_pitch(motion.pitch, see)
     return replace(motion, **changes)
+
+
+def _watched_pitch(pitch: Pitch, see: Callable[[Course], Callable[[float], Any]]) -> Pitch:
+    """Return a pitch as it is seen; of a function the acceleration is looked at, where all that is fast shows most."""
+    none, changes = np.empty(0), dict[str, Any]()
+    for name in ("angle", "rate", "acceleration"):
+        known = pitch.known or name == "rate"
+        changes[name] = see(Course(f"pitch.{name}", getattr(pitch, name), _times(pitch.knots), none, known=known))
+    return replace(pitch, **changes)
 
 
 def _watched_hub(hub: FreeHub, see: Callable[[Course], Callable[[float], Any]]) -> FreeHub:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from rotfem.mechanics.pitch import is_beside
 from rotfem.registry import Registry, register, resolved
 from rotfem.registry import effects as registered
 
@@ -87,6 +88,21 @@ def hinges_of(problem: Any) -> list[Any]:
     return list(getattr(problem.structure, "hinges", {}).values())
 
 
+def pitches(problem: Any) -> bool:
+    """Return whether the frame of a scene or problem turns with a pitch over time too."""
+    return getattr(problem.structure, "pitches", False) or getattr(problem.motion, "pitch", None) is not None
+
+
+def turns(problem: Any) -> bool:
+    """Return whether the frame turns."""
+    return problem.motion.is_spinning or pitches(problem)
+
+
+def moves_origin(problem: Any) -> bool:
+    """Return whether a pitch over time moves the origin of the frame, which is not on its axis."""
+    return pitches(problem) and is_beside(problem.structure.root_position, problem.structure.root_axis)
+
+
 # What every model has.
 INTERNAL = Effect("internal", _work("internal"), constants=(), internal=True, passive=True)
 INERTIA = Effect("inertia", _work("inertia"), constants=(), momentum=True)
@@ -96,7 +112,7 @@ for _effect in (
     Effect(
         "coriolis",
         _work("coriolis"),
-        lambda problem: problem.motion.is_spinning,
+        turns,
         ("the structure spins", "nothing spins"),
         ("w",),
         of_rotation=True,
@@ -106,7 +122,7 @@ for _effect in (
     Effect(
         "centrifugal",
         _work("centrifugal"),
-        lambda problem: problem.motion.is_spinning,
+        turns,
         ("the structure spins", "nothing spins"),
         ("w", "w"),
         of_rotation=True,
@@ -116,8 +132,8 @@ for _effect in (
     Effect(
         "euler",
         _work("euler"),
-        lambda problem: problem.motion.changes_speed,
-        ("the speed changes", "the speed is constant"),
+        lambda problem: problem.motion.changes_speed or pitches(problem),
+        ("the speed or the pitch changes", "the speed is constant"),
         ("dw",),
         of_rotation=True,
         momentum=True,
@@ -130,7 +146,7 @@ for _effect in (
     Effect(
         "base",
         _work("base"),
-        lambda problem: problem.motion.is_accelerated,
+        lambda problem: problem.motion.is_accelerated or moves_origin(problem),
         ("the origin is accelerated", "no base_acceleration"),
         ("a_o",),
         potential=_work("potential_of_base"),

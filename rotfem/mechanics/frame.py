@@ -16,7 +16,7 @@ Array = npt.NDArray[np.float64]
 
 
 class Frame:
-    """The constants of the floating frame in the forms: w, dw (its rate), a_o and gravity, all frame components.
+    """The constants of the floating frame in the forms: w, dw (its rate), a_o, v_o and gravity, all frame components.
 
     A constant comes into being when a form first asks for it, so an effect that is off leaves none behind.
 
@@ -26,15 +26,24 @@ class Frame:
             forms lose their zero terms symbolically.
         fixed: the frame translates with the hub but does not rotate (the inertial-frame form).
         gravity: inertial components, m/s^2.
+        pitching: the frame pitches over time.
     """
 
-    def __init__(self, domain: mesh.Mesh, planar: bool, fixed: bool = False, gravity: npt.ArrayLike = (0, 0, 0)):
-        self._domain, self.planar, self.fixed = domain, planar, fixed
+    def __init__(
+        self,
+        domain: mesh.Mesh,
+        planar: bool,
+        fixed: bool = False,
+        gravity: npt.ArrayLike = (0, 0, 0),
+        pitching: bool = False,
+    ):
+        self._domain, self.planar, self.fixed, self.pitching = domain, planar, fixed, pitching
         self._gravity = np.asarray(gravity, dtype=float)
         self.constants: dict[str, fem.Constant] = {}
         self._entries: dict[str, Array] = {}  # of the constants, where they are
         turn, plane = (slice(2, 3), slice(0, 2)) if planar else (slice(0, 3), slice(0, 3))
-        self._slices = {"w": turn, "dw": turn, "a_o": plane, "gravity": plane}
+        self._slices = {"w": turn, "dw": turn, "a_o": plane, "v_o": plane, "gravity": plane}
+        self._slices |= dict.fromkeys(("pitch", "pitch_rate"), slice(0, 2))
 
     def _constant(self, name: str, size: int) -> fem.Constant:
         if name not in self.constants:
@@ -69,6 +78,23 @@ class Frame:
         return self._translation("a_o")
 
     @property
+    def v_o(self) -> Any:
+        """Velocity of the origin, m/s, by a pitch whose axis it is not on."""
+        return self._translation("v_o")
+
+    @property
+    def pitch(self) -> tuple[Any, Any]:
+        """(cos φ, sin φ) of the turn φ of a frame that pitches; the constants are zero at φ = 0."""
+        c = self._constant("pitch", 2)
+        return 1 + c[0], c[1]
+
+    @property
+    def pitch_rate(self) -> tuple[Any, Any]:
+        """Their rates, 1/s."""
+        c = self._constant("pitch_rate", 2)
+        return c[0], c[1]
+
+    @property
     def gravity(self) -> Any:
         """Acceleration of gravity, m/s^2."""
         return self._translation("gravity")
@@ -76,16 +102,12 @@ class Frame:
     def values(self, motion: Motion, t: float) -> dict[str, Array]:
         """Return the value of every constant in use at time t (s), as arrays of the constants' sizes."""
         out: dict[str, Array] = {}
+        moved = motion.frame(t)
         for name in self.constants:
-            if name == "w":
-                value = motion.speed(t) * motion.axis
-            elif name == "dw":
-                value = motion.rate(t) * motion.axis
-            elif name == "a_o":
-                value = motion.base_acceleration(t)
-                value = motion.rotation(t) @ value if self.fixed else value
-            else:
+            if name == "gravity":
                 value = self._gravity if self.fixed else motion.rotation(t).T @ self._gravity
+            else:
+                value = motion.rotation(t) @ moved[name] if self.fixed and name == "a_o" else moved[name]
             out[name] = value[self._slices[name]]
         return out
 

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.mechanics.free_hub import FreeHub
+from rotfem.mechanics.pitch import Pitch, turn_about
 
 Scalar = Callable[[float], float]
 Array = npt.NDArray[np.float64]
@@ -38,7 +39,7 @@ def about(axis: npt.ArrayLike) -> Array:
 
 @dataclass(frozen=True)
 class Motion:
-    """Rotation about a fixed axis of the frame, and the acceleration of its origin.
+    """Rotation of the hub about a fixed axis of its frame, the acceleration of its center, and a pitch over time.
 
     Attributes:
         speed: Omega(t) in rad/s.
@@ -58,6 +59,7 @@ class Motion:
         base_knots: times (s) between which a_o is linear; None if that is not known.
         settled: time (s) from which on Omega stays as it is, 0 if that is not known.
         hub: what turns freely where the rotation is an unknown; its speed is then only that of the start.
+        pitch: turn of the frame beside that of the hub (see `rotfem.mechanics.pitch`); None: the frame is the hub's.
     """
 
     speed: Scalar
@@ -77,6 +79,7 @@ class Motion:
     base_knots: tuple[float, ...] | None = None
     settled: float = 0.0
     hub: FreeHub | None = None
+    pitch: Pitch | None = None
 
     @classmethod
     def constant_speed(cls, speed: float, axis: npt.ArrayLike = (0, 0, 1), **more: Any) -> Motion:
@@ -145,16 +148,29 @@ class Motion:
         """Whether a hub is free and feels the structure's motion."""
         return self.hub is not None and self.hub.coupled
 
+    def frame(self, t: float) -> dict[str, Array]:
+        """Return the motion of the frame: its w and dw (rad/s, rad/s²), a_o and v_o of its origin, its components.
+
+        The velocity v_o is that by the pitch, without that of the hub's center.
+        """
+        w, dw, a_o = self.speed(t) * self.axis, self.rate(t) * self.axis, self.base_acceleration(t)
+        if self.pitch is None:
+            return {"w": w, "dw": dw, "a_o": a_o}
+        return self.pitch.frame(t, w, dw, a_o)
+
     def rotation(self, t: float) -> Array:
-        """Return Q(t), shape (3, 3): inertial components = Q(t) · frame components (Rodrigues' formula)."""
-        e, psi = self.axis, self.angle(t)
-        cross = np.array([[0, -e[2], e[1]], [e[2], 0, -e[0]], [-e[1], e[0], 0]])
-        return np.asarray(np.eye(3) + np.sin(psi) * cross + (1 - np.cos(psi)) * cross @ cross)
+        """Return Q(t), shape (3, 3): inertial components = Q(t) · frame components."""
+        turn = turn_about(self.axis, self.angle(t))
+        return turn if self.pitch is None else turn @ self.pitch.rotation(t)
 
     def at_speed(self, omega: float) -> Motion:
-        """Return the same frame spinning at the constant speed omega (rad/s)."""
-        still = Motion.constant_speed(omega, self.axis)
+        """Return the same frame spinning at the constant speed omega (rad/s), its pitch that of t = 0."""
+        still = Motion.constant_speed(omega, self.axis, pitch=None if self.pitch is None else self.pitch.held())
         return replace(still, base_acceleration=self.base_acceleration, is_accelerated=self.is_accelerated)
+
+    def pitched(self, pitch: Pitch) -> Motion:
+        """Return the motion of a frame that pitches over time too."""
+        return replace(self, pitch=pitch, constant=False)
 
     def with_changing_base(self) -> Motion:
         """Return the motion, known to have an acceleration of its origin that changes with time."""

@@ -13,13 +13,13 @@ bodies.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import ufl
 from ufl import cross
 
-from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, Strain
+from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, RootSpring, Strain
 from rotfem.mechanics.frame import Frame
 from rotfem.mechanics.sums import added
 
@@ -83,6 +83,16 @@ class Mechanics:
         """Return the stress resultant of the strain of a name ("axial", "bending", …), N or N·m, as an expression."""
         strain = next(s for s in self.strains if s.name == name)
         return strain.force(strain.value)
+
+    def springs(self) -> list[RootSpring]:
+        """Return what holds the hinges of the root; of a frame that pitches, flap and lag about axes that do not."""
+        held: list[RootSpring] = self.structure.springs()
+        turns = {s.axis: s.turn for s in held}
+        if not self.frame.pitching or not {2, 3} <= turns.keys():
+            return held
+        (c, s), (dc, ds), flap, lag = self.frame.pitch, self.frame.pitch_rate, turns[2], turns[3]
+        still = {2: (c * flap - s * lag, dc * flap - ds * lag), 3: (c * lag + s * flap, dc * lag + ds * flap)}
+        return [replace(x, turn=still[x.axis][0], drift=still[x.axis][1]) if x.axis in still else x for x in held]
 
     def positions(self) -> list[Body]:
         """Return the bodies of the structure itself that are points of it, not directors: its axis or mid-surface."""
@@ -149,12 +159,12 @@ def damping(m: Mechanics, delta: Variation) -> Any:
 
 def root_springs(m: Mechanics, delta: Variation) -> Any:
     """Return Σ k φ δφ over the turns φ that the root makes against springs."""
-    return added(s.stiffness * s.turn * m.k.variation(s.turn) * s.measure for s in m.structure.springs())
+    return added(s.stiffness * s.turn * m.k.variation(s.turn) * s.measure for s in m.springs())
 
 
 def root_dampers(m: Mechanics, delta: Variation) -> Any:
     """Return Σ c φ̇ δφ over the turns φ that the root makes against dampers."""
-    return added(s.damping * m.k.rate(s.turn) * m.k.variation(s.turn) * s.measure for s in m.structure.springs())
+    return added(s.damping * (m.k.rate(s.turn) + s.drift) * m.k.variation(s.turn) * s.measure for s in m.springs())
 
 
 def loads(m: Mechanics, delta: Any) -> Any:
@@ -176,7 +186,10 @@ def strain_energy(m: Mechanics) -> Any:
 
 
 def kinetic_parts(m: Mechanics) -> dict[str, Callable[[], Any]]:
-    """Return T2, T1, T0 of T = ∫ ½ρ |ẋ + w×x|², by degree in the velocities relative to the frame (J), as UFL forms."""
+    """Return T2, T1, T0 of T = ∫ ½ρ |ẋ + w×x|², by degree in the velocities relative to the frame (J), as UFL forms.
+
+    Where the origin moves by a pitch, "origin" is what its velocity adds, ∫ ρ v_o·(ẋ + w×x + ½ v_o).
+    """
 
     def product(first: Callable[[Body], Any], second: Callable[[Body], Any]) -> Any:
         return added(b.density * ufl.inner(first(b), second(b)) * b.measure for b in m.bodies)
@@ -184,10 +197,15 @@ def kinetic_parts(m: Mechanics) -> dict[str, Callable[[], Any]]:
     def relative(body: Body) -> Any:
         return body.rate(m.k)
 
+    def of_origin() -> Any:
+        v_o, places = m.frame.v_o, [b for b in m.bodies if b.is_position]
+        return added(b.density * ufl.inner(v_o, m.velocity(b) + v_o / 2) * b.measure for b in places)
+
     return {
         "T2": lambda: 0.5 * product(relative, relative),
         "T1": lambda: product(relative, m.carried),
         "T0": lambda: 0.5 * product(m.carried, m.carried),
+        "origin": of_origin,
     }
 
 
@@ -208,7 +226,7 @@ def potential_of_gravity(m: Mechanics) -> Any:
 
 def potential_of_root_springs(m: Mechanics) -> Any:
     """Return Σ ½ k φ² over the springs of the root."""
-    return added(s.stiffness * s.turn**2 / 2 * s.measure for s in m.structure.springs())
+    return added(s.stiffness * s.turn**2 / 2 * s.measure for s in m.springs())
 
 
 def potential_of_loads(m: Mechanics) -> Any:

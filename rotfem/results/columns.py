@@ -41,6 +41,7 @@ COLUMNS = {
     "angular_momentum": ("angular momentum", "N·m·s"),
     "impulse": ("impulse of the torque", "N·m·s"),
     "work": ("work of the torque", "J"),
+    "pitch": ("pitch of the blade", "rad"),
     "speed": ("speed Ω", "rad/s"),
     "frequency": ("frequency in the rotating frame", "rad/s"),
     "frequency_hz": ("frequency in the rotating frame", "Hz"),

@@ -15,10 +15,10 @@ from rotfem.scene.magnitudes import check_magnitudes
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.point_masses import PointMass, as_inertia, check_masses
 from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_through
-from rotfem.scene.root import Hinge, Root, SpatialRoot, check_cone
+from rotfem.scene.root import Held, Root, SpatialRoot, check_cone, check_pitch
 from rotfem.scene.section import PlanarSection
 from rotfem.scene.section_spatial import SpatialSection
-from rotfem.scene.structure import MeanBeam, StructureTable, apart, means
+from rotfem.scene.structure import MeanBeam, apart, means
 from rotfem.scene.values import (
     AnyProfile,
     Array,
@@ -51,7 +51,7 @@ def _as_sweep(value: Any) -> Profile:
 EXACT, AGREE = 1e-9, 1e-6
 
 
-class PlanarBeamStructure(StructureTable):
+class PlanarBeamStructure(Held):
     """A beam that moves in the plane (1, 2) of the rotating frame, clamped at X = 0.
 
     Attributes:
@@ -85,11 +85,6 @@ class PlanarBeamStructure(StructureTable):
     def root_position(self) -> tuple[float, float, float]:
         """Position of the root in the frame (m)."""
         return self.hub_radius + self.root.hinge_offset, 0.0, 0.0
-
-    @property
-    def hinges(self) -> dict[int, Hinge]:
-        """Axis ↦ the hinge about it at the root."""
-        return self.root.hinges
 
     @property
     def knots(self) -> tuple[float, ...]:
@@ -130,7 +125,7 @@ class PlanarBeamStructure(StructureTable):
         return self
 
 
-class SpatialBeamStructure(StructureTable):
+class SpatialBeamStructure(Held):
     """A beam in space, its axis along direction 1 of the rotating frame (before precone), clamped at X = 0.
 
     Attributes:
@@ -201,9 +196,9 @@ class SpatialBeamStructure(StructureTable):
         return x + self.root.hinge_offset, y, z
 
     @property
-    def hinges(self) -> dict[int, Hinge]:
-        """Axis ↦ the hinge about it at the root."""
-        return self.root.hinges
+    def root_axis(self) -> tuple[float, float, float]:
+        """Unit vector along the blade at its root, before sweep, which it is pitched about."""
+        return float(np.cos(self.precone)), 0.0, float(np.sin(self.precone))
 
     @property
     def has_tip_mass(self) -> bool:
@@ -260,6 +255,7 @@ class SpatialBeamStructure(StructureTable):
         check_one_hub(self.hub_radius, self.hub_offset)
         check_masses(self.masses, self.length, planar=False)
         check_cone(self.root, self.precone)
+        check_pitch(self.root)
         return self
 
 

@@ -80,6 +80,8 @@ def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:
     """Refuse the inertial-frame form where there is none, and a controller where the motion is solved for at once."""
     if model.reduced and isinstance(motion, TorqueMotion) and motion.function is not None:
         raise problem("model.reduced", model.reduced, "needs a torque over time, not motion.function")
+    if structure.pitches and motion.is_free:
+        raise problem("structure.root.pitch", None, 'over time needs a speed that is prescribed, not type = "torque"')
     if model.frame != "inertial":
         return
     if not structure.is_planar or not registry.theories[model.theory].exact:

@@ -6,7 +6,9 @@ from typing import ClassVar, NamedTuple, Self
 
 from pydantic import model_validator
 
-from rotfem.scene.values import NonNegative, Number, SceneModel, problem
+from rotfem.scene.pitch import PitchAngle
+from rotfem.scene.structure import StructureTable
+from rotfem.scene.values import NonNegative, SceneModel, problem
 
 
 class Hinge(NamedTuple):
@@ -57,7 +59,7 @@ class SpatialRoot(Root):
         flap_damping: against their rate (N·m·s/rad).
         pitch_stiffness: against turns about the axis of the blade (N·m/rad), or None: rigid.
         pitch_damping: against their rate (N·m·s/rad).
-        pitch: angle that the whole blade is turned by about its axis at the root (rad).
+        pitch: angle that the whole blade is turned by about its axis at the root (rad), a number or over time.
     """
 
     AXES: ClassVar[dict[str, int]] = {"pitch": 1, "flap": 2, "lag": 3}
@@ -66,7 +68,36 @@ class SpatialRoot(Root):
     flap_damping: NonNegative = 0.0
     pitch_stiffness: NonNegative | None = None
     pitch_damping: NonNegative = 0.0
-    pitch: Number = 0.0
+    pitch: PitchAngle = PitchAngle(value=0.0)
+
+
+class Held(StructureTable):
+    """What a beam has of its `root`."""
+
+    @property
+    def hinges(self) -> dict[int, Hinge]:
+        """Axis ↦ the hinge about it at the root."""
+        root: Root = vars(self)["root"]
+        return root.hinges
+
+    @property
+    def pitches(self) -> bool:
+        """Whether its pitch changes with time."""
+        root: Root = vars(self)["root"]
+        return isinstance(root, SpatialRoot) and root.pitch.changes
+
+
+def check_pitch(root: SpatialRoot) -> None:
+    """Refuse one spring of the two whose axes a pitch over time turns, the other rigid.
+
+    Raises:
+        PydanticCustomError: says which is missing.
+    """
+    if not root.pitch.changes or (2 in root.hinges) == (3 in root.hinges):
+        return
+    missing = "lag" if 2 in root.hinges else "flap"
+    why = "must be given too with a pitch over time, which turns the axes of both; a large number holds it"
+    raise problem(f"root.{missing}_stiffness", None, why)
 
 
 def check_cone(root: SpatialRoot, precone: float) -> None:

@@ -68,6 +68,11 @@ class StructureTable(SceneModel):
         return {}
 
     @property
+    def pitches(self) -> bool:
+        """Whether it has a pitch that changes with time."""
+        return False
+
+    @property
     def has_fibers(self) -> bool:
         """Whether its sections twist about an axis, beside which they have fibers that this stretches."""
         return False

@@ -83,14 +83,14 @@ DEPENDING: dict[str, tuple[str, dict[str, Unit]]] = {
     ),
 }
 
-#: What any load may have below it ↦ its unit; the unit of what is not here is that of the load.
+#: What any load, or the pitch, may have below it ↦ its unit; the unit of what is not here is that of the load.
 HARMONIC: dict[str, Unit] = {"harmonic.frequency": "rad/s", "harmonic.per_rev": "", "harmonic.phase": "rad"}
 
 #: Tables of loads whose first columns are no times ↦ units of these.
 OVER: dict[str, tuple[str, ...]] = {"over_span": ("m",), "amplitude": ("m",), "over_span_and_time": ("m", "s")}
 
-#: Part of a scene ↦ unit of the first column of its tables.
-_ABSCISSAE = {"structure": "m", "motion": "s", "loads": "s"}
+#: Part of a scene, or one of its keys ↦ unit of the first column of its tables.
+_ABSCISSAE = {"structure": "m", "motion": "s", "loads": "s", "structure.root.pitch": "s"}
 
 
 def in_si(tables: dict[str, Any], file: str) -> dict[str, Any]:
@@ -123,7 +123,8 @@ def _converted(value: Any, path: tuple[str, ...], unit_of: Callable[[str], Unit 
     if unit is None or (isinstance(value, str) and not is_quantity(value)):
         return value
     try:
-        first = OVER.get(path[-1], (_ABSCISSAE.get(path[0], ""),))
+        over_time = next((name for name in (key, key.rpartition(".")[0]) if name in _ABSCISSAE), path[0])
+        first = OVER.get(path[-1], (_ABSCISSAE.get(over_time, ""),))
         return _in_units(value, unit, first)
     except ValueError as error:
         raise SceneError(file, ".".join(path), value, str(error)) from None
@@ -137,7 +138,10 @@ def _has_text(value: Any) -> bool:
 
 def _unit_of(key: str, tables: Mapping[str, Any]) -> Unit | None:
     """Return the unit of a dotted key, or of the nearest table above that has one; None if there is none."""
-    if key.startswith("loads.") and (own := HARMONIC.get(".".join(key.split(".")[-2:]))) is not None:
+    if (
+        key.startswith(("loads.", "structure.root.pitch."))
+        and (own := HARMONIC.get(".".join(key.split(".")[-2:]))) is not None
+    ):
         return own
     while key:
         if key in UNITS:

@@ -73,6 +73,8 @@ def leave_out(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, released: bool 
     # Ratios by mode are counted among the modes of all unknowns.
     if problem.terms or problem.frame != "rotating" or problem.structure.damping.has_modal:
         return problem, None
+    if problem.motion.pitch is not None:  # which turns about an axis that is in every plane of symmetry
+        return problem, None
     driven = Driven(problem)
     for kept, constants in driven.candidates(structure):
         if released and 1 not in kept:

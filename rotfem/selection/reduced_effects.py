@@ -39,7 +39,8 @@ def reduced_effects(trial: Trial, theory: str, effects: Collection[str]) -> dict
         effects: those that are asked for.
     """
     linear = linear_of(trial, theory)
-    if linear is None or trial.samples is None or trial.case.problem.motion.hub is not None:
+    motion = trial.case.problem.motion
+    if linear is None or trial.samples is None or motion.hub is not None or motion.pitch is not None:
         return {}
     candidate = trial.candidate(linear.name)
     times: Array = np.linspace(0.0, trial.samples.end, len(trial.samples.parts) + 1, dtype=np.float64)

@@ -65,7 +65,10 @@ def given(problem: Problem) -> list[Given]:
     if motion.changes_speed:
         knots = np.array(motion.knots)
         out += [Given(_each(f), knots, smooth=motion.smooth) for f in (motion.speed, motion.rate)]
-    if any(loads.gravity) and motion.is_spinning:
+    if (pitch := motion.pitch) is not None:
+        smooth = pitch.known
+        out += [Given(_each(f), np.array(pitch.knots), smooth=smooth) for f in (pitch.rate, pitch.acceleration)]
+    if any(loads.gravity) and (motion.is_spinning or pitch is not None):
         g = np.array(loads.gravity)
         out.append(Given(_each(lambda t: motion.rotation(t).T @ g), np.empty(0), smooth=True))
     return out

@@ -92,6 +92,7 @@ class Beam(Structure):
                 self.scalar(f"{hinge.name}_stiffness", hinge.stiffness),
                 self.scalar(f"{hinge.name}_damping", hinge.damping),
                 self.root,
+                axis,
             )
             for axis, hinge in found
         ]

@@ -23,6 +23,7 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
+from rotfem.errors import InputError
 from rotfem.mechanics.bodies import AppliedLoad, Body, Kinematics, Strain
 from rotfem.mechanics.loads import Load
 from rotfem.mechanics.problem import Problem
@@ -51,7 +52,7 @@ class SpatialBeam(Beam):
         comm: communicator the mesh is distributed over.
 
     Raises:
-        InputError: a 6×6 mass matrix that no section has.
+        InputError: a 6×6 mass matrix that no section has, a pitch over time that is not in the motion.
     """
 
     type = "spatial_beam"
@@ -68,7 +69,11 @@ class SpatialBeam(Beam):
     families: ClassVar = {"axial": ((0,), 0), "lag": ((1, 5), 1), "flap": ((2, 4), 2), "torsion": ((3,), 3)}
 
     def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):
-        s = problem.structure
+        s, pitch = problem.structure, problem.motion.pitch
+        if s.pitches and pitch is None:
+            raise InputError("structure.root.pitch", None, "changes with time: the motion of the problem must have it")
+        #: Pitch at t = 0; that of later times is in the motion of the frame.
+        self._first_pitch = s.root.pitch.constant if pitch is None else pitch.start
         super().__init__(problem, comm, s.knots)
         self._forms = SectionForms(self, s.section)
         if s.hub_offset is None:
@@ -95,8 +100,8 @@ class SpatialBeam(Beam):
         c, s = (ufl.cos(beta), ufl.sin(beta)) if cone != 0.0 else (1, 0)
         e_1, e_2, e_3 = ufl.as_vector((c, 0, s)), ufl.as_vector((0, 1, 0)), ufl.as_vector((-s, 0, c))
         self._root_axes = (e_1, e_2, e_3)
-        if self.data.root.pitch != 0.0:
-            pitch = self.scalar("pitch", self.data.root.pitch)
+        if self._first_pitch != 0.0:
+            pitch = self.scalar("pitch", self._first_pitch)
             c, s = ufl.cos(pitch), ufl.sin(pitch)
             e_2, e_3 = c * e_2 + s * e_3, c * e_3 - s * e_2
         X = ufl.SpatialCoordinate(self.mesh)[0]

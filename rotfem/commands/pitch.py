@@ -1,0 +1,48 @@
+"""The pitch over time of a scene as a motion has it: a value, a table or a function, and harmonics, added up."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rotfem.mechanics.motion import Motion
+from rotfem.mechanics.pitch import Pitch, Scalar, differentiated, harmonic_pitch, tabulated_pitch
+from rotfem.scene import Scene
+
+
+def with_pitch(scene: Scene, motion: Motion) -> Motion:
+    """Return the motion of a scene with the pitch of its blade, which may change with time.
+
+    Raises:
+        InputError: the pitch is a function that raises at t = 0, or returns no finite number.
+    """
+    structure: Any = scene.structure
+    if not structure.pitches:
+        return motion
+    given = structure.root.pitch
+    parts = [harmonic_pitch(h.amplitude, h.phase, _turn(h, motion)) for h in given.harmonic]
+    knots = motion.sharp if any(h.per_rev is not None for h in given.harmonic) else ()
+    if given.table is not None:
+        parts.append(tabulated_pitch(given.table))
+        knots = tuple(sorted({*knots, *(row[0] for row in given.table)}))
+    if given.function is not None:
+        parts.append(differentiated(given.at))
+    angle, rate, acceleration = (_sum([part[i] for part in parts], given.value if i == 0 else None) for i in range(3))
+    axis, root = np.array(structure.root_axis), np.array(structure.root_position)
+    known = given.function is None and not given.harmonic
+    return motion.pitched(Pitch(angle, rate, acceleration, axis, root, knots, known, start=angle(0.0)))
+
+
+def _turn(harmonic: Any, motion: Motion) -> tuple[Scalar, Scalar, Scalar]:
+    """Return the angle that a harmonic is a cosine of, but for its phase, and its rates."""
+    if harmonic.per_rev is None:
+        omega = harmonic.frequency
+        return (lambda t: omega * t), (lambda t: omega), (lambda t: 0.0)
+    n = harmonic.per_rev
+    return (lambda t: n * motion.angle(t)), (lambda t: n * motion.speed(t)), (lambda t: n * motion.rate(t))
+
+
+def _sum(parts: list[Scalar], more: float | None) -> Scalar:
+    constant = more or 0.0
+    return lambda t: constant + sum(part(t) for part in parts)

@@ -1,0 +1,177 @@
+"""Pitch over time: the frame of a blade turns about the blade's axis at the root, beside the turn of the hub.
+
+The pitched frame turns with the blade and coincides with that of the hub at t = 0, where the blade has its first pitch
+already. With the pitch θ(t), φ = θ − θ(0), the axis e and the rotation R = exp(φ e), vectors of the hub's frame have
+the components Rᵀ v in the pitched one, and
+
+    w = Rᵀ w_hub + θ̇ e,        ẇ = Rᵀ ẇ_hub − θ̇ e×Rᵀ w_hub + θ̈ e.
+
+The root r stays where it is in both, so the origin, the point of the pitched frame that was the hub's center, moves
+unless the axis of the pitch goes through that center:
+
+    v_o = Rᵀ (w_hub×r) − w×r,        a_o = Rᵀ (a_hub + ẇ_hub×r + w_hub×(w_hub×r)) − ẇ×r − w×(w×r).
+
+So bodies, strains, sections and theories know nothing of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Scalar = Callable[[float], float]
+Array = npt.NDArray[np.float64]
+
+#: A quantity over time and its two rates.
+Course = tuple[Scalar, Scalar, Scalar]
+
+#: Distance of the hub's center from the axis of the pitch, relative to that of the root, below which it is none.
+ON_AXIS = 1e-12
+
+
+def turn_about(axis: Array, angle: float) -> Array:
+    """Return the matrix (3, 3) of the turn by an angle (rad) about a unit vector (Rodrigues' formula)."""
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
+
+
+def is_beside(root: npt.ArrayLike, axis: npt.ArrayLike) -> bool:
+    """Return whether the line through the root (m) along an axis misses the origin."""
+    arm, along = np.asarray(root, dtype=float), np.asarray(axis, dtype=float)
+    return bool(np.linalg.norm(np.cross(arm, along)) > ON_AXIS * np.linalg.norm(arm))
+
+
+def _none(t: float) -> float:
+    return 0.0
+
+
+@dataclass(frozen=True)
+class Pitch:
+    """The pitch of a blade over time.
+
+    Attributes:
+        angle: θ(t), rad.
+        rate: θ̇(t), rad/s.
+        acceleration: θ̈(t), rad/s².
+        axis: unit vector e along the blade at its root, the same in both frames.
+        root: position of the root, m, the same in both frames.
+        knots: times (s) at which the acceleration may jump.
+        known: whether these are all; a function has to be looked at.
+        start: θ(0), rad.
+    """
+
+    angle: Scalar
+    rate: Scalar
+    acceleration: Scalar
+    axis: Array
+    root: Array
+    knots: tuple[float, ...] = ()
+    known: bool = True
+    start: float = 0.0
+
+    @property
+    def moves_origin(self) -> bool:
+        """Whether the center of the hub is not on its axis."""
+        return is_beside(self.root, self.axis)
+
+    def held(self) -> Pitch:
+        """Return the pitch that stays as it is at t = 0."""
+        return replace(self, angle=lambda t: self.start, rate=_none, acceleration=_none, knots=(), known=True)
+
+    def turned(self, t: float) -> float:
+        """Return φ = θ(t) − θ(0), rad."""
+        return self.angle(t) - self.start
+
+    def rotation(self, t: float) -> Array:
+        """Return R(t), shape (3, 3): components in the hub's frame = R · components in the pitched frame."""
+        return turn_about(self.axis, self.turned(t))
+
+    def frame(self, t: float, w: Array, dw: Array, a_o: Array) -> dict[str, Array]:
+        """Return the motion of the pitched frame: w, dw, a_o and v_o, the velocity of its origin, its components.
+
+        Beside it "pitch" (cos φ − 1, sin φ) and "pitch_rate", its rate (1/s).
+
+        Args:
+            t: time, s.
+            w: angular velocity of the hub, rad/s, components of its frame.
+            dw: its rate, rad/s².
+            a_o: acceleration of the hub's center, m/s², likewise.
+        """
+        back, rate, e, r = self.rotation(t).T, self.rate(t), self.axis, self.root
+        of_hub = back @ w
+        spin = of_hub + rate * e
+        change = back @ dw - rate * np.cross(e, of_hub) + self.acceleration(t) * e
+        acceleration, velocity = back @ a_o, np.zeros(3)
+        if self.moves_origin:
+            of_root = np.cross(dw, r) + np.cross(w, np.cross(w, r))
+            acceleration += back @ of_root - np.cross(change, r) - np.cross(spin, np.cross(spin, r))
+            velocity = back @ np.cross(w, r) - np.cross(spin, r)
+        c, s = np.cos(self.turned(t)), np.sin(self.turned(t))
+        turn = {"pitch": np.array([c - 1.0, s]), "pitch_rate": rate * np.array([-s, c])}
+        return {"w": spin, "dw": change, "a_o": acceleration, "v_o": velocity, **turn}
+
+    def in_hub_axes(self, values: Array, t: float) -> Array:
+        """Return vectors (…, 3 n), n of them one after the other, with components in the hub's frame."""
+        triples = values.reshape(*values.shape[:-1], -1, 3)
+        return np.asarray((triples @ self.rotation(t).T).reshape(values.shape))
+
+
+def tabulated_pitch(rows: npt.ArrayLike) -> Course:
+    """Return (θ, θ̇, θ̈) through rows (t in s, θ in rad): at rest at the first and the last, and before and after them.
+
+    Piecewise cubics without overshoot, whose rate is continuous (Fritsch & Carlson, SIAM J. Numer. Anal. 17, 1980,
+    238), since a rate that jumps takes a moment without bound.
+    """
+    from scipy import interpolate  # only a table needs it, and it is slow to load
+
+    t, angles = np.asarray(rows, dtype=float).T
+    slopes = interpolate.PchipInterpolator(t, angles).derivative()(t)
+    slopes[[0, -1]] = 0.0
+    curve: Any = interpolate.CubicHermiteSpline(t, angles, slopes)
+    first, second = curve.derivative(), curve.derivative(2)
+
+    def inside(s: float) -> bool:
+        return bool(t[0] <= s < t[-1])
+
+    return (
+        lambda s: float(curve(min(max(s, t[0]), t[-1]))),
+        lambda s: float(first(s)) if inside(s) else 0.0,
+        lambda s: float(second(s)) if inside(s) else 0.0,
+    )
+
+
+#: Distance of the points of differences, s.
+DIFFERENCE = 2e-4
+
+
+def differentiated(angle: Scalar) -> Course:
+    """Return (θ, θ̇, θ̈) of a function of time, its rates as central differences of fourth order."""
+    h = DIFFERENCE
+
+    def around(t: float) -> list[float]:
+        middle = angle(t)  # of which the others are counted, so that what does not change has no rates
+        return [angle(t + k * h) - middle for k in (-2, -1, 1, 2)]
+
+    return (
+        angle,
+        lambda t: float(np.dot((1, -8, 8, -1), around(t)) / (12 * h)),
+        lambda t: float(np.dot((-1, 16, 16, -1), around(t)) / (12 * h * h)),
+    )
+
+
+def harmonic_pitch(amplitude: float, phase: float, turn: Course) -> Course:
+    """Return (θ, θ̇, θ̈) of amplitude · cos(α + phase), of an angle α(t) and its two rates."""
+    alpha, rate, acceleration = turn
+
+    def at(t: float) -> tuple[float, float]:
+        return amplitude * np.cos(alpha(t) + phase), amplitude * np.sin(alpha(t) + phase)
+
+    return (
+        lambda t: float(at(t)[0]),
+        lambda t: float(-rate(t) * at(t)[1]),
+        lambda t: float(-acceleration(t) * at(t)[1] - rate(t) ** 2 * at(t)[0]),
+    )
