@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
 
 from rotfem.analysis.mesh_estimate import SAFE, MeshEstimate
-from rotfem.analysis.ritz_vectors import RitzVectors
+from rotfem.numerics.projection import summed
 
 Array = npt.NDArray[np.float64]
 
 #: What of an estimate of a frequency is taken, which is 0.2 to 1 of the true error without its margin.
 LIKELY = 2.0
+
+
+class Shapes(Protocol):
+    """Some shapes of a structure.
+
+    Attributes:
+        V: shapes, locally owned unknowns, (n, r).
+        massed: M V.
+        comm: MPI communicator.
+    """
+
+    V: Array
+    massed: Array
+    comm: Any
 
 
 class ShapeError:
@@ -32,7 +46,7 @@ class ShapeError:
         self._turns = [i for i, name in enumerate(names) if not name.startswith("u")]
         self._rotations = {i for i, name in enumerate(system.structure.components) if not name.startswith("u")}
 
-    def of_modes(self, shapes: RitzVectors) -> Array:
+    def of_modes(self, shapes: Shapes) -> Array:
         """Return the relative errors of the frequencies of shapes, by what bends or else by what stretches."""
         function, out = fem.Function(self.system.V), []
         for x, bends in zip(shapes.V.T, self.bend(shapes), strict=True):
@@ -42,11 +56,11 @@ class ShapeError:
             out.append(LIKELY / SAFE * self._estimate(function.x.array.reshape(-1, self._size)[:, components]))
         return np.array(out)
 
-    def bend(self, shapes: RitzVectors) -> npt.NDArray[np.bool_]:
+    def bend(self, shapes: Shapes) -> npt.NDArray[np.bool_]:
         """Return of which shapes the most kinetic energy is in a family that bends, shape (r,)."""
         structure, r = self.system.structure, shapes.V.shape[1]
         along = [structure.oriented(self._whole(Y.reshape(-1, self._size, r))) for Y in (shapes.V, shapes.massed)]
-        energy = shapes.sum((along[0] * along[1]).sum(axis=0))
+        energy = summed(shapes.comm, (along[0] * along[1]).sum(axis=0))
         families = [list(components) for components, _ in structure.families.values()]
         leading = np.argmax([energy[components].sum(axis=0) for components in families], axis=0)
         return np.array([bool(set(families[i]) & self._rotations) for i in leading])

@@ -129,8 +129,10 @@ def next_of(scene: Scene, settings: Settings, done: Result, ahead: Ahead | None)
     error = done.summary["error"]
     assert scene.accuracy is not None
     following = settings.better(error, scene.accuracy)
-    if following is None or following.models == settings.models or ahead is None:
+    if following is None or ahead is None:
         return following
+    if following.models == settings.models:
+        return ahead.meshed(following, error)
     return ahead.prepared(following, error)
 
 

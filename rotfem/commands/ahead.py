@@ -39,6 +39,9 @@ NEWTON, SMALL, MANY = 1e-4, 1e-2, 2000
 #: estimate on free hubs, twice on plates.
 TRUST = 3.0
 
+#: Part of the lowest frequency of what stretches from which a vibration may be one that stretches.
+STRETCHING = 0.7
+
 #: Error of a model from which its motion is another one.
 POOR = 0.1
 
@@ -77,22 +80,27 @@ class Ahead:
             self.own = Motion.between(*path)
 
     def judge(self, done: RunResult, settings: Settings) -> None:
-        """Write into the error of a result what its steps put it off, if the spectra or the run before say less.
+        """Write into the error of a result what the spectra and the run before say of it.
 
         An estimate that follows an error through a nonlinear motion has to doubt its phases; a spectrum knows how much
-        there is of each frequency.
+        there is of each frequency, and of vibrations that stretch, whose phases are not followed, it alone does. A
+        reduced answer has no other estimate of what its mesh has put off by the end than its spectrum.
 
         Args:
             done: the result.
             settings: that it was computed with.
         """
         error = done.summary["error"]
-        if settings.models[0].get("reduced") and error["model"] is not None:
-            error["total"] += (TRUST - 1) * error["model"]
-            error["model"] *= TRUST
+        if settings.models[0].get("reduced"):
+            put(error, "model", TRUST * part(error, "model"))
+            if self.mesh is not None and self.linear is not None and self.linear.tells:
+                put(error, "space", max(part(error, "space"), self.mesh.error(self.linear)))
         elif settings.step is not None and settings.scheme is not None:
-            found = error_ahead(self.motions, Scheme.registry[settings.scheme], settings.step)
-            less(error, found)
+            scheme = Scheme.registry[settings.scheme]
+            if self.mesh is not None and error["time"] is not None:
+                quick = error_ahead(self.motions, scheme, settings.step, STRETCHING * self.mesh.stretching)
+                put(error, "time", error["time"] + (quick or 0.0))
+            less(error, error_ahead(self.motions, scheme, settings.step))
         if self._last is not None:
             compare(done, settings, *self._last)
         self._last = (settings, done)
@@ -106,14 +114,29 @@ class Ahead:
         """
         self.off = min(self.off, part(error, "model") if error else np.inf)
         error = {**error, "time": 1.0, "model": 0.0}
-        if self.mesh is not None and settings.elements is not None:
-            allowed = AIM * shares({**error, "space": 1.0}, self.accuracy)["space"]
-            growth, off = self.mesh.growth(self.motions, allowed)
-            settings = replace(settings, elements=finest(settings.elements, finer(self.mesh.elements, growth)))
-            error["space"] = max(part(error, "space"), off)
+        settings, off = self._grown(settings, error)
+        error["space"] = max(part(error, "space"), off)
         # what is known by a poor model only may be less demanding than the motion is
         trusted = self.own is not None or self.off < POOR
         return self.stepped(settings, (1.0 if trusted else AIM) * shares(error, self.accuracy)["time"])
+
+    def meshed(self, settings: Settings, error: Mapping[str, Any]) -> Settings:
+        """Return settings of the model of before with at least the mesh that its motion needs, if the mesh is to grow.
+
+        Args:
+            settings: to follow.
+            error: of the result before them.
+        """
+        is_coarse = part(error, "space") > shares(error, self.accuracy)["space"]
+        return self._grown(settings, error)[0] if is_coarse and settings.models[0].get("reduced") else settings
+
+    def _grown(self, settings: Settings, error: Mapping[str, Any]) -> tuple[Settings, float]:
+        """Return settings with elements as the motion needs them, and the relative error that these leave."""
+        if self.mesh is None or settings.elements is None:
+            return settings, 0.0
+        allowed = AIM * shares({**error, "space": 1.0}, self.accuracy)["space"]
+        growth, off = self.mesh.growth(self.motions, allowed)
+        return replace(settings, elements=finest(settings.elements, finer(self.mesh.elements, growth))), off
 
     def stepped(self, settings: Settings, allowed: float) -> Settings:
         """Return settings with the steps of an error that is allowed."""
@@ -139,10 +162,16 @@ def sampled(response: Response) -> Motion:
 
 def less(error: dict[str, Any], found: float | None) -> None:
     """Write an estimate of the error of steps that is the smaller one, or the only one, into an error."""
-    if found is None or (error["time"] is not None and error["time"] <= found):
+    if found is not None and (error["time"] is None or found < error["time"]):
+        put(error, "time", found)
+
+
+def put(error: dict[str, Any], name: str, found: float) -> None:
+    """Write another estimate of a part of an error into it, and into the sum; one that is unknown stays so if zero."""
+    if error[name] is None and found == 0.0:
         return
-    error["total"] = (error["total"] or 0.0) + found - part(error, "time")
-    error["time"] = found
+    error["total"] = (error["total"] or 0.0) + found - part(error, name)
+    error[name] = found
 
 
 def compare(done: RunResult, settings: Settings, before: Settings, coarse: RunResult) -> None:

@@ -29,6 +29,9 @@ SHARES = {"time": 0.5, "space": 0.2, "model": 0.3}
 #: Least and most that a number of elements grows by at once, and to what a tolerance and a step shrink at most.
 FINER, TIGHTER, SHORTER = (1.25, 4.0), 1e-3, 1 / 16
 
+#: Part of an accuracy that a reduced model may be off by while a finer mesh, which costs it little, is still tried.
+SPARED = 0.75
+
 #: What is aimed at, as a part of a share: an error as large as its share would be missed by half of all attempts.
 AIM = 0.7
 
@@ -100,7 +103,8 @@ class Settings:
         """
         allowed = shares(error, accuracy)
         new = self
-        if part(error, "model") > allowed["model"]:
+        spared = SPARED * SAFETY * accuracy if self.models[0].get("reduced") else 0.0
+        if part(error, "model") > max(allowed["model"], spared):
             richer = self.richer()
             if richer is None and part(error, "model") >= accuracy:
                 return None

@@ -1,13 +1,15 @@
 """How fine a mesh has to be for an accuracy, from a reduced answer: what it puts the frequencies off that move the tip.
 
-The modes of a reduced model at rest are shapes of the structure, whose errors by the mesh are told from themselves
-(`rotfem.analysis.shape_error`). With n elements for each they fall as n^{−2k} with the degree k.
+The modes of a reduced model at its start are shapes of the structure, whose errors by the mesh are told from themselves
+(`rotfem.analysis.shape_error`). With n elements for each they fall as n^{−2k} with the degree k. A line of the spectrum
+has the error of the mode at its frequency: what stretches is followed by far coarser meshes than what bends as fast.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,19 +24,30 @@ Array = npt.NDArray[np.float64]
 MODES, LEAST, GROWTHS = 12, 1e-14, np.geomspace(1.0, 8.0, 25)
 
 
+@dataclass
+class ModeShapes:
+    """Modes in the locally owned unknowns, (n, r), the forces of their masses, and the communicator."""
+
+    V: Array
+    massed: Array
+    comm: Any
+
+
 @dataclass(frozen=True)
 class MeshAhead:
     """What a mesh puts frequencies off.
 
     Attributes:
         omega: frequencies, increasing, rad/s, (n,).
-        off: relative errors, which grow with them, (n,).
+        off: their relative errors, (n,).
+        stretches: which modes stretch rather than bend, (n,).
         elements: number of elements, (nx, ny) of a plate.
         degree: of the elements.
     """
 
     omega: Array
     off: Array
+    stretches: npt.NDArray[np.bool_]
     elements: int | tuple[int, int]
     degree: int
 
@@ -44,14 +57,22 @@ class MeshAhead:
         model, shapes = response.model, ShapeError(response.model.system)
         if model.size == 0:
             return None
-        M, _, K, _ = (x[0] for x in model.operators(response.factors()[:1]))
+        c = response.factors()[:1]
+        M, _, K, _ = (x[0] for x in model.operators(c))
         squares, modes = np.linalg.eig(np.linalg.solve(M, K))
         chosen = np.argsort(squares.real)[:MODES]
         chosen = chosen[squares.real[chosen] > 0.0]
         if not len(chosen):
             return None
-        off = [max(LEAST, shapes.of_shape(model.V @ modes[:, i].real)) for i in chosen]
-        return cls(np.sqrt(squares.real[chosen]), np.maximum.accumulate(off), elements, degree)
+        X = modes[:, chosen].real
+        found = ModeShapes(model.V[model.owned] @ X, model.forces("M", c[0]) @ X, model.comm)
+        off = np.maximum(LEAST, shapes.of_modes(found))
+        return cls(np.sqrt(squares.real[chosen]), off, ~shapes.bend(found), elements, degree)
+
+    @property
+    def stretching(self) -> float:
+        """Frequency of the lowest mode that stretches, rad/s; infinite where there is none among those known."""
+        return float(self.omega[self.stretches].min(initial=np.inf))
 
     def growth(self, motions: Sequence[Motion], allowed: float) -> tuple[float, float]:
         """Return how many times more elements are expected to keep to an error, and what they leave.

@@ -80,6 +80,10 @@ class Spectrum:
         amplitudes = np.linalg.norm(lines, axis=1) * 2 / window.sum() / scale / beside
         return cls(2 * np.pi * np.fft.rfftfreq(n, step), amplitudes, n * step)
 
+    def above(self, omega: float) -> Spectrum:
+        """Return the part of it at frequencies from one (rad/s) on."""
+        return Spectrum(self.omega, np.where(self.omega >= omega, self.amplitudes, 0.0), self.duration)
+
     def lost(self, h: float) -> float:
         """Return the error by what steps of h (s) damp out, with all amplitudes together."""
         return LOST * float(self.amplitudes[self.omega * h >= DAMPED].sum())
@@ -154,12 +158,19 @@ class Motion:
         windows = np.array_split(np.arange(len(self.t)), WINDOWS)
         return [Spectrum.of(self.t[i], self.tips[i], self.scale, SHARP) for i in windows]
 
-    def error(self, scheme: Any, h: float) -> float:
-        """Return the relative error of steps of h (s): what they damp out counts where there is most of it."""
+    def error(self, scheme: Any, h: float, above: float = 0.0) -> float:
+        """Return the relative error of steps of h (s): what they damp out counts where there is most of it.
+
+        Args:
+            scheme: of the steps.
+            h: their length.
+            above: frequency from which vibrations count, rad/s.
+        """
         omega, amplitudes = np.array(self.struck).reshape(-1, 2).T
-        struck = Spectrum(omega, amplitudes / self.scale, self.whole.duration)
-        lost = max(struck.lost(h), *(part.lost(h) for part in self.parts)) - self.whole.lost(h)
-        return self.whole.error(scheme, h) + struck.error(scheme, h) - struck.lost(h) + max(0.0, lost)
+        struck = Spectrum(omega, amplitudes / self.scale, self.whole.duration).above(above)
+        whole, parts = self.whole.above(above), [part.above(above) for part in self.parts]
+        lost = max(struck.lost(h), *(part.lost(h) for part in parts)) - whole.lost(h)
+        return whole.error(scheme, h) + struck.error(scheme, h) - struck.lost(h) + max(0.0, lost)
 
     def plan(self, scheme: Any, allowed: float) -> Plan:
         """Return the steps of a scheme."""
@@ -203,6 +214,13 @@ def plan(motions: Sequence[Motion], allowed: float, schemes: Iterable[Any]) -> P
     return min(each, key=lambda found: found.work, default=None)
 
 
-def error_ahead(motions: Sequence[Motion], scheme: Any, step: float) -> float | None:
-    """Return the relative error of fixed steps (s) of a scheme, of the most demanding motion; None where none tells."""
-    return max((motion.error(scheme, step) for motion in motions if motion.tells), default=None)
+def error_ahead(motions: Sequence[Motion], scheme: Any, step: float, above: float = 0.0) -> float | None:
+    """Return the relative error of fixed steps (s) of a scheme, of the most demanding motion; None where none tells.
+
+    Args:
+        motions: answers that there are.
+        scheme: of the steps.
+        step: s.
+        above: frequency from which vibrations count, rad/s.
+    """
+    return max((motion.error(scheme, step, above) for motion in motions if motion.tells), default=None)
