@@ -123,7 +123,7 @@ class Settings:
                 return None
             growth = (part(error, "space") / (AIM * allowed["space"])) ** (1 / (self.degree + 1))
             new = replace(new, elements=finer(self.elements, min(max(growth, FINER[0]), FINER[1])))
-        return None if new is self else new
+        return self.richer() if new is self else new
 
 
 def part(error: Mapping[str, Any], name: str) -> float:

@@ -89,6 +89,28 @@ def test_two_runs_say_what_their_steps_do() -> None:
     assert error["total"] == pytest.approx(error["time"] + error["space"])
 
 
+def test_a_mesh_too_coarse_for_a_blow_is_seen() -> None:
+    """Eight milliseconds strike modes up to the eighth: what their frequencies are off by moves the tip in the end.
+
+    A reduced answer is told to be at least as far off as its mesh puts it, and a finer mesh follows.
+    """
+    steel = {"E": 2.1e11, "nu": 0.3, "rho": 7800.0, "shape": "rectangle", "width": 0.04, "height": 0.012}
+    struck = {
+        "structure": {"type": "planar_beam", "length": 2.0, "section": steel},
+        "motion": {"type": "constant", "speed": 0.0},
+        "loads": {"tip_force": [[0, 0, 0], [0.1, 0, 0], [0.104, 0, 60.0], [0.108, 0, 0], [1, 0, 0]]},
+        "time": {"end": 0.4, "step": 4e-4},
+    }
+    exact, coarse = (
+        run({**struck, "model": {"theory": "consistent_linear", "reduced": 5e-4}, "mesh": {"elements": n}})
+        for n in (24, 8)
+    )
+    result = run({**struck, "accuracy": 3e-3})
+    first, *_, last = result.summary["accuracy"]["attempts"]
+    assert true_error(coarse, exact) < first["error"]
+    assert first["elements"] == 8 < last["elements"]
+
+
 def test_rows_are_where_they_were_asked_for() -> None:
     """However long the steps are; between them the tip is as good as at their ends."""
     result = run(scene("spin-up", **{"time.step": 0.25, "time.output_every": 2}))
