@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+from mpi4py import MPI
 
 from rotfem.analysis.reduced.response import Response, tips_of
 from rotfem.analysis.reduced.struck import struck
 from rotfem.analysis.schemes import Scheme
 from rotfem.numerics.newton import SMALLEST
 from rotfem.results.run import RunResult
-from rotfem.selection.accuracy import AIM, Settings, finer, finest, part, shares
+from rotfem.selection.accuracy import AIM, Elements, Settings, finer, finest, part, shares
+from rotfem.selection.effects_ahead import effects_ahead
 from rotfem.selection.mesh_ahead import MeshAhead
 from rotfem.selection.steps_ahead import Motion, error_ahead, plan
 
@@ -39,6 +41,9 @@ NEWTON, SMALL, MANY = 1e-4, 1e-2, 2000
 #: estimate on free hubs, twice on plates.
 TRUST = 3.0
 
+#: By how much larger elements may be off than those of an answer, which they follow if that is allowed.
+LARGER = 8.0
+
 #: Part of the lowest frequency of what stretches from which a vibration may be one that stretches.
 STRETCHING = 0.7
 
@@ -61,6 +66,7 @@ class Ahead:
         self.linear: Motion | None = None
         self.own: Motion | None = None
         self.mesh: MeshAhead | None = None
+        self.response: Response | None = None
         self.length, self.off = 1.0, np.inf
         self._last: tuple[Settings, RunResult] | None = None
 
@@ -73,7 +79,7 @@ class Ahead:
         """Take note of how the tip has moved in a run."""
         self.length = float(run.system.structure.length)
         if run.response is not None:
-            self.linear = sampled(run.response)
+            self.response, self.linear = run.response, sampled(run.response)
             mesh = run.scene.mesh
             self.mesh = MeshAhead.of(run.response, mesh.elements, mesh.degree)
         elif run.track is not None and len((path := run.track.path())[0]) > 1:
@@ -92,6 +98,7 @@ class Ahead:
         """
         error = done.summary["error"]
         if settings.models[0].get("reduced"):
+            self.off = min(self.off, part(error, "model") if error["model"] is not None else np.inf)
             put(error, "model", TRUST * part(error, "model"))
             if self.mesh is not None and self.linear is not None and self.linear.tells:
                 put(error, "space", max(part(error, "space"), self.mesh.error(self.linear)))
@@ -130,13 +137,27 @@ class Ahead:
         is_coarse = part(error, "space") > shares(error, self.accuracy)["space"]
         return self._grown(settings, error)[0] if is_coarse and settings.models[0].get("reduced") else settings
 
+    def effects(self, error: Mapping[str, Any], spent: float, comm: MPI.Comm) -> Any:
+        """Return what effects are worth (see `rotfem.selection.effects_ahead`).
+
+        Args:
+            error: of the answer.
+            spent: time that it took, s.
+            comm: of the processes that have computed it.
+        """
+        allowed = shares({**error, "model": 1.0}, self.accuracy)["model"]
+        return effects_ahead(self.response, self.off, allowed, spent, comm)
+
     def _grown(self, settings: Settings, error: Mapping[str, Any]) -> tuple[Settings, float]:
         """Return settings with elements as the motion needs them, and the relative error that these leave."""
         if self.mesh is None or settings.elements is None:
             return settings, 0.0
         allowed = AIM * shares({**error, "space": 1.0}, self.accuracy)["space"]
         growth, off = self.mesh.growth(self.motions, allowed)
-        return replace(settings, elements=finest(settings.elements, finer(self.mesh.elements, growth))), off
+        grown: Elements = finer(self.mesh.elements, growth)
+        if growth >= 1.0 or part(error, "space") > allowed / LARGER:
+            grown = finest(settings.elements, grown)
+        return replace(settings, elements=grown), off
 
     def stepped(self, settings: Settings, allowed: float) -> Settings:
         """Return settings with the steps of an error that is allowed."""
