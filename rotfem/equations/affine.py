@@ -234,9 +234,14 @@ class AffineSystem(AffineEnergies):
             out.append(A)
         return out[0], out[1]
 
+    @cached_property
+    def _spun(self) -> Any:
+        return compat.create_vector(self.V)
+
     def spin_derivative(self, c_v: float, c_m: float) -> Any:
-        """Return c_v ∂F/∂Omega + c_m ∂F/∂Omega' of the state, a PETSc vector: the speed along the axis varies."""
-        axis, out = self._decomposed.axis, compat.create_vector(self.V)
+        """Return c_v ∂F/∂Omega + c_m ∂F/∂Omega' of the state, a PETSc vector (reused): the speed varies."""
+        axis, out = self._decomposed.axis, self._spun
+        out.zeroEntries()
         values = {name: constant.value.ravel() for name, constant in self._constants.items()}
         states = dict(zip("KCM", self._qva, strict=True))
         for p, weight in zip(self.pieces, self._weights, strict=True):

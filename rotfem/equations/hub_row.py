@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import ufl
 
-from rotfem.equations.nonlinear import assembled, by_spin
+from rotfem.equations.nonlinear import BySpin, assembled
 from rotfem.equations.system import System
 from rotfem.mechanics import work
 from rotfem.numerics import compat, forms
@@ -39,8 +39,8 @@ class HubRow:
         return forms.form(work.momentum(self.model.mechanics, self.model.turn))
 
     @cached_property
-    def _by_spin(self) -> list[Any]:
-        return [by_spin(self.model, self._work, name) for name in ("w", "dw")]
+    def _by_spin(self) -> BySpin:
+        return BySpin(self.model, self._work)
 
     @cached_property
     def _row(self) -> tuple[list[Any], Any]:
@@ -83,9 +83,9 @@ class HubRow:
 
     def diagonal(self, c_v: float, c_m: float) -> float:
         """Return ∂(residual)/∂psi: c_v ∂/∂psi' + c_m ∂/∂psi''."""
-        by_speed = self._value(self._by_spin[0]) + self.hub.damping
-        by_rate = self._value(self._by_spin[1]) + self.hub.inertia
-        return c_v * by_speed + c_m * by_rate
+        form = self._by_spin.form(c_v, c_m)
+        own = c_v * self.hub.damping + c_m * self.hub.inertia
+        return own if form is None else own + self._value(form)
 
     def row(self, shifts: tuple[float, float, float]) -> Any:
         """Return ∂(residual)/∂q as a PETSc vector (reused); zero if uncoupled."""

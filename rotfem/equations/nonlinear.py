@@ -11,6 +11,7 @@ import ufl
 from dolfinx import fem, la
 from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms import expand_derivatives
+from ufl.algorithms.analysis import extract_constants
 
 from rotfem.equations.energy_balance import EnergyBalance
 from rotfem.equations.hub_damping import HubDamping
@@ -235,28 +236,51 @@ class NonlinearSystem(System):
         A.setDiagonal(d)
 
     @cached_property
-    def _by_spin(self) -> list[Any]:
-        return [by_spin(self.model, self._residual_form, name) for name in ("w", "dw")]
+    def _by_spin(self) -> BySpin:
+        return BySpin(self.model, self._residual_form)
+
+    @cached_property
+    def _spun(self) -> Any:
+        return compat.create_vector(self.V)
 
     def spin_derivative(self, c_v: float, c_m: float) -> Any:
-        """Return c_v ∂F/∂Omega + c_m ∂F/∂Omega' at the state, a PETSc vector, zero at clamped unknowns."""
-        out = compat.create_vector(self.V)
-        for form, factor in zip(self._by_spin, (c_v, c_m), strict=True):
-            if form is not None and factor != 0.0:
-                out.axpy(factor, assembled(form, self.V, self.clamped))
-        return out
+        """Return c_v ∂F/∂Omega + c_m ∂F/∂Omega' at the state, a PETSc vector (reused), zero at clamped unknowns."""
+        form = self._by_spin.form(c_v, c_m)
+        if form is None:
+            self._spun.zeroEntries()
+            return self._spun
+        return assembled(form, self.V, self.clamped, self._spun)
 
 
-def by_spin(model: Any, form: Any, name: str) -> Any:
-    """Compile ∂form/∂s where the constant w (or its rate) is w + s e; None if it is not in the form."""
-    constant = model.frame.constants.get(name)
-    if constant is None:
-        return None
-    s = ufl.variable(model.structure.constant(0.0))
-    axis = model.motion.axis[-constant.value.size :]
-    shifted = ufl.as_vector([constant[i] + s * float(e) for i, e in enumerate(axis)])
-    derivative = expand_derivatives(ufl.diff(ufl.replace(form, {constant: shifted}), s))
-    return None if derivative.empty() else forms.form(derivative)
+class BySpin:
+    """c_v ∂/∂Omega + c_m ∂/∂Omega' of a form, the speed along the axis of the motion varied, compiled.
+
+    Args:
+        model: the constants of the frame.
+        form: UFL form; only its integrals with the speed or its rate are differentiated.
+    """
+
+    def __init__(self, model: Any, form: Any):
+        self._factors = [model.structure.constant(0.0) for _ in range(2)]
+        parts = []
+        for name, factor in zip(("w", "dw"), self._factors, strict=True):
+            constant = model.frame.constants.get(name)
+            if constant is None:
+                continue
+            within = [part for part in form.integrals() if constant in extract_constants(part.integrand())]
+            s = ufl.variable(model.structure.constant(0.0))
+            axis = model.motion.axis[-constant.value.size :]
+            shifted = ufl.as_vector([constant[i] + s * float(e) for i, e in enumerate(axis)])
+            derivative = expand_derivatives(ufl.diff(ufl.replace(ufl.Form(within), {constant: shifted}), s))
+            if not derivative.empty():
+                parts.append(factor * derivative)
+        self._form = forms.form(added(parts)) if parts else None
+
+    def form(self, c_v: float, c_m: float) -> Any:
+        """Return it with these factors, compiled; None if the speed is not in the form."""
+        for constant, value in zip(self._factors, (c_v, c_m), strict=True):
+            constant.value = value
+        return self._form
 
 
 def assembled(form: Any, V: fem.FunctionSpace, clamped: Any, b: Any = None) -> Any:

@@ -2,8 +2,8 @@
 
 Two meshes are compared by the frequencies of the shapes that move the tip, the structure at rest, each told as a run
 tells it (`rotfem.analysis.refined_mesh`): on cells of half the size, or from the shapes themselves where there are too
-many. Modes are solved by the poorest theory on the case's own mesh and on cells of half the size, of a mesh file with
-the hub held.
+many. Modes are solved by the poorest theory on the case's own mesh and on cells of half the size; of a free
+hub with a mesh file the hub is held.
 """
 
 from __future__ import annotations
@@ -70,9 +70,9 @@ def error_of_modes(trial: Trial, own: Candidate) -> float:
     Raises:
         ComputationError: eigenpairs not to be trusted.
     """
-    system, count = own.switched(), trial.case.mode_count
-    cells = 2**system.structure.mesh.topology.dim
-    if cells * len(system.held.zeros()) <= MOST and not from_file(trial.case.problem):
+    system, count, hub = own.switched(), trial.case.mode_count, trial.case.problem.motion.hub
+    small = 2**system.structure.mesh.topology.dim * len(system.held.zeros()) <= MOST
+    if hub is not None and small and not from_file(trial.case.problem):
         twice = trial.on_mesh(halved(trial.full.problem.mesh), next(iter(trial.theories)))
         return modes_change(own.eigenvalues(trial.speeds), twice.eigenvalues(trial.speeds))
     fine = RefinedMesh(system).equations if system.held.linear else None
