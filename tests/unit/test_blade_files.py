@@ -15,36 +15,6 @@ from tests import blade_main_decks as mains
 from tests.blade_scenes import RIGID, STIFF, blade, read
 
 
-def along_ours(matrix: Any) -> Any:
-    """Return a matrix in axes 1, 2, 3 = z, −y, x from one in x, y, z: entry by entry."""
-    place, sign = [2, 1, 0, 5, 4, 3], np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
-    return np.asarray(matrix)[np.ix_(place, place)] * np.outer(sign, sign)
-
-
-def test_one_blade_in_four_formats(tmp_path: Path) -> None:
-    """Matrices at root and tip are those of sums over centres in IEC axes; pretwist is −twist."""
-    (tmp_path / "windio.yaml").write_text(decks.windio())
-    (tmp_path / "windio2.yaml").write_text(decks.windio_2())
-    beams = {
-        "beamdyn": blade(tmp_path, decks.beamdyn_blade(), structure_length=decks.LENGTH),
-        "hawc2 full": blade(tmp_path, decks.hawc2(True), "full.st"),
-        "hawc2": blade(tmp_path, decks.hawc2(False), "centres.st"),
-        "windio": read(tmp_path, "windio.yaml"),
-        "windio 2": read(tmp_path, "windio2.yaml"),
-    }
-    for name, beam in beams.items():
-        assert beam.length == pytest.approx(decks.LENGTH, rel=1e-12)
-        for x, station, angle in zip((0.0, decks.LENGTH), decks.STATIONS, decks.ANGLE, strict=True):
-            at = beam.section.at(x)
-            for key, matrix in zip(("stiffness", "mass"), decks.iec_matrices(station, angle), strict=True):
-                wanted = along_ours(matrix)
-                scale = np.sqrt(np.outer(np.diag(wanted), np.diag(wanted)))
-                assert np.max(np.abs(at[key] - wanted) / scale) < 1e-12, (name, key, x)
-    for name in ("windio", "windio 2"):
-        twist = np.array(beams[name].pretwist)
-        np.testing.assert_allclose(twist[[0, -1], 1], -np.radians(decks.TWIST), rtol=1e-12)
-
-
 def test_elastodyn(tmp_path: Path) -> None:
     beam = blade(tmp_path, decks.elastodyn(), structure_length=decks.LENGTH, **RIGID)
     section = beam.section
@@ -282,6 +252,13 @@ def test_windio_2(tmp_path: Path) -> None:
     assert beam.precone == pytest.approx(np.radians(4.0))
     np.testing.assert_allclose(np.array(beam.line)[:, 2], [0.0, 0.0, 1.0, 3.0])
     assert "hub_radius" not in beam.model_fields_set
+
+
+def test_an_anchor_may_be_named_again(tmp_path: Path) -> None:
+    """As YAML 1.2 has it: an alias is the last one before it."""
+    text = decks.windio().replace("name: small", "name: &axis small\nother: *axis")
+    (tmp_path / "blade.yaml").write_text(text)
+    assert read(tmp_path, "blade.yaml").length == pytest.approx(decks.LENGTH, rel=1e-12)
 
 
 def test_windio_2_with_axes_exchanged(tmp_path: Path) -> None:

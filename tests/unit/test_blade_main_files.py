@@ -78,7 +78,7 @@ def test_main_body_of_hawc2(tmp_path: Path) -> None:
 
 
 def test_bodies_of_hawc2_in_another_file(tmp_path: Path) -> None:
-    """Paths start at the folder of the main file or at the one above, but not at both."""
+    """Paths start at the folder of the main file or at one of the two above, but not at several."""
     (tmp_path / "htc").mkdir()
     (tmp_path / "blade.st").write_text(decks.hawc2(True))
     (tmp_path / "bodies.htc").write_text(mains.hawc2_htc() + "exit ;\nbegin nothing\n")
@@ -86,7 +86,7 @@ def test_bodies_of_hawc2_in_another_file(tmp_path: Path) -> None:
     beam = blade(tmp_path / "htc", main, "main.htc", body="blade1")
     assert beam.length == pytest.approx(decks.LENGTH, rel=1e-12)
     (tmp_path / "htc" / "blade.st").write_text(decks.hawc2(True))
-    with pytest.raises(rotfem.SceneError, match=r"line 13, column 2: there are two files"):
+    with pytest.raises(rotfem.SceneError, match=r"line 13, column 2: there are several files"):
         blade(tmp_path / "htc", main, "main.htc", body="blade1")
     with pytest.raises(rotfem.SceneError, match="continues in more than 8 files"):
         blade(tmp_path, "continue_in_file main.htc ;\n", "main.htc")

@@ -31,6 +31,19 @@ def is_symmetric(matrix: Array) -> bool:
     return bool(np.max(np.abs(matrix - matrix.T)) <= SYMMETRIC * np.max(np.abs(matrix)))
 
 
+def is_positive(matrix: Array, definite: bool = True) -> bool:
+    """Return whether a symmetric matrix is positive definite, or at least semidefinite, as a mass without inertias is.
+
+    It is judged with ones on its diagonal, as its entries have different units.
+    """
+    diagonal = np.diag(matrix)
+    if not np.all(np.isfinite(matrix)) or np.any(diagonal <= 0.0 if definite else diagonal < 0.0):
+        return False
+    scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    least = np.linalg.eigvalsh(matrix / np.outer(scale, scale))[0]
+    return bool(least > 0.0 if definite else least >= -SYMMETRIC)
+
+
 def symmetric(matrix: Array) -> Array:
     """Return a matrix with what its digits leave of asymmetry taken out."""
     return (matrix + matrix.T) / 2

@@ -18,6 +18,7 @@ from rotfem.registry import register
 from rotfem.scene.blades.axes import (
     FROM_IEC,
     iec_pretwist,
+    is_positive,
     is_symmetric,
     rows_over,
     scaled_rows,
@@ -35,6 +36,9 @@ VERSIONS = ("1.00",)
 
 #: The same of the primary file, which need not say any.
 PRIMARY_VERSIONS = ("1.00", "1.01")
+
+#: Part of the length by which the first key point may miss the origin: files that programs write have round-off.
+ORIGIN = 1e-9
 
 
 def recognises(deck: Deck) -> bool:
@@ -72,6 +76,8 @@ def _section(deck: Deck, length: float) -> dict[str, Any]:
             matrix = np.array(deck.rows(line, 6, 6))
             if not is_symmetric(matrix):
                 deck.fail(f"the {name} matrix of station {len(stations)} is not symmetric", line)
+            if not is_positive(symmetric(matrix), definite=name == "stiffness"):
+                deck.fail(f"the {name} matrix of station {len(stations)} is not positive definite", line)
             found.append(symmetric(turned_matrix(matrix, FROM_IEC)))
             line += 6
     if not np.isclose(stations[-1], 1.0, rtol=1e-6):
@@ -99,8 +105,9 @@ def _primary(deck: Deck) -> dict[str, Any]:
     first = deck.find("kp_xr kp_yr kp_zr initial_twist") + 2
     points = np.array(deck.rows(first, count, 4))
     line = points[:, :3] @ FROM_IEC.T
-    if np.any(line[0] != 0.0):
+    if np.linalg.norm(line[0]) > ORIGIN * np.linalg.norm(line[-1]):
         deck.fail("the first key point must be (0, 0, 0)", first)
+    line -= line[0]
     through = line_through(as_line(line.tolist()))
     at = np.array([0.0, *through.knots, through.length])
     if len(at) != count:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+
 from rotfem.errors import show
 from rotfem.registry import Registry
 from rotfem.registry import blade_formats as registered
@@ -95,7 +97,8 @@ def keys_of(path: Path, asked: Asked) -> dict[str, Any]:
     """
     deck = Deck(path)
     kind = format_of(deck, asked.section.get("format"))
-    read = kind.read(deck, asked)
+    with np.errstate(all="ignore"):  # what overflows is refused by the section, with its key
+        read = kind.read(deck, asked)
     own = {key: value for key, value in asked.section.items() if key not in ("from", "format", "set", "body")}
     for where, given, there in (("section.", own, read["section"]), ("", asked.structure, read)):
         for key in there:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from rotfem.registry import register
-from rotfem.scene.blades.axes import FROM_HAWC2, about_axis, rows_over, shifted, turned_matrix
+from rotfem.scene.blades.axes import FROM_HAWC2, about_axis, is_positive, rows_over, shifted, turned_matrix
 from rotfem.scene.blades.deck import Deck
 from rotfem.scene.blades.formats import Asked, BladeFormat
 from rotfem.scene.blades.hawc2_body import c2_def, is_htc, main_body, named_file
@@ -140,7 +140,7 @@ def _sections(deck: Deck, wanted: Any, full: bool | None = None) -> tuple[Array,
     rows = [{name: float(values[i]) for name, values in table.items()} for i in range(count)]
     stiffness = np.array([_stiffness(row) for row in rows])
     for i, matrix in enumerate(stiffness):
-        if np.linalg.eigvalsh(matrix / np.sqrt(np.outer(np.diag(matrix), np.diag(matrix))))[0] <= 0.0:
+        if not is_positive(matrix):
             deck.fail("the stiffness matrix is not positive definite", first + i)
     mass = np.array([_mass(row) for row in rows])
     return table["r"], stiffness, mass

@@ -2,7 +2,7 @@
 
 A command is the words of a line up to a semicolon; `begin NAME` and `end` bracket blocks, `continue_in_file` goes on in
 another file, which `exit` ends. Paths start where HAWC2 is run, which the file does not say: here at the folder of the
-htc file or at the one above, where its models have their `htc` folder.
+htc file or at one of the two above, where its models have their folders `htc` and `htc/_master`.
 """
 
 from __future__ import annotations
@@ -170,15 +170,15 @@ def _commands(deck: Deck, main: Deck, depth: int) -> Iterator[Command]:
 
 
 def named_file(command: Command, main: Deck) -> Deck:
-    """Return the file that a command names, from the folder of the main file or from the one above.
+    """Return the file that a command names, from the folder of the main file or from one of the two above.
 
     Raises:
-        PydanticCustomError: it is in neither, or there are two.
+        PydanticCustomError: it is in none of them, or there are several.
     """
     name = command.words[1].strip("\"'").replace("\\", "/")
-    places = {(folder / name).resolve() for folder in (main.path.parent, main.path.parent.parent)}
+    places = {(folder / name).resolve() for folder in list(main.path.parents)[:3]}
     found = sorted(path for path in places if path.is_file())
     if len(found) != 1:
-        what = "there is no file" if not found else "there are two files"
-        command.fail(f"{what} {show(name)} from the folder of {main.path.name} or the one above", 2)
+        what = "there is no file" if not found else "there are several files"
+        command.fail(f"{what} {show(name)} from the folder of {main.path.name} or the two above", 2)
     return Deck(found[0])

@@ -16,7 +16,15 @@ from typing import Any
 import numpy as np
 
 from rotfem.registry import register
-from rotfem.scene.blades.axes import FROM_IEC, coned_root, iec_pretwist, rows_over, scaled_rows, turned_matrix
+from rotfem.scene.blades.axes import (
+    FROM_IEC,
+    coned_root,
+    iec_pretwist,
+    is_positive,
+    rows_over,
+    scaled_rows,
+    turned_matrix,
+)
 from rotfem.scene.blades.deck import Deck
 from rotfem.scene.blades.formats import Asked, BladeFormat
 from rotfem.scene.blades.yaml_tree import YamlNode, yaml_tree
@@ -58,8 +66,8 @@ def _blade_1(tree: YamlNode) -> dict[str, Any]:
     properties = tree["components.blade.elastic_properties_mb.six_x_six"]
     line, length, pretwist = _axis(properties["reference_axis"], properties["twist"], degrees=False)
     section = {
-        "stiffness": _rows_of_21(properties["stiff_matrix"], length),
-        "mass": _rows_of_21(properties["inertia_matrix"], length),
+        "stiffness": _rows_of_21(properties["stiff_matrix"], length, definite=True),
+        "mass": _rows_of_21(properties["inertia_matrix"], length, definite=False),
     }
     return {"line": line, "pretwist": pretwist, "section": section}
 
@@ -110,15 +118,15 @@ def _hub(tree: YamlNode, degrees: bool) -> dict[str, Any]:
     return coned_root(diameter.number() / 2, float(precone))
 
 
-def _rows_of_21(table: YamlNode, length: float) -> list[list[Any]]:
-    """Return the table of matrices from rows of 21 entries."""
+def _rows_of_21(table: YamlNode, length: float, definite: bool) -> list[list[Any]]:
+    """Return the table of matrices, definite or semidefinite, from rows of 21 entries."""
     rows = table["values"].entries()
     grid = table["grid"].grid(len(rows))
     upper = [row.numbers() for row in rows]
     for row, entries in zip(rows, upper, strict=True):
         if len(entries) != len(ELEMENTS):
             row.fail(f"has {len(entries)} entries; must be the 21 of the upper triangle")
-    return scaled_rows(grid, length, _along_ours(np.array(upper)))
+    return scaled_rows(grid, length, _checked(_along_ours(np.array(upper)), rows, definite))
 
 
 def _stiffness(table: YamlNode, length: float) -> list[list[Any]]:
@@ -138,7 +146,7 @@ def _stiffness(table: YamlNode, length: float) -> list[list[Any]]:
     upper = np.zeros((count, len(ELEMENTS)))
     for column, name in enumerate(ELEMENTS):
         upper[:, column] = _column(table, name, count)
-    return scaled_rows(grid, length, _along_ours(upper))
+    return scaled_rows(grid, length, _checked(_along_ours(upper), table["K44"].entries(), definite=True))
 
 
 def _mass(table: YamlNode, length: float) -> list[list[Any]]:
@@ -155,7 +163,8 @@ def _mass(table: YamlNode, length: float) -> list[list[Any]]:
             table[name].fail(f"has {len(values)} values for {count} places")
     M = {"K11": mass, "K16": -mass * y, "K22": mass, "K26": mass * x, "K33": mass, "K34": mass * y, "K35": -mass * x}
     M |= {"K44": edge, "K45": -cross, "K55": flap, "K66": polar}
-    return scaled_rows(grid, length, _along_ours(np.stack([M.get(e, np.zeros(count)) for e in ELEMENTS], axis=-1)))
+    upper = np.stack([M.get(element, np.zeros(count)) for element in ELEMENTS], axis=-1)
+    return scaled_rows(grid, length, _checked(_along_ours(upper), table["mass"].entries(), definite=False))
 
 
 def _column(table: YamlNode, name: str, zeros: int | None = None) -> Array:
@@ -169,6 +178,16 @@ def _column(table: YamlNode, name: str, zeros: int | None = None) -> Array:
     if len(values) != zeros:
         found.fail(f"has {len(values)} values for {zeros} places")
     return values
+
+
+def _checked(matrices: Array, places: list[YamlNode], definite: bool) -> Array:
+    """Return matrices (n, 6, 6); refuse one that no section has where its numbers stand."""
+    for matrix, place in zip(matrices, places, strict=True):
+        if not is_positive(matrix, definite):
+            place.fail(
+                "is of a matrix that is not positive definite" + ("; nor may shear stiffness be 0" if definite else "")
+            )
+    return matrices
 
 
 def _along_ours(upper: Array) -> Array:

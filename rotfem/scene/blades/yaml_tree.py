@@ -19,7 +19,7 @@ def yaml_tree(deck: Deck) -> YamlNode:
     import yaml
 
     try:
-        root = yaml.compose(deck.text, Loader=yaml.SafeLoader)
+        root = yaml.compose(deck.text, Loader=_loader())
     except RecursionError:
         deck.fail("is nested too deeply")
     except yaml.YAMLError as error:
@@ -29,6 +29,19 @@ def yaml_tree(deck: Deck) -> YamlNode:
     if root is None:
         deck.fail("is empty")
     return YamlNode(deck, root)
+
+
+def _loader() -> Any:
+    """Return a loader for which an anchor may be named again: YAML 1.2 allows it (section 3.2.2.2), PyYAML does not."""
+    import yaml
+
+    class Loader(yaml.SafeLoader):  # type: ignore[misc]
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            if not self.check_event(yaml.AliasEvent):
+                self.anchors.pop(self.peek_event().anchor, None)
+            return super().compose_node(parent, index)
+
+    return Loader
 
 
 class YamlNode:
