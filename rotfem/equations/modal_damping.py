@@ -40,12 +40,17 @@ class ByMode(LowRank):
     Args:
         B: M φ_j √(2 ζ_j ω_j), owned rows, a column each.
         shapes: φ_j √(2 ζ_j ω_j) likewise.
+        omega: ω_j, rad/s.
         like: see `LowRank`.
     """
 
-    def __init__(self, B: Array, shapes: Array, like: Any):
+    def __init__(self, B: Array, shapes: Array, omega: Array, like: Any):
         super().__init__(B, like)
-        self.shapes = shapes
+        self.shapes, self.omega = shapes, omega
+
+    def displaced(self, v: Array) -> Array:
+        """Return the owned displacement at which the forces of the structure at rest are C v, of owned velocities."""
+        return np.asarray(self.shapes @ (self.along(v) / self.omega**2))
 
 
 def damping_by_mode(system: Any) -> ByMode | None:
@@ -64,7 +69,7 @@ def damping_by_mode(system: Any) -> ByMode | None:
     modes, zeta = of_families(system, ratios) if isinstance(ratios, Mapping) else in_order(system, ratios)
     damped = np.flatnonzero(zeta)
     weights = np.sqrt(2 * zeta[damped] * modes.omega[damped])
-    return ByMode(modes.massed[:, damped] * weights, modes.shapes[:, damped] * weights, system.A)
+    return ByMode(modes.massed[:, damped] * weights, modes.shapes[:, damped] * weights, modes.omega[damped], system.A)
 
 
 def in_order(system: Any, ratios: float | tuple[float, ...]) -> tuple[ModesAtRest, Array]:

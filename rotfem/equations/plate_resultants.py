@@ -16,6 +16,7 @@ import numpy.typing as npt
 import ufl
 from dolfinx import la
 
+from rotfem.equations.damped_stress import DampedStress
 from rotfem.numerics import forms
 from rotfem.section_quantities import RESULTANTS
 
@@ -65,17 +66,16 @@ class PlateResultants:
         self._carry = at_nodes @ np.linalg.pinv(at_points)
         self._sum = la.vector(self.V.dofmap.index_map, len(self.names) + 1)
         self._compiled: tuple[int, Any] | None = None
+        self._damped = DampedStress(system)
 
     def _expression(self) -> Any:
         """Return resultants and thickness as a compiled expression, anew where rotations are counted otherwise."""
         if self._compiled is None or self._compiled[0] != self.system.compilations:
-            m, k = self.system.model.mechanics, self.system.structure.k
+            m = self.system.model.mechanics
             parts: list[Any] = []
             for name in STRAINS:
                 strain = next(s for s in m.strains if s.name == name)
-                force = strain.force(strain.value)
-                if m.damping.stiffness is not None:
-                    force = force + m.damping.stiffness * k.rate(force)
+                force = self._damped.of(strain.force(strain.value))
                 parts += [force[i] for i in range(ufl.as_ufl(force).ufl_shape[0])]
             both = ufl.as_vector([*parts, self.system.structure.section["thickness"]])
             self._compiled = self.system.compilations, forms.expression(both, self._points, self.system.comm)
@@ -85,6 +85,7 @@ class PlateResultants:
         """Return all quantities at all nodes in the order of `structure.nodes`, (n, names), on every rank."""
         width, total = len(self.names), self._sum.array.reshape(-1, len(self.names) + 1)
         total[:] = 0.0
+        self._damped.update()
         if len(self._cells):
             found = self._expression().eval(self.V.mesh, self._cells).reshape(len(self._cells), len(self._points), -1)
             nodal = np.einsum("np,cpj->cnj", self._carry, found)

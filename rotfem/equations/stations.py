@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 
+from rotfem.equations.damped_stress import DampedStress
 from rotfem.numerics import forms
 from rotfem.section_quantities import FORCES, STRAINS
 from rotfem.structures.beam import Beam
@@ -54,6 +55,7 @@ class Stations:
         self.names = (*FORCES[self.beam.type], *STRAINS[self.beam.type], *self.beam.components)
         self._points = forms.quadrature_points(self.beam.mesh, self.degree)
         self._compiled: tuple[int, Any] | None = None
+        self._damped = DampedStress(system)
         self._place()
 
     # --- where ----------------------------------------------------------------------------------------------------
@@ -131,14 +133,11 @@ class Stations:
         """Return forces and strains as a compiled expression, made anew where rotations are counted otherwise."""
         if self._compiled is None or self._compiled[0] != self.system.compilations:
             beam, model = self.beam, self.system.model
-            k, viscosity = beam.k, model.mechanics.damping.stiffness
             strains = beam.section_strains(model.theory.measures(beam.type))
             at = ufl.variable(strains)
             stored = model.with_gains(beam.stored(at), first_order=model.theory.linear)
             energy = sum(ufl.inner(s.force(s.value), s.value) / 2 for s in stored)
-            force = ufl.diff(energy, at)
-            if viscosity is not None:
-                force = force + viscosity * k.rate(force)
+            force = self._damped.of(ufl.diff(energy, at))
             n = strains.ufl_shape[0]
             both = ufl.as_vector([*(force[i] for i in range(n)), *(strains[i] for i in range(n))])
             self._compiled = self.system.compilations, forms.expression(both, self._points, self.comm)
@@ -146,6 +145,7 @@ class Stations:
 
     def __call__(self) -> Array:
         """Return all quantities at all stations, (stations, names), on every rank; unknowns in the turning frame."""
+        self._damped.update()
         values: Array = np.zeros((*self._shape, self._order.stop))
         if len(self._cells):
             found = self._expression().eval(self.beam.mesh, self._cells)

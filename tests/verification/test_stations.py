@@ -158,3 +158,21 @@ def test_a_resumed_run_has_the_same_rows(tmp_path: Path) -> None:
     assert whole.stations is not None
     assert resumed.stations is not None
     assert resumed.stations.text() == whole.stations.text()
+
+
+def test_damping_by_mode_is_a_stress() -> None:
+    """M and Q at the root are those of the hub at every step: to the mesh, without damping 5e-5 and 5e-4; it is 2e-2."""
+    scene = {
+        "structure": {**STRUCTURE, "damping": {"modal": [0.02, 0.03, 0.05]}},
+        "motion": {"type": "constant", "speed": 0.0},
+        "mesh": {"elements": 16, "degree": 3},
+        "model": {"theory": "linear"},
+        "loads": {"tip_force": [0.0, 1.0]},
+        "time": {"end": 0.5, "step": 0.005},
+        "output": {"stations": [0.0, 10.0], "quantities": ["M", "Q"], "error": False},
+    }
+    result = rotfem.run(scene)
+    assert result.stations is not None
+    for name, root, close in (("M", "root_m3", 2e-4), ("Q", "root_f2", 2e-3)):
+        hub = result.history[root]
+        assert np.max(np.abs(result.stations[name][1:, 0] + hub[1:])) < close * np.max(np.abs(hub)), name
