@@ -13,6 +13,7 @@ over some λ_j and their conjugates, with the static answer of all others beside
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -37,37 +38,49 @@ BRAKED = 0.05
 
 
 class FrequencyResponse:
-    """Answers of the tip to a harmonic load.
+    """Answers to a harmonic load.
 
     Args:
         analysis: compiled scene, of a hub that is held.
         spinning: equilibrium, pencil and pairs at one speed.
         force: f̂, complex amplitude of the load's generalised forces on the owned unknowns, shape (n_local,).
+        outputs: what is read of motions (see `rotfem.analysis.response_outputs`).
+
+    Attributes:
+        names: of the outputs.
     """
 
-    def __init__(self, analysis: ModalAnalysis, spinning: Spinning, force: Array):
-        self.analysis, self.spinning = analysis, spinning
+    def __init__(self, analysis: ModalAnalysis, spinning: Spinning, force: Array, outputs: Sequence[Any]):
+        self.analysis, self.spinning, self._outputs = analysis, spinning, outputs
+        self.names = [name for output in outputs for name in output.names]
         self.force = np.array(force, dtype=np.complex128)
         self.force[analysis.system.held.clamped] = 0.0
         pencil = spinning.pencil
         self._values = [A.getValuesCSR()[2] for A in (pencil.K, pencil.C, pencil.M)]
         self._solver = ComplexSolver(pencil.K)
-        self._tip = analysis.structure.tip_values
 
     def direct(self, omega: float) -> Array:
-        """Return the complex amplitudes of the tip's components (m, rad) at a frequency (rad/s), from one solution.
+        """Return the complex amplitudes of the outputs at a frequency (rad/s), from one solution.
 
         Raises:
             ComputationError: there is no answer, at the frequency of a mode that has no damping.
         """
+        return self._read(self._solved(omega), omega)
+
+    def _read(self, x: Array, omega: float) -> Array:
+        return np.concatenate([output(x, omega) for output in self._outputs])
+
+    def _solved(self, omega: float) -> Array:
+        """Return q̂ of the owned unknowns."""
         K, C, M = self._values
         by_mode = self.spinning.pencil.by_mode
         if by_mode is None:
             self._solver.factor(K + 1j * omega * C - omega**2 * M)
-            return self._at_tip(self._solver.solve(self.force))
+            return np.asarray(self._solver.solve(self.force))
         self._solver.factor(K + 1j * omega * C - (1 - 1j * BRAKED) * omega**2 * M, by_mode, 1j * omega)
-        x = solve_by_nearby(lambda x: self._times(omega, x), self._solver.solve, self.force, self.analysis.comm)
-        return self._at_tip(x)
+        return np.asarray(
+            solve_by_nearby(lambda x: self._times(omega, x), self._solver.solve, self.force, self.analysis.comm)
+        )
 
     def _times(self, omega: float, x: Array) -> Array:
         """Return (K + iω C − ω² M) x."""
@@ -76,7 +89,7 @@ class FrequencyResponse:
         return np.asarray(K + 1j * omega * C - omega**2 * M)
 
     def modal(self, frequencies: Array, count: int) -> Array:
-        """Return the amplitudes of the tip's components at frequencies (n,), rad/s, by modes; shape (n, components).
+        """Return the amplitudes of the outputs at frequencies (n,), rad/s, by modes; shape (n, outputs).
 
         Args:
             frequencies: rad/s.
@@ -84,18 +97,17 @@ class FrequencyResponse:
         """
         pairs = self.spinning.pairs.select(np.arange(min(count, len(self.spinning.pairs.values))))
         n = np.diag(self.spinning.pencil.gram(pairs.left, pairs.values, pairs.right, pairs.values))
-        tips = np.array([self._at_tip(x) for x in pairs.right.T]).T
         gains = self._summed(pairs.left.conj().T @ self.force) / n
         others = self._summed(pairs.left.T @ self.force) / n.conj()  # of the conjugate pairs
         twice = pairs.values.imag > 0.0
 
         def at(omega: float) -> Array:
-            plain = tips @ (gains / (1j * omega - pairs.values))
-            mirrored = tips.conj() @ np.where(twice, others / (1j * omega - pairs.values.conj()), 0.0)
+            plain = pairs.right @ (gains / (1j * omega - pairs.values))
+            mirrored = pairs.right.conj() @ np.where(twice, others / (1j * omega - pairs.values.conj()), 0.0)
             return np.asarray(plain + mirrored)
 
-        left_out = self.direct(0.0) - at(0.0)
-        return np.array([at(omega) + left_out for omega in frequencies])
+        left_out = self._solved(0.0) - at(0.0)
+        return np.array([self._read(at(omega) + left_out, omega) for omega in frequencies])
 
     def peaks(self, low: float, high: float) -> tuple[Array, list[int]]:
         """Return frequencies (rad/s) by which the peaks between two are seen, and which modes there have no damping."""
@@ -112,13 +124,6 @@ class FrequencyResponse:
                 found.append(omega + width * ABOUT_PEAK)
         points = np.concatenate([*found, np.empty(0)])
         return points[(points >= low) & (points <= high)], undamped
-
-    def _at_tip(self, x: Array) -> Array:
-        """Return the complex components at the tip of owned unknowns."""
-        read = self._tip
-        full = np.zeros(len(self.analysis.system.zeros()), dtype=np.complex128)
-        full[: len(x)] = x
-        return np.asarray(read(full.real) + 1j * read(full.imag))
 
     def _summed(self, local: Array) -> Array:
         comm = self.analysis.comm

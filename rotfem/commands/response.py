@@ -15,9 +15,10 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.equilibrium import check_steady
+from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.frequency_response import FrequencyResponse
 from rotfem.analysis.modal import ModalAnalysis, Spinning
+from rotfem.analysis.response_outputs import RootOutput, StationOutput, TipOutput
 from rotfem.analysis.stability import stability_of_pencil
 from rotfem.commands.loads import SWEPT, swept_loads
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
@@ -25,6 +26,7 @@ from rotfem.commands.modes import analysis_of, theory_error
 from rotfem.commands.problem import Problem
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import SceneError, input_of
+from rotfem.results.columns import described
 from rotfem.results.response import ResponseResult
 from rotfem.scene import Scene, as_scene
 from rotfem.units import quantity
@@ -48,7 +50,7 @@ def response(
     per_rev: Sequence[float] = (),
     comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> ResponseResult:
-    """Return amplitude and phase of the tip under the harmonic loads of a scene, over their frequency.
+    """Return amplitude and phase of tip, root and stations under the harmonic loads of a scene, over their frequency.
 
     Args:
         scene: scene, path of a scene file, or nested tables; `modes.count` is that of the response by modes.
@@ -72,23 +74,34 @@ def response(
         analysis.needs_fixed_hub("the frequency response")
         speed = problem.motion.final_speed(scene.time.end if scene.time is not None else 0.0)
         spinning = analysis.at(speed, scene.modes.count)
-        answers = FrequencyResponse(analysis, spinning, force_of(analysis, spinning))
+        answers = FrequencyResponse(analysis, spinning, *loaded(scene, analysis, spinning))
         asked, peaks, undamped = frequencies_of(answers, spinning, (low, high, number, per_rev))
         direct = np.array([answers.direct(omega) for omega in asked])
         modal = answers.modal(asked, scene.modes.count)
-        return result_of(scene, analysis, spinning, (asked, peaks, undamped), (direct, modal), started)
+        return result_of(scene, answers, (asked, peaks, undamped), (direct, modal), started)
 
 
-def force_of(analysis: ModalAnalysis, spinning: Spinning) -> Array:
-    """Return f̂ of the harmonic loads at an equilibrium: what they add to the forces on the owned unknowns."""
-    system = analysis.system.held
-    parts = []
-    for t in SWEPT:
-        system.set_time(t, system.motion.at_speed(spinning.speed))
-        system.set_state(spinning.q)
-        parts.append(system.residual().array.copy())  # −F: loads push with their sign
-    mean, cosine, sine = parts
-    return np.asarray((cosine - mean) + 1j * (sine - mean))
+def loaded(scene: Scene, analysis: ModalAnalysis, spinning: Spinning) -> tuple[Array, list[Any]]:
+    """Return f̂ of the harmonic loads at an equilibrium, what they add to the forces on the owned unknowns, and outputs.
+
+    The equilibrium is left in the system.
+    """
+    system, motion = analysis.system.held, analysis.system.held.motion.at_speed(spinning.speed)
+    forces, held, q = [], [], spinning.q
+    if system.linear and analysis.about == "steady":  # a load prestresses what is displaced
+        q = steady_state(system, spinning.speed, analysis.newton, past_limits=False, notes=[])
+    for t in (*SWEPT, SWEPT[0]):  # what is read of motions is about the loads that are constant
+        system.set_time(t, motion)
+        system.set_state(q)
+        forces.append(system.residual().array.copy())  # −F: loads push with their sign
+        held.append(system.clamp_forces())
+    force, push = ((parts[1] - parts[0]) + 1j * (parts[2] - parts[0]) for parts in (forces, held))
+    outputs: list[Any] = [TipOutput(system), RootOutput(system, push)]
+    if scene.output.stations is not None:
+        beam = system.structure
+        names = (*scene.output.sections(beam.type), *beam.components)
+        outputs.append(StationOutput(system, scene.output.positions(beam.length), names))
+    return np.asarray(force), outputs
 
 
 def frequencies_of(
@@ -134,20 +147,19 @@ def angular(value: float | str | None, option: str, default: float) -> float:
 
 def result_of(
     scene: Scene,
-    analysis: ModalAnalysis,
-    spinning: Spinning,
+    found: FrequencyResponse,
     asked: tuple[Array, Array, list[int]],
     answers: tuple[Array, Array],
     started: float,
 ) -> ResponseResult:
     """Return the result of all answers (direct, by modes) at frequencies, those of peaks marked."""
-    (omegas, peaks, undamped), (direct, modal) = asked, answers
-    outputs = [f"tip_{name}" for name in analysis.structure.components]
-    off = differences(outputs, direct, modal)
+    (omegas, peaks, undamped), (direct, modal), outputs = asked, answers, found.names
+    analysis, spinning = found.analysis, found.spinning
+    off, worst = differences(outputs, direct, modal, "tip_"), differences(outputs, direct, modal, "")
     rows = [
         row_of(omega, spinning.speed, dict(zip(outputs, zip(d, m, strict=True), strict=True)))
-        | {"difference": float(o), "peak": int(peak)}
-        for omega, d, m, o, peak in zip(omegas, direct, modal, off, peaks, strict=True)
+        | {"difference": float(o), "worst_difference": float(w), "peak": int(peak)}
+        for omega, d, m, o, w, peak in zip(omegas, direct, modal, off, worst, peaks, strict=True)
     ]
     modes = mode_rows(analysis, spinning)
     stability, theory = stability_of_pencil(spinning.pencil, spinning.clamped), theory_error(analysis, spinning)
@@ -163,7 +175,7 @@ def result_of(
         "outputs": outputs,
         "frequencies": len(omegas),
         "peaks": {name: peak_of(omegas, np.abs(direct[:, i])) for i, name in enumerate(outputs)},
-        "difference": {"median": usual, "largest": float(np.max(off))},
+        "difference": {"median": usual, "largest": float(np.max(off)), "worst": float(np.max(worst))},
         "modes": modes[: scene.modes.count],
         "theory_error": theory.summary(),
         "warnings": list(dict.fromkeys(warnings)),
@@ -182,13 +194,21 @@ def row_of(omega: float, speed: float, outputs: Mapping[str, tuple[complex, comp
     return row
 
 
-def differences(outputs: Sequence[str], direct: Array, modal: Array) -> Array:
-    """Return for every frequency how far the answers by modes are off, of displacements and rotations the worse."""
-    moves = np.array([name.startswith("tip_u") for name in outputs])
-    out = np.zeros(len(direct))
-    for kind in (moves, ~moves):
-        size = np.linalg.norm(direct[:, kind], axis=1)
-        off = np.linalg.norm((modal - direct)[:, kind], axis=1)
+def differences(outputs: Sequence[str], direct: Array, modal: Array, kind: str) -> Array:
+    """Return for every frequency how far the answers by modes are off, of quantities of one unit the worst.
+
+    Args:
+        outputs: names.
+        direct: their amplitudes, (frequencies, outputs).
+        modal: the same by modes.
+        kind: what the names of those begin with that count.
+    """
+    units = np.array([described(name)[1] for name in outputs])
+    chosen, out = np.array([name.startswith(kind) for name in outputs]), np.zeros(len(direct))
+    for unit in dict.fromkeys(units[chosen]):
+        those = chosen & (units == unit)
+        size = np.linalg.norm(direct[:, those], axis=1)
+        off = np.linalg.norm((modal - direct)[:, those], axis=1)
         out = np.maximum(out, np.divide(off, size, out=np.zeros_like(off), where=size > 0.0))
     return out
 

@@ -197,6 +197,11 @@ class AffineSystem(AffineEnergies):
         assert self._coefficients is not None
         return self._at_clamp(self._coefficients, self._state)
 
+    def clamp_tangents(self) -> tuple[Array, Array, Array]:
+        """Return what small q, v and a add to the forces of the clamp (see `Readings`)."""
+        assert self._coefficients is not None
+        return self._at_clamp.tangents(self._coefficients, len(self.root.weights))
+
     @property
     def current(self) -> bool:
         """Whether the last tangent is that of this time, but for its shifts (see `System`)."""

@@ -93,6 +93,14 @@ class ClampRows:
             near = np.flatnonzero(np.any(whole != 0.0, axis=(0, 2)))
             self._near[kind] = near, whole[:, near].reshape(len(rows), len(near) * motions)
 
+    def tangents(self, c: Array, unknowns: int) -> tuple[Array, Array, Array]:
+        """Return the derivatives of these forces to q, v and a, each (unknowns, motions), at factors of all pieces."""
+        out = np.zeros((3, unknowns, self._motions))
+        for part, kind in zip(out, "KCM", strict=True):
+            near, products = self._near[kind]
+            part[near] = (c[self._kinds[kind]] @ products).reshape(len(near), self._motions)
+        return out[0], out[1], out[2]
+
     def __call__(self, c: Array, state: tuple[Array, ...]) -> Array:
         """Return the forces of the clamp, (motions,).
 

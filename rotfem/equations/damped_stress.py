@@ -12,10 +12,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 import ufl
 from dolfinx import fem
 
 from rotfem.numerics import forms
+
+Array = npt.NDArray[np.float64]
 
 
 class DampedStress:
@@ -31,17 +35,24 @@ class DampedStress:
 
     def of(self, force: Any) -> Any:
         """Return a resultant, a UFL expression of the unknowns, with damping."""
-        m, out = self._system.model.mechanics, force
-        if m.damping.stiffness is not None:
-            out = out + m.damping.stiffness * m.k.rate(force)
+        return sum(self._parts(force, self._system.v), start=force)
+
+    def change(self, force: Any, dq: Any, dv: Any) -> Any:
+        """Return what small q and v about a state at rest, two functions, add to a resultant with damping."""
+        return sum(self._parts(force, dv), start=ufl.derivative(force, self._system.q, dq))
+
+    def _parts(self, force: Any, v: Any) -> list[Any]:
+        """Return what damping adds to a resultant at velocities v, a function, and those of `update`."""
+        viscosity, q, out = self._system.model.mechanics.damping.stiffness, self._system.q, list[Any]()
+        if viscosity is not None:
+            out.append(viscosity * ufl.derivative(force, q, v))
         if self._displaced is not None:
-            out = out + forms.without(ufl.derivative(force, m.k.q, self._displaced), m.k.q)
+            out.append(forms.without(ufl.derivative(force, q, self._displaced), q))
         return out
 
-    def update(self) -> None:
-        """Take the velocities of the state that is written into the system; all processes come here together."""
+    def update(self, v: Array) -> None:
+        """Take the velocities of the owned unknowns; all processes come here together."""
         if self._displaced is not None:
             w, part = self._displaced.x, self._system.by_mode
-            owned = len(part.B)
-            w.array[:owned] = part.displaced(self._system.v.x.array[:owned])
+            w.array[: len(part.B)] = part.displaced(v[: len(part.B)])
             w.scatter_forward()

@@ -24,6 +24,7 @@ from rotfem.equations.modal_damping import EFFECT
 from rotfem.mechanics import work
 from rotfem.mechanics.work import Variation
 from rotfem.numerics import forms
+from rotfem.numerics.projection import times
 
 Array = npt.NDArray[np.float64]
 
@@ -47,6 +48,24 @@ class HubDamping:
             return []
         alone = replace(m, damping=replace(m.damping, stiffness=None))
         return [forms.form(model.switches[EFFECT] * work.damping(alone, Variation(m.k)), once=True)]
+
+    def tangent(self, M: Any) -> Array | float:
+        """Return what small velocities about a state at rest add to it, (owned unknowns, motions); 0 of none.
+
+        Args:
+            M: mass matrix at the state, with the rows of the clamp.
+        """
+        system, by_mode = self._system, self._system.by_mode
+        mass = system.model.mechanics.damping.mass if EFFECT in system.model.effects else None
+        if mass is None and by_mode is None:
+            return 0.0
+        rigid = system.root.carried(system.q.x.array)
+        out: Array = np.zeros_like(rigid)
+        if mass is not None:
+            out += float(mass.value) * times(M, rigid)
+        if by_mode is not None:
+            out += by_mode.times(rigid)
+        return out
 
     def __call__(self) -> Array | float:
         """Return the part of this process in their work in the unit motions at the state set, (motions,); 0 of none."""

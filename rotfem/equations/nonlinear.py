@@ -13,8 +13,8 @@ from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms import expand_derivatives
 from ufl.algorithms.analysis import extract_constants
 
+from rotfem.equations.clamp_work import ClampWork
 from rotfem.equations.energy_balance import EnergyBalance
-from rotfem.equations.hub_damping import HubDamping
 from rotfem.equations.model import Model
 from rotfem.equations.point_stresses import PointStresses
 from rotfem.equations.system import System
@@ -153,29 +153,32 @@ class NonlinearSystem(System):
         return b
 
     @cached_property
-    def _motions(self) -> Array:
-        weights: Array = self.root.weights[self.clamped]
-        return weights
+    def _at_clamp(self) -> ClampWork:
+        return ClampWork(self)
 
     def clamp_forces(self) -> Array:
-        """Return the part of this process in what the clamp does in its unit motions (see `System`)."""
-        held = np.asarray(self.sum_of(self._F)[self.clamped] @ self._motions) - self._hub_damping()
-        if not self._F_at_root:
-            return held
-        forces = self.sum_of(self._F_at_root)[: len(self.root.weights)].copy()
-        forces[self.clamped] = 0.0  # what is left works on the turns of hinges, against which the root is held
-        return np.asarray(held - forces @ self.root.weights)
+        """Return the part of this process in what the clamp does in its unit motions (see `Readings`)."""
+        return self._at_clamp(self.sum_of(self._F))
 
-    @cached_property
-    def _hub_damping(self) -> HubDamping:
-        return HubDamping(self)
+    def clamp_tangents(self) -> tuple[Array, Array, Array]:
+        """Return what small q, v and a add to the forces of the clamp (see `Readings`)."""
+        return self._at_clamp.tangents()
 
-    @cached_property
-    def _F_at_root(self) -> list[Any]:
-        """The work of springs and dampers of the root, compiled; empty where it has none."""
-        acting = self.model.acting
-        terms = [term for name, term in self.model.terms.items() if acting[name].at_root]
-        return [forms.form(added(terms), once=True)] if terms else []
+    def whole(self, kind: str) -> Any:
+        """Return K, C or M at the state with the rows of the clamp, a new matrix; None where it vanishes."""
+        names, shifts = self.tangent_forms(kind)
+        self.shift(shifts)
+        return self.whole_of([self.known_form(name)[1] for name in names])
+
+    def whole_of(self, parts: list[Any]) -> Any:
+        """Return compiled bilinear forms added up, a new matrix with the rows of the clamp; None of none."""
+        if not parts:
+            return None
+        A = self._empty.duplicate()
+        for form in parts:
+            fem_petsc.assemble_matrix(A, form)
+            A.assemble()
+        return A
 
     def tangent(self, c_k: float, c_v: float, c_m: float, before: Array | None = None) -> tuple[Any, bool]:
         """Return (c_k K + c_v C + c_m M at the state, True); clamped rows are identity rows.

@@ -85,7 +85,7 @@ class PlateResultants:
         """Return all quantities at all nodes in the order of `structure.nodes`, (n, names), on every rank."""
         width, total = len(self.names), self._sum.array.reshape(-1, len(self.names) + 1)
         total[:] = 0.0
-        self._damped.update()
+        self._damped.update(self.system.v.x.array)
         if len(self._cells):
             found = self._expression().eval(self.V.mesh, self._cells).reshape(len(self._cells), len(self._points), -1)
             nodal = np.einsum("np,cpj->cnj", self._carry, found)

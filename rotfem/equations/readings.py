@@ -41,6 +41,13 @@ class Readings:
     def clamp_forces(self) -> Array:
         """Return the part of this process in what the clamp does in its unit motions at the state and time set."""
 
+    @abstractmethod
+    def clamp_tangents(self) -> tuple[Array, Array, Array]:
+        """Return what small q, v and a of the owned unknowns add to `clamp_forces` about an equilibrium that is set.
+
+        Three arrays (unknowns, motions), of K, C and M.
+        """
+
     def size(self, x: Array) -> float:
         """Return the largest entry of a local dof array in units of `scale`, over all ranks."""
         here = float(np.max(np.abs(x) / self.scale)) if x.size else 0.0

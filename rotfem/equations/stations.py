@@ -19,6 +19,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import ufl
+from dolfinx import fem
+from ufl.algorithms import expand_derivatives
 
 from rotfem.equations.damped_stress import DampedStress
 from rotfem.numerics import forms
@@ -132,31 +134,71 @@ class Stations:
     def _expression(self) -> Any:
         """Return forces and strains as a compiled expression, made anew where rotations are counted otherwise."""
         if self._compiled is None or self._compiled[0] != self.system.compilations:
-            beam, model = self.beam, self.system.model
-            strains = beam.section_strains(model.theory.measures(beam.type))
-            at = ufl.variable(strains)
-            stored = model.with_gains(beam.stored(at), first_order=model.theory.linear)
-            energy = sum(ufl.inner(s.force(s.value), s.value) / 2 for s in stored)
-            force = self._damped.of(ufl.diff(energy, at))
-            n = strains.ufl_shape[0]
-            both = ufl.as_vector([*(force[i] for i in range(n)), *(strains[i] for i in range(n))])
+            both = ufl.as_vector([part[i] for part in self._quantities() for i in range(part.ufl_shape[0])])
             self._compiled = self.system.compilations, forms.expression(both, self._points, self.comm)
         return self._compiled[1]
 
-    def __call__(self) -> Array:
-        """Return all quantities at all stations, (stations, names), on every rank; unknowns in the turning frame."""
-        self._damped.update()
+    def _quantities(self) -> tuple[Any, Any]:
+        """Return forces and strains as UFL vectors."""
+        force, strains = self._section()
+        return self._damped.of(force), strains
+
+    def _section(self) -> tuple[Any, Any]:
+        """Return forces without those of damping, and strains, as UFL vectors."""
+        beam, model = self.beam, self.system.model
+        strains = beam.section_strains(model.theory.measures(beam.type))
+        at = ufl.variable(strains)
+        stored = model.with_gains(beam.stored(at), first_order=model.theory.linear)
+        energy = sum(ufl.inner(s.force(s.value), s.value) / 2 for s in stored)
+        return ufl.diff(energy, at), strains
+
+    def _read(self, q: Array, v: Array) -> Array:
+        """Return the values of the expression, and those of unknowns (local dof array q), on every rank.
+
+        Args:
+            q: unknowns, counted from the undeformed structure.
+            v: velocities that damping by mode is of.
+        """
+        self._damped.update(v)
         values: Array = np.zeros((*self._shape, self._order.stop))
         if len(self._cells):
             found = self._expression().eval(self.beam.mesh, self._cells)
             values[self._rows] = found.reshape(len(self._cells), self.degree, -1)
         out: Array = np.zeros((len(self.positions), len(self.names)))
         out[:, self._order] = np.tensordot(self._stress, values, 2)
-        total = self.beam.total(self.system.q.x.array).reshape(-1, self.beam.size)
         for row, nodes, factors in self._nodal:
-            out[row, self._order.stop :] = self.beam.whole_values(factors @ total[nodes])
-        if self.comm.size > 1:
-            out = self.comm.allreduce(out)
+            out[row, self._order.stop :] = self.beam.whole_values(factors @ q.reshape(-1, self.beam.size)[nodes])
+        return np.asarray(self.comm.allreduce(out) if self.comm.size > 1 else out)
+
+    def __call__(self) -> Array:
+        """Return all quantities at all stations, (stations, names), on every rank; unknowns in the turning frame."""
+        out = self._read(self.beam.total(self.system.q.x.array), self.system.v.x.array)
         unknowns = out[:, self._order.stop :]
         out[:, self._order.stop :] = self.system.seen_from_hub(unknowns, self.positions, self.system.time)
         return out
+
+
+class StationChanges(Stations):
+    """What small motions about an equilibrium add to what a beam has at its stations.
+
+    Args:
+        system: equations of motion of the beam, the hub held; the equilibrium must be written into it.
+        positions: of the stations, increasing, m.
+    """
+
+    def __init__(self, system: Any, positions: tuple[float, ...]):
+        super().__init__(system, positions)
+        self._dq, self._dv = fem.Function(system.V), fem.Function(system.V)
+
+    def _quantities(self) -> tuple[Any, Any]:
+        """Return the changes of forces and strains as UFL vectors."""
+        force, strains = self._section()
+        change = ufl.derivative(strains, self.system.q, self._dq)
+        return tuple(expand_derivatives(x) for x in (self._damped.change(force, self._dq, self._dv), change))
+
+    def of(self, q: Array, v: Array) -> Array:
+        """Return the changes of all quantities at all stations by small q and v of the owned unknowns."""
+        for function, values in ((self._dq, q), (self._dv, v)):
+            function.x.array[: len(values)] = values
+            function.x.scatter_forward()
+        return self._read(self._dq.x.array, v)

@@ -7,22 +7,28 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from rotfem.results.columns import label
+from rotfem.results.columns import described, is_at_station, label
 from rotfem.results.units import ShownUnits
 
 if TYPE_CHECKING:
     from rotfem.results.response import ResponseResult
 
-#: Part of the largest output of its kind, displacement or rotation, below which one is round-off.
+#: Part of the largest output of its unit below which one is round-off.
 SHOWN = 1e-9
 
 
 def response_figure(result: ResponseResult) -> Figure:
-    """Return amplitudes, direct and by modes (dashed), and phases over frequency; what does not answer is left out."""
+    """Return amplitudes, direct and by modes (dashed), and phases over frequency, of tip and root.
+
+    What does not answer is left out.
+    """
     units, size = ShownUnits.of(result.summary), np.max(np.abs(result.direct), axis=0)
-    moves = np.array([name.startswith("tip_u") for name in result.outputs])
-    largest = np.where(moves, np.max(size[moves], initial=0.0), np.max(size[~moves], initial=0.0))
-    drawn = [i for i in range(len(size)) if size[i] > SHOWN * largest[i]]
+    kinds = [described(name)[1] for name in result.outputs]
+    largest: dict[str, float] = {}
+    for kind, value in zip(kinds, size, strict=True):
+        largest[kind] = max(largest.get(kind, 0.0), float(value))
+    own = [not is_at_station(name) for name in result.outputs]
+    drawn = [i for i, kind in enumerate(kinds) if own[i] and size[i] > SHOWN * largest[kind]]
     figure = Figure(figsize=(9, 2.2 * max(len(drawn), 1) + 2.4))
     panels = figure.subplots(len(drawn) + 1, 1, sharex=True, squeeze=False)[:, 0]
     x = units.frequencies(result.frequencies)

@@ -30,9 +30,10 @@ class ResponseResult(Result):
     Attributes:
         summary: scene, speed, outputs, modes, peaks, warnings, timings; JSON-able.
         rows: one dictionary a frequency: `frequency` (rad/s), `frequency_hz`, `per_rev` (frequency over speed, of what
-            spins); of every output, as `tip_u2`, the amplitude `tip_u2` (m, rad), `tip_u2_phase` (rad, how far it is
-            ahead of a load of phase 0) and `tip_u2_modal`, the amplitude by modes; `difference` of the two responses,
-            relative to the direct one; `peak` (1 at frequencies that were added to see a peak).
+            spins); of every output, as `tip_u2`, `root_m3` or, at a station, `M@2.5`, the amplitude `tip_u2` (in its
+            unit), `tip_u2_phase` (rad, how far it is ahead of a load of phase 0) and `tip_u2_modal`, the amplitude by
+            modes; `difference` of the two responses, relative to the direct one, at the tip, and `worst_difference` of
+            all outputs; `peak` (1 at frequencies that were added to see a peak).
         direct: complex amplitudes of the outputs, shape (frequencies, outputs).
         modal: the same by modes.
     """
@@ -43,7 +44,7 @@ class ResponseResult(Result):
 
     @property
     def outputs(self) -> list[str]:
-        """Names of the outputs, `tip_u1` and so on."""
+        """Names of the outputs: of the tip `tip_u1`, …, of the root `root_f1`, …, of stations `M@2.5`, …."""
         return list(self.summary["outputs"])
 
     @property
@@ -52,7 +53,7 @@ class ResponseResult(Result):
         return np.array([row["frequency"] for row in self.rows])
 
     def amplitude(self, output: str) -> Array:
-        """Return the amplitude of an output over the frequencies, m or rad."""
+        """Return the amplitude of an output over the frequencies, in its unit."""
         return np.asarray(np.abs(self.direct[:, self.outputs.index(output)]), dtype=np.float64)
 
     def phase(self, output: str) -> Array:

@@ -53,16 +53,30 @@ def test_direct_response_is_that_of_the_exported_matrices(swept, tmp_path):
     """To the digits of the matrices: 1e-8 of the largest component."""
     for i in (3, 12, 20):
         wanted = by_scipy(scene(loads={}), float(swept.frequencies[i]), tmp_path)
-        assert swept.direct[i] == pytest.approx(wanted, abs=1e-8 * np.max(np.abs(wanted)))
+        assert swept.direct[i, :3] == pytest.approx(wanted, abs=1e-8 * np.max(np.abs(wanted)))
 
 
 def test_statics():
-    """At rest and at frequency 0 it is F L³/3EI + F L/GA, in phase with the load."""
-    still = response(scene(speed=0.0), 0.0, 1.0, number=2)
+    """At rest and at frequency 0 it is F L³/3EI + F L/GA, in phase with the load; root and sections carry F and F x."""
+    still = response(scene(speed=0.0, output={"stations": [0.0, 2.5]}), 0.0, 1.0, number=2)
+    amplitudes = dict(zip(still.outputs, still.direct[0] * np.exp(-0.3j), strict=True))
+    for name, wanted in {"root_f2": -2.0, "root_m3": -20.0, "Q@2.5": 2.0, "M@0": 20.0, "M@2.5": 15.0}.items():
+        assert amplitudes[name] == pytest.approx(wanted, rel=1e-8), name
     u2 = still.direct[0, still.outputs.index("tip_u2")]
     assert abs(u2) == pytest.approx(2.0 * LENGTH**3 / (3 * SECTION["EI"]) + 2.0 * LENGTH / SECTION["GA"], rel=1e-9)
     assert np.angle(u2) == pytest.approx(0.3, abs=1e-9)
     assert "per_rev" not in still.rows[0]
+
+
+def test_a_load_prestresses_what_is_displaced():
+    """An axial load on the bent beam of a linear theory: at frequency 0 half the difference of two steady states."""
+    steady, amplitude = [0.0, 30.0], 1e-3
+    harmonic = {"amplitude": [amplitude, 0.0], "frequency": 1.0}
+    line = response(scene(loads={"tip_force": {"value": steady, "harmonic": harmonic}}), 0.0, 1.0, number=2)
+    ends = [rotfem.run(scene(loads={"tip_force": [sign * amplitude, 30.0]})).summary["figures"] for sign in (1, -1)]
+    for name in ("tip_u2", "root_f1", "root_f2"):
+        found = line.direct[0, line.outputs.index(name)]
+        assert found.real == pytest.approx((ends[0][f"{name}_final"] - ends[1][f"{name}_final"]) / 2, rel=1e-5), name
 
 
 def test_all_modes_are_the_direct_response():
@@ -89,22 +103,29 @@ def test_peaks_are_seen(swept):
 
 
 def test_a_long_history_swings_like_that():
-    """Reissner about the deformed steady state under a constant load; 1 % of the amplitude after 10 decay times."""
+    """Reissner about the deformed steady state under a constant load: tip, root and sections, with every damping.
+
+    1 % of the amplitude after 10 decay times; 0.5 % is of the steps, 60 a turn.
+    """
     force = {"value": [0.0, 30.0], "harmonic": {"amplitude": [0.0, 0.1], "per_rev": 1}}
-    damped = {**STRUCTURE, "damping": {"rayleigh": [2.0, 1e-3]}}
+    damped = {**STRUCTURE, "damping": {"rayleigh": [1.0, 1e-3], "modal": [0.1, 0.05]}}
     tables = scene("reissner", 5.0, structure=damped, loads={"tip_force": force})
+    tables["output"] = {"stations": [0.0, 4.0], "error": False}
     line = response(tables, per_rev=[1])
     assert [row["per_rev"] for row in line.rows] == [1.0]
     end = 10.0
-    history = rotfem.run(
-        tables | {"time": {"end": end, "step": 0.02}, "initial": {"state": "steady"}, "output": {"error": False}}
-    ).history
-    last = history["t"] > end - 4 * np.pi / 5.0
-    t, u2 = history["t"][last], history["tip_u2"][last]
+    run = rotfem.run(tables | {"time": {"end": end, "step": 0.02}, "initial": {"state": "steady"}})
+    assert run.stations is not None
+    last = run.history["t"] > end - 4 * np.pi / 5.0
+    t = run.history["t"][last]
     columns = np.column_stack([np.ones(len(t)), np.cos(5.0 * t), np.sin(5.0 * t)])
-    _, cosine, sine = np.linalg.lstsq(columns, u2, rcond=None)[0]
-    found = line.direct[0, line.outputs.index("tip_u2")]
-    assert abs(cosine - 1j * sine - found) < 0.01 * abs(found)
+    moved = [*(f"tip_{name}" for name in ("u1", "u2", "alpha")), "root_f1", "root_f2", "root_m3"]
+    values = {name: run.history[name] for name in moved}
+    values |= {f"{name}@{x:g}": run.stations[name][:, i] for name in "NQM" for i, x in enumerate(run.stations.x)}
+    for name, value in values.items():
+        _, cosine, sine = np.linalg.lstsq(columns, value[last], rcond=None)[0]
+        found = line.direct[0, line.outputs.index(name)]
+        assert abs(cosine - 1j * sine - found) < 0.01 * abs(found), name
 
 
 def test_without_damping_it_is_said():
@@ -137,4 +158,4 @@ def test_files_and_figure(swept, tmp_path):
     table = (tmp_path / "response.csv").read_text().splitlines()
     assert table[0].startswith("frequency,frequency_hz,per_rev,tip_u1,tip_u1_phase,tip_u1_modal,tip_u2")
     assert len(table) == 1 + len(swept.rows)
-    assert len(swept.plot().axes) == 4  # u1, u2, alpha and the phases
+    assert len(swept.plot().axes) == 7  # u1, u2, alpha, f1, f2, m3 and the phases

@@ -161,7 +161,7 @@ def test_a_resumed_run_has_the_same_rows(tmp_path: Path) -> None:
 
 
 def test_damping_by_mode_is_a_stress() -> None:
-    """M and Q at the root are those of the hub at every step: to the mesh, without damping 5e-5 and 5e-4; it is 2e-2."""
+    """M and Q at the root are those of the hub at every step, to the mesh: 5e-5 and 5e-4. It makes 2e-2 of them."""
     scene = {
         "structure": {**STRUCTURE, "damping": {"modal": [0.02, 0.03, 0.05]}},
         "motion": {"type": "constant", "speed": 0.0},
