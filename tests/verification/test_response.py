@@ -70,7 +70,7 @@ def test_statics():
 
 def test_a_load_prestresses_what_is_displaced():
     """An axial load on the bent beam of a linear theory: at frequency 0 half the difference of two steady states."""
-    steady, amplitude = [0.0, 30.0], 1e-3
+    steady, amplitude = [0.0, 30.0], 0.1
     harmonic = {"amplitude": [amplitude, 0.0], "frequency": 1.0}
     line = response(scene(loads={"tip_force": {"value": steady, "harmonic": harmonic}}), 0.0, 1.0, number=2)
     ends = [rotfem.run(scene(loads={"tip_force": [sign * amplitude, 30.0]})).summary["figures"] for sign in (1, -1)]
