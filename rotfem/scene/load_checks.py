@@ -64,9 +64,10 @@ def check_place(key: str, structure: Any, x: tuple[float, ...]) -> None:
 def _check_moment(key: str, structure: Any, moment: MomentLoad | None) -> None:
     if moment is None:
         return
-    amplitudes = [len(h.amplitude) for h in moment.harmonic]
-    sizes = [*([moment.components] if moment.given else []), *amplitudes]
-    if structure.is_planar and any(n != 1 for n in sizes) and moment.time_function is None:
+    # A function is looked at where it is called; its moment of a planar beam may have one component or three.
+    own = [moment.components] if moment.given and moment.time_function is None else []
+    sizes = [*own, *(len(h.amplitude) for h in moment.harmonic)]
+    if structure.is_planar and any(n != 1 for n in sizes):
         raise problem(key, None, "must have one component, about axis 3, for a planar_beam")
     if not structure.is_planar and any(n != 3 for n in sizes):
         raise problem(key, None, f"must have three components for a {structure.type}")

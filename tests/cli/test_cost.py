@@ -98,6 +98,8 @@ def test_an_accuracy_out_of_reach(rotfem: Rotfem, folder: Path) -> None:
         (("--budget", "soon"), 'cost --budget = "soon": must be a time greater than 0, such as 60s'),
         (("--of", "campbell", "--set", "motion.speed=0.0"), "the scene has no speed to go up to"),
         (("--degrees", "9"), "cost --degrees = 9: must be"),
+        # adaptive steps, of which the mean is measured first
+        (("--elements", "-1", "--set", "time={end=0.4, tolerance=1e-3}"), "cost --elements = -1: must be integers"),
         (("--theories", "linear", "--set", "model.frame=inertial"), 'cost --theories = "linear"'),
         (("--write", "no/where.toml"), '--write = "no/where.toml": there is no folder no'),
         (("--write", "results"), '--write = "results": is a folder'),

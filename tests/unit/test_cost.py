@@ -14,7 +14,7 @@ from rotfem.commands.cost.front import Row, pareto, recommend
 from rotfem.commands.cost.record import Measurement, Record, fingerprint
 from rotfem.commands.cost.reference import Samples, combined, distance, limit, observed_order
 from rotfem.commands.cost.refinement import Plan, Refinement, finer_meshes
-from rotfem.commands.cost.settings import Setting, grid, ladder, own_setting
+from rotfem.commands.cost.settings import Setting, check_choice, grid, ladder, own_setting
 from rotfem.commands.cost.tuned import write_tuned
 from rotfem.errors import SceneError
 from rotfem.scene import Scene, load_scene
@@ -208,7 +208,7 @@ def test_ladder_is_one_of_powers_of_two() -> None:
 )
 def test_a_bad_choice_is_refused(choice: dict[str, Any], says: str) -> None:
     with pytest.raises(SceneError, match=says):
-        grid(Scene.from_dict(BEAM), "tip", True, 0.004, choice)
+        check_choice(Scene.from_dict(BEAM), choice)
 
 
 def test_record_is_read_back_but_for_other_studies_and_torn_lines(tmp_path: Path) -> None:
@@ -267,7 +267,7 @@ def test_fingerprint_sees_what_is_in_a_mesh_file(tmp_path: Path) -> None:
 def test_numbers_of_elements_are_refused_for_a_mesh_file(tmp_path: Path) -> None:
     (tmp_path / "plate.msh").write_text("")
     with pytest.raises(SceneError, match=r"cost --elements = 4: has no meaning with structure\.mesh"):
-        grid(plate_on(tmp_path / "plate.msh"), "frequencies", True, None, {"elements": [4]})
+        check_choice(plate_on(tmp_path / "plate.msh"), {"elements": [4]})
 
 
 def test_locking_degrees_are_refused() -> None:
@@ -275,7 +275,7 @@ def test_locking_degrees_are_refused() -> None:
     motion = {"type": "constant", "speed": 1.0}
     scene = Scene.from_dict({"structure": plate, "motion": motion, "mesh": {"cell": "triangle"}})
     with pytest.raises(SceneError, match="cost --degrees = 1: triangles of degree 1.*at least 3"):
-        grid(scene, "frequencies", True, None, {"degrees": [1]})
+        check_choice(scene, {"degrees": [1]})
 
 
 def test_tuned_scene_keeps_keys_and_finds_its_files(tmp_path: Path) -> None:

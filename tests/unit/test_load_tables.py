@@ -41,6 +41,11 @@ REFUSED: dict[str, tuple[Any, dict[str, Any], str]] = {
     "point of a plate": ({"at": [{"x": [1, 2], "force": [0, 1]}]}, {}, "must be a number"),
     "nothing at a point": ({"at": [{"x": 1.0}]}, {}, "force, moment, or both"),
     "three moments": ({"at": [{"x": 1.0, "moment": [0, 0, 1]}]}, {}, "one component"),
+    "three moments beside a function": (
+        {"tip_moment": {"over_time": lambda t: 1.0, "harmonic": {"amplitude": [0, 0, 1], "frequency": 1.0}}},
+        {},
+        "one component",
+    ),
     "no list": ({"at": {"x": 1.0, "force": [0, 1]}}, {}, "list of tables"),
     "no frequency": ({"tip_force": {"harmonic": {"amplitude": [0, 1]}}}, {}, "frequency and per_rev"),
     "no amplitude": ({"tip_force": {"harmonic": {"frequency": 1.0}}}, {}, "amplitude"),

@@ -118,13 +118,10 @@ def grid(
         output: one of OUTPUTS.
         quick: a small grid.
         base_step: a fixed step (s) of about the scene's accuracy; its own where it has one.
-        chosen: `theories`, `elements`, `degrees`, `steps`, `schemes` that replace the default ones, or None each.
-
-    Raises:
-        SceneError: a choice is not allowed.
+        chosen: `theories`, `elements`, `degrees`, `steps`, `schemes` that replace the default ones, or None each, as
+            `check_choice` allows them.
     """
     own = own_setting(scene)
-    check_choice(scene, chosen)
     theories = list(chosen.get("theories") or default_theories(scene, quick))
     factors = MESHES_QUICK if quick else MESHES_FULL
     meshes = list(chosen.get("elements") or unique([scaled(own.elements, factor) for factor in factors]))

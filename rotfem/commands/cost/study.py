@@ -12,7 +12,7 @@ from mpi4py import MPI
 from rotfem.commands.cost.budget import DEFAULT_FULL, DEFAULT_QUICK, Budget, seconds_of
 from rotfem.commands.cost.exploration import Study
 from rotfem.commands.cost.result import CostResult
-from rotfem.commands.cost.settings import OUTPUTS, default_output, sweep_speeds
+from rotfem.commands.cost.settings import OUTPUTS, check_choice, default_output, sweep_speeds
 from rotfem.errors import SceneError
 from rotfem.listeners import Progress
 from rotfem.scene import Scene, as_scene
@@ -77,5 +77,6 @@ def cost(
         sweep_speeds(scene)
     seconds = (DEFAULT_QUICK if quick else DEFAULT_FULL) if budget is None else seconds_of(budget, scene.file)
     chosen = {"theories": theories, "elements": elements, "degrees": degrees, "steps": steps, "schemes": schemes}
+    check_choice(scene, chosen)  # before anything is computed or kept
     study = Study(scene, output, repeat, Budget(seconds, comm), None if folder is None else Path(folder), resume)
     return study.run(quick, accuracy, chosen, progress or (lambda share: None))
