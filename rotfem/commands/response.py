@@ -167,7 +167,7 @@ def result_of(
     warnings += [stability.warning()] if not stability.stable else []
     warnings += [said] if (said := theory.warning()) else []
     usual = float(np.median(off))
-    warnings += told(modes, undamped, usual, scene.modes.count)
+    warnings += [*told(modes, undamped, usual, scene.modes.count), *not_pursued(scene)]
     summary = {
         **modal_summary("response", analysis, scene, None, started),
         "speed": spinning.speed,
@@ -217,6 +217,13 @@ def peak_of(omegas: Array, amplitude: Array) -> dict[str, float]:
     """Return largest amplitude and where it is (rad/s)."""
     i = int(np.argmax(amplitude))
     return {"frequency": float(omegas[i]), "amplitude": float(amplitude[i])}
+
+
+def not_pursued(scene: Scene) -> list[str]:
+    """Return a warning where a scene asks for an accuracy, which chooses nothing here."""
+    asked = {"accuracy": scene.accuracy, "model.tolerance": scene.model.tolerance}
+    names = [f"{name} = {value:g}" for name, value in asked.items() if value is not None]
+    return [f"{name} is not pursued: a frequency response is of the scene's own model and mesh" for name in names]
 
 
 def told(modes: Sequence[Mapping[str, Any]], undamped: Sequence[int], off: float, count: int) -> list[str]:

@@ -76,13 +76,13 @@ def in_order(system: Any, ratios: float | tuple[float, ...]) -> tuple[ModesAtRes
     """Return (modes, their ratios) in the order of frequency.
 
     Raises:
-        InputError: there are fewer modes than ratios.
+        InputError: there are fewer modes than ratios, of a model with all its effects.
     """
     several = isinstance(ratios, tuple)
     wanted = np.array(ratios if several else [ratios] * FIRST)
     modes = modes_at_rest(system, len(wanted))
     there = len(modes.omega)
-    if several and there < len(wanted):
+    if several and there < len(wanted) and is_whole(system):
         raise InputError(KEY, ratios, f"has more ratios than there are modes on this mesh: {there}")
     return modes, wanted[:there]
 
@@ -91,7 +91,7 @@ def of_families(system: Any, ratios: Mapping[str, tuple[float, ...]]) -> tuple[M
     """Return (modes, their ratios), each mode in the family that has most of its energy, in order of frequency there.
 
     Raises:
-        InputError: there is no such family, or it has fewer modes than ratios.
+        InputError: there is no such family, or it has fewer modes than ratios, of a model with all its effects.
     """
     known = system.structure.families
     for name in ratios:
@@ -107,11 +107,20 @@ def of_families(system: Any, ratios: Mapping[str, tuple[float, ...]]) -> tuple[M
         if all(len(of[name]) >= len(given) for name, given in ratios.items()):
             break
         if len(modes.omega) < count:
+            if not is_whole(system):
+                break
             name = next(name for name, given in ratios.items() if len(of[name]) < len(given))
             why = f"has more ratios than there are {name} modes on this mesh: {len(of[name])}"
             raise InputError(f"{KEY}.{name}", list(ratios[name]), why)
         count *= 2
     zeta = np.zeros(len(modes.omega))
     for name, given in ratios.items():
-        zeta[of[name][: len(given)]] = given
+        found = of[name][: len(given)]
+        zeta[found] = given[: len(found)]
     return modes, zeta
+
+
+def is_whole(system: Any) -> bool:
+    """Return whether a system has all effects there are; without rotary inertia there are no modes of torsion."""
+    problem = system.model.problem
+    return set(system.model.effects) == set(problem.replace(effects=None).effective_effects())

@@ -8,6 +8,7 @@ from rotfem.scene.beams import PlanarBeamStructure, SpatialBeamStructure
 from rotfem.scene.limits import Limits
 from rotfem.scene.loads import Loads
 from rotfem.scene.motion import Motion, TorqueMotion
+from rotfem.scene.output import OutputTable
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh
 from rotfem.scene.signals import Signal
@@ -160,8 +161,8 @@ def check_first_state(model: Model, initial: Initial, accuracy: float | None) ->
         raise problem(key, value, 'is relative to the turning frame: it needs model.frame = "rotating"')
 
 
-def check_accuracy(model: Model, accuracy: float | None) -> None:
-    """Refuse a tolerance of the model beside an accuracy, which has one in it.
+def check_accuracy(model: Model, output: OutputTable, accuracy: float | None) -> None:
+    """Refuse a tolerance of the model beside an accuracy, which has one in it, and to leave out what tells of it.
 
     Raises:
         PydanticCustomError: there are both.
@@ -171,6 +172,8 @@ def check_accuracy(model: Model, accuracy: float | None) -> None:
         raise problem("model.tolerance", model.tolerance, reason)
     if accuracy is not None and model.frame == "inertial":
         raise problem("model.frame", model.frame, "cannot be combined with accuracy; the rotating frame is as true")
+    if accuracy is not None and not output.error:
+        raise problem("output.error", False, "cannot be combined with accuracy, which is met by what is estimated")
 
 
 def check_limits(limits: Limits, time: Time | None, modes: Modes) -> None:

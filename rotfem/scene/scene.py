@@ -38,10 +38,7 @@ from rotfem.scene.digest import abridged
 from rotfem.scene.limits import Limits, limits_of
 from rotfem.scene.load_checks import check_loads, doubtful_table
 from rotfem.scene.loads import Load, Loads
-from rotfem.scene.motion import (
-    AnyMotion,
-    Swept,
-)
+from rotfem.scene.motion import AnyMotion, Swept
 from rotfem.scene.output import OutputTable
 from rotfem.scene.problems import scene_error
 from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh, Solver
@@ -211,7 +208,7 @@ class Scene(SceneModel):
         """Check that the scene can be run: a time history needs times, a steady state a constant speed.
 
         Raises:
-            SceneError: there is no [time] table though the motion is not constant.
+            SceneError: there is no [time] table though the motion is not constant, or starts in a way of its own.
         """
         if self.time is None and not self.motion.is_steady:
             raise SceneError(
@@ -221,6 +218,8 @@ class Scene(SceneModel):
                 f'missing; with motion.type = "{self.motion.type}" a run is a time history: give [time] with end and '
                 "step (or tolerance). Only constant motion has a steady state to run without it",
             )
+        if self.time is None and (key := self.initial.first) is not None:
+            raise SceneError(self._file, f"initial.{key}", None, "needs [time]: a steady state has no beginning")
         self.check_tables("a steady state" if self.time is None else "")
 
     def check_tables(self, when: str) -> None:
@@ -255,7 +254,7 @@ class Scene(SceneModel):
         check_frame(self.structure, self.motion, self.model)
         check_initial(self.structure, self.motion, self.initial)
         check_limits(self.limits, self.time, self.modes)
-        check_accuracy(self.model, self.accuracy)
+        check_accuracy(self.model, self.output, self.accuracy)
         check_first_state(self.model, self.initial, self.accuracy)
         self.output.check(self.structure.type, self.structure.length)
         return self

@@ -114,6 +114,11 @@ class Initial(SceneModel):
         """Whether the structure does not start at rest, or in a mode."""
         return self.mode is not None or self.velocity is not None
 
+    @property
+    def first(self) -> str | None:
+        """The key that says how a motion starts; None where it starts at rest in a state of balance."""
+        return next((key for key in ("tip_displacement", "mode", "velocity") if getattr(self, key) is not None), None)
+
     @model_validator(mode="after")
     def _check_one(self) -> Self:
         if (self.mode is None) != (self.amplitude is None):

@@ -295,6 +295,10 @@ def test_check_run() -> None:
     with pytest.raises(SceneError, match="spin_up") as caught:
         scene(motion=SPIN_UP).check_run()
     assert caught.value.key == "time"
+    for key, start in (("tip_displacement", 0.1), ("velocity", [[0, 0, 0], [10, 0, 1]])):
+        with pytest.raises(SceneError, match=r"needs \[time\]") as caught:
+            scene(initial={key: start}).check_run()
+        assert caught.value.key == f"initial.{key}"
 
 
 # --- bad scenes -----------------------------------------------------------------------------------------------------
@@ -345,6 +349,7 @@ TIME = {"end": 1.0, "step": 0.1}
         ("planar", {"model__effects": ["euler", "euler"]}, "model.effects", "twice"),
         ("planar", {"model__effects": "all"}, "model.effects", '"auto" or a list'),
         ("planar", {"model__tolerance": 0}, "model.tolerance", "greater than 0"),
+        ("planar", {"accuracy": 1e-3, "output": {"error": False}}, "output.error", "cannot be combined with accuracy"),
         ("planar", {"model": {"frame": "inertial", "theory": "linear"}}, "model.frame", "reissner"),
         ("plate", {"model__frame": "inertial"}, "model.frame", "planar_beam"),
         ("planar", {"model__frame": "inertial", "motion": TORQUE}, "model.frame", "torque"),

@@ -293,6 +293,14 @@ def test_modes_that_are_none(modal: Any, key: str, message: str) -> None:
     assert caught.value.key == f"structure.damping.{key}"
 
 
+def test_a_model_without_rotary_inertia_has_the_modes_that_are_left() -> None:
+    """A beam of 8 nodes has 24 modes with rotary inertia, 16 without: what has no mode there has no damping."""
+    there = beam([0.01] * 20, **{"model.effects": ["damping"]})
+    assert Problem.of(there).system().by_mode.B.shape[1] == 16
+    axial = beam({"axial": [0.01] * 8, "lag": [0.01] * 12}, **{"model.effects": ["damping"]})
+    assert Problem.of(axial).system().by_mode.B.shape[1] == 16
+
+
 def test_what_cannot_have_it() -> None:
     """The inertial frame, sensitivities, and rotations beyond those of small motions."""
     with pytest.raises(SceneError, match='use "rotating"'):

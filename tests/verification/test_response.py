@@ -134,6 +134,13 @@ def test_without_damping_it_is_said():
     assert any("no damping" in line for line in warned.warnings)
 
 
+def test_an_accuracy_is_said_not_to_be_pursued():
+    tables = scene(structure=STRUCTURE)
+    for key, value in (("accuracy", 1e-3), ("model", {"theory": "consistent_linear", "tolerance": 1e-2})):
+        said = response({**tables, key: value}, 1.0, 10.0, number=3).warnings
+        assert any(" is not pursued" in line for line in said)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
