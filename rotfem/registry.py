@@ -103,6 +103,7 @@ blade_formats: Registry[BladeFormat] = Registry(
     "format of blade files",
     "rotfem.scene.blades.elastodyn",
     "rotfem.scene.blades.beamdyn",
+    "rotfem.scene.blades.openfast",
     "rotfem.scene.blades.bmodes",
     "rotfem.scene.blades.hawc2",
     "rotfem.scene.blades.windio",

@@ -110,3 +110,15 @@ a small blade
 ---------------------- PRIMARY INPUT FILE --------------------------------------
 "{primary}"    InputFile - Name of the primary BeamDyn input file
 """
+
+
+def openfast(elasticity: int) -> str:
+    """Return OpenFAST's main file with the blades of ElastoDyn (1) or BeamDyn (2)."""
+    return f"""------- OpenFAST INPUT FILE -------------------------------------------
+a small turbine
+---------------------- FEATURE SWITCHES AND FLAGS ------------------------------
+          {elasticity}   CompElast       - Compute structural dynamics (switch)
+---------------------- INPUT FILES ---------------------------------------------
+"main.dat"      EDFile          - Name of file containing ElastoDyn input parameters (quoted string)
+"primary.dat"   BDBldFile(1)    - Name of file containing BeamDyn input parameters for blade 1 (quoted string)
+"""

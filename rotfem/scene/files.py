@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from pydantic import ValidationInfo
 
-from rotfem.errors import show
+from rotfem.errors import show, shown
 from rotfem.scene.limits import limits_in
 from rotfem.scene.reading import Unreadable, read_bytes
 from rotfem.scene.values import Array, Matrix, are_numbers, as_increasing_rows, problem, rows_of
@@ -66,7 +66,7 @@ def existing_file_beside(deck: Path, name: str, line: int) -> Path:
     except (OSError, ValueError):
         found = False
     if not name or not found:
-        raise problem("", str(deck), f"line {line}: there is no file {show(name)} beside it")
+        raise problem("", shown(deck), f"line {line}: there is no file {show(name)} beside it")
     return path
 
 

@@ -55,6 +55,41 @@ def test_driver_of_beamdyn(tmp_path: Path) -> None:
     assert blade(tmp_path, mains.beamdyn_driver(), "driver.inp") == primary
 
 
+def openfast_files(folder: Path, blade_file: str) -> None:
+    (folder / "blade.dat").write_text(blade_file)
+    (folder / "main.dat").write_text(mains.elastodyn_main())
+    (folder / "primary.dat").write_text(mains.beamdyn_primary(PRIMARY))
+
+
+def test_main_file_of_openfast(tmp_path: Path) -> None:
+    """CompElast says whose blade it is; of a blade of BeamDyn the root is in ElastoDyn's main file."""
+    openfast_files(tmp_path, decks.elastodyn())
+    assert blade(tmp_path, mains.openfast(1), "main.fst", **RIGID) == read(tmp_path, "main.dat", **RIGID)
+    openfast_files(tmp_path, decks.beamdyn_blade())
+    beam, primary = blade(tmp_path, mains.openfast(2), "main.fst"), read(tmp_path, "primary.dat")
+    assert (beam.section, beam.line, beam.pretwist) == (primary.section, primary.line, primary.pretwist)
+    assert beam.precone == pytest.approx(-np.radians(4.0))
+    assert beam.root_position == pytest.approx((1.5 * np.cos(beam.precone), 0.0, 1.5 * np.sin(beam.precone)))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("OpenFAST", "FAST v8.16.*"), "line 1: the first line must say OpenFAST INPUT FILE"),
+        (("2   Comp", "3   Comp"), "line 4, column 1: CompElast = 3 is not known; known: 1"),
+        (("2   Comp", "two   Comp"), 'line 4, column 1: CompElast is "two"; must be a whole number'),
+        (("main.dat", "none.dat"), 'line 6: there is no file "none.dat" beside it'),
+        (("main.dat", "blade.dat"), "blade.dat.*line 1: the first line must be that of ElastoDyn's main file"),
+        (("primary.dat", ""), 'line 7: there is no file "" beside it'),
+        (("EDFile", "File"), "no line with a value of EDFile"),
+    ],
+)
+def test_bad_main_files_of_openfast(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+    openfast_files(tmp_path, decks.beamdyn_blade())
+    with pytest.raises(rotfem.SceneError, match=message):
+        blade(tmp_path, mains.openfast(2).replace(*change, 1), "main.fst", format="openfast")
+
+
 def test_main_body_of_hawc2(tmp_path: Path) -> None:
     """A body, or a copy of it, has the st file's sections on its own line with its own twist."""
     (tmp_path / "blade.st").write_text(decks.hawc2(True))

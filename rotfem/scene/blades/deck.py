@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from rotfem.errors import shown
 from rotfem.scene.files import SHOWN_CELL, read_text
 from rotfem.scene.values import problem
 
@@ -45,7 +46,7 @@ class Deck:
             PydanticCustomError: always.
         """
         where = "" if line is None else f"line {line}: " if column is None else f"line {line}, column {column}: "
-        raise problem("", str(self.path), f"{where}{reason}")
+        raise problem("", shown(self.path), f"{where}{reason}")
 
     def check_version(self, program: str, known: Sequence[str], kind: str = "blade") -> None:
         """Refuse a file whose first line does not name a version that is known.

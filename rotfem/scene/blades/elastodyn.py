@@ -50,18 +50,26 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
 
 def _main(deck: Deck) -> dict[str, Any]:
     """Return what a main file has of blade 1, and its blade file."""
-    if WITHOUT not in deck.lines[0].upper():
-        deck.check_version("ElastoDyn", MAIN_VERSIONS, "main")
-    tip, hub, mass = deck.number("TipRad"), deck.number("HubRad"), deck.number("TipMass(1)")
-    if not 0.0 <= hub < tip:
-        deck.fail(f"HubRad = {hub:g} must be at least 0 and less than TipRad = {tip:g}", deck.named("HubRad")[0], 1)
+    place, length = root(deck), deck.number("TipRad") - deck.number("HubRad")
+    mass = deck.number("TipMass(1)")
     if mass < 0.0:
         deck.fail(f"TipMass(1) = {mass:g} must be at least 0", deck.named("TipMass(1)")[0], 1)
     line, name = deck.named("BldFile1" if deck.has("BldFile1") else "BldFile(1)")
     blade = Deck(existing_file_beside(deck.path, name, line))
     blade.check_version("ElastoDyn", VERSIONS)
-    root = coned_root(hub, float(np.radians(deck.number("PreCone(1)"))))
-    return {"length": tip - hub, **root, "tip_mass": mass, **_blade(blade, tip - hub)}
+    return {"length": length, **place, "tip_mass": mass, **_blade(blade, length)}
+
+
+def root(deck: Deck) -> dict[str, Any]:
+    """Return where a main file of a known version has the root of blade 1, and its precone."""
+    if not _is_main(deck):
+        deck.fail("the first line must be that of ElastoDyn's main file", 1)
+    if WITHOUT not in deck.lines[0].upper():
+        deck.check_version("ElastoDyn", MAIN_VERSIONS, "main")
+    tip, hub = deck.number("TipRad"), deck.number("HubRad")
+    if not 0.0 <= hub < tip:
+        deck.fail(f"HubRad = {hub:g} must be at least 0 and less than TipRad = {tip:g}", deck.named("HubRad")[0], 1)
+    return coned_root(hub, float(np.radians(deck.number("PreCone(1)"))))
 
 
 def _blade(deck: Deck, length: float) -> dict[str, Any]:
