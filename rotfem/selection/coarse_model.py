@@ -7,6 +7,7 @@ discretisation is in both. Effects are switched, so each theory is compiled once
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -225,6 +226,14 @@ class Trial:
         case = self.case.replace(problem=self.case.problem.replace(mesh=mesh))
         _, left_out = self._stand_in(theory)
         return Candidate(case, self.compiled(case.problem, theory), left_out.union(without))
+
+    def poorest_on(self, mesh: Any) -> Candidate:
+        """Return the poorest theory with its geometric stiffness on another mesh, nothing left out.
+
+        Raises:
+            InputError: a mesh that cannot be computed with.
+        """
+        return replace(self.on_mesh(mesh, next(iter(self.theories))), without=frozenset())
 
     def _frequencies_at_rest(self) -> Array:
         """Return the frequencies (rad/s) of the resting structure, its hub held."""

@@ -30,7 +30,7 @@ MOST_STEPS, CORRECTIONS = 800, 20
 AFFORDABLE = 1e6
 
 #: Error of the steps with which that of the mesh can be seen beside it, and most steps for one that see it.
-SEEING, MOST_FINER = 1e-2, 4
+SEEING, MOST_FINER = 4e-3, 5
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def discretisation(trial: Trial, theory: str, without: Collection[str] = ()) -> 
     """
     out = Discretisation()
     try:
-        own = trial.on_mesh(trial.full.problem.mesh, next(iter(trial.theories)))
+        own = trial.poorest_on(trial.full.problem.mesh)
     except (ComputationError, InputError, np.linalg.LinAlgError):
         return out
     for name in (HISTORY, STEADY):

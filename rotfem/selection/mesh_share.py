@@ -73,7 +73,7 @@ def error_of_modes(trial: Trial, own: Candidate) -> float:
     system, count, hub = own.switched(), trial.case.mode_count, trial.case.problem.motion.hub
     small = 2**system.structure.mesh.topology.dim * len(system.held.zeros()) <= MOST
     if hub is not None and small and not from_file(trial.case.problem):
-        twice = trial.on_mesh(halved(trial.full.problem.mesh), next(iter(trial.theories)))
+        twice = trial.poorest_on(halved(trial.full.problem.mesh))
         return modes_change(own.eigenvalues(trial.speeds), twice.eigenvalues(trial.speeds))
     fine = RefinedMesh(system).equations if system.held.linear else None
     if fine is None:
