@@ -19,8 +19,8 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 Index = npt.NDArray[np.int64]
 
-#: |λh| up to which integrals are summed by Gauss points, and how many.
-SMALL, POINTS = 1.0, 8
+#: |λh| up to which integrals are summed by Gauss points, and these points and weights on (−1, 1).
+SMALL, GAUSS = 1.0, np.polynomial.legendre.leggauss(8)
 
 #: Samples at the start of a piece that may jump, those after its first that are looked at, and how many times the bends
 #: of these theirs are then.
@@ -102,9 +102,8 @@ def moments(z: Complex, count: int) -> Complex:
         out[0] = np.expm1(z) / z
         for k in range(1, count):
             out[k] = (k * out[k - 1] - 1.0) / z
-    x, w = np.polynomial.legendre.leggauss(POINTS)
-    theta = 0.5 + 0.5 * x
-    grown = np.exp(z[small][:, None] * (1.0 - theta)) * (0.5 * w)
+    theta, w = 0.5 + 0.5 * GAUSS[0], 0.5 * GAUSS[1]
+    grown = np.exp(z[small][:, None] * (1.0 - theta)) * w
     out[:, small] = np.stack([grown @ theta**k for k in range(count)])
     return out
 

@@ -47,7 +47,7 @@ def largest_errors(
         length: of the structure, m.
     """
     if linear:
-        return Track(scheme, linear).errors(windows, [window.K for window in windows])
+        return _both(Track(scheme, linear).errors(windows, [window.K for window in windows]))
     (changes, spreads), phase = smoothed(windows)
     best: dict[str, tuple[float, float]] = {}
     least = np.inf
@@ -57,13 +57,19 @@ def largest_errors(
         moved = (change + factor * spread for change, spread in zip(changes, spreads, strict=True))
         stiffness = [window.K + np.diag(change) for window, change in zip(windows, moved, strict=True)]
         found = Track(scheme, linear, factor == 0.0).errors(windows, stiffness)
-        best = {"space": found["space"], **best, "time": max(best.get("time", (0.0, 0.0)), found["time"])}
+        best = {**found, **best, "time": max(best.get("time", (0.0, 0.0)), found["time"])}
         least = min(least, found["time"][0])
     else:
         fed = 1.0 + scale / length
         best["time"] = (MARGIN * max(best["time"][0], fed * least), best["time"][1])
         best["space"] = (MARGIN * fed * best["space"][0], best["space"][1])
-    return best
+    return _both(best)
+
+
+def _both(found: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    """Return errors of time and space: of the latter the larger one, by frequencies or by what the motion lacks."""
+    size, when = found.get("missing", (0.0, 0.0))
+    return {"time": found["time"], "space": max(found["space"], (MARGIN * size, when))}
 
 
 def smoothed(windows: Sequence[Window]) -> tuple[tuple[list[Array], list[Array]], float]:
@@ -108,11 +114,11 @@ class Track:
 
     def __init__(self, scheme: Any, linear: bool, space: bool = True):
         self.scheme, self.bounded, self.space = scheme, not linear, space
-        self.carried: Array = np.zeros((2, 2, 0))
+        self.carried: Array = np.zeros((0, 2, 0))
 
     def errors(self, windows: Sequence[Window], stiffness: Sequence[Array]) -> dict[str, tuple[float, float]]:
         """Return the largest errors of the tip: size (m) and when (s)."""
-        best: dict[str, tuple[float, float]] = {"time": (0.0, 0.0), "space": (0.0, 0.0)}
+        best: dict[str, tuple[float, float]] = dict.fromkeys(("time", "space", "missing"), (0.0, 0.0))
         for window, K in zip(windows, stiffness, strict=True):
             found = self._through(window, K)
             best |= {name: max(best[name], error) for name, error in zip(best, found, strict=False)}
@@ -126,8 +132,8 @@ class Track:
         defects = states[end] - exact.factors * states[begin] - exact.forced(self._drives(window, K))
         parts = [defects]
         if self.space:
-            off = self._mesh_force(window)
-            parts.append(exact.forced(np.stack([off[begin], off[end] - off[begin]], axis=1)))
+            for off in self._mesh_forces(window, not self.bounded):
+                parts.append(exact.forced(np.stack([off[begin], off[end] - off[begin]], axis=1)))
         c, rate = self._start(window, len(parts))
         errors = accumulated(exact.modal(c, rate), exact.carried, np.stack(parts, axis=1))
         self.carried = np.array([exact.sampled(e) for e in errors[-1]]).reshape(len(parts), 2, -1)
@@ -136,7 +142,7 @@ class Track:
         moved = [exact.displacements(e)[:, :r] for e in np.moveaxis(errors, 1, 0)]
         if self.space:  # a vibration of another frequency is off by twice its amplitude at most
             most = 2.0 * np.abs(window.motion[0][:, :r]).max(axis=0)
-            moved[1] = np.clip(moved[1], -most, most)
+            moved[1:] = [np.clip(c, -most, most) for c in moved[1:]]
         sizes = [np.linalg.norm(c @ tip.T, axis=1) for c in moved]
         return [(float(size.max()), float(window.t[end[int(size.argmax())]])) for size in sizes]
 
@@ -159,9 +165,15 @@ class Track:
         return interpolated(t, a[end] + v @ window.C.T + c @ K.T, window.in_middles, most)
 
     @staticmethod
-    def _mesh_force(window: Window) -> Array:
-        """Return 2 ε c̈: the forces of inertia, whose static answer the mesh puts off by 2 ε."""
+    def _mesh_forces(window: Window, linear: bool) -> list[Array]:
+        """Return what the mesh makes of forces: by frequencies, and of a nonlinear theory what it leaves out of them.
+
+        The one is 2 ε c̈: of the forces of inertia, whose static answer the mesh puts off by 2 ε.
+        """
         a = settled(window.t, window.motion[2], np.array(window.samples.pieces))
-        out, r = np.zeros_like(a), len(window.epsilon)
-        out[:, :r] = 2.0 * window.epsilon * a[:, :r]
+        out = [np.zeros_like(a) for _ in ("vibrating", "missing")[: 1 if linear else 2]]
+        r = len(window.epsilon)
+        out[0][:, :r] = 2.0 * window.epsilon * a[:, :r]
+        if window.missing is not None:
+            out[1][:, :r] = window.missing
         return out

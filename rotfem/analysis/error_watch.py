@@ -20,9 +20,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.error_tracks import largest_errors
 from rotfem.analysis.error_window import MeshErrors, Samples, Window
-from rotfem.analysis.refined_mesh import RefinedMesh
 from rotfem.analysis.schemes import State
-from rotfem.analysis.shape_error import ShapeError
 from rotfem.analysis.turning_view import TurningView
 from rotfem.errors import ComputationError
 
@@ -62,7 +60,7 @@ class ErrorWatch:
         self._view = None if system.clamp is None else TurningView(system)
         self.system: Any = system if self._view is None else self._view.system
         self.end, self.scheme = end, scheme
-        self._mesh = MeshErrors(ShapeError(self.system.held), RefinedMesh(self.system))
+        self._mesh = MeshErrors.of(self.system)
         self._fewest = FEWEST[system.A.getSize()[0] > LARGE]
         self._now = Samples([], [], [])
         self._windows: list[Window] = []
@@ -73,7 +71,6 @@ class ErrorWatch:
         #: Whether all windows could be solved.
         self._sound = True
         self._farthest: tuple[float, State | None] = (0.0, None)
-        self._roughest: tuple[float, State | None] = (0.0, None)
 
     def __call__(self, old: Any, new: Any) -> None:
         """Look at a step from an old to a new state."""
@@ -108,7 +105,7 @@ class ErrorWatch:
         if state is None:
             state = last if self._view is None else self._view.state(last)
             size = float(self._tip_sizes([state.q])[0])
-        shape = max(self._shape(s, size) for s in (state, self._roughest[1]) if s is not None)
+        shape = self._shape(state, size)
         found: dict[str, tuple[float, float]] = {"time": (0.0, 0.0), "space": (0.0, 0.0)}
         if self._windows and self._sound:
             held = self.system.held
@@ -134,11 +131,6 @@ class ErrorWatch:
         i = int(np.argmax(sizes))
         if sizes[i] > self._farthest[0]:
             self._farthest = (float(sizes[i]), now.state(i))
-        if not self.system.held.linear:
-            n = len(self.system.held.zeros())
-            i, rough = self._mesh.shape.roughest(np.array([state[1][:n] for state in now.states]))
-            if rough > self._roughest[0]:
-                self._roughest = (rough, now.state(i))
         if self._sound:
             before = self._windows[-1] if self._windows else None
             try:

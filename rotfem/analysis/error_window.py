@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.error_recursion import Index, Spans
+from rotfem.analysis.mesh_force import MeshForce
 from rotfem.analysis.reduced_tangents import Tangents
 from rotfem.analysis.refined_mesh import RefinedMesh
 from rotfem.analysis.ritz_vectors import RitzVectors
@@ -74,10 +75,19 @@ class MeshErrors:
     Attributes:
         shape: of shapes, told from themselves.
         refined: by a finer mesh.
+        force: what is missing of the forces on shapes in large motions; None of a linear theory.
     """
 
     shape: ShapeError
     refined: RefinedMesh
+    force: MeshForce | None
+
+    @staticmethod
+    def of(system: Any) -> MeshErrors:
+        """Return those of a system, in the frame that turns."""
+        shape = ShapeError(system.held)
+        force = None if system.held.linear or not shape.turns else MeshForce(system, shape)
+        return MeshErrors(shape, RefinedMesh(system), force)
 
 
 class Window:
@@ -98,6 +108,7 @@ class Window:
         speed: of the frame in the middle, rad/s.
         bends: which shapes bend, (r of the structure,).
         epsilon: relative errors of their frequencies by the mesh.
+        missing: forces that the mesh leaves out in a large motion, (N, r of the structure); None where not known.
         turn: Vᵀ M V_before, by which errors are handed on; None for the first.
     """
 
@@ -117,6 +128,7 @@ class Window:
             self.turn = np.eye(len(self.K))
         else:
             self._reduce(system, mesh, end, before)
+        self.missing = self._missing(system, mesh)
         self.motion = tuple(self._coordinates(x) for x in list(zip(*samples.states, strict=True))[1:4])
         samples.states.clear()
 
@@ -136,20 +148,31 @@ class Window:
             K[-1, -1] += HELD * M[-1, -1] * (2 * np.pi / end) ** 2
         self.C, self.K = (np.asarray(np.linalg.solve(M, A), dtype=float) for A in (C, K))
         self.bends = mesh.shape.bend(self.shapes)
-        self.epsilon = self._errors_by_mesh(mesh, tangents, before)
+        self.epsilon = self._errors_by_mesh(mesh, before)
         self.shapes.release()
         if before is not None:
             self.turn = self._turned(before.shapes)
 
-    def _errors_by_mesh(self, mesh: MeshErrors, tangents: Tangents, before: Window | None) -> Array:
-        """Return the relative errors of the frequencies: those of the window before where they are much the same."""
+    def _errors_by_mesh(self, mesh: MeshErrors, before: Window | None) -> Array:
+        """Return the relative errors of the frequencies: those of the window before where they are much the same.
+
+        Of a nonlinear theory they are those at rest, once and for all.
+        """
         mine = self.shapes.squares
         if before is not None and len(before.epsilon) == len(mine):
             ratio = np.abs(mine[:LOWEST]) / np.maximum(np.abs(before.shapes.squares[:LOWEST]), TINY)
-            if np.all((ratio <= LIKE) & (ratio >= 1.0 / LIKE)):
+            if mesh.force is not None or np.all((ratio <= LIKE) & (ratio >= 1.0 / LIKE)):
                 return before.epsilon
-        found = mesh.refined.of_frequencies(self.shapes, tangents.t, tangents.speed)
+        found = mesh.refined.of_frequencies(self.shapes, np.pi / float(np.median(self.lengths)))
         return mesh.shape.of_modes(self.shapes) if found is None else found
+
+    def _missing(self, system: Any, mesh: MeshErrors) -> Array | None:
+        """Return the forces on shapes that bend which the mesh leaves out, where rotations are those of the motion."""
+        states = self.samples.states
+        if mesh.force is None or any(state[4] is not None for state in states):
+            return None
+        n = len(system.held.zeros())
+        return mesh.force(np.array([state[1][:n] for state in states]), self.shapes) * self.bends
 
     @cached_property
     def ends(self) -> tuple[Index, Index]:

@@ -11,6 +11,7 @@ much again, for which a factor stands.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from math import factorial
 from typing import Any
@@ -27,9 +28,32 @@ Array = npt.NDArray[Any]
 #: What is told, in units of the estimate: of beams and plates it is 0.2 to 1 of the true error where that is small.
 SAFE = 3.0
 
+#: An energy that is none.
+TINY = 1e-300
+
 
 def _sine(n: int) -> float:
     return (factorial(n) / factorial(2 * n)) ** 2 / (2 * n + 1)
+
+
+@dataclass(frozen=True)
+class Part:
+    """The highest degree along one direction of the cells, of the gradient along one direction.
+
+    Attributes:
+        level: degree of every polynomial along the one.
+        direction: the other.
+        top: the highest.
+    """
+
+    level: Array
+    direction: int
+    top: int
+
+    @property
+    def polynomials(self) -> npt.NDArray[np.bool_]:
+        """Which polynomials have it."""
+        return np.asarray(self.level == self.top)
 
 
 class MeshEstimate:
@@ -52,11 +76,11 @@ class MeshEstimate:
         x = mesh.geometry.x[mesh.geometry.dofmap[:owned]][:, :, :tdim]
         J = np.einsum("cpi,dqp->cqid", x, dN)
         # Along the directions of the cell, whose degrees are counted, and per unit length.
-        self._per_length = 1 / np.linalg.norm(J, axis=2)
-        self._weights = weights * np.abs(np.linalg.det(J))
-        self._shape, self._points = shape, points
-        self._polynomials = basix.tabulate_polynomials(basix.PolynomialType.legendre, cell, self.degree, points)
-        self._reference = weights
+        per_length = 1 / np.linalg.norm(J, axis=2)
+        #: Of the cells, length, area or volume.
+        self.volumes = (weights * np.abs(np.linalg.det(J))).sum(axis=1)
+        polynomials = basix.tabulate_polynomials(basix.PolynomialType.legendre, cell, self.degree, points)
+        self._expand = np.einsum("pq,q,dqn,cqd->cpnd", polynomials, weights, shape, per_length)
         if cell == basix.CellType.quadrilateral:
             i, j = np.divmod(np.arange(n * n), n)
             self._levels = [i, j]
@@ -70,36 +94,56 @@ class MeshEstimate:
 
     def __call__(self, values: Array) -> float:
         """Return the estimated relative error of ω (half that of ω²) of nodal values (local nodes, components)."""
-        local = values[self.cells]  # (cells, nodes, components)
-        reference = np.einsum("cnk,dqn->cqkd", local, self._shape)
-        gradient = reference * self._per_length[:, :, None, :]
-        volume = self._weights.sum(axis=1)
-        coefficients = np.einsum("pq,q,cqki->cpki", self._polynomials, self._reference, gradient)
-        energy = np.einsum("c,cpki->pi", volume, coefficients**2)  # by polynomial and direction of the gradient
-        comm = self.V.mesh.comm
-        energy = comm.allreduce(energy) if comm.size > 1 else energy
+        energy = self.energies(self.coefficients(values[None]))
         total = float(energy.sum())
         if total == 0.0:
             return 0.0
-        return min(1.0, SAFE * 0.5 * sum(self._missing(energy, level) for level in self._levels) / total)
+        missing = sum((kept * ratio).sum() for kept, ratio in (self.highest(energy, part) for part in self.parts))
+        return float(min(1.0, SAFE * 0.5 * missing / total))
+
+    def coefficients(self, values: Array) -> Array:
+        """Return the gradients of nodal values (states, local nodes, components), expanded in every cell.
+
+        Their squares times the volumes are energies; shape (states, cells, polynomials, components, directions).
+        """
+        return np.asarray(np.einsum("cpnd,scnk->scpkd", self._expand, values[:, self.cells], optimize=True))
+
+    def energies(self, coefficients: Array) -> Array:
+        """Return the energies over all cells, by polynomial and direction, shape (states, polynomials, directions)."""
+        return self.sum(np.einsum("c,scpkd->spd", self.volumes, coefficients**2))
+
+    def sum(self, local: Array) -> Array:
+        """Return the sum over all ranks."""
+        comm = self.V.mesh.comm
+        return np.asarray(comm.allreduce(local)) if comm.size > 1 else local
 
     @cached_property
-    def _top(self) -> Array:
-        """What the values at the nodes of a cell have of the highest degree, shape (polynomials, nodes)."""
-        e = self.V.ufl_element()
-        base = e.sub_elements[0] if e.block_size > 1 else e
-        values = base.tabulate(0, self._points)[0]
-        highest = np.max(self._levels, axis=0) == self.degree
-        return np.asarray(self._polynomials[highest] * self._reference @ values)
+    def parts(self) -> list[Part]:
+        """The degrees along every direction of the cells that are the highest, for every direction of the gradient."""
+        out = []
+        for level in self._levels:
+            for i in range(self._expand.shape[3]):
+                # A derivative along a direction has one degree less in it.
+                less = len(self._levels) == 1 or self._levels[i] is level
+                out.append(Part(level, i, self.degree - 1 if less else self.degree))
+        return out
 
-    def roughness(self, values: Array) -> Array:
-        """Return how much of the highest degree nodal values (states, local nodes, components) have, shape (states,).
+    def highest(self, energy: Array, part: Part) -> tuple[Array, Array]:
+        """Return the energy of the highest degree, and that of the first missing one as a part of it, shape (states,).
 
-        That is what the mesh follows last: where it is large, the mesh is the farthest off.
+        Args:
+            energy: shape (states, polynomials, directions).
+            part: which degree and direction.
         """
-        own = (np.einsum("pn,scnk->scpk", self._top, values[:, self.cells]) ** 2).sum(axis=(1, 2, 3))
-        comm = self.V.mesh.comm
-        return np.asarray(comm.allreduce(own) if comm.size > 1 else own)
+        top = part.top
+        along = np.array([energy[:, part.level == n, part.direction].sum(axis=1) for n in range(self.degree + 1)])
+        if top == 0:
+            return along[0], np.ones(len(energy))
+        ratio = along[top] / np.maximum(along[top - 1], TINY) * _sine(top + 1) * _sine(top - 1) / _sine(top) ** 2
+        if top > 1:  # a shape that is even or odd in every cell has only every other degree
+            spread = np.sqrt(along[top] / np.maximum(along[top - 2], TINY) * _sine(top - 2) / _sine(top))
+            ratio = np.maximum(ratio, spread * _sine(top + 1) / _sine(top))
+        return along[top], np.minimum(1.0, ratio)
 
     def of_shapes(self, X: Array, components: list[list[int]]) -> list[float]:
         """Return the estimates of complex shapes, columns of owned unknowns, each for some of their components."""
@@ -111,21 +155,4 @@ class MeshEstimate:
             function.x.array[:owned] = np.real(x * np.exp(-1j * phase))
             function.x.scatter_forward()
             out.append(self(function.x.array.reshape(-1, size)[:, chosen]))
-        return out
-
-    def _missing(self, energy: Array, level: Array) -> float:
-        """Return the energy of the first missing degree along one direction, summed over the gradient's directions."""
-        out = 0.0
-        for i in range(energy.shape[1]):
-            along = np.array([energy[level == n, i].sum() for n in range(self.degree + 1)])
-            # A derivative along a direction has one degree less in it.
-            top = self.degree - 1 if len(self._levels) == 1 or self._levels[i] is level else self.degree
-            if top == 0:
-                out += float(along[0])
-                continue
-            ratio = along[top] / max(along[top - 1], 1e-300) * _sine(top + 1) * _sine(top - 1) / _sine(top) ** 2
-            if top > 1:  # a shape that is even or odd in every cell has only every other degree
-                spread = np.sqrt(along[top] / max(along[top - 2], 1e-300) * _sine(top - 2) / _sine(top))
-                ratio = max(ratio, float(spread) * _sine(top + 1) / _sine(top))
-            out += float(along[top] * min(1.0, ratio))
         return out

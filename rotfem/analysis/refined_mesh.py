@@ -5,15 +5,14 @@ that balance them, by Newton's method with velocities and accelerations as they 
 
 *Frequencies.* Shapes X of the coarse mesh become Y = (K + sM)⁻¹ M X on either mesh, by which what the cells cannot
 follow is out of them, and the frequencies of the two meshes in Y are compared one by one: of a nonlinear theory those
-about the equilibrium at the speed, without loads. About a state that moves they say less: a tangent is off by stress in
-the points of integration, and the path of the motion is not.
+of the undeformed structure at rest. About a state that moves they say less: a tangent is off by stress in the points of
+integration, and the path of the motion is not. What motions bend sharply is for `rotfem.analysis.mesh_force`.
 
 Both leave out the error of the finer mesh, a small part: (½)^{2k} of it in smooth shapes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -33,8 +32,8 @@ Array = npt.NDArray[np.float64]
 #: Most corrections, the relative size of one that is small, and how many of these in a row are the last.
 CORRECTIONS, SMALL, ENOUGH = 15, 0.02, 2
 
-#: Size of the last increment of an equilibrium, relative to its largest unknown (m or rad) or to 1.
-SETTLED = 1e-9
+#: Number of the lowest shapes whose frequencies are always compared.
+LOWEST = 3
 
 #: Most unknowns of the refined mesh.
 MOST = 40_000
@@ -96,53 +95,37 @@ class RefinedMesh:
                 return size
         return None
 
-    def of_frequencies(self, shapes: RitzVectors, t: float, speed: float) -> Array | None:
-        """Return (ω − ω_fine)/ω of shapes, shape (r,); None where it cannot be found.
+    def of_frequencies(self, shapes: RitzVectors, most: float = np.inf) -> Array | None:
+        """Return (ω − ω_fine)/ω of shapes, shape (r,), at the time that is set in the system if its theory is linear.
+
+        None where it cannot be found.
 
         Args:
             shapes: of the system's own mesh.
-            t: when, s.
-            speed: of the frame then, rad/s.
+            most: frequency above which shapes are left out, but for the lowest, rad/s; their errors are 0.
         """
         if (fine := self.equations) is None:
             return None
         inner = self.system.held
         try:
             if not inner.linear:
-                inner.set_time(t, inner.motion.at_speed(speed), 0.0)
+                self.system.count_rotations_from(None)
+                inner.set_time(0.0, inner.motion.at_speed(0.0), 0.0)
                 inner.set_state(inner.zeros())
-                _settle(Increment(inner.V), lambda: inner.matrix(1.0, 0.0, 0.0, 1.0), inner.residual, inner.q)
             fine.take()
-            if not inner.linear:
-                _settle(Increment(fine.V), lambda: fine.matrix("K", 1.0), fine.imbalance, fine.q)
             M, K = inner.matrix(0.0, 0.0, 1.0, 0.0), inner.matrix(1.0, 0.0, 0.0, 1.0)
-            here = _frequencies(shapes, (M, K, inner.clamped), shapes.V)
+            number = max(LOWEST, int(np.sum(shapes.squares <= most**2)))
+            V = shapes.V[:, :number]
+            here = _frequencies(shapes, (M, K, inner.clamped), V)
             M, K = fine.matrix("M"), fine.matrix("K", 1.0)
-            X = fine.carried(_local(inner, shapes.V))
+            X = fine.carried(_local(inner, V))
             there = _frequencies(shapes, (M, K, fine.clamped), X, own=False)
         except (ComputationError, NotRefined, np.linalg.LinAlgError):
             return None
+        out = np.zeros(shapes.V.shape[1])
         errors = 0.5 * (here - there) / np.maximum(np.abs(here), np.finfo(float).tiny)
-        return np.asarray(np.clip(errors, -1.0, 1.0)) if np.all(np.isfinite(errors)) else None
-
-
-def _settle(increment: Increment, stiffness: Callable[[], Any], imbalance: Callable[[], Any], q: Any) -> None:
-    """Put the function q into the equilibrium near it.
-
-    Raises:
-        ComputationError: there is none that a few corrections lead to.
-    """
-    for _ in range(CORRECTIONS):
-        dq = increment.solve(DirectSolver(stiffness()), imbalance())
-        q.x.array[:] += dq
-        size, whole = (float(np.max(np.abs(x), initial=0.0)) for x in (dq, q.x.array))
-        comm = increment.function.function_space.mesh.comm
-        size, whole = max(comm.allgather((size, whole))) if comm.size > 1 else (size, whole)
-        if not np.isfinite(size):
-            break
-        if size <= SETTLED * max(whole, 1.0):
-            return
-    raise ComputationError("no equilibrium at the speed")
+        out[: len(errors)] = np.clip(errors, -1.0, 1.0)
+        return out if np.all(np.isfinite(errors)) else None
 
 
 def _local(system: Any, owned: Array) -> Array:

@@ -39,11 +39,11 @@ class ShapeError:
     """
 
     def __init__(self, system: Any):
-        self.system, self._estimate = system, MeshEstimate(system.V)
+        self.system, self.estimate = system, MeshEstimate(system.V)
         names = system.structure.unknowns
         self._size = len(names)
         self._moves = [i for i, name in enumerate(names) if name.startswith("u")]
-        self._turns = [i for i, name in enumerate(names) if not name.startswith("u")]
+        self.turns = [i for i, name in enumerate(names) if not name.startswith("u")]
         self._rotations = {i for i, name in enumerate(system.structure.components) if not name.startswith("u")}
 
     def of_modes(self, shapes: Shapes) -> Array:
@@ -52,8 +52,8 @@ class ShapeError:
         for x, bends in zip(shapes.V.T, self.bend(shapes), strict=True):
             function.x.array[: len(x)] = x
             function.x.scatter_forward()
-            components = self._turns if bends else self._moves
-            out.append(LIKELY / SAFE * self._estimate(function.x.array.reshape(-1, self._size)[:, components]))
+            components = self.turns if bends else self._moves
+            out.append(LIKELY / SAFE * self.estimate(function.x.array.reshape(-1, self._size)[:, components]))
         return np.array(out)
 
     def bend(self, shapes: Shapes) -> npt.NDArray[np.bool_]:
@@ -78,16 +78,5 @@ class ShapeError:
         """
         nodal = q.reshape(-1, self._size)
         sizes = self.system.sizes(q)
-        bends = datum is None and self._turns and np.any(sizes[list(self._rotations)] > 0.0)
-        return min(1.0, 2.0 / SAFE * self._estimate(nodal[:, self._turns if bends else self._moves]))
-
-    def roughest(self, states: Array) -> tuple[int, float]:
-        """Return which of some states (n, unknowns) the mesh follows worst, and how much it has of the highest degree.
-
-        Args:
-            states: local dof arrays.
-        """
-        nodal = states.reshape(len(states), -1, self._size)
-        found = self._estimate.roughness(nodal[:, :, self._turns or self._moves])
-        worst = int(np.argmax(found))
-        return worst, float(found[worst])
+        bends = datum is None and self.turns and np.any(sizes[list(self._rotations)] > 0.0)
+        return min(1.0, 2.0 / SAFE * self.estimate(nodal[:, self.turns if bends else self._moves]))

@@ -55,7 +55,7 @@ def _errors_at_rest(system: Any) -> float:
     held.set_state(held.zeros())
     M, _, K = held.mass_damping_stiffness()
     shapes = RitzVectors(held, M, K, 0.0)
-    found = RefinedMesh(system).of_frequencies(shapes, 0.0, 0.0)
+    found = RefinedMesh(system).of_frequencies(shapes)
     errors = ShapeError(held).of_modes(shapes) if found is None else np.abs(found)
     return float(errors[:COMPARED].sum())
 
