@@ -42,10 +42,14 @@ def held(problem: Problem) -> list[str]:
     """Return a warning where what is computed at one time, as modes are, takes pitch and loads for those of t = 0."""
     given = {name: getattr(load, "unpitched", load) for name, load in named(problem.loads).items()}
     names = [f"loads.{name}" for name, load in given.items() if not (load.constant or load.is_zero)]
-    names += ["structure.root.pitch"] if problem.motion.pitch is not None else []
-    if not names:
-        return []
-    return [f"{', '.join(names)} {'change' if len(names) > 1 else 'changes'} with time: taken as at t = 0"]
+    said = [f"{', '.join(names)} {'change' if len(names) > 1 else 'changes'} with time: taken as at t = 0"]
+    return [*held_pitch(problem), *(said if names else [])]
+
+
+def held_pitch(problem: Problem) -> list[str]:
+    """Return the same of the pitch."""
+    pitches = problem.motion.pitch is not None
+    return ["structure.root.pitch changes with time: taken as at t = 0"] if pitches else []
 
 
 #: Times at which swept loads are without what is harmonic, with its part in phase, and with that ahead by a quarter.

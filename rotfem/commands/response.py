@@ -20,7 +20,7 @@ from rotfem.analysis.frequency_response import FrequencyResponse
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.response_outputs import RootOutput, StationOutput, TipOutput
 from rotfem.analysis.stability import stability_of_pencil
-from rotfem.commands.loads import SWEPT, swept_loads
+from rotfem.commands.loads import held_pitch, swept_loads
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
 from rotfem.commands.modes import analysis_of, theory_error
 from rotfem.commands.problem import Problem
@@ -163,7 +163,13 @@ def result_of(
     ]
     modes = mode_rows(analysis, spinning)
     stability, theory = stability_of_pencil(spinning.pencil, spinning.clamped), theory_error(analysis, spinning)
-    warnings = [*analysis.notes, *advice(analysis, spinning.speed), *instabilities(modes), *doubtful(modes)]
+    warnings = [
+        *held_pitch(analysis.problem),
+        *analysis.notes,
+        *advice(analysis, spinning.speed),
+        *instabilities(modes),
+        *doubtful(modes),
+    ]
     warnings += [stability.warning()] if not stability.stable else []
     warnings += [said] if (said := theory.warning()) else []
     usual = float(np.median(off))

@@ -72,11 +72,13 @@ class PitchAngle(SceneModel):
         assert self.function is not None
         where = f"the function of time, at {t:g},"
         try:
-            angle = float(self.function(t))
-        except (TypeError, ValueError) as error:
-            raise InputError(KEY, None, f"{where} must return a number (rad): {error}") from error
+            given: Any = self.function(t)
         except Exception as error:
             raise InputError(KEY, None, f"{where} raised {type(error).__name__}: {error}") from error
+        try:
+            angle = float(given)
+        except (TypeError, ValueError) as error:
+            raise InputError(KEY, None, f"{where} must return a number (rad): {error}") from error
         if not math.isfinite(angle):
             raise InputError(KEY, None, f"{where} returned {angle}; must return a finite number (rad)")
         return angle
