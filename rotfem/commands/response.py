@@ -20,7 +20,7 @@ from rotfem.analysis.frequency_response import FrequencyResponse
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.response_outputs import RootOutput, StationOutput, TipOutput
 from rotfem.analysis.stability import stability_of_pencil
-from rotfem.commands.loads import held_pitch, swept_loads
+from rotfem.commands.loads import SWEPT, held_pitch, swept_loads
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
 from rotfem.commands.modes import analysis_of, theory_error
 from rotfem.commands.problem import Problem
