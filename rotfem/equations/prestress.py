@@ -6,6 +6,7 @@ What an effect adds to the strains is apart from the rest, so that it can be lef
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
+#: Pieces of one load from which on it is seen first whether they make any geometric stiffness.
+MANY = 8
+
 
 def geometric_pieces(pieces: Pieces) -> list[tuple[Piece, Any, frozenset[str]]]:
     """Return (load piece, its geometric stiffness, which is not zero, the effect that adds it or none) of all.
@@ -31,7 +35,7 @@ def geometric_pieces(pieces: Pieces) -> list[tuple[Piece, Any, frozenset[str]]]:
     form, compiled = pieces.known_form("G")
     there = set(extract_constants(form))
     adding = [name for name, switch in switches.items() if switch in there]
-    loads, displaced = [p for p in pieces.all if p.kind == "f"], list[tuple[Any, list[Array]]]()
+    loads, displaced = _stressing(pieces, compiled), list[tuple[Any, list[Array]]]()
 
     def stiffness(without: Collection[str]) -> list[Any]:
         material = pieces.material_without(without)
@@ -54,6 +58,28 @@ def geometric_pieces(pieces: Pieces) -> list[tuple[Piece, Any, frozenset[str]]]:
     for name in adding:
         switches[name].value = 1.0
     return [(load, K, added) for load, K, added in found if K.norm() > 0.0]
+
+
+def _stressing(pieces: Pieces, compiled: Any) -> list[Piece]:
+    """Return the load pieces but those of loads of many pieces that all make no geometric stiffness.
+
+    A load over the nodes of a mesh has a piece for each. If a random sum of them makes none, then each of them does.
+    """
+    of: dict[str, list[Piece]] = {}
+    for p in (p for p in pieces.all if p.kind == "f"):
+        of.setdefault(p.key[0][0] if p.key else "", []).append(p)
+    out, random, material = list[Any](), np.random.default_rng(1), pieces.material
+    for group in of.values():
+        if len(group) > MANY:
+            mixed = group[0].operator.duplicate()
+            mixed.zeroEntries()
+            for p, factor in zip(group, random.uniform(0.5, 1.5, len(group)), strict=True):
+                mixed.axpy(factor, p.operator)
+            (pieces.prestressed.x.array[:],) = _displaced(pieces, material, [replace(group[0], operator=mixed)])
+            if pieces.assemble(compiled, "K").norm() == 0.0:
+                continue
+        out += group
+    return out
 
 
 def _displaced(pieces: Pieces, material: Any, loads: list[Piece]) -> list[Array]:

@@ -97,7 +97,7 @@ class LoadsOfStructure:
         if span is None:
             return self.add_load(name, size, partial(_first, load, size))
         if span.shapes is None:
-            field, at = SpanField.of_place(self, span, size)
+            field, at = SpanField.of_place(self, span, size, load.constant)
         else:
             field, at = SpanField.of_shapes(self, tuple(span.shapes), size), load.at
         self.load_constants[name] = (field, at)

@@ -29,7 +29,7 @@ class Amplitude(ABC):
 
     Attributes:
         spread: whether it is that of shapes over the span, not of the components of a vector.
-        follows_nodes: whether it is that of the components at the nodes of the mesh.
+        follows_nodes: whether its values are those of a function of place at the nodes of the mesh, not of the load.
     """
 
     spread: ClassVar[bool] = False
@@ -109,8 +109,11 @@ class SpanField(Amplitude):
         return cls(f, basis, None, len(basis))
 
     @classmethod
-    def of_place(cls, structure: Any, span: Span, n: int) -> tuple[SpanField, Callable[[float], Array]]:
-        """Return (the field through the nodes of the structure, time (s) ↦ its amplitudes) of a function of place."""
+    def of_place(cls, structure: Any, span: Span, n: int, constant: bool) -> tuple[SpanField, Callable[[float], Array]]:
+        """Return (the field through the nodes of the structure, time (s) ↦ its amplitudes) of a function of place.
+
+        One that is constant is asked once, and has the single amplitude 1.
+        """
         mesh, comm = structure.mesh, structure.comm
         degree = structure.V.element.basix_element.degree
         f = fem.Function(fem.functionspace(mesh, ("Lagrange", degree, blocked(n))))
@@ -122,6 +125,10 @@ class SpanField(Amplitude):
         def amplitudes(t: float) -> Array:
             return np.ravel(at(t).reshape(size, -1)[:, :n])
 
+        if constant:
+            field = cls(f, amplitudes(0.0).reshape(-1, n)[places].reshape(1, -1), None, 1)
+            field.follows_nodes = True
+            return field, lambda t: np.ones(1)
         return cls(f, None, places, size * n), amplitudes
 
     @property
