@@ -21,6 +21,10 @@ STEPS = 8
 #: Cosine of the smallest angle to direction 3 that the line may have: section axis 2 is across both.
 STEEPEST = 1 - 1e-6
 
+#: Smallest speed that a spline may have over the lengths of its chords, and looks between two points: near 1 where points
+#: follow each other, 0.7 at a corner of 90° without a kink, through 0 where the line turns back.
+SLOWEST, LOOKS = 0.05, 64
+
 
 def as_line(value: Any) -> Matrix:
     """Return points (x, y, z) in m, the first of them the clamp (0, 0, 0); raise on anything else.
@@ -35,7 +39,14 @@ def as_line(value: Any) -> Matrix:
     for number, (a, b, c) in enumerate(zip(rows, rows[1:], rows[2:], strict=False), start=1):
         if a == b == c:
             raise problem("", list(a), f"rows {number} to {number + 2} are the same; two equal rows are a kink")
-    steep = ReferenceLine(rows).steepest
+    line = ReferenceLine(rows)
+    with np.errstate(all="ignore"):  # points whose distances are no numbers have no speed
+        forward = line.slowest > SLOWEST
+    if not forward:
+        raise problem(
+            "", None, "the line turns back on itself between two points; they must follow each other along it"
+        )
+    steep = line.steepest
     if steep > STEEPEST:
         reason = "runs along direction 3 somewhere, which leaves section axis 2 no direction; choose other axes"
         raise problem("", None, f"the line {reason}")
@@ -90,6 +101,15 @@ class ReferenceLine:
         places = [start + np.cumsum(np.concatenate([[0.0], _lengths(spline)])) for start, spline in self._pieces]
         inner = np.unique(np.concatenate([p[:-1] for p in places]))
         return tuple(inner[1:].tolist())
+
+    @property
+    def slowest(self) -> float:
+        """Smallest speed |dr/ds| of the splines over the lengths s of their chords, by looks between all points."""
+        speeds = []
+        for _, spline in self._pieces:
+            looks = np.linspace(spline.x[:-1], spline.x[1:], LOOKS + 1)
+            speeds.append(np.min(np.linalg.norm(spline(looks, 1), axis=-1)))
+        return float(np.min(speeds))
 
     @property
     def steepest(self) -> float:

@@ -183,7 +183,7 @@ def _stiffness(row: dict[str, float]) -> Array:
 def _mass(row: dict[str, float]) -> Array:
     """Return the mass matrix along our axes about the line of c2_def."""
     m, turn = row["m"], about_axis(np.radians(row["pitch"]))
-    flap, edge = m * row["ri_x"] ** 2, m * row["ri_y"] ** 2
+    flap, edge = m * row["ri_x"] * row["ri_x"], m * row["ri_y"] * row["ri_y"]
     center = (row["x_cg"], row["y_cg"])
     B = shifted(center, center)
     return np.asarray(B.T @ turn @ np.diag([m, m, m, flap + edge, flap, edge]) @ turn.T @ B)
