@@ -21,7 +21,7 @@ STEPS = 8
 #: Cosine of the smallest angle to direction 3 that the line may have: section axis 2 is across both.
 STEEPEST = 1 - 1e-6
 
-#: Smallest speed that a spline may have over the lengths of its chords, and looks between two points: near 1 where points
+#: Smallest speed that a spline may have over the lengths of its chords, and looks between two points: near 1 where they
 #: follow each other, 0.7 at a corner of 90° without a kink, through 0 where the line turns back.
 SLOWEST, LOOKS = 0.05, 64
 
