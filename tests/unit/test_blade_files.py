@@ -37,6 +37,8 @@ def test_bmodes(tmp_path: Path) -> None:
         np.testing.assert_allclose(beam.section.center("tension_center", x), [s["ec"][0] - s["sc"][0], 0.0])
     (tmp_path / "main.bmi").write_text(mains.bmodes_main())
     main = read(tmp_path, "main.bmi", **STIFF)
+    of_pybmodes = mains.bmodes_main().replace("BModes v1.03 Main", "Main")
+    assert blade(tmp_path, of_pybmodes, "other.bmi", **STIFF) == main
     assert main.length == decks.LENGTH
     assert main.precone == pytest.approx(np.radians(3.0))
     # hub_rad is measured along the coned axis

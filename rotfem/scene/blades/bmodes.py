@@ -53,7 +53,7 @@ SHEAR = ("GA2", "GA3")
 
 
 def _is_main(deck: Deck) -> bool:
-    return "BMODES" in deck.lines[0].upper() and "MAIN INPUT FILE" in deck.lines[0].upper()
+    return "MAIN INPUT FILE" in deck.lines[0].upper() and deck.has("beam_type")
 
 
 def recognises(deck: Deck) -> bool:
@@ -66,7 +66,8 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
     if not _is_main(deck):
         length = asked.length(deck, "sec_loc is a part of radius − hub_rad of BModes' main file")
         return _keys(deck, asked, length, {})
-    deck.check_version("BModes", VERSIONS, "main")
+    if "BMODES" in deck.lines[0].upper():  # files of pyBModes name neither program nor version
+        deck.check_version("BModes", VERSIONS, "main")
     for name, value in ONLY.items():
         if (found := deck.number(name)) != value:
             deck.fail(f"{name} = {found:g} is not known; only {value:g}", deck.named(name)[0], 1)
