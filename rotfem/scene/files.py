@@ -61,7 +61,7 @@ def existing_file_beside(deck: Path, name: str, line: int) -> Path:
         PydanticCustomError: there is no such file.
     """
     try:
-        path = (deck.parent / name).resolve()
+        path = (deck.parent / name.replace("\\", "/")).resolve()  # as Windows has them
         found = path.is_file()
     except (OSError, ValueError):
         found = False

@@ -42,7 +42,12 @@ def test_main_file_of_elastodyn(tmp_path: Path) -> None:
     """Length, root, precone and tip mass of blade 1, and its blade file."""
     (tmp_path / "blade.dat").write_text(decks.elastodyn())
     alone = read(tmp_path, "blade.dat", structure_length=decks.LENGTH, **RIGID)
-    for change in (("", ""), ("BldFile1", "BldFile(1)"), ("v1.03.* INPUT", "for OpenFAST INPUT")):
+    for change in (
+        ("", ""),
+        ("BldFile1", "BldFile(1)"),
+        ('"blade', '".\\blade'),
+        ("v1.03.* INPUT", "for OpenFAST INPUT"),
+    ):
         beam = blade(tmp_path, mains.elastodyn_main().replace(*change, 1), "main.dat", **RIGID)
         assert (beam.section, beam.pretwist, beam.length) == (alone.section, alone.pretwist, decks.LENGTH)
         assert (beam.precone, beam.tip_mass) == (pytest.approx(-np.radians(4.0)), 7.0)
