@@ -147,7 +147,8 @@ class Window:
         if self.free:
             K[-1, -1] += HELD * M[-1, -1] * (2 * np.pi / end) ** 2
         self.C, self.K = (np.asarray(np.linalg.solve(M, A), dtype=float) for A in (C, K))
-        self.bends = mesh.shape.bend(self.shapes)
+        middle = self.samples.state(self.samples.middle[0]).q[: len(system.held.zeros())]
+        self.bends = mesh.shape.bend(self.shapes, middle)
         self.epsilon = self._errors_by_mesh(mesh, before)
         self.shapes.release()
         if before is not None:
@@ -228,7 +229,8 @@ class Window:
         shapes = tangents.shapes()
         if system.held.linear:
             return shapes, tangents
-        quick = self._vibrating(shapes, mesh.shape.bend(shapes), number, h)
+        bends = mesh.shape.bend(shapes, state.q[: len(system.held.zeros())])
+        quick = self._vibrating(shapes, bends, number, h)
         if not np.any(quick):
             return shapes, tangents
         q, v, a = (_without(x, moved) for x, moved in zip((state.q, state.v, state.a), quick, strict=True))

@@ -44,7 +44,6 @@ class ShapeError:
         self._size = len(names)
         self._moves = [i for i, name in enumerate(names) if name.startswith("u")]
         self.turns = [i for i, name in enumerate(names) if not name.startswith("u")]
-        self._rotations = {i for i, name in enumerate(system.structure.components) if not name.startswith("u")}
 
     def of_modes(self, shapes: Shapes) -> Array:
         """Return the relative errors of the frequencies of shapes, by what bends or else by what stretches."""
@@ -56,14 +55,37 @@ class ShapeError:
             out.append(LIKELY / SAFE * self.estimate(function.x.array.reshape(-1, self._size)[:, components]))
         return np.array(out)
 
-    def bend(self, shapes: Shapes) -> npt.NDArray[np.bool_]:
-        """Return of which shapes the most kinetic energy is in a family that bends, shape (r,)."""
-        structure, r = self.system.structure, shapes.V.shape[1]
-        along = [structure.oriented(self._whole(Y.reshape(-1, self._size, r))) for Y in (shapes.V, shapes.massed)]
-        energy = summed(shapes.comm, (along[0] * along[1]).sum(axis=0))
-        families = [list(components) for components, _ in structure.families.values()]
-        leading = np.argmax([energy[components].sum(axis=0) for components in families], axis=0)
-        return np.array([bool(set(families[i]) & self._rotations) for i in leading])
+    def bend(self, shapes: Shapes, q: Array | None = None) -> npt.NDArray[np.bool_]:
+        """Return which shapes bend, shape (r,): less than half of their kinetic energy is along the structure.
+
+        Args:
+            shapes: columns and M times them.
+            q: local dof array of the state they are about, which says where the structure lies; None: undeformed.
+        """
+        r, tangents = shapes.V.shape[1], self._tangents(q)
+        moved = [
+            self._oriented(Y.reshape(-1, self._size, r))[:, : tangents.shape[1]] for Y in (shapes.V, shapes.massed)
+        ]
+        along = [np.einsum("nmd,nmr->ndr", tangents, u) for u in moved]
+        stretch = summed(shapes.comm, (along[0] * along[1]).sum(axis=(0, 1)))
+        return np.asarray(stretch < 0.5)
+
+    def _tangents(self, q: Array | None) -> Array:
+        """Return unit vectors along the structure at the owned nodes, shape (n, components of displacement, d)."""
+        V, structure = self.system.V, self.system.structure
+        x = V.tabulate_dof_coordinates()
+        place = np.zeros((len(x), sum(name.startswith("u") for name in structure.components)))
+        place[:, : V.mesh.geometry.dim] = x[:, : V.mesh.geometry.dim]
+        if q is not None:
+            place += self._oriented(q.reshape(-1, self._size, 1))[:, : place.shape[1], 0]
+        gradients = self.estimate.coefficients(place[None])[0, :, 0]
+        nodes: Array = np.zeros((len(x), *gradients.shape[1:]))
+        np.add.at(nodes, self.estimate.cells, gradients[:, None])
+        return np.asarray(np.linalg.qr(nodes[: V.dofmap.index_map.size_local])[0])
+
+    def _oriented(self, values: Array) -> Array:
+        """Return all components along the undeformed structure of nodal values (n, unknowns of a node, r)."""
+        return np.asarray(self.system.structure.oriented(self._whole(values)))
 
     def _whole(self, values: Array) -> Array:
         """Return all components of nodal values (n, unknowns of a node, r), zeros for those left out."""
@@ -78,5 +100,7 @@ class ShapeError:
         """
         nodal = q.reshape(-1, self._size)
         sizes = self.system.sizes(q)
-        bends = datum is None and self.turns and np.any(sizes[list(self._rotations)] > 0.0)
+        names = self.system.structure.components
+        turned = any(size > 0.0 for size, name in zip(sizes, names, strict=True) if not name.startswith("u"))
+        bends = datum is None and self.turns and turned
         return min(1.0, 2.0 / SAFE * self.estimate(nodal[:, self.turns if bends else self._moves]))
