@@ -13,7 +13,7 @@ over some λ_j and their conjugates, with the static answer of all others beside
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -36,12 +36,15 @@ BESIDE = 1e-3
 #: of the structure alone would be singular at its resonances.
 BRAKED = 0.05
 
+#: Frequencies, as parts of the lowest one of a free hub's vibrating modes, at which its rigid turn is told.
+BELOW = np.array([0.2, 0.4, 0.6])
+
 
 class FrequencyResponse:
     """Answers to a harmonic load.
 
     Args:
-        analysis: compiled scene, of a hub that is held.
+        analysis: compiled scene; of a free hub the angle is the last unknown.
         spinning: equilibrium, pencil and pairs at one speed.
         force: f̂, complex amplitude of the load's generalised forces on the owned unknowns, shape (n_local,).
         outputs: what is read of motions (see `rotfem.analysis.response_outputs`).
@@ -53,6 +56,7 @@ class FrequencyResponse:
     def __init__(self, analysis: ModalAnalysis, spinning: Spinning, force: Array, outputs: Sequence[Any]):
         self.analysis, self.spinning, self._outputs = analysis, spinning, outputs
         self.names = [name for output in outputs for name in output.names]
+        self._given = np.concatenate([output.given for output in outputs])
         self.force = np.array(force, dtype=np.complex128)
         self.force[analysis.system.held.clamped] = 0.0
         pencil = spinning.pencil
@@ -65,10 +69,10 @@ class FrequencyResponse:
         Raises:
             ComputationError: there is no answer, at the frequency of a mode that has no damping.
         """
-        return self._read(self._solved(omega), omega)
+        return np.asarray(self._read(self._solved(omega), 1j * omega) + self._given)
 
-    def _read(self, x: Array, omega: float) -> Array:
-        return np.concatenate([output(x, omega) for output in self._outputs])
+    def _read(self, x: Array, s: complex) -> Array:
+        return np.concatenate([output(x, s) for output in self._outputs])
 
     def _solved(self, omega: float) -> Array:
         """Return q̂ of the owned unknowns."""
@@ -97,17 +101,34 @@ class FrequencyResponse:
         """
         pairs = self.spinning.pairs.select(np.arange(min(count, len(self.spinning.pairs.values))))
         n = np.diag(self.spinning.pencil.gram(pairs.left, pairs.values, pairs.right, pairs.values))
+        seen = np.array([self._read(x, s) for x, s in zip(pairs.right.T, pairs.values, strict=True)]).T
         gains = self._summed(pairs.left.conj().T @ self.force) / n
         others = self._summed(pairs.left.T @ self.force) / n.conj()  # of the conjugate pairs
         twice = pairs.values.imag > 0.0
 
         def at(omega: float) -> Array:
-            plain = pairs.right @ (gains / (1j * omega - pairs.values))
-            mirrored = pairs.right.conj() @ np.where(twice, others / (1j * omega - pairs.values.conj()), 0.0)
+            plain = seen @ (gains / (1j * omega - pairs.values))
+            mirrored = seen.conj() @ np.where(twice, others / (1j * omega - pairs.values.conj()), 0.0)
             return np.asarray(plain + mirrored)
 
-        left_out = self._solved(0.0) - at(0.0)
-        return np.array([self._read(at(omega) + left_out, omega) for omega in frequencies])
+        left_out = self._left_out(at)
+        return np.array([at(omega) + left_out(omega) for omega in frequencies])
+
+    def _left_out(self, at: Callable[[float], Array]) -> Callable[[float], Array]:
+        """Return what all other modes answer, as a function of the frequency: what is static, and a free hub's turn.
+
+        Args:
+            at: response of the modes that are taken, of the frequency.
+        """
+        if not self.analysis.free:
+            static = self.direct(0.0) - at(0.0)
+            return lambda omega: static
+        values = self.spinning.pairs.values
+        vibrating = values[values.imag > 0.0]
+        known = BELOW * float(np.min(np.abs(vibrating if len(vibrating) else values)))
+        powers = np.array([[1.0, 1 / (1j * w), 1 / (1j * w) ** 2] for w in known])
+        parts = np.linalg.solve(powers, np.array([self.direct(w) - at(w) for w in known]))
+        return lambda omega: np.asarray(np.array([1.0, 1 / (1j * omega), 1 / (1j * omega) ** 2]) @ parts)
 
     def peaks(self, low: float, high: float) -> tuple[Array, list[int]]:
         """Return frequencies (rad/s) by which the peaks between two are seen, and which modes there have no damping."""

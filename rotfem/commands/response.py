@@ -18,7 +18,7 @@ from mpi4py import MPI
 from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.frequency_response import FrequencyResponse
 from rotfem.analysis.modal import ModalAnalysis, Spinning
-from rotfem.analysis.response_outputs import RootOutput, StationOutput, TipOutput
+from rotfem.analysis.response_outputs import HubOutput, RootOfFreeHub, RootOutput, StationOutput, TipOutput
 from rotfem.analysis.stability import stability_of_pencil
 from rotfem.commands.loads import SWEPT, held_pitch, swept_loads
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
@@ -71,7 +71,6 @@ def response(
         problem = Problem.of(scene)
         problem = problem.replace(loads=swept_loads(scene, problem.motion))
         analysis = analysis_of(scene, problem, comm)
-        analysis.needs_fixed_hub("the frequency response")
         speed = problem.motion.final_speed(scene.time.end if scene.time is not None else 0.0)
         spinning = analysis.at(speed, scene.modes.count)
         answers = FrequencyResponse(analysis, spinning, *loaded(scene, analysis, spinning))
@@ -87,7 +86,7 @@ def loaded(scene: Scene, analysis: ModalAnalysis, spinning: Spinning) -> tuple[A
     The equilibrium is left in the system.
     """
     system, motion = analysis.system.held, analysis.system.held.motion.at_speed(spinning.speed)
-    forces, held, q = [], [], spinning.q
+    forces, held, moments, q = [], [], list[Any](), spinning.q
     if system.linear and analysis.about == "steady":  # a load prestresses what is displaced
         q = steady_state(system, spinning.speed, analysis.newton, past_limits=False, notes=[])
     for t in (*SWEPT, SWEPT[0]):  # what is read of motions is about the loads that are constant
@@ -95,8 +94,12 @@ def loaded(scene: Scene, analysis: ModalAnalysis, spinning: Spinning) -> tuple[A
         system.set_state(q)
         forces.append(system.residual().array.copy())  # −F: loads push with their sign
         held.append(system.clamp_forces())
-    force, push = ((parts[1] - parts[0]) + 1j * (parts[2] - parts[0]) for parts in (forces, held))
+        moments.append(-analysis.system.row.work() if analysis.free else 0.0)
+    force, push, moment = (parts[1] - parts[0] + 1j * (parts[2] - parts[0]) for parts in (forces, held, moments))
     outputs: list[Any] = [TipOutput(system), RootOutput(system, push)]
+    if analysis.free:
+        outputs[1:] = [RootOfFreeHub(analysis.system, push, spinning.speed), HubOutput(analysis.system)]
+        force = np.append(force, [moment] if analysis.comm.rank == analysis.comm.size - 1 else [])
     if scene.output.stations is not None:
         beam = system.structure
         names = (*scene.output.sections(beam.type), *beam.components)
@@ -114,8 +117,11 @@ def frequencies_of(
         raise SceneError("command line", "--per-rev", list(per_rev), "orders must be above 0, of a hub that spins")
     if len(lines) and low is None and high is None:
         return np.unique(lines), np.zeros(len(np.unique(lines)), dtype=bool), []
-    first = angular(low, "--from", 0.0)
     last = angular(high, "--to", BEYOND * float(np.max(spinning.pairs.values.imag)))
+    free = answers.analysis.free
+    first = angular(low, "--from", last / max(number, 1) if free else 0.0)
+    if free and first == 0.0:
+        raise SceneError("command line", "--from", low, "must be above 0 of a free hub, which nothing holds")
     if not 0.0 <= first < last or number < 2:
         reason = "frequencies must increase from at least 0 (rad/s, or with a unit), and their number be at least 2"
         raise SceneError("command line", "--from, --to, --number", [first, last, number], reason)
