@@ -201,7 +201,8 @@ class Model:
             effect.work is None or effect.momentum or effect.passive or effect.potential is not None
             for effect in self.acting.values()
         )
-        return motion.hub is None and motion.constant and not turning and steady and dead and known
+        sprung = self.fixed and bool(self.structure.hinges)  # the hub turns their springs
+        return motion.hub is None and motion.constant and not (turning or sprung) and steady and dead and known
 
     @cached_property
     def driven_by_hub(self) -> bool:

@@ -43,7 +43,7 @@ class Frame:
         self._entries: dict[str, Array] = {}  # of the constants, where they are
         turn, plane = (slice(2, 3), slice(0, 2)) if planar else (slice(0, 3), slice(0, 3))
         self._slices = {"w": turn, "dw": turn, "a_o": plane, "v_o": plane, "gravity": plane}
-        self._slices |= dict.fromkeys(("pitch", "pitch_rate"), slice(0, 2))
+        self._slices |= dict.fromkeys(("pitch", "pitch_rate"), slice(0, 2)) | {"psi": slice(0, 1)}
 
     def _constant(self, name: str, size: int) -> fem.Constant:
         if name not in self.constants:
@@ -83,6 +83,11 @@ class Frame:
         return self._translation("v_o")
 
     @property
+    def psi(self) -> Any:
+        """Angle of the hub about axis 3, rad, which a frame that does not rotate sees."""
+        return self._constant("psi", 1)[0]
+
+    @property
     def pitch(self) -> tuple[Any, Any]:
         """(cos φ, sin φ) of the turn φ of a frame that pitches; the constants are zero at φ = 0."""
         c = self._constant("pitch", 2)
@@ -106,6 +111,8 @@ class Frame:
         for name in self.constants:
             if name == "gravity":
                 value = self._gravity if self.fixed else motion.rotation(t).T @ self._gravity
+            elif name == "psi":
+                value = motion.angle(t) * motion.axis[2:]
             else:
                 value = motion.rotation(t) @ moved[name] if self.fixed and name == "a_o" else moved[name]
             out[name] = value[self._slices[name]]

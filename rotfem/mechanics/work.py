@@ -85,8 +85,14 @@ class Mechanics:
         return strain.force(strain.value)
 
     def springs(self) -> list[RootSpring]:
-        """Return what holds the hinges of the root; of a frame that pitches, flap and lag about axes that do not."""
+        """Return what holds the hinges of the root.
+
+        The turns are those from the hub: in a frame that does not rotate less its angle, in one that pitches flap and
+        lag about axes that do not.
+        """
         held: list[RootSpring] = self.structure.springs()
+        if self.frame.fixed:
+            return [replace(s, turn=s.turn - self.frame.psi, drift=-self.frame.w[2]) for s in held]
         turns = {s.axis: s.turn for s in held}
         if not self.frame.pitching or not {2, 3} <= turns.keys():
             return held

@@ -95,8 +95,6 @@ def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:
         )
     if motion.is_free:
         raise problem("model.frame", model.frame, 'is not available with motion.type = "torque"; use "rotating"')
-    if structure.hinges:
-        raise problem("structure.root", None, 'is rigid with frame = "inertial"; use "rotating"')
     if structure.damping.rayleigh[0] > 0.0:
         raise problem(
             "structure.damping.rayleigh",

@@ -17,7 +17,7 @@ Array = npt.NDArray[np.float64]
 
 
 class TurningClamp:
-    """Prescribed q = (u_1, u_2, alpha) of the clamped node, and rigid turns of the whole beam.
+    """Prescribed q = (u_1, u_2, alpha) of the clamped node, without alpha in a hinge, and rigid turns of the beam.
 
     Args:
         structure: planar beam.
@@ -26,7 +26,8 @@ class TurningClamp:
 
     def __init__(self, structure: Any, motion: Motion):
         self.motion, self.structure = motion, structure
-        self.dofs = (structure.clamped[:, None] * 3 + np.arange(3)).ravel()
+        self._held = np.arange(2 if structure.hinges else 3)
+        self.dofs = (structure.clamped[:, None] * 3 + self._held).ravel()
         self._x = structure.V.tabulate_dof_coordinates()[:, 0] + structure.hub_radius
 
     def angle(self, t: float) -> float:
@@ -41,8 +42,8 @@ class TurningClamp:
         q = np.array([R * (c - 1), R * s, psi])
         v = w * np.array([-R * s, R * c, 1.0])
         a = dw * np.array([-R * s, R * c, 1.0]) - w * w * np.array([R * c, R * s, 0.0])
-        repeat = len(self.dofs) // 3
-        return np.tile(q, repeat), np.tile(v, repeat), np.tile(a, repeat)
+        held, repeat = self._held, len(self.dofs) // len(self._held)
+        return np.tile(q[held], repeat), np.tile(v[held], repeat), np.tile(a[held], repeat)
 
     def rigid(self, relative: Array, t: float) -> tuple[Array, Array]:
         """Return (q, q̇) in inertial components of a shape given in the turning frame and at rest there.
