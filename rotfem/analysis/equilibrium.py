@@ -9,7 +9,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.arc_length import LoadPath, Tracer
-from rotfem.analysis.load_steps import LESS, SMALLEST_SHARE, balance, counted, from_held_root, raised
+from rotfem.analysis.load_steps import LESS, SMALLEST_SHARE, Raised, balance, counted, from_held_root, raised
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError, InputError
@@ -69,15 +69,24 @@ def steady_state(
     try:
         found = raised(system, omega, newton)
     except ComputationError as error:
-        path = _path(system, omega, newton, past_limits, notes)
+        path = _path(system, omega, newton, False, notes)
         if path is None or path.share < 1.0:
             raise error if path is None or not path.limits else _at_limit(omega, path) from None
         return counted(system, omega, 1.0, path.q, newton)
+    return _judged(system, omega, newton, found, notes)
+
+
+def _judged(system: Any, omega: float, newton: Newton, found: Raised, notes: list[str]) -> Array:
+    """Return the equilibrium that the growing load leads to, which is the one found unless Newton left the path.
+
+    Raises:
+        ComputationError: the path ends at a limit point.
+    """
     if found.sure and not _has_descent(system):
         return found.q
     system.count_rotations_from(found.datum)
     total = system.structure.total(found.q)
-    path = _path(system, omega, newton, past_limits, notes)
+    path = _path(system, omega, newton, False, notes)
     if path is not None and path.limits:
         raise _at_limit(omega, path)
     if path is None or path.share < 1.0:

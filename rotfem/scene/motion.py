@@ -56,14 +56,6 @@ class Motion(SceneModel):
     base_acceleration: Signal | None = None
 
     @property
-    def unit_axis(self) -> Vector3:
-        """Unit vector of the axis."""
-        scale = max(abs(component) for component in self.axis)
-        a, b, c = (component / scale for component in self.axis)
-        norm = math.sqrt(a * a + b * b + c * c)
-        return a / norm, b / norm, c / norm
-
-    @property
     def is_steady(self) -> bool:
         """Whether the speed is constant and prescribed, so that there is a steady state."""
         return False

@@ -37,7 +37,7 @@ from rotfem.scene.consistency import (
 from rotfem.scene.digest import abridged
 from rotfem.scene.limits import Limits, limits_of
 from rotfem.scene.load_checks import check_loads, doubtful_table
-from rotfem.scene.loads import Load, Loads
+from rotfem.scene.loads import Loads
 from rotfem.scene.motion import AnyMotion, Swept
 from rotfem.scene.output import OutputTable
 from rotfem.scene.problems import scene_error
@@ -174,11 +174,6 @@ class Scene(SceneModel):
     def digest(self) -> dict[str, Any]:
         """Return `to_dict` with long tables referred to instead of repeated (see `abridged`)."""
         return abridged(self.to_dict(), self._tables)
-
-    def is_dead(self, load: str) -> bool:
-        """Return whether a load (`tip_force`, `tip_moment`, `distributed`) is given and is a dead one."""
-        applied: Load | None = getattr(self.loads, load)
-        return applied is not None and applied.kind == "dead"
 
     @property
     def frame(self) -> str:
