@@ -34,8 +34,8 @@ ACCURACIES = (1e-2, 1e-3, 1e-4)
 #: that is.
 TRUTHS = {False: ((32, 2, 1), (16, 2, 0)), True: ((2, 2, 1), (2, 2, 0))}
 
-#: How many times more steps truths have of scenes whose motion is quicker than their own steps are, or slower; increments
-#: of Newton's method in truths, whose errors add up over many steps, and fewest elements of a beam there.
+#: How many times more steps truths have of scenes whose motion is quicker than their own steps are, or slower;
+#: increments of Newton's method in truths, whose errors add up over many steps, and fewest elements of a beam there.
 QUICK = dict.fromkeys(("moment pulse", "resonance once a turn", "torque reversed in each step", "spin-down"), 4.0) | {
     "step load, adaptive": 8.0,
     "gusts on a long blade": 0.125,

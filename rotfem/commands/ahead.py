@@ -47,8 +47,8 @@ LARGER = 8.0
 #: Part of the lowest frequency of what stretches from which a vibration may be one that stretches.
 STRETCHING = 0.7
 
-#: Error of a model from which its motion is another one.
-POOR = 0.1
+#: Error of a model from which its motion is another one, and the part of the accuracy that is aimed at then.
+POOR, DOUBTED = 0.1, 0.5
 
 #: Columns of the displacement of the tip.
 TIPS = ("tip_u1", "tip_u2", "tip_u3")
@@ -98,8 +98,8 @@ class Ahead:
         """
         error = done.summary["error"]
         if settings.models[0].get("reduced"):
-            self.off = min(self.off, part(error, "model") if error["model"] is not None else np.inf)
             put(error, "model", TRUST * part(error, "model"))
+            self.off = part(error, "model") if error["model"] is not None else np.inf
             if self.mesh is not None and self.linear is not None and self.linear.tells:
                 put(error, "space", max(part(error, "space"), self.mesh.error(self.linear)))
         elif settings.step is not None and settings.scheme is not None:
@@ -119,13 +119,12 @@ class Ahead:
             settings: of the next model.
             error: of the result before it.
         """
-        self.off = min(self.off, part(error, "model") if error else np.inf)
         error = {**error, "time": 1.0, "model": 0.0}
         settings, off = self._grown(settings, error)
         error["space"] = max(part(error, "space"), off)
         # what is known by a poor model only may be less demanding than the motion is
         trusted = self.own is not None or self.off < POOR
-        return self.stepped(settings, (1.0 if trusted else AIM) * shares(error, self.accuracy)["time"])
+        return self.stepped(settings, (1.0 if trusted else DOUBTED) * shares(error, self.accuracy)["time"])
 
     def meshed(self, settings: Settings, error: Mapping[str, Any]) -> Settings:
         """Return settings of the model of before with at least the mesh that its motion needs, if the mesh is to grow.

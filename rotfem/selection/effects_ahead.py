@@ -20,7 +20,7 @@ from rotfem.errors import ComputationError
 PART, LEAST, EACH = 0.1, 0.15, 0.5
 
 #: Error of a reduced model from which it does not say what effects are worth.
-POOR = 0.3
+POOR = 0.5
 
 
 def effects_ahead(response: Response | None, off: float, allowed: float, spent: float, comm: MPI.Comm) -> Any:
