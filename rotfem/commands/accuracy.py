@@ -29,7 +29,7 @@ PROJECTED = 0.05
 ROWS = 1000
 
 #: Nodes along a structure to start from, and for every mode that is wanted.
-NODES, NODES_A_MODE = 24, 4
+NODES, NODES_A_MODE = 30, 4
 
 
 class Missed(ComputationError):

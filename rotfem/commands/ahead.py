@@ -42,7 +42,7 @@ NEWTON, SMALL, MANY = 1e-4, 1e-2, 2000
 TRUST = 3.0
 
 #: By how much larger elements may be off than those of an answer, which they follow if that is allowed.
-LARGER = 8.0
+LARGER = 20.0
 
 #: Part of the lowest frequency of what stretches from which a vibration may be one that stretches.
 STRETCHING = 0.7

@@ -21,7 +21,7 @@ from rotfem.selection.steps_ahead import Motion
 Array = npt.NDArray[np.float64]
 
 #: Modes whose errors are told, smallest error of one, and growths of the number of elements that are tried.
-MODES, LEAST, GROWTHS = 12, 1e-14, np.append(0.75, np.geomspace(1.0, 8.0, 25))
+MODES, LEAST, GROWTHS = 12, 1e-14, np.append([0.6, 0.8], np.geomspace(1.0, 8.0, 25))
 
 
 @dataclass
