@@ -117,7 +117,7 @@ def pursue(
     done.summary["scene"] = scene.digest()
     done.summary["accuracy"] = told(scene, settings, error, is_met, tried)
     if ahead is not None:
-        done.summary["accuracy"]["effects"] = ahead.effects(error, perf_counter() - started, comm)
+        done.summary["accuracy"]["effects"] = ahead.effects(error)
     timings = done.summary["timings"]
     timings["choice"] = began - started
     timings["total"] += timings["choice"]

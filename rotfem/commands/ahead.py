@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-from mpi4py import MPI
 
 from rotfem.analysis.reduced.response import Response, tips_of
 from rotfem.analysis.reduced.struck import struck
@@ -136,16 +135,9 @@ class Ahead:
         is_coarse = part(error, "space") > shares(error, self.accuracy)["space"]
         return self._grown(settings, error)[0] if is_coarse and settings.models[0].get("reduced") else settings
 
-    def effects(self, error: Mapping[str, Any], spent: float, comm: MPI.Comm) -> Any:
-        """Return what effects are worth (see `rotfem.selection.effects_ahead`).
-
-        Args:
-            error: of the answer.
-            spent: time that it took, s.
-            comm: of the processes that have computed it.
-        """
-        allowed = shares({**error, "model": 1.0}, self.accuracy)["model"]
-        return effects_ahead(self.response, self.off, allowed, spent, comm)
+    def effects(self, error: Mapping[str, Any]) -> Any:
+        """Return what effects are worth in an answer of an error (see `rotfem.selection.effects_ahead`)."""
+        return effects_ahead(self.response, self.off, shares({**error, "model": 1.0}, self.accuracy)["model"])
 
     def _grown(self, settings: Settings, error: Mapping[str, Any]) -> tuple[Settings, float]:
         """Return settings with elements as the motion needs them, and the relative error that these leave."""

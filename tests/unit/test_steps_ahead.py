@@ -40,10 +40,23 @@ def test_what_is_fast_and_damped_counts_with_its_amplitude() -> None:
     assert tight.step < 0.1 < 0.4 < loose.step
 
 
+def test_a_start_that_is_over_soon_counts() -> None:
+    """A hundredth of the motion that has died out after a tenth of a second, where the window has hardly opened."""
+    t = np.linspace(0.0, 100.0, 8001)
+    blip = 0.01 * np.exp(-40.0 * t) * (np.cos(40.0 * t) + np.sin(40.0 * t))  # starts at rest
+    motion = Motion(t, (1.0 - np.cos(t) + blip)[:, None])
+    assert motion.start(5.0) == pytest.approx(0.01, rel=0.2)
+    assert motion.start(200.0) < 1e-3
+    loose, tight = (plan([motion], allowed, [ESDIRK4]) for allowed in (2e-2, 3e-3))
+    assert loose is not None
+    assert tight is not None
+    assert tight.step < 0.15 < 0.4 < loose.step
+
+
 def test_steps_between_times_at_any_distances() -> None:
     """Splines add a little; straight lines would make it thirty times as large."""
     t = np.cumsum(np.random.default_rng(1).uniform(0.01, 0.04, 2000))
-    t *= 16 * np.pi / t[-1]
+    t = (t - t[0]) * 16 * np.pi / (t[-1] - t[0])
     motion = Motion.between(t, np.cos(t)[:, None])
     assert np.ptp(np.diff(motion.t)) < 1e-9
     assert error_ahead([motion], ESDIRK4, 0.2) == pytest.approx(SAFE * of_one(1.0, 0.2, 50.0), rel=0.5)
@@ -57,7 +70,7 @@ def test_nothing_is_planned_where_nothing_moves() -> None:
 
 def test_elements_grow_by_the_order_of_a_frequency() -> None:
     """ε ω T of one vibration, which falls by 2⁶ with twice the cubic elements."""
-    mesh = MeshAhead(np.array([1.0, 50.0]), np.array([1e-4, 2e-4]), 6, 3)
+    mesh = MeshAhead(np.array([1.0, 50.0]), np.array([1e-4, 2e-4]), np.array([False, False]), 6, 3)
     off = mesh.error(vibration(1.0))
     assert off == pytest.approx(SAFE * 1e-4 * 1.0 * 100.0, rel=0.1)
     assert mesh.error(vibration(1.0), 2.0) == pytest.approx(off / 64, rel=1e-2)  # a little is off by as much as can be
