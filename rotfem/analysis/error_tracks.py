@@ -63,6 +63,7 @@ def largest_errors(
         fed = 1.0 + scale / length
         best["time"] = (MARGIN * max(best["time"][0], fed * least), best["time"][1])
         best["space"] = (MARGIN * fed * best["space"][0], best["space"][1])
+        best["missing"] = (fed * best["missing"][0], best["missing"][1])
     return _both(best)
 
 
