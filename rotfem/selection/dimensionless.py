@@ -10,7 +10,7 @@ from dolfinx import fem
 
 from rotfem.numerics import forms
 from rotfem.selection.case import Case
-from rotfem.selection.coarse_model import Trial
+from rotfem.selection.coarse_model import Trial, turning_inertia
 from rotfem.selection.distance import Outputs
 
 Array = npt.NDArray[np.float64]
@@ -59,7 +59,7 @@ def groups(trial: Trial, own: Outputs) -> dict[str, float]:
     if len(own.values) and not structure.damping.is_zero:
         out["damping"] = float(-own.values[0].real / abs(own.values[0]))
     if structure.has_tip_mass:
-        out["tip_mass_ratio"] = _mass(system, "tip_mass") / _mass(system) - 1.0
+        out["tip_mass_ratio"] = _added_mass(system, "tip_mass")
     if case.steps is not None and case.steps.step is not None and (first is not None or len(own.values)):
         fastest = float(np.abs(own.values).max()) if len(own.values) else float(trial.at_rest[-1])
         out["steps_per_period"] = 2 * np.pi / fastest / case.steps.step
@@ -72,8 +72,7 @@ def _turning(case: Case, system: Any) -> tuple[Array, Array]:
     times = np.linspace(0.0, max(end, motion.settled), SAMPLES + 1)
     if motion.hub is None:
         return np.array([motion.speed(t) for t in times]), np.array([motion.rate(t) for t in times])
-    system.held.set_state(system.held.zeros())
-    rates = np.array([motion.hub.torque.at(t) for t in times]) / system.row.diagonal(0.0, 1.0)
+    rates = np.array([motion.hub.torque.at(t) for t in times]) / turning_inertia(system)
     return motion.hub.speed + np.cumsum(rates * np.diff(times, prepend=0.0)), rates
 
 
@@ -91,8 +90,15 @@ def _radius(structure: Any) -> float | None:
     return float(np.sqrt(min(float(b[0]) for b in bending) / float(at["EA"][0]))) if bending else None
 
 
-def _mass(system: Any, *effects: str) -> float:
-    """Return the mass of the structure, with the masses of an effect or without, kg."""
-    bodies = [b for b in system.structure.bodies(effects) if b.is_position]
-    local = sum(float(fem.assemble_scalar(forms.form(b.density * b.measure))) for b in bodies)
-    return float(system.comm.allreduce(local))
+def _added_mass(system: Any, effect: str) -> float:
+    """Return the masses that an effect brings, as a share of the mass of the structure without them."""
+    switch = system.structure.constant(1.0)
+    bodies = [b for b in system.structure.bodies((effect,)) if b.is_position]
+    mass = forms.form(sum((switch if b.effect == effect else 1.0) * b.density * b.measure for b in bodies), once=True)
+
+    def total() -> float:
+        return float(system.comm.allreduce(float(fem.assemble_scalar(mass))))
+
+    whole = total()
+    switch.value = 0.0
+    return whole / total() - 1.0

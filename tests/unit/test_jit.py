@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import dolfinx.jit
 import pytest
@@ -78,6 +80,25 @@ def test_errors_of_the_compiler_are_errors(cache: Path, monkeypatch: pytest.Monk
     monkeypatch.setitem(dolfinx.jit.DOLFINX_DEFAULT_JIT_OPTIONS, "cffi_libraries", (["no_such_library"], ""))
     with pytest.raises(Exception, match=r"[Ll]inkError|failed"):
         forms.form(mass())
+
+
+def test_plug_ins_are_looked_for_once(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the second form setuptools looks through no package; others find plug-ins as before, after an error too."""
+    forms.form(mass())
+    entry_points, distributions = importlib.metadata.entry_points, importlib.metadata.distributions
+    looked = []
+
+    def counted(**which: Any) -> Any:
+        looked.append(which)
+        return distributions(**which)
+
+    monkeypatch.setattr(importlib.metadata, "distributions", counted)
+    forms.form(2 * mass())
+    assert looked == []
+    monkeypatch.setitem(dolfinx.jit.DOLFINX_DEFAULT_JIT_OPTIONS, "cffi_libraries", (["no_such_library"], ""))
+    with pytest.raises(Exception, match=r"[Ll]inkError|failed"):
+        forms.form(3 * mass())
+    assert importlib.metadata.entry_points is entry_points
 
 
 def test_two_programs_want_one_form(tmp_path: Path) -> None:
