@@ -47,18 +47,23 @@ def largest_errors(
         length: of the structure, m.
     """
     if linear:
-        return _both(Track(scheme, linear).errors(windows, [window.K for window in windows]))
+        known = [window.K for window in windows]
+        return _both(Track(scheme, linear).errors(windows, known, drives(windows, [known], scheme)[0]))
     (changes, spreads), phase = smoothed(windows)
     best: dict[str, tuple[float, float]] = {}
     least = np.inf
-    for factor in FACTORS:
-        if factor != 0.0 and (phase < UNSURE or best["time"][0] < SMALL * scale):
-            break
-        moved = (change + factor * spread for change, spread in zip(changes, spreads, strict=True))
-        stiffness = [window.K + np.diag(change) for window, change in zip(windows, moved, strict=True)]
-        found = Track(scheme, linear, factor == 0.0).errors(windows, stiffness)
+    sure = phase < UNSURE
+    stiffness = [
+        [window.K + np.diag(x + factor * y) for window, x, y in zip(windows, changes, spreads, strict=True)]
+        for factor in (FACTORS[:1] if sure else FACTORS)
+    ]
+    forces = drives(windows, stiffness, scheme)
+    for number, (K, driven) in enumerate(zip(stiffness, forces, strict=True)):
+        found = Track(scheme, linear, space=not number).errors(windows, K, driven)
         best = {**found, **best, "time": max(best.get("time", (0.0, 0.0)), found["time"])}
         least = min(least, found["time"][0])
+        if sure or best["time"][0] < SMALL * scale:
+            break
     else:
         fed = 1.0 + scale / length
         best["time"] = (MARGIN * max(best["time"][0], fed * least), best["time"][1])
@@ -104,6 +109,34 @@ def _padded(x: Array, window: Window) -> Array:
     return out
 
 
+def drives(windows: Sequence[Window], stiffness: Sequence[Sequence[Array]], scheme: Any) -> list[list[Array]]:
+    """Return γ over every step as polynomials (see `interpolated`), for every track and window.
+
+    Args:
+        windows: the motion.
+        stiffness: K of every track and window.
+        scheme: that made the motion.
+    """
+    found = [_drives(window, matrices, scheme) for window, *matrices in zip(windows, *stiffness, strict=True)]
+    return [list(track) for track in zip(*found, strict=True)]
+
+
+def _drives(window: Window, stiffness: Sequence[Array], scheme: Any) -> list[Array]:
+    """Return γ over every step of a window with one K or another: all at once, as they have the same samples."""
+    (c, v, a), most = window.motion, scheme.order + BEYOND
+    begin, end = window.ends
+    t, later = window.t, a
+    if not scheme.balanced_at_end:
+        t, c, v = (0.5 * (x[begin] + x[end]) for x in (t, c, v))
+        later = a[end]
+    rest = later + v @ window.C.T
+    values = np.hstack([rest + c @ K.T for K in stiffness])
+    if scheme.balanced_at_end:
+        values = settled(t, values, np.array(window.samples.pieces))
+    spans = window.at_ends if scheme.balanced_at_end else window.in_middles
+    return np.split(interpolated(t, values, spans, most), len(stiffness), axis=2)
+
+
 class Track:
     """Errors of time and space that go from window to window.
 
@@ -117,20 +150,28 @@ class Track:
         self.scheme, self.bounded, self.space = scheme, not linear, space
         self.carried: Array = np.zeros((0, 2, 0))
 
-    def errors(self, windows: Sequence[Window], stiffness: Sequence[Array]) -> dict[str, tuple[float, float]]:
-        """Return the largest errors of the tip: size (m) and when (s)."""
+    def errors(
+        self, windows: Sequence[Window], stiffness: Sequence[Array], forces: Sequence[Array]
+    ) -> dict[str, tuple[float, float]]:
+        """Return the largest errors of the tip: size (m) and when (s).
+
+        Args:
+            windows: the motion.
+            stiffness: K of every window.
+            forces: γ over the steps of every window (see `drives`).
+        """
         best: dict[str, tuple[float, float]] = dict.fromkeys(("time", "space", "missing"), (0.0, 0.0))
-        for window, K in zip(windows, stiffness, strict=True):
-            found = self._through(window, K)
+        for window, K, driven in zip(windows, stiffness, forces, strict=True):
+            found = self._through(window, K, driven)
             best |= {name: max(best[name], error) for name, error in zip(best, found, strict=False)}
         return best
 
-    def _through(self, window: Window, K: Array) -> list[tuple[float, float]]:
+    def _through(self, window: Window, K: Array, driven: Array) -> list[tuple[float, float]]:
         """Go on with the errors through a window; return the largest of the tip and when they are."""
         (begin, end), h = window.ends, window.lengths
         exact = Propagator(window.C, K, h, self.bounded)
         states = exact.modal(*window.motion[:2])
-        defects = states[end] - exact.factors * states[begin] - exact.forced(self._drives(window, K))
+        defects = states[end] - exact.factors * states[begin] - exact.forced(driven)
         parts = [defects]
         if self.space:
             for off in self._mesh_forces(window, not self.bounded):
@@ -154,16 +195,6 @@ class Track:
             return zero, zero
         turned = self.carried @ window.turn.T
         return turned[:, 0], turned[:, 1]
-
-    def _drives(self, window: Window, K: Array) -> Array:
-        """Return γ over every step as polynomials."""
-        (c, v, a), most = window.motion, self.scheme.order + BEYOND
-        if self.scheme.balanced_at_end:
-            drives = settled(window.t, a + v @ window.C.T + c @ K.T, np.array(window.samples.pieces))
-            return interpolated(window.t, drives, window.at_ends, most)
-        begin, end = window.ends
-        t, c, v = (0.5 * (x[begin] + x[end]) for x in (window.t, c, v))
-        return interpolated(t, a[end] + v @ window.C.T + c @ K.T, window.in_middles, most)
 
     @staticmethod
     def _mesh_forces(window: Window, linear: bool) -> list[Array]:

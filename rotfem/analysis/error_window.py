@@ -141,14 +141,15 @@ class Window:
 
     def _reduce(self, system: Any, mesh: MeshErrors, end: float, before: Window | None) -> None:
         """Find shapes and matrices."""
-        self.shapes, tangents = self._tangents(system, mesh)
+        middle = self.samples.state(self.samples.middle[0]).q[: len(system.held.zeros())]
+        along = mesh.shape.directions(middle)
+        self.shapes, tangents = self._tangents(system, mesh, along)
         self.speed = tangents.speed
         M, C, K = tangents.reduced(self.shapes)
         if self.free:
             K[-1, -1] += HELD * M[-1, -1] * (2 * np.pi / end) ** 2
         self.C, self.K = (np.asarray(np.linalg.solve(M, A), dtype=float) for A in (C, K))
-        middle = self.samples.state(self.samples.middle[0]).q[: len(system.held.zeros())]
-        self.bends = mesh.shape.bend(self.shapes, middle)
+        self.bends = mesh.shape.bend(self.shapes, along)
         self.epsilon = self._errors_by_mesh(mesh, before)
         self.shapes.release()
         if before is not None:
@@ -221,15 +222,15 @@ class Window:
 
     # --- the tangent -------------------------------------------------------------------------------------------------
 
-    def _tangents(self, system: Any, mesh: MeshErrors) -> tuple[RitzVectors, Tangents]:
-        """Return shapes and matrices in the middle of the window."""
+    def _tangents(self, system: Any, mesh: MeshErrors, along: Array) -> tuple[RitzVectors, Tangents]:
+        """Return shapes and matrices in the middle of the window, where the structure has directions `along`."""
         number, h = self.samples.middle
         state = self.samples.state(number)
         tangents = Tangents(system, state)
         shapes = tangents.shapes()
         if system.held.linear:
             return shapes, tangents
-        bends = mesh.shape.bend(shapes, state.q[: len(system.held.zeros())])
+        bends = mesh.shape.bend(shapes, along)
         quick = self._vibrating(shapes, bends, number, h)
         if not np.any(quick):
             return shapes, tangents

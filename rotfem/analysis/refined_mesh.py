@@ -24,7 +24,7 @@ from rotfem.analysis.ritz_vectors import RitzVectors
 from rotfem.analysis.schemes import State
 from rotfem.equations.finer import FinerEquations
 from rotfem.errors import ComputationError
-from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.linear import DirectSolver, Increment, NearbySolver
 from rotfem.numerics.refinement import NotRefined
 
 Array = npt.NDArray[np.float64]
@@ -84,7 +84,7 @@ class RefinedMesh:
         increment, done = Increment(fine.V), 0
         moves = [i for i, name in enumerate(self.system.held.structure.unknowns) if name.startswith("u")]
         for _ in range(CORRECTIONS):
-            dq = increment.solve(DirectSolver(fine.matrix("K", 1.0)), fine.imbalance())
+            dq = increment.solve(fine.solver(fine.matrix("K", 1.0)), fine.imbalance())
             q += dq
             last = float(np.linalg.norm(fine.tip(dq)[moves]))
             size = float(np.linalg.norm(fine.tip(q - start)[moves]))
@@ -116,10 +116,13 @@ class RefinedMesh:
             M, K = inner.matrix(0.0, 0.0, 1.0, 0.0), inner.matrix(1.0, 0.0, 0.0, 1.0)
             number = max(LOWEST, int(np.sum(shapes.squares <= most**2)))
             V = shapes.V[:, :number]
-            here = _frequencies(shapes, (M, K, inner.clamped), V)
+            # A linear theory has the tangent of the shapes, whose factor is there.
+            solver = shapes.solver if inner.linear else DirectSolver(_shifted(K, shapes.shift, M))
+            here = shapes.sum(_energies((M, K, inner.clamped), solver, V))
             M, K = fine.matrix("M"), fine.matrix("K", 1.0)
             X = fine.carried(_local(inner, V))
-            there = _frequencies(shapes, (M, K, fine.clamped), X, own=False)
+            there = _energies((M, K, fine.clamped), fine.solver(_shifted(K, shapes.shift, M)), X)
+            here, there = (scipy.linalg.eigh(*energies, eigvals_only=True) for energies in (here, there))
         except (ComputationError, NotRefined, np.linalg.LinAlgError):
             return None
         out = np.zeros(shapes.V.shape[1])
@@ -139,28 +142,31 @@ def _local(system: Any, owned: Array) -> Array:
     return out
 
 
-def _frequencies(shapes: RitzVectors, system: tuple[Any, Any, Any], X: Array, own: bool = True) -> Array:
-    """Return the squares of frequencies in (K + shift M)⁻¹ M X, increasing.
+def _shifted(K: Any, shift: float, M: Any) -> Any:
+    """Return K + shift M, a new matrix."""
+    A = K.copy()
+    A.axpy(shift, M)
+    return A
+
+
+def _energies(system: tuple[Any, Any, Any], solver: DirectSolver | NearbySolver, X: Array) -> Array:
+    """Return the stiffness and the mass of A⁻¹ M X, shape (2, r, r).
 
     Args:
-        shapes: whose shift it is, and whose sums over the ranks where the system is theirs.
         system: M, K (with 1 at clamped unknowns), and the clamped unknowns.
+        solver: of A.
         X: columns.
-        own: whether it is.
     """
     M, K, clamped = system
-    A = K.copy()
-    A.axpy(shapes.shift, M)
-    solver, Y = DirectSolver(A), _times(M, X)
+    Y = _times(M, X)
     x, y = M.createVecs()
     for column in Y.T:
         x.array[:] = column
         x.array[clamped] = 0.0
         solver.solve(x, y)
         column[:] = y.array
-    small = [Y.T @ _times(B, Y) for B in (K, M)]
-    stiffness, mass = (shapes.sum(B) if own else B for B in small)
-    return np.asarray(scipy.linalg.eigh(*(0.5 * (B + B.T) for B in (stiffness, mass)), eigvals_only=True))
+    small = np.array([Y.T @ _times(B, Y) for B in (K, M)])
+    return 0.5 * (small + np.swapaxes(small, 1, 2))
 
 
 def _times(A: Any, X: Array) -> Array:

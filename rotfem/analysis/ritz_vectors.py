@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
+from petsc4py import PETSc
 
 from rotfem.numerics.linear import DirectSolver
 
@@ -39,6 +40,7 @@ class RitzVectors:
         squares: diagonal of Vᵀ K V, 1/s², increasing.
         tip: displacement of the tip of each column, shape (d, r), on every rank.
         shift: as it was given.
+        solver: of K + shift M, until it is released.
         block: number of unknowns of a node.
     """
 
@@ -47,9 +49,9 @@ class RitzVectors:
         self.block = int(system.V.dofmap.index_map_bs)
         self._x, self._y = M.createVecs()
         A = K.copy()
-        A.axpy(shift, M)
+        A.axpy(shift, M, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         self.shift, self._M = shift, M
-        self._solver, self._clamped = DirectSolver(A), system.clamped
+        self.solver, self._clamped = DirectSolver(A), system.clamped
         moves = [i for i, name in enumerate(system.structure.unknowns) if name.startswith("u")]
         columns: list[Array] = []
         massed: list[Array] = []
@@ -81,7 +83,7 @@ class RitzVectors:
 
     def release(self) -> None:
         """Let go of the factor and the matrix, which nothing asks for any more."""
-        del self._solver, self._M
+        del self.solver, self._M
 
     def times(self, A: Any, x: Array) -> Array:
         """Return A x of owned unknowns."""
@@ -99,7 +101,7 @@ class RitzVectors:
     def _solved(self, b: Array) -> Array:
         self._x.array[:] = b
         self._x.array[self._clamped] = 0.0
-        self._solver.solve(self._x, self._y)
+        self.solver.solve(self._x, self._y)
         return np.array(self._y.array)
 
     def _new(self, x: Array, columns: list[Array], massed: list[Array]) -> tuple[Array, Array] | None:

@@ -55,14 +55,14 @@ class ShapeError:
             out.append(LIKELY / SAFE * self.estimate(function.x.array.reshape(-1, self._size)[:, components]))
         return np.array(out)
 
-    def bend(self, shapes: Shapes, q: Array | None = None) -> npt.NDArray[np.bool_]:
+    def bend(self, shapes: Shapes, along: Array | None = None) -> npt.NDArray[np.bool_]:
         """Return which shapes bend, shape (r,): less than half of their kinetic energy is along the structure.
 
         Args:
             shapes: columns and M times them.
-            q: local dof array of the state they are about, which says where the structure lies; None: undeformed.
+            along: directions of the structure in the state they are about; None: undeformed.
         """
-        r, tangents = shapes.V.shape[1], self._tangents(q)
+        r, tangents = shapes.V.shape[1], self.directions() if along is None else along
         moved = [
             self._oriented(Y.reshape(-1, self._size, r))[:, : tangents.shape[1]] for Y in (shapes.V, shapes.massed)
         ]
@@ -70,8 +70,12 @@ class ShapeError:
         stretch = summed(shapes.comm, (along[0] * along[1]).sum(axis=(0, 1)))
         return np.asarray(stretch < 0.5)
 
-    def _tangents(self, q: Array | None) -> Array:
-        """Return unit vectors along the structure at the owned nodes, shape (n, components of displacement, d)."""
+    def directions(self, q: Array | None = None) -> Array:
+        """Return unit vectors along the structure at the owned nodes, shape (n, components of displacement, d).
+
+        Args:
+            q: local dof array of a state, which says where the structure lies; None: undeformed.
+        """
         V, structure = self.system.V, self.system.structure
         x = V.tabulate_dof_coordinates()
         place = np.zeros((len(x), sum(name.startswith("u") for name in structure.components)))

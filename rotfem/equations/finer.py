@@ -16,13 +16,16 @@ from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
 from rotfem.numerics import compat
-from rotfem.numerics.linear import DirectSolver, Increment, held
+from rotfem.numerics.linear import DirectSolver, Increment, NearbySolver, held
 from rotfem.numerics.low_rank import LowRank
 from rotfem.numerics.projection import times
 from rotfem.numerics.refinement import Refinement
 from rotfem.structures.tip_values import TipValues
 
 Array = npt.NDArray[np.float64]
+
+#: Number of unknowns up to which a factor costs less than iterations with another one.
+FEW = 500
 
 
 class FinerEquations:
@@ -49,6 +52,8 @@ class FinerEquations:
         #: Of a linear theory: matrices at the time that was taken, and the factor of the strains' stiffness.
         self._matrices: dict[str, Any] = {}
         self._material: DirectSolver | None = None
+        #: A factor of before; all matrices are near its one.
+        self._near: DirectSolver | None = None
         nodes, structure = self._refined.clamped(system.structure.clamped), system.structure
         self.clamped, self._hinged = structure.clamped_unknowns(nodes), structure.hinged_unknowns(nodes)
         self._bcs = structure.clamp_conditions(self.V, nodes=nodes)
@@ -56,7 +61,7 @@ class FinerEquations:
 
     def take(self) -> None:
         """Take the state, and all fields, that are set in the system."""
-        self._matrices.clear()
+        self._matrices = {kind: A for kind, A in self._matrices.items() if kind == "M"}
         for f, g in self._functions.items():
             g.x.array[:] = self._refined.carried(f.function_space, f.x.array, g.function_space)
         if self.system.linear and self.system.prestressed:
@@ -70,7 +75,7 @@ class FinerEquations:
             with s.of_material():
                 K = self._assembled(("K",), 1.0)
             held(K, self._hinged)
-            self._material = DirectSolver(K, symmetric=True)
+            self._material = self._near = DirectSolver(K, symmetric=True)
         load = compat.create_vector(self.V)
         fem_petsc.assemble_vector(load, self._form("F"))
         load.array[self.clamped] = 0.0
@@ -83,7 +88,7 @@ class FinerEquations:
     def matrix(self, kind: str, diagonal: float = 0.0) -> Any:
         """Return M, C or K at the state that was taken, a PETSc matrix with `diagonal` at clamped unknowns.
 
-        Of a linear theory it is the same one until another state is taken.
+        Of a linear theory it is the same one until another state is taken, M always.
         """
         names, shifts = self.system.tangent_forms(kind)
         if not self.system.linear:
@@ -103,6 +108,13 @@ class FinerEquations:
         d.array[self.clamped] = diagonal
         A.setDiagonal(d)
         return A
+
+    def solver(self, A: Any) -> DirectSolver | NearbySolver:
+        """Return a solver of a matrix on the refined mesh, which must not change any more."""
+        if self._near is not None and A.getSize()[0] > FEW:
+            return NearbySolver(A, self._near)
+        self._near = DirectSolver(A)
+        return self._near
 
     def imbalance(self) -> Any:
         """Return −F at q, v, a as a PETSc vector, zero at clamped unknowns."""
