@@ -86,11 +86,11 @@ class Propagator:
         return c
 
     def sampled(self, z: Complex) -> Array:
-        """Return (c, ċ) of coordinates (m,), one after the other, of what steps can sample: |λ| h < π.
+        """Return (c, ċ) of coordinates (k, m), shape (k, 2 r), of what steps can sample: |λ| h < π.
 
         The rest is none that a later motion could be off by: its rates are large, and not those of the motion.
         """
-        y: Array = (self._vectors @ np.where(np.abs(self._values) * np.median(self._h) < np.pi, z, 0.0)).real
+        y: Array = (np.where(np.abs(self._values) * np.median(self._h) < np.pi, z, 0.0) @ self._vectors.T).real
         return y
 
 

@@ -178,7 +178,7 @@ class Track:
                 parts.append(exact.forced(np.stack([off[begin], off[end] - off[begin]], axis=1)))
         c, rate = self._start(window, len(parts))
         errors = accumulated(exact.modal(c, rate), exact.carried, np.stack(parts, axis=1))
-        self.carried = np.array([exact.sampled(e) for e in errors[-1]]).reshape(len(parts), 2, -1)
+        self.carried = exact.sampled(errors[-1]).reshape(len(parts), 2, -1)
         r, tip = window.shapes.V.shape[1], window.shapes.tip
         self.carried[:, :, :r] *= window.bends  # what stretches has no phase to lose
         moved = [exact.displacements(e)[:, :r] for e in np.moveaxis(errors, 1, 0)]

@@ -165,8 +165,8 @@ def _energies(system: tuple[Any, Any, Any], solver: DirectSolver | NearbySolver,
         x.array[clamped] = 0.0
         solver.solve(x, y)
         column[:] = y.array
-    small = np.array([Y.T @ _times(B, Y) for B in (K, M)])
-    return 0.5 * (small + np.swapaxes(small, 1, 2))
+    small: Array = np.array([Y.T @ _times(B, Y) for B in (K, M)])
+    return np.asarray(0.5 * (small + np.swapaxes(small, 1, 2)))
 
 
 def _times(A: Any, X: Array) -> Array:

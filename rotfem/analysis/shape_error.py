@@ -62,12 +62,13 @@ class ShapeError:
             shapes: columns and M times them.
             along: directions of the structure in the state they are about; None: undeformed.
         """
-        r, tangents = shapes.V.shape[1], self.directions() if along is None else along
+        r = shapes.V.shape[1]
+        tangents = self.directions() if along is None else along
         moved = [
             self._oriented(Y.reshape(-1, self._size, r))[:, : tangents.shape[1]] for Y in (shapes.V, shapes.massed)
         ]
-        along = [np.einsum("nmd,nmr->ndr", tangents, u) for u in moved]
-        stretch = summed(shapes.comm, (along[0] * along[1]).sum(axis=(0, 1)))
+        shares = [np.einsum("nmd,nmr->ndr", tangents, u) for u in moved]
+        stretch = summed(shapes.comm, (shares[0] * shares[1]).sum(axis=(0, 1)))
         return np.asarray(stretch < 0.5)
 
     def directions(self, q: Array | None = None) -> Array:

@@ -140,14 +140,13 @@ class NearbySolver:
     """
 
     def __init__(self, A: Any, near: DirectSolver):
-        self._A = A
+        self._A, self._near = A, near
         self._own: DirectSolver | None = None
         factor = near._ksp.getPC()
         factor.setReusePreconditioner(True)
         self._ksp = PETSc.KSP().create(A.comm)
         self._ksp.setType(PETSc.KSP.Type.GMRES)
         self._ksp.setPC(factor)
-        self._ksp.setOperators(A, near.A)
         self._ksp.setTolerances(rtol=CLOSE, atol=0.0, max_it=ITERATIONS)
 
     def solve(self, b: Any, x: Any) -> None:
@@ -157,6 +156,7 @@ class NearbySolver:
             ComputationError: A is singular to working precision.
         """
         if self._own is None:
+            self._ksp.setOperators(self._A, self._near.A)  # the factor keeps them, and others may share it
             self._ksp.solve(b, x)
             if self._ksp.getConvergedReason() > 0:
                 return

@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics.left_vectors import mirror_error
-from rotfem.numerics.linear import DirectSolver, SingularSolver, combine, is_regular
+from rotfem.numerics.linear import DirectSolver, NearbySolver, SingularSolver, combine, is_regular
 from rotfem.numerics.newton import Newton
 
 
@@ -125,6 +125,42 @@ def test_a_singular_matrix_is_a_computation_error() -> None:
     b.set(1.0)
     with pytest.raises(ComputationError, match="singular"):
         DirectSolver(A).solve(b, x)
+
+
+def spread(rng: np.random.Generator, n: int) -> PETSc.Mat:
+    """Return a matrix whose eigenvalues lie far apart: no few iterations with the factor of 1 solve it."""
+    Q, _ = np.linalg.qr(rng.normal(size=(n, n)))
+    return matrix((Q * np.geomspace(1.0, 1e4, n) @ Q.T).tolist())
+
+
+def test_the_factor_of_a_matrix_near_by_solves_one_within_iterations_and_its_own() -> None:
+    """To the preconditioned residual with which iterations end, 1e-8, times what matrices near by differ by, 100."""
+    rng, n = np.random.default_rng(1), 40
+    near, far = spread(rng, n), spread(rng, n)
+    direct, (x, b) = DirectSolver(near), near.createVecs()
+    b.array[:] = rng.normal(size=n)
+    direct.solve(b, x)
+    first = x.array.copy()
+    changed = near.copy()
+    changed.scale(1.5)
+    changed.shift(0.1)
+    solvers = [NearbySolver(A, direct) for A in (changed, far)]
+    for _ in range(2):
+        for A, solver in zip((changed, far), solvers, strict=True):
+            solver.solve(b, x)
+            np.testing.assert_allclose(A[:, :] @ x.array, b.array, atol=1e-6 * np.abs(b.array).max())
+    assert [solver._own is None for solver in solvers] == [True, False]
+    direct.solve(b, x)
+    np.testing.assert_array_equal(x.array, first)
+
+
+def test_a_singular_matrix_is_one_to_a_matrix_near_by_too() -> None:
+    near, A = matrix([[1.0, 0.5], [0.5, 1.0]]), matrix([[1.0, 1.0], [1.0, 1.0]])
+    direct, (x, b) = DirectSolver(near), near.createVecs()
+    b.array[:] = [1.0, 2.0]
+    direct.solve(b, x)
+    with pytest.raises(ComputationError, match="singular"):
+        NearbySolver(A, direct).solve(b, x)
 
 
 def test_combine() -> None:
