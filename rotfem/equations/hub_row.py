@@ -87,6 +87,11 @@ class HubRow:
         own = c_v * self.hub.damping + c_m * self.hub.inertia
         return own if form is None else own + self._value(form)
 
+    def rest_inertia(self) -> float:
+        """Return the moment of inertia of hub and undeformed structure about the axis, kg·m²; writes that state."""
+        self.system.set_state(self.system.zeros())
+        return self.diagonal(0.0, 1.0)
+
     def row(self, shifts: tuple[float, float, float]) -> Any:
         """Return ∂(residual)/∂q as a PETSc vector (reused); zero if uncoupled."""
         if not self.coupled:

@@ -65,12 +65,6 @@ def from_file(problem: Problem) -> bool:
     return getattr(problem.structure, "mesh", None) is not None
 
 
-def turning_inertia(system: Any) -> float:
-    """Return the moment of inertia of a free hub with the undeformed structure about the axis, kg·m²."""
-    system.held.set_state(system.held.zeros())
-    return float(system.row.diagonal(0.0, 1.0))
-
-
 def absent(case: Case) -> dict[str, str]:
     """Return output ↦ why a case has none of it, among history, steady state and modes."""
     out = {STEADY: "the scene asks for a history"}
@@ -193,7 +187,7 @@ class Trial:
         if hub is None or steps is None:
             return problem.motion.final_speed(end)
         speeds = hub.rigid_speeds(
-            np.unique([*np.linspace(0.0, end, HUB_LOOKS), *hub.torque.knots]), turning_inertia(self.poorest)
+            np.unique([*np.linspace(0.0, end, HUB_LOOKS), *hub.torque.knots]), self.poorest.row.rest_inertia()
         )
         return float(speeds[np.argmax(np.abs(speeds))])
 

@@ -10,7 +10,7 @@ from dolfinx import fem
 
 from rotfem.numerics import forms
 from rotfem.selection.case import Case
-from rotfem.selection.coarse_model import Trial, turning_inertia
+from rotfem.selection.coarse_model import Trial
 from rotfem.selection.distance import Outputs
 
 Array = npt.NDArray[np.float64]
@@ -72,7 +72,7 @@ def _turning(case: Case, system: Any) -> tuple[Array, Array]:
     times = np.linspace(0.0, max(end, motion.settled), SAMPLES + 1)
     if motion.hub is None:
         return np.array([motion.speed(t) for t in times]), np.array([motion.rate(t) for t in times])
-    rates = np.array([motion.hub.torque.at(t) for t in times]) / turning_inertia(system)
+    rates = np.array([motion.hub.torque.at(t) for t in times]) / system.row.rest_inertia()
     return motion.hub.speed + np.cumsum(rates * np.diff(times, prepend=0.0)), rates
 
 
