@@ -20,7 +20,7 @@ from rotfem.analysis.equilibrium import check_steady
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.participation import participation as masses_of
-from rotfem.analysis.stability import stability_of_pencil
+from rotfem.analysis.stability import Stability, stability_of_pencil
 from rotfem.analysis.theory_error import TheoryCheck, TheoryError
 from rotfem.commands.accuracy import changes_of, pursue, refuse, settings_of
 from rotfem.commands.finite import check_rows
@@ -107,17 +107,11 @@ def _modes(
     hints = hints_of(analysis, scene, "modes", hint, speed)
     found = mode_tables(analysis, speed, scene.modes.count, keep=False)
     check_rows(found.rows)
-    spinning, warnings = found.spinning, found.warnings
-    if choice is not None:  # a choice knows what it left out
-        warnings = [line for line in warnings if line not in advice(analysis, speed)]
-    warnings = [*held(problem), *analysis.notes, *warnings]
-    stability = stability_of_pencil(spinning.pencil, spinning.clamped)
-    known = GROWS_AS_SAID * max(row["growth"] for row in found.rows if row["stability"] != "neutral")
-    if stability.stable is None or stability.held_by_spin or stability.growth > max(known, 0.0):
-        warnings = [*warnings, stability.warning()]
-    off = theory_error(analysis, spinning)
-    if said := off.warning():
-        warnings = [*warnings, said]
+    spinning = found.spinning
+    stability, off = stability_of_pencil(spinning.pencil, spinning.clamped), theory_error(analysis, spinning)
+    known = [] if choice is None else advice(analysis, speed)  # a choice knows what it left out
+    warnings = [*held(problem), *analysis.notes, *(line for line in found.warnings if line not in known)]
+    warnings += [*_of_stability(stability, found.rows), *([said] if (said := off.warning()) else [])]
     result = {
         **modal_summary("modes", analysis, scene, choice, started),
         "speed": speed,
@@ -146,6 +140,13 @@ def _modes(
 
         done.sensitivities = derivatives(analysis, spinning)
     return done
+
+
+def _of_stability(stability: Stability, rows: list[dict[str, Any]]) -> list[str]:
+    """Return the warning of a state that is not stable, if the rows of the modes do not say it."""
+    known = GROWS_AS_SAID * max((row["growth"] for row in rows if row["stability"] != "neutral"), default=0.0)
+    unsaid = stability.stable is None or stability.held_by_spin or stability.growth > max(known, 0.0)
+    return [stability.warning()] if unsaid else []
 
 
 def add_participation(found: ModesResult) -> None:

@@ -97,28 +97,31 @@ def run_summary(run: Simulation, status: str, history: dict[str, npt.NDArray[np.
         "figures": figures(history),
         "warnings": run.warnings,
         "advice": run.advice,
+        "root": {"place": [float(c) for c in system.root.place]},
     }
-    out["root"] = {"place": [float(c) for c in system.root.place]}
     if run.scene.time is None and len(history["t"]):
         out["root"] |= {name: float(x[-1]) for name, x in history.items() if name.startswith("root_")}
-    if run.record.resultants is not None:
-        out["stress"] = run.record.resultants.summary()
-    if run.resumed:
-        out["resumed"] = run.resumed
-    if stepper is not None and stepper.rejected:
-        out["rejected_steps"] = stepper.rejected
-    if run.reduced is not None:
-        out["reduced"] = run.reduced.summary()
-    if run.foreshortened is not None:
-        out["reduced"]["foreshortening"] = run.foreshortened.summary()
-    if run.error is not None:
-        out["error"] = run.error.summary()
-    if run.left_out is not None:
-        out["left_out"] = run.left_out
-    if run.theory_error is not None:
-        out["theory_error"] = run.theory_error.summary()
-    if run.stability is not None:
-        out["stability"] = run.stability.summary()
     if run.critical is not None:
         out["figures"]["critical_speed"] = run.critical
+    return out | _told(run)
+
+
+def _told(run: Simulation) -> dict[str, Any]:
+    """Return what a summary says of a run only where there is something to be said."""
+    parts = {
+        "stress": run.record.resultants,
+        "reduced": run.reduced,
+        "error": run.error,
+        "theory_error": run.theory_error,
+        "stability": run.stability,
+    }
+    out: dict[str, Any] = {name: part.summary() for name, part in parts.items() if part is not None}
+    if run.foreshortened is not None:
+        out["reduced"]["foreshortening"] = run.foreshortened.summary()
+    if run.resumed:
+        out["resumed"] = run.resumed
+    if run.stepper is not None and run.stepper.rejected:
+        out["rejected_steps"] = run.stepper.rejected
+    if run.left_out is not None:
+        out["left_out"] = run.left_out
     return out

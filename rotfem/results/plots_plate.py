@@ -131,36 +131,18 @@ def animate(result: ModesResult, mode: int, folder: Path) -> list[Path]:
         raise SceneError("command line", "--animate", mode, f"must be a mode from 1 to {len(titles)}")
     title, columns = titles[mode - 1], result.shapes[titles[mode - 1]]
     try:
-        import pyvista
+        import pyvista  # noqa: F401
         from PIL import Image
     except ImportError:
         raise OutputError(folder / f"mode_{mode}.gif", "PyVista is not installed (pip install rotfem[plots])") from None
-    mesh = surface(columns, result.triangles)
-    z = np.column_stack([columns[n] + 1j * columns[f"{n}_imag"] for n in ("u1", "u2", "u3")])
-    size = float(np.max(np.ptp(mesh.points, axis=0)))
-    scale = WARP * size / float(np.max(np.linalg.norm(np.abs(z), axis=1)))
-    rest = mesh.points.copy()
-    name = leading(columns)
-    bar = {"title": f"{name} (–)", "n_labels": 3}
-    plotter = pyvista.Plotter(off_screen=True, window_size=(800, 600))
-    plotter.add_mesh(mesh.copy(), style="wireframe", color="lightgray", opacity=0.3)
-    moving, peak = mesh.copy(), float(np.max(np.abs(columns[name])))
-    moving[name] = z[:, ["u1", "u2", "u3"].index(name)].real
-    plotter.add_mesh(moving, scalars=name, cmap="RdBu_r", clim=(-peak, peak), scalar_bar_args=bar)
-    plotter.add_text(title, font_size=10)
-    plotter.show_bounds(grid="back", xtitle="x (m)", ytitle="y (m)", ztitle=" ", font_size=9, show_zlabels=False)
-    moving.points = rest + scale * z.real
-    plotter.camera_position = [(1.6 * size, -1.8 * size, 1.3 * size), mesh.center, (0, 0, 1)]
-    plotter.reset_camera(bounds=np.array(mesh.bounds) + WARP * size * np.array([-1, 1] * 3))
-    plotter.camera.zoom(1.3)
+    moving = Moving(surface(columns, result.triangles), columns)
     paths = [folder / f"mode_{mode}.png", folder / f"mode_{mode}.gif"]
+    plotter = moving.plotter(title)
     try:
         plotter.screenshot(str(paths[0]))
         frames = []
         for turn in np.linspace(0.0, 2 * np.pi, FRAMES, endpoint=False):
-            now = np.real(z * np.exp(1j * turn))
-            moving.points = rest + scale * now
-            moving[name] = now[:, ["u1", "u2", "u3"].index(name)]
+            moving.show(turn)
             plotter.render()
             frames.append(Image.fromarray(plotter.screenshot(return_img=True)).quantize(64))
         frames[0].save(paths[1], save_all=True, append_images=frames[1:], duration=1000 // RATE, loop=0)
@@ -169,3 +151,43 @@ def animate(result: ModesResult, mode: int, folder: Path) -> list[Path]:
     finally:
         plotter.close()
     return paths
+
+
+class Moving:
+    """A mid-surface in a mode, coloured by its leading displacement.
+
+    Args:
+        rest: the undeformed surface, a PyVista mesh.
+        columns: the shape, of which the surface shows `WARP` of its own size.
+    """
+
+    def __init__(self, rest: Any, columns: dict[str, Array]):
+        self._rest, self._moving, names = rest, rest.copy(), ("u1", "u2", "u3")
+        self._z = np.column_stack([columns[n] + 1j * columns[f"{n}_imag"] for n in names])
+        self._size = float(np.max(np.ptp(rest.points, axis=0)))
+        self._scale = WARP * self._size / float(np.max(np.linalg.norm(np.abs(self._z), axis=1)))
+        self._name = leading(columns)
+        self._leading, self._peak = names.index(self._name), float(np.max(np.abs(columns[self._name])))
+        self.show(0.0)
+
+    def show(self, turn: float) -> None:
+        """Move and colour the surface as it is at a phase of the period, rad."""
+        now = np.real(self._z * np.exp(1j * turn))
+        self._moving.points = self._rest.points + self._scale * now
+        self._moving[self._name] = now[:, self._leading]
+
+    def plotter(self, title: str) -> Any:
+        """Return a PyVista plotter with the surface, its place at rest and a colour bar."""
+        import pyvista
+
+        size, bar = self._size, {"title": f"{self._name} (–)", "n_labels": 3}
+        plotter = pyvista.Plotter(off_screen=True, window_size=(800, 600))
+        plotter.add_mesh(self._rest, style="wireframe", color="lightgray", opacity=0.3)
+        limits = -self._peak, self._peak
+        plotter.add_mesh(self._moving, scalars=self._name, cmap="RdBu_r", clim=limits, scalar_bar_args=bar)
+        plotter.add_text(title, font_size=10)
+        plotter.show_bounds(grid="back", xtitle="x (m)", ytitle="y (m)", ztitle=" ", font_size=9, show_zlabels=False)
+        plotter.camera_position = [(1.6 * size, -1.8 * size, 1.3 * size), self._rest.center, (0, 0, 1)]
+        plotter.reset_camera(bounds=np.array(self._rest.bounds) + WARP * size * np.array([-1, 1] * 3))
+        plotter.camera.zoom(1.3)
+        return plotter

@@ -88,23 +88,8 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
 
 
 def _keys(deck: Deck, asked: Asked, length: float, factors: dict[str, float]) -> dict[str, Any]:
-    """Return section and pretwist of a file of section properties."""
-    count = deck.count("n_secs", 2)
-    head = deck.find("str_tw mass_den")
-    names = deck.lines[head - 1].split()
-    if names[0] not in FIRST or names[1:] != COLUMNS:
-        deck.fail(f"columns must be {FIRST[0]} {' '.join(COLUMNS)}", head)
-    first = head + 2  # below the units
-    values = np.array(deck.rows(first, count, len(names))).T
-    x, table = values[0], dict(zip(COLUMNS, values[1:], strict=True))
-    deck.increasing(x, first, 1.0, names[0])
-    for column, name in enumerate(COLUMNS, start=2):
-        for i in np.flatnonzero(table[name] <= 0.0) if name in POSITIVE else ():
-            deck.fail(f"{name} must be greater than 0, not {table[name][i]:g}", first + int(i), column)
-    for i in np.flatnonzero(table["tw_iner"] != table["str_tw"]):
-        deck.fail(
-            "tw_iner must be str_tw: principal axes of mass and stiffness that differ are not read", first + int(i), 3
-        )
+    """Return section and pretwist of a file of section properties, whose columns a main file multiplies by factors."""
+    x, table, first = _table(deck)
     asked.needs(deck, SHEAR, "beams of BModes do not shear")
     table |= {column: factor * table[column] for column, factor in factors.items()}
     tension = table["tc_offst"] - table["sc_offst"]
@@ -122,7 +107,7 @@ def _keys(deck: Deck, asked: Asked, length: float, factors: dict[str, float]) ->
         return scaled_rows(x, length, found)
 
     def points(y: Array) -> Any:
-        return rows(np.stack([y, np.zeros(count)], axis=-1))
+        return rows(np.stack([y, np.zeros_like(y)], axis=-1))
 
     return {
         "pretwist": rows(-np.radians(table["str_tw"])),
@@ -138,6 +123,27 @@ def _keys(deck: Deck, asked: Asked, length: float, factors: dict[str, float]) ->
             "tension_center": points(tension),
         },
     }
+
+
+def _table(deck: Deck) -> tuple[Array, dict[str, Array], int]:
+    """Return the places of the sections, parts of the length, the columns there, and the line that they start at."""
+    count = deck.count("n_secs", 2)
+    head = deck.find("str_tw mass_den")
+    names = deck.lines[head - 1].split()
+    if names[0] not in FIRST or names[1:] != COLUMNS:
+        deck.fail(f"columns must be {FIRST[0]} {' '.join(COLUMNS)}", head)
+    first = head + 2  # below the units
+    values = np.array(deck.rows(first, count, len(names))).T
+    x, table = values[0], dict(zip(COLUMNS, values[1:], strict=True))
+    deck.increasing(x, first, 1.0, names[0])
+    for column, name in enumerate(COLUMNS, start=2):
+        for i in np.flatnonzero(table[name] <= 0.0) if name in POSITIVE else ():
+            deck.fail(f"{name} must be greater than 0, not {table[name][i]:g}", first + int(i), column)
+    for i in np.flatnonzero(table["tw_iner"] != table["str_tw"]):
+        deck.fail(
+            "tw_iner must be str_tw: principal axes of mass and stiffness that differ are not read", first + int(i), 3
+        )
+    return x, table, first
 
 
 register(BladeFormat("bmodes", "BModes' section properties, or its main file (.bmi)", recognises, read))
