@@ -149,8 +149,8 @@ class ErrorWatch:
         values, names = inner.structure.tip_values, inner.structure.unknowns
         dofs = [values.dofs.start + i for i, name in enumerate(names) if name.startswith("u")]
         here: Array = np.zeros(len(shapes))
-        if inner.comm.rank == values._owner:  # others may have no unknowns at all
+        if inner.comm.rank == values.owner:  # others may have no unknowns at all
             here[:] = np.linalg.norm(np.array([q[dofs] for q in shapes]), axis=1)
         if inner.comm.size > 1:
-            inner.comm.Bcast(here, root=values._owner)
+            inner.comm.Bcast(here, root=values.owner)
         return here

@@ -36,12 +36,12 @@ def look_at(course: Course, times: Array) -> None:
     """Find the knots and marks of a course that are not known, between the ends of steps (s).
 
     Raises:
-        InputError: the speed of the frame jumps: no force is large enough for that.
+        InputError: it, or its rate, jumps and must not (see `Course.continuous`).
     """
     if course.known:
         return
     course.known = True
-    if course.name == "pitch.angle":
+    if course.continuous > 1:
         check_bends(course, times)
         return
     number = int(np.clip(LOOKS // (len(times) - 1), FEWEST, MOST))
@@ -52,9 +52,9 @@ def look_at(course: Course, times: Array) -> None:
     if not size > 0.0:
         return
     knots = _jumps(course, t, f, size)
-    if len(knots) and course.name == "motion.speed":
+    if len(knots) and course.continuous:
         raise InputError(
-            "motion.speed",
+            course.name,
             None,
             f"jumps at t = {knots[0]:.9g} s; a speed that changes at once takes a force without bound: give a ramp",
         )
@@ -81,7 +81,7 @@ def check_bends(course: Course, times: Array) -> None:
         where, depth = _followed(course, (float(t[i]), float(t[i + 2])), float(changes[i]), noise)
         if depth >= SURE:
             raise InputError(
-                "structure.root.pitch",
+                course.name,
                 None,
                 f"its rate jumps at t = {where:.9g} s, which takes a moment without bound: round it off",
             )

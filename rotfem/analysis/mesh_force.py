@@ -97,7 +97,7 @@ class MeshForce:
         columns = np.empty((len(self.turns), len(load.array)))
         for column, turn in zip(columns, self.turns, strict=True):
             load.set(0.0)
-            if inner.comm.rank == tip._owner:
+            if inner.comm.rank == tip.owner:
                 load.array[tip.dofs.start + turn] = 1.0
             solver.solve(load, answer)
             column[:] = answer.array

@@ -84,7 +84,7 @@ class RefinedMesh:
         increment, done = Increment(fine.V), 0
         moves = [i for i, name in enumerate(self.system.held.structure.unknowns) if name.startswith("u")]
         for _ in range(CORRECTIONS):
-            dq = increment.solve(fine.solver(fine.matrix("K", 1.0)), fine.imbalance())
+            dq = increment.solve(fine.solver(fine.matrix("K")), fine.imbalance())
             q += dq
             last = float(np.linalg.norm(fine.tip(dq)[moves]))
             size = float(np.linalg.norm(fine.tip(q - start)[moves]))
@@ -119,7 +119,7 @@ class RefinedMesh:
             # A linear theory has the tangent of the shapes, whose factor is there.
             solver = shapes.solver if inner.linear else DirectSolver(_shifted(K, shapes.shift, M))
             here = shapes.sum(_energies((M, K, inner.clamped), solver, V))
-            M, K = fine.matrix("M"), fine.matrix("K", 1.0)
+            M, K = fine.matrix("M"), fine.matrix("K")
             X = fine.carried(_local(inner, V))
             there = _energies((M, K, fine.clamped), fine.solver(_shifted(K, shapes.shift, M)), X)
             here, there = (scipy.linalg.eigh(*energies, eigvals_only=True) for energies in (here, there))
@@ -150,7 +150,7 @@ def _shifted(K: Any, shift: float, M: Any) -> Any:
 
 
 def _energies(system: tuple[Any, Any, Any], solver: DirectSolver | NearbySolver, X: Array) -> Array:
-    """Return the stiffness and the mass of A⁻¹ M X, shape (2, r, r).
+    """Return the part of this process in the stiffness and the mass of A⁻¹ M X, shape (2, r, r).
 
     Args:
         system: M, K (with 1 at clamped unknowns), and the clamped unknowns.

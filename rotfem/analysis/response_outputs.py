@@ -35,7 +35,7 @@ class TipOutput:
     def __call__(self, x: Array, s: complex) -> Array:
         """Return the amplitudes of a motion x e^{st} of the owned unknowns."""
         read, full = self._system.structure.tip_values, np.zeros(len(self._system.zeros()), dtype=np.complex128)
-        n = min(len(x), len(full))  # without the angle of a free hub
+        n = len(self._system.root.weights)  # without the angle of a free hub
         full[:n] = x[:n]
         return np.asarray(read(full.real) + 1j * read(full.imag))
 
@@ -74,10 +74,10 @@ class HubOutput:
     """
 
     names = ("psi",)
-    given: Array = np.zeros(1)
 
     def __init__(self, system: Any):
         self._comm = system.comm
+        self.given: Array = np.zeros(1)
 
     def __call__(self, x: Array, s: complex) -> Array:
         """Return the amplitude (rad) of owned unknowns x, the angle last on the last process."""

@@ -25,7 +25,7 @@ class TipTrack:
         self.values, self.comm, self.further = inner.structure.tip_values, inner.comm, further
         names = inner.structure.unknowns
         self._moves = [self.values.dofs.start + i for i, name in enumerate(names) if name.startswith("u")]
-        self._has_tip = inner.comm.rank == self.values._owner
+        self._has_tip = inner.comm.rank == self.values.owner
         self._times: list[float] = []
         self._tips: list[Array] = []
 
@@ -49,5 +49,5 @@ class TipTrack:
         if self._has_tip and self._tips:
             tips[:] = self._tips
         if self.comm.size > 1:
-            self.comm.Bcast(tips, root=self.values._owner)
+            self.comm.Bcast(tips, root=self.values.owner)
         return np.array(self._times), tips

@@ -172,9 +172,9 @@ def known(error: dict[str, Any]) -> bool:
 def changes_of(scene: Scene, settings: Settings) -> dict[str, Any]:
     """Return the keys ↦ values that make a scene one with these settings; None removes what it says."""
     out: dict[str, Any] = settings.changes()
-    time, key = scene.time, "increment_tolerance"
-    if key in scene.solver.model_fields_set:
-        out.pop(f"solver.{key}", None)
+    time = scene.time
+    if "increment_tolerance" in scene.solver.model_fields_set:  # what the user has set stays
+        out.pop("solver.increment_tolerance", None)
     if settings.moving and time is not None:
         out |= {f"time.{name}": None for name in time.parameters}
         out |= {"time.output_every": None, "time.output_step": time.output_step or time.end / ROWS}

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rotfem.mechanics.motion import Motion
-from rotfem.mechanics.pitch import Pitch, Scalar, differentiated, harmonic_pitch, tabulated_pitch
+from rotfem.mechanics.pitch import Pitch, Scalar, constant_pitch, differentiated, harmonic_pitch, tabulated_pitch
 from rotfem.scene import Scene
 
 
@@ -21,14 +21,15 @@ def with_pitch(scene: Scene, motion: Motion) -> Motion:
     if not structure.pitches:
         return motion
     given = structure.root.pitch
-    parts = [harmonic_pitch(h.amplitude, h.phase, _turn(h, motion)) for h in given.harmonic]
+    parts = [constant_pitch(given.value or 0.0)]
+    parts += [harmonic_pitch(h.amplitude, h.phase, _turn(h, motion)) for h in given.harmonic]
     knots = motion.sharp if any(h.per_rev is not None for h in given.harmonic) else ()
     if given.table is not None:
         parts.append(tabulated_pitch(given.table))
         knots = tuple(sorted({*knots, *(row[0] for row in given.table)}))
     if given.function is not None:
         parts.append(differentiated(given.at))
-    angle, rate, acceleration = (_sum([part[i] for part in parts], given.value if i == 0 else None) for i in range(3))
+    angle, rate, acceleration = (_sum([part[i] for part in parts]) for i in range(3))
     axis, root = np.array(structure.root_axis), np.array(structure.root_position)
     known = given.function is None and not given.harmonic
     return motion.pitched(Pitch(angle, rate, acceleration, axis, root, knots, known, start=angle(0.0)))
@@ -43,6 +44,5 @@ def _turn(harmonic: Any, motion: Motion) -> tuple[Scalar, Scalar, Scalar]:
     return (lambda t: n * motion.angle(t)), (lambda t: n * motion.speed(t)), (lambda t: n * motion.rate(t))
 
 
-def _sum(parts: list[Scalar], more: float | None) -> Scalar:
-    constant = more or 0.0
-    return lambda t: constant + sum(part(t) for part in parts)
+def _sum(parts: list[Scalar]) -> Scalar:
+    return lambda t: sum(part(t) for part in parts)

@@ -85,12 +85,13 @@ class FinerEquations:
         """Return columns (n, r) of local dof arrays of the system on the refined mesh."""
         return self._refined.carried(self.system.V, columns, self.V)
 
-    def matrix(self, kind: str, diagonal: float = 0.0) -> Any:
-        """Return M, C or K at the state that was taken, a PETSc matrix with `diagonal` at clamped unknowns.
+    def matrix(self, kind: str) -> Any:
+        """Return M, C or K at the state that was taken, a PETSc matrix; K has 1 at clamped unknowns, the others have 0.
 
         Of a linear theory it is the same one until another state is taken, M always.
         """
         names, shifts = self.system.tangent_forms(kind)
+        diagonal = float(kind == "K")
         if not self.system.linear:
             self.system.shift(shifts)
             return self._assembled(names, diagonal)
@@ -151,8 +152,7 @@ class FinerEquations:
     def _add(self, b: Any, kind: str, x: fem.Function) -> None:
         """Add A x to a vector, A of a linear theory; it has all of one kind there is, or none."""
         if self.system.tangent_forms(kind)[0]:  # what is clamped is zero, whatever is on the diagonal there
-            A = self.matrix(kind, float(kind == "K"))
-            A.multAdd(compat.wrap(x.x), b, b)
+            self.matrix(kind).multAdd(compat.wrap(x.x), b, b)
 
     def _form(self, name: str) -> Any:
         """Return a form of the system on the refined mesh."""
@@ -166,8 +166,8 @@ def _tip(system: Any) -> Array:
     """Return where the tip of a structure is (3,), m."""
     values, x = system.structure.tip_values, system.V.tabulate_dof_coordinates()
     at: Array = np.zeros(3)
-    if system.comm.rank == values._owner:
+    if system.comm.rank == values.owner:
         at[:] = x[values.dofs.start // values.size]
     if system.comm.size > 1:
-        system.comm.Bcast(at, root=values._owner)
+        system.comm.Bcast(at, root=values.owner)
     return at

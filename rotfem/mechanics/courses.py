@@ -55,12 +55,14 @@ class Course:
     """One quantity over time.
 
     Attributes:
-        name: what it is, for messages.
+        name: what it is; of what must not jump its key, for messages. No two have the same.
         at: time (s) ↦ value, scalar or shape (components,).
         knots: times (s) between which it is smooth, increasing.
         marks: further times (s) between which it is nearly straight, where it is known to be fast.
         many: the same of an array of times, shape (n, components); made of `at` if None.
         looks: times (s) at which it is looked at to see whether a step resolves it, but not landed on.
+        continuous: derivatives, from 0 on, that must not jump, as no force is large enough for that: 2 are the value
+            and its rate.
         known: whether all knots are known; otherwise it is a function that has to be looked at.
     """
 
@@ -71,6 +73,7 @@ class Course:
     many: Callable[[Array], Array] | None = None
     known: bool = True
     looks: Array = field(default_factory=lambda: np.empty(0))
+    continuous: int = 0
 
     def values(self, t: Array) -> Array:
         """Return the values at times (n,), shape (n, components)."""
@@ -183,6 +186,7 @@ def _watched_motion(motion: Motion, see: Callable[[Course], Callable[[float], An
             many = _columns(f) if motion.arrays else None
             course = Course(f"motion.{name}", f, _times(motion.sharp), _times(motion.knots), many, known)
             course.looks = 0.5 * (course.marks[1:] + course.marks[:-1])
+            course.continuous = int(name == "speed")
             changes[name] = see(course)
     if motion.pitch is not None:
         changes["pitch"] = _watched_pitch(motion.pitch, see)
@@ -194,7 +198,10 @@ def _watched_pitch(pitch: Pitch, see: Callable[[Course], Callable[[float], Any]]
     none, changes = np.empty(0), dict[str, Any]()
     for name in ("angle", "rate", "acceleration"):
         known = pitch.known or name == "rate"
-        changes[name] = see(Course(f"pitch.{name}", getattr(pitch, name), _times(pitch.knots), none, known=known))
+        key = "structure.root.pitch" if name == "angle" else f"pitch.{name}"
+        course = Course(key, getattr(pitch, name), _times(pitch.knots), none, known=known)
+        course.continuous = 2 if name == "angle" else 0
+        changes[name] = see(course)
     return replace(pitch, **changes)
 
 

@@ -45,10 +45,6 @@ def is_beside(root: npt.ArrayLike, axis: npt.ArrayLike) -> bool:
     return bool(np.linalg.norm(np.cross(arm, along)) > ON_AXIS * np.linalg.norm(arm))
 
 
-def _none(t: float) -> float:
-    return 0.0
-
-
 @dataclass(frozen=True)
 class Pitch:
     """The pitch of a blade over time.
@@ -80,7 +76,8 @@ class Pitch:
 
     def held(self) -> Pitch:
         """Return the pitch that stays as it is at t = 0."""
-        return replace(self, angle=lambda t: self.start, rate=_none, acceleration=_none, knots=(), known=True)
+        angle, rate, acceleration = constant_pitch(self.start)
+        return replace(self, angle=angle, rate=rate, acceleration=acceleration, knots=(), known=True)
 
     def turned(self, t: float) -> float:
         """Return φ = θ(t) − θ(0), rad."""
@@ -118,6 +115,11 @@ class Pitch:
         """Return vectors (…, 3 n), n of them one after the other, with components in the hub's frame."""
         triples = values.reshape(*values.shape[:-1], -1, 3)
         return np.asarray((triples @ self.rotation(t).T).reshape(values.shape))
+
+
+def constant_pitch(angle: float) -> Course:
+    """Return (θ, θ̇, θ̈) of an angle (rad) that stays."""
+    return (lambda t: angle), (lambda t: 0.0), (lambda t: 0.0)
 
 
 def tabulated_pitch(rows: npt.ArrayLike) -> Course:

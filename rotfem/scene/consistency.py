@@ -160,10 +160,10 @@ def check_first_state(model: Model, initial: Initial, accuracy: float | None) ->
 
 
 def check_accuracy(model: Model, output: OutputTable, accuracy: float | None) -> None:
-    """Refuse a tolerance of the model beside an accuracy, which has one in it, and to leave out what tells of it.
+    """Refuse what an accuracy cannot stand beside: a tolerance of the model, which it has in it, and no estimates.
 
     Raises:
-        PydanticCustomError: there are both.
+        PydanticCustomError: there are both, or the frame or the output has no estimate of errors.
     """
     if accuracy is not None and model.tolerance is not None:
         reason = "cannot be combined with accuracy, which allows the model a share of its own"

@@ -97,7 +97,7 @@ def _eigenvalues(held: Any, fine: FinerEquations, speed: float, count: int) -> t
     held.set_state(held.zeros())
     here = held.mass_damping_stiffness()
     fine.take()
-    M, K = fine.matrix("M"), fine.matrix("K", 1.0)
+    M, K = fine.matrix("M"), fine.matrix("K")
     if held.tangent_forms("C")[0]:
         C = fine.matrix("C")
     else:

@@ -13,6 +13,11 @@ class TipValues:
     Args:
         V: blocked function space.
         point: coordinates (3,), m.
+
+    Attributes:
+        owner: rank that owns the node.
+        dofs: local numbers of its unknowns there.
+        size: number of unknowns of a node.
     """
 
     def __init__(self, V: fem.FunctionSpace, point: npt.ArrayLike):
@@ -20,7 +25,8 @@ class TipValues:
         owned = V.dofmap.index_map.size_local
         distance = np.linalg.norm(V.tabulate_dof_coordinates()[:owned] - np.asarray(point), axis=1)
         nearest = float(distance.min()) if owned else np.inf
-        _, self._owner = self._comm.allreduce((nearest, self._comm.rank), op=_closest)
+        self.owner: int
+        _, self.owner = self._comm.allreduce((nearest, self._comm.rank), op=_closest)
         node = int(distance.argmin()) if owned else 0
         self.dofs = slice(node * self.size, (node + 1) * self.size)
 
@@ -28,8 +34,8 @@ class TipValues:
         """Return the (block size,) values at the point from a local dof array of the space."""
         if self._comm.size == 1:
             return values[self.dofs].copy()
-        here = values[self.dofs].copy() if self._comm.rank == self._owner else np.empty(self.size)
-        self._comm.Bcast(here, root=self._owner)
+        here = values[self.dofs].copy() if self._comm.rank == self.owner else np.empty(self.size)
+        self._comm.Bcast(here, root=self.owner)
         return here
 
 

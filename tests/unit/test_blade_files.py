@@ -161,11 +161,12 @@ BAD: list[tuple[str, str, dict[str, Any], tuple[str, str], str]] = [
     ("windio_2", "blade.yaml", {}, ("Upwind", "Up"), 'line 3, column 22: assembly.rotor_orientation is "up"; must be'),
     ("windio_2", "blade.yaml", {}, ("cone_angle", "cone"), "line 6, column 5: components.hub has no cone_angle"),
     ("windio_2", "blade.yaml", {}, ("K22: [", "K22: [1.0, "), "line 19, column 13: .* has 2 places for 3 values|has 3"),
+    ("windio_2", "blade.yaml", {}, ("K55: [", "K55: [1.0, "), "K55 has 3 values for 2 places"),
     (
         "windio_2",
         "blade.yaml",
         {},
-        ("K11: [", "K11: [0.0]  # ["),
+        ("K11: [", "K11: [0.0, 1.0]  # ["),
         r"line 19, column 17: .*K11\[0\] is 0; must be greater",
     ),
     ("windio_2", "blade.yaml", {}, ("i_plr", "i_polar"), "inertia_matrix has no i_plr"),

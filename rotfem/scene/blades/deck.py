@@ -61,9 +61,9 @@ class Deck:
         """
         found = re.search(rf"{program}\s+V(\d+\.\d+)", self.lines[0], re.IGNORECASE)
         if found is None or found[1] not in known:
-            shown = found[1] if found else "missing"
+            version = found[1] if found else "missing"
             possessive = f"{program}'" if program.endswith("s") else f"{program}'s"
-            self.fail(f"the version of {possessive} {kind} file is {shown}; known: {', '.join(known)}", 1)
+            self.fail(f"the version of {possessive} {kind} file is {version}; known: {', '.join(known)}", 1)
 
     def find(self, words: str, start: int = 1) -> int:
         """Return the number of the first line, not before start, in which all words stand, whatever their case."""

@@ -131,9 +131,9 @@ def _rows_of_21(table: YamlNode, length: float, definite: bool) -> list[list[Any
 
 def _stiffness(table: YamlNode, length: float) -> list[list[Any]]:
     """Return the table of stiffness matrices from their elements, each over the grid."""
-    diagonal = {name: _column(table, name) for name in DIAGONAL}
-    count = len(diagonal["K44"])
+    count = len(table["K44"].numbers())
     grid = table["grid"].grid(count)
+    diagonal = {name: _column(table, name, count) for name in DIAGONAL}
     for name, values in diagonal.items():
         for i in np.flatnonzero(values <= 0.0):
             table[name].entries()[i].fail(f"is {values[i]:g}; must be greater than 0")
@@ -145,39 +145,36 @@ def _stiffness(table: YamlNode, length: float) -> list[list[Any]]:
         )
     upper = np.zeros((count, len(ELEMENTS)))
     for column, name in enumerate(ELEMENTS):
-        upper[:, column] = _column(table, name, count)
+        upper[:, column] = _column_or_zeros(table, name, count)
     return scaled_rows(grid, length, _checked(_along_ours(upper), table["K44"].entries(), definite=True))
 
 
 def _mass(table: YamlNode, length: float) -> list[list[Any]]:
     """Return the table of mass matrices from mass, centre and inertias about the reference axis."""
-    mass = _column(table, "mass")
+    mass = table["mass"].numbers()
     count = len(mass)
     grid = table["grid"].grid(count)
     for i in np.flatnonzero(mass <= 0.0):
         table["mass"].entries()[i].fail(f"is {mass[i]:g}; must be greater than 0")
-    x, y, cross = (_column(table, name, count) for name in ("cm_x", "cm_y", "i_cp"))
-    edge, flap, polar = (_column(table, name) for name in ("i_edge", "i_flap", "i_plr"))
-    for name, values in (("i_edge", edge), ("i_flap", flap), ("i_plr", polar)):
-        if len(values) != count:
-            table[name].fail(f"has {len(values)} values for {count} places")
+    edge, flap, polar = (_column(table, name, count) for name in ("i_edge", "i_flap", "i_plr"))
+    x, y, cross = (_column_or_zeros(table, name, count) for name in ("cm_x", "cm_y", "i_cp"))
     M = {"K11": mass, "K16": -mass * y, "K22": mass, "K26": mass * x, "K33": mass, "K34": mass * y, "K35": -mass * x}
     M |= {"K44": edge, "K45": -cross, "K55": flap, "K66": polar}
     upper = np.stack([M.get(element, np.zeros(count)) for element in ELEMENTS], axis=-1)
     return scaled_rows(grid, length, _checked(_along_ours(upper), table["mass"].entries(), definite=False))
 
 
-def _column(table: YamlNode, name: str, zeros: int | None = None) -> Array:
-    """Return the values of an element; so many zeros, where that is allowed, if it is not given."""
-    if zeros is None:
-        return table[name].numbers()
-    found = table.get(name)
-    if found is None:
-        return np.zeros(zeros)
-    values = found.numbers()
-    if len(values) != zeros:
-        found.fail(f"has {len(values)} values for {zeros} places")
+def _column(table: YamlNode, name: str, count: int) -> Array:
+    """Return the values (count,) of an element."""
+    values = table[name].numbers()
+    if len(values) != count:
+        table[name].fail(f"has {len(values)} values for {count} places")
     return values
+
+
+def _column_or_zeros(table: YamlNode, name: str, count: int) -> Array:
+    """Return the same of an element that is zero where it is not given."""
+    return np.zeros(count) if table.get(name) is None else _column(table, name, count)
 
 
 def _checked(matrices: Array, places: list[YamlNode], definite: bool) -> Array:
