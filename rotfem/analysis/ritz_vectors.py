@@ -94,7 +94,7 @@ class RitzVectors:
     def _force(self, system: Any, component: int) -> Array:
         """Return a unit force at the tip, owned unknowns."""
         values, out = system.structure.tip_values, np.zeros(self._x.getLocalSize())
-        if self.comm.rank == values._owner:
+        if self.comm.rank == values.owner:
             out[values.dofs.start + component] = 1.0
         return out
 
