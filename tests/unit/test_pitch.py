@@ -104,13 +104,17 @@ def test_functions_that_are_none(function: Any, said: str) -> None:
         course(function)
 
 
+def angle(function: Any) -> Course:
+    return Course("structure.root.pitch", function, np.empty(0), np.empty(0), known=False, continuous=2)
+
+
 @pytest.mark.parametrize(
     ("function", "at"),
     [(lambda t: abs(t - 0.777), 0.777), (lambda t: 1.0 * (t > 0.5), 0.5), (lambda t: max(0.3, t / 2), 0.6)],
 )
 def test_a_rate_that_jumps_is_refused(function: Any, at: float) -> None:
     with pytest.raises(InputError, match="its rate jumps at t = ") as caught:
-        look_at(Course("pitch.angle", function, np.empty(0), np.empty(0), known=False), np.linspace(0, 2, 101))
+        look_at(angle(function), np.linspace(0, 2, 101))
     assert float(str(caught.value).split("t = ")[1].split(" s")[0]) == pytest.approx(at, abs=1e-6)
 
 
@@ -119,7 +123,7 @@ def test_a_rate_that_jumps_is_refused(function: Any, at: float) -> None:
     [lambda t: 0.3, lambda t: 0.3 + 1e-9 * np.sin(t), lambda t: np.sin(40 * t), lambda t: max(t - 1.0, 0.0) ** 2],
 )
 def test_what_is_smooth_is_not(function: Any) -> None:
-    look_at(Course("pitch.angle", function, np.empty(0), np.empty(0), known=False), np.linspace(0, 2, 101))
+    look_at(angle(function), np.linspace(0, 2, 101))
 
 
 def test_dead_loads_keep_their_direction_in_the_hub() -> None:
