@@ -72,7 +72,7 @@ def test_equations_are_those_of_twice_the_elements() -> None:
     other.set_state(*state)
     for kind, shift in (("M", (0.0, 0.0, 1.0)), ("C", (0.0, 1.0, 0.0)), ("K", (1.0, 0.0, 0.0))):
         diagonal = float(kind == "K")
-        A, B = fine.matrix(kind, diagonal)[:, :], other.matrix(*shift, diagonal)[:, :]
+        A, B = fine.matrix(kind)[:, :], other.matrix(*shift, diagonal)[:, :]
         np.testing.assert_allclose(A[np.ix_(mine, mine)], B[np.ix_(theirs, theirs)], atol=1e-12 * np.abs(B).max())
     F, G = fine.imbalance().array, other.residual().array
     np.testing.assert_allclose(F[mine], G[theirs], atol=1e-12 * np.abs(G).max())
