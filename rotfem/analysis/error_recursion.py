@@ -10,7 +10,9 @@ e_{n+1} = e^{Ah} e_n + y_{n+1} − y*_{n+1}. In eigenvectors of A all of it is s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -37,61 +39,100 @@ class Propagator:
     """Exact steps of c̈ + C ċ + K c = γ, in coordinates one for each eigenvalue or pair of conjugate ones.
 
     Args:
-        C, K: of the equation, shape (r, r).
+        C: of the equation in every window, shape (w, r, r).
+        K: of the equation in every window, on each of k tracks, shape (w, k, r, r).
         h: lengths of the steps, s, shape (n,).
+        of: numbers of the windows that the steps are in, increasing, shape (n,).
         bounded: whether errors do not grow by themselves, whatever C and K say.
 
     Attributes:
-        factors, carried: e^{λh} of states and of errors, shape (n, m).
+        factors, carried: e^{λh} of states and of errors, shape (n, k, m).
     """
 
-    def __init__(self, C: Array, K: Array, h: Array, bounded: bool = False):
-        r = len(K)
-        A = np.block([[np.zeros((r, r)), np.eye(r)], [-K, -C]])
-        values, vectors = np.linalg.eig(A)
+    def __init__(self, C: Array, K: Array, h: Array, of: Index, bounded: bool = False):
+        r = K.shape[-1]
+        A = np.zeros((*K.shape[:2], 2 * r, 2 * r))
+        A[..., :r, r:] = np.eye(r)
+        A[..., r:, :r], A[..., r:, r:] = -K, -C[:, None]
+        values, vectors = (x.astype(complex) for x in np.linalg.eig(A))
         inverse = np.linalg.inv(vectors)
         upper = values.imag >= 0.0
-        self._values = values[upper].astype(complex)
-        self._inverse: Complex = inverse[upper].astype(complex)
-        self._vectors: Complex = vectors[:, upper] * np.where(values[upper].imag > 0.0, 2.0, 1.0)
-        self._h = h
-        lengths, self._of_length = np.unique(np.float32(h / h.max()), return_inverse=True)
-        self._lengths = np.array([h[np.argmax(self._of_length == i)] for i in range(len(lengths))])
-        self.factors: Complex = np.exp(self._lengths[:, None] * self._values)[self._of_length]
-        self.carried: Complex = self.factors / np.maximum(np.abs(self.factors), 1.0) if bounded else self.factors
+        # Where matrices have more real eigenvalues than others, these are filled up by ones that move nothing.
+        order = np.argsort(~upper, axis=-1, kind="stable")[..., : upper.sum(axis=-1).max()]
+        self._values: Complex = np.take_along_axis(values, order, -1)
+        self._inverse: Complex = np.take_along_axis(inverse, order[..., None], -2)
+        twice = 1.0 + np.sign(self._values.imag)
+        self._vectors: Complex = twice[..., None, :] * np.take_along_axis(vectors, order[..., None, :], -1)
+        self._h, self._of_length = h, _alike(h, of)
+        first = np.unique(self._of_length, return_index=True)[1]
+        self._lengths: Complex = h[first, None, None] * self._values[of[first]]
+        factors: Complex = np.exp(self._lengths)
+        self.factors: Complex = factors[self._of_length]
+        self.carried: Complex = self.factors
+        if bounded:
+            self.carried = (factors / np.maximum(np.abs(factors), 1.0))[self._of_length]
+        self._sampled = np.abs(self._values) * _medians(h, of, len(K))[:, None, None] < np.pi
 
-    def modal(self, c: Array, rate: Array) -> Complex:
-        """Return the coordinates of states, (n, r) each, shape (n, m)."""
-        z: Complex = np.concatenate([c, rate], axis=-1) @ self._inverse.T
-        return z
-
-    def forced(self, polynomials: Array) -> Complex:
-        """Return ∫ e^{λ(h−s)} γ(s) ds over the steps, shape (n, m).
+    def modal(self, c: Array, rate: Array, rows: Sequence[slice]) -> Complex:
+        """Return the coordinates of states on all tracks, shape (n, k, m).
 
         Args:
-            polynomials: coefficients of γ in powers of s/h, shape (n, k, r).
+            c: of the states, (n, r).
+            rate: their ċ, (n, r).
+            rows: of the windows.
         """
-        r = polynomials.shape[2]
-        forces = polynomials @ self._inverse[:, r:].T
-        weights = moments(self._lengths[:, None] * self._values, polynomials.shape[1])
-        out = np.zeros(forces[:, 0].shape, dtype=complex)
-        for k, weight in enumerate(weights):
-            out += weight[self._of_length] * forces[:, k]
-        out *= self._h[:, None]
+        y = np.concatenate([c, rate], axis=1)
+        parts = [y[part] @ A.reshape(-1, A.shape[-1]).T for part, A in zip(rows, self._inverse, strict=True)]
+        return np.asarray(np.concatenate(parts).reshape(len(y), *self._values.shape[1:]))
+
+    def forced(self, polynomials: Array, rows: Sequence[slice]) -> Complex:
+        """Return ∫ e^{λ(h−s)} γ(s) ds over the steps, shape (n, tracks of γ, m).
+
+        Args:
+            polynomials: coefficients of γ in powers of s/h on all tracks, or on the first one again and again, shape
+                (powers, n, tracks, r).
+            rows: of the windows.
+        """
+        count, n, tracks, r = polynomials.shape
+        weights = moments(self._lengths, count)
+        out = np.empty((n, tracks, self._values.shape[2]), dtype=complex)
+        for part, inverse in zip(rows, self._inverse, strict=True):
+            into = inverse[:, :, r:] if tracks == len(inverse) else inverse[[0] * tracks, :, r:]
+            forces = np.swapaxes(polynomials[:, part], 1, 2) @ np.swapaxes(into, 1, 2)
+            own = weights[:, self._of_length[part]]
+            own = own if tracks == len(inverse) else own[:, :, :1]
+            out[part] = np.einsum("qnkm,qknm->nkm", own, forces)
+        out *= self._h[:, None, None]
         return out
 
-    def displacements(self, z: Complex) -> Array:
-        """Return c of coordinates (n, m), shape (n, r)."""
-        c: Array = (z @ self._vectors[: len(self._vectors) // 2].T).real
-        return c
+    def started(self, window: int, tracks: Index, y: Array) -> Complex:
+        """Return the coordinates of (c, ċ), shape (l, 2 r), each on a track of a window, shape (l, m)."""
+        return np.asarray((self._inverse[window, tracks] @ y[:, :, None])[:, :, 0])
 
-    def sampled(self, z: Complex) -> Array:
-        """Return (c, ċ) of coordinates (k, m), shape (k, 2 r), of what steps can sample: |λ| h < π.
+    def displacements(self, window: int, tracks: Index, z: Complex) -> Array:
+        """Return c of coordinates (n, l, m), each on a track of a window, shape (l, n, r)."""
+        vectors = self._vectors[window, tracks, : self._vectors.shape[2] // 2]
+        return np.asarray((np.swapaxes(z, 0, 1) @ np.swapaxes(vectors, 1, 2)).real)
 
-        The rest is none that a later motion could be off by: its rates are large, and not those of the motion.
+    def sampled(self, window: int, tracks: Index, z: Complex) -> Array:
+        """Return (c, ċ) of coordinates (l, m), each on a track of a window, (l, 2 r), of what steps can sample.
+
+        That is |λ| h < π. The rest is none that a later motion could be off by: its rates are large, and not those of
+        the motion.
         """
-        y: Array = (np.where(np.abs(self._values) * np.median(self._h) < np.pi, z, 0.0) @ self._vectors.T).real
-        return y
+        kept = np.where(self._sampled[window, tracks], z, 0.0)
+        return np.asarray((self._vectors[window, tracks] @ kept[:, :, None])[:, :, 0].real)
+
+
+def _alike(h: Array, of: Index) -> Index:
+    """Return numbers of steps, the same for those of one window (numbers, increasing) that are as long."""
+    key = of * (1 << 32) + np.float32(h / h.max()).view(np.int32)
+    return np.asarray(np.unique(key, return_inverse=True)[1]).ravel()
+
+
+def _medians(h: Array, of: Index, windows: int) -> Array:
+    """Return the median of the lengths of the steps in every window, s."""
+    return np.array([np.median(part) for part in np.split(h, np.searchsorted(of, np.arange(1, windows)))])
 
 
 def moments(z: Complex, count: int) -> Complex:
@@ -109,13 +150,23 @@ def moments(z: Complex, count: int) -> Complex:
 
 
 def accumulated(start: Complex, factors: Complex, defects: Complex) -> Complex:
-    """Return e_1 … e_n of e_{n+1} = factor e_n + defect, shape (n, k, m), from e_0 = start, shape (k, m)."""
-    out = np.empty_like(defects)
-    e = start
-    for i, (factor, defect) in enumerate(zip(factors, defects, strict=True)):
-        e = factor * e + defect
-        out[i] = e
-    return out
+    """Return e_1 … e_n of e_{n+1} = factor e_n + defect, shape (n, k, m), from e_0 = start, shape (k, m).
+
+    As many blocks of steps as each has steps are gone through side by side, then one after the other.
+    """
+    n, rest = len(defects), defects.shape[1:]
+    size = isqrt(n)
+    blocks = -(-n // size)
+    e, grown = np.zeros((blocks * size, *rest), complex), np.ones((blocks * size, *rest), complex)
+    e[:n], grown[:n] = defects, factors
+    e, grown = (x.reshape(blocks, size, *rest) for x in (e, grown))
+    for i in range(1, size):
+        e[:, i] += grown[:, i] * e[:, i - 1]
+        grown[:, i] *= grown[:, i - 1]
+    for i in range(blocks):
+        e[i] += grown[i] * start
+        start = e[i, -1]
+    return np.asarray(e.reshape(-1, *rest)[:n])
 
 
 @dataclass(frozen=True)
@@ -151,16 +202,19 @@ def settled(times: Array, values: Array, first: Index) -> Array:
         first: numbers of the first samples of all pieces.
     """
     out = values.copy()
-    ends = np.append(first[1:], len(times))
-    for i in first[ends - first > AFTER]:
-        t, x = times[i : i + AFTER + 1], values[i : i + AFTER + 1]
-        slopes = np.diff(x, axis=0) / np.diff(t)[:, None]
-        bends = np.abs(np.diff(slopes, axis=0)) * np.diff(t)[1:, None]
-        jumps = bends[:EARLY] > JUMP * bends[EARLY:].max(axis=0)
-        for j in range(EARLY):  # those up to j are off if the last jump is there
-            off = jumps[j] & ~jumps[j + 1 :].any(axis=0)
-            line = x[j + 1] + (t[: j + 1, None] - t[j + 1]) * slopes[j + 1]
-            out[i : i + j + 1, off] = line[:, off]
+    long = first[np.diff(np.append(first, len(times))) > AFTER]
+    if not long.size:
+        return out
+    index = long[:, None] + np.arange(AFTER + 1)
+    t, x = times[index], values[index]
+    slopes = np.diff(x, axis=1) / np.diff(t)[..., None]
+    bends = np.abs(np.diff(slopes, axis=1)) * np.diff(t)[:, 1:, None]
+    jumps = bends[:, :EARLY] > JUMP * bends[:, EARLY:].max(axis=1, keepdims=True)
+    for j in range(EARLY):  # those up to j are off if the last jump is there
+        piece, column = np.nonzero(jumps[:, j] & ~jumps[:, j + 1 :].any(axis=1))
+        slope, at = slopes[piece, j + 1, column], t[piece, j + 1]
+        line = x[piece, j + 1, column, None] + (t[piece, : j + 1] - at[:, None]) * slope[:, None]
+        out[long[piece, None] + np.arange(j + 1), column[:, None]] = line
     return out
 
 

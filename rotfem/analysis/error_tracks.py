@@ -8,13 +8,14 @@ range, and the largest error counts.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.error_recursion import Propagator, accumulated, interpolated, settled
+from rotfem.analysis.error_recursion import Complex, Propagator, accumulated, interpolated, settled
+from rotfem.analysis.error_stretch import Stretch, in_windows, stretches
 from rotfem.analysis.error_window import Window
 
 Array = npt.NDArray[np.float64]
@@ -47,26 +48,20 @@ def largest_errors(
         length: of the structure, m.
     """
     if linear:
-        known = [window.K for window in windows]
-        return _both(Track(scheme, linear).errors(windows, known, drives(windows, [known], scheme)[0]))
+        return _both(Tracks(scheme, linear).errors(windows, [[window.K] for window in windows])[0])
     (changes, spreads), phase = smoothed(windows)
-    best: dict[str, tuple[float, float]] = {}
-    least = np.inf
     sure = phase < UNSURE
+    factors = FACTORS[:1] if sure else FACTORS
     stiffness = [
-        [window.K + np.diag(x + factor * y) for window, x, y in zip(windows, changes, spreads, strict=True)]
-        for factor in (FACTORS[:1] if sure else FACTORS)
+        [window.K + np.diag(x + factor * y) for factor in factors]
+        for window, x, y in zip(windows, changes, spreads, strict=True)
     ]
-    forces = drives(windows, stiffness, scheme)
-    for number, (K, driven) in enumerate(zip(stiffness, forces, strict=True)):
-        found = Track(scheme, linear, space=not number).errors(windows, K, driven)
-        best = {**found, **best, "time": max(best.get("time", (0.0, 0.0)), found["time"])}
-        least = min(least, found["time"][0])
-        if sure or best["time"][0] < SMALL * scale:
-            break
-    else:
+    best, *others = Tracks(scheme, linear).errors(windows, stiffness)
+    if not sure and best["time"][0] >= SMALL * scale:
+        times = [best["time"], *(found["time"] for found in others)]
         fed = 1.0 + scale / length
-        best["time"] = (MARGIN * max(best["time"][0], fed * least), best["time"][1])
+        (largest, when), least = max(times), min(size for size, _ in times)
+        best["time"] = (MARGIN * max(largest, fed * least), when)
         best["space"] = (MARGIN * fed * best["space"][0], best["space"][1])
         best["missing"] = (fed * best["missing"][0], best["missing"][1])
     return _both(best)
@@ -84,15 +79,15 @@ def smoothed(windows: Sequence[Window]) -> tuple[tuple[list[Array], list[Array]]
     squares = np.array([w.shapes.squares[:r] for w in windows])
     speeds = np.array([w.speed**2 for w in windows])
     number = np.arange(len(windows))
-    scale = speeds.max() or 1.0
-    fitted, spread = squares.copy(), np.zeros_like(squares)
-    for i in number if len(windows) > 2 else ():
-        weights = np.exp(-0.5 * ((number - i) / WIDTH) ** 2)
-        base = np.column_stack([np.ones(len(windows)), (speeds - speeds[i]) / scale])
-        normal = base.T @ (weights[:, None] * base) + np.diag([0.0, 1e-3])
-        fit = np.linalg.solve(normal, base.T @ (weights[:, None] * squares))
-        fitted[i] = fit[0]
-        spread[i] = np.sqrt(weights @ (squares - base @ fit) ** 2 / weights.sum())
+    fitted, spread = squares, np.zeros_like(squares)
+    if len(windows) > 2:
+        weights = np.exp(-0.5 * (np.subtract.outer(number, number) / WIDTH) ** 2)
+        scaled = np.subtract.outer(speeds, speeds).T / (speeds.max() or 1.0)
+        base = np.stack([np.ones_like(scaled), scaled], axis=2)  # of every window, at all windows
+        weighed = np.swapaxes(weights[:, :, None] * base, 1, 2)
+        fit = np.linalg.solve(weighed @ base + np.diag([0.0, 1e-3]), weighed @ squares)
+        fitted = fit[:, 0]
+        spread = np.sqrt((weights[:, None] @ (squares - base @ fit) ** 2)[:, 0] / weights.sum(axis=1)[:, None])
     spread = np.minimum(spread, MOST * np.abs(fitted))
     lengths = np.array([w.t[-1] - w.t[0] for w in windows])
     rates = np.sqrt(np.maximum(np.abs(fitted), 1e-300))
@@ -109,103 +104,91 @@ def _padded(x: Array, window: Window) -> Array:
     return out
 
 
-def drives(windows: Sequence[Window], stiffness: Sequence[Sequence[Array]], scheme: Any) -> list[list[Array]]:
-    """Return γ over every step as polynomials (see `interpolated`), for every track and window.
+def drives(stretch: Stretch, C: Array, K: Array, scheme: Any) -> Array:
+    """Return γ over every step of a stretch, coefficients in powers of s/h, shape (powers, steps, tracks, r).
 
     Args:
-        windows: the motion.
-        stiffness: K of every track and window.
+        stretch: of the motion.
+        C: its matrices, (windows, r, r).
+        K: on every track, (windows, tracks, r, r).
         scheme: that made the motion.
     """
-    found = [_drives(window, matrices, scheme) for window, *matrices in zip(windows, *stiffness, strict=True)]
-    return [list(track) for track in zip(*found, strict=True)]
-
-
-def _drives(window: Window, stiffness: Sequence[Array], scheme: Any) -> list[Array]:
-    """Return γ over every step of a window with one K or another: all at once, as they have the same samples."""
-    (c, v, a), most = window.motion, scheme.order + BEYOND
-    begin, end = window.ends
-    t, later = window.t, a
+    (c, v, a), begin, end = stretch.motion, stretch.begin, stretch.end
+    t, rows, later = stretch.t, stretch.samples, a
     if not scheme.balanced_at_end:
         t, c, v = (0.5 * (x[begin] + x[end]) for x in (t, c, v))
-        later = a[end]
-    rest = later + v @ window.C.T
-    values = np.hstack([rest + c @ K.T for K in stiffness])
+        later, rows = a[end], stretch.steps
+    tracks, r = K.shape[1:3]
+    values = in_windows(c, K.reshape(len(K), -1, r), rows)
+    values += np.tile(later + in_windows(v, C, rows), tracks)
     if scheme.balanced_at_end:
-        values = settled(t, values, np.array(window.samples.pieces))
-    spans = window.at_ends if scheme.balanced_at_end else window.in_middles
-    return np.split(interpolated(t, values, spans, most), len(stiffness), axis=2)
+        values = settled(t, values, stretch.pieces)
+    spans = stretch.at_ends if scheme.balanced_at_end else stretch.in_middles
+    found = interpolated(t, values, spans, scheme.order + BEYOND)
+    return np.moveaxis(found.reshape(*found.shape[:2], tracks, r), 1, 0)
 
 
-class Track:
-    """Errors of time and space that go from window to window.
+class Tracks:
+    """Errors that go from window to window, of time on several tracks and of space on the first one.
 
     Args:
         scheme: that made the motion.
         linear: whether what the tangents say may grow.
-        space: whether the error of space is wanted too.
     """
 
-    def __init__(self, scheme: Any, linear: bool, space: bool = True):
-        self.scheme, self.bounded, self.space = scheme, not linear, space
-        self.carried: Array = np.zeros((0, 2, 0))
+    def __init__(self, scheme: Any, linear: bool):
+        self.scheme, self.bounded = scheme, not linear
+        #: Errors c and ċ at the end of the last window, (lanes, 2 r); a lane is an error on a track.
+        self.carried: Array = np.zeros((0, 0))
 
     def errors(
-        self, windows: Sequence[Window], stiffness: Sequence[Array], forces: Sequence[Array]
-    ) -> dict[str, tuple[float, float]]:
-        """Return the largest errors of the tip: size (m) and when (s).
+        self, windows: Sequence[Window], stiffness: Sequence[Sequence[Array]]
+    ) -> list[dict[str, tuple[float, float]]]:
+        """Return the largest errors of the tip on every track, size (m) and when (s), those of space on the first.
 
         Args:
             windows: the motion.
-            stiffness: K of every window.
-            forces: γ over the steps of every window (see `drives`).
+            stiffness: K of every window on every track.
         """
-        best: dict[str, tuple[float, float]] = dict.fromkeys(("time", "space", "missing"), (0.0, 0.0))
-        for window, K, driven in zip(windows, stiffness, forces, strict=True):
-            found = self._through(window, K, driven)
-            best |= {name: max(best[name], error) for name, error in zip(best, found, strict=False)}
-        return best
-
-    def _through(self, window: Window, K: Array, driven: Array) -> list[tuple[float, float]]:
-        """Go on with the errors through a window; return the largest of the tip and when they are."""
-        (begin, end), h = window.ends, window.lengths
-        exact = Propagator(window.C, K, h, self.bounded)
-        states = exact.modal(*window.motion[:2])
-        defects = states[end] - exact.factors * states[begin] - exact.forced(driven)
-        parts = [defects]
-        if self.space:
-            for off in self._mesh_forces(window, not self.bounded):
-                parts.append(exact.forced(np.stack([off[begin], off[end] - off[begin]], axis=1)))
-        c, rate = self._start(window, len(parts))
-        errors = accumulated(exact.modal(c, rate), exact.carried, np.stack(parts, axis=1))
-        self.carried = exact.sampled(errors[-1]).reshape(len(parts), 2, -1)
-        r, tip = window.shapes.V.shape[1], window.shapes.tip
-        self.carried[:, :, :r] *= window.bends  # what stretches has no phase to lose
-        moved = [exact.displacements(e)[:, :r] for e in np.moveaxis(errors, 1, 0)]
-        if self.space:  # a vibration of another frequency is off by twice its amplitude at most
-            most = 2.0 * np.abs(window.motion[0][:, :r]).max(axis=0)
-            moved[1:] = [np.clip(c, -most, most) for c in moved[1:]]
-        sizes = [np.linalg.norm(c @ tip.T, axis=1) for c in moved]
-        return [(float(size.max()), float(window.t[end[int(size.argmax())]])) for size in sizes]
-
-    def _start(self, window: Window, parts: int) -> tuple[Array, Array]:
-        """Return the errors that a window starts with, c and ċ, shape (parts, r) each."""
-        if window.turn is None or not self.carried.size:
-            zero = np.zeros((parts, len(window.K)))
-            return zero, zero
-        turned = self.carried @ window.turn.T
-        return turned[:, 0], turned[:, 1]
-
-    @staticmethod
-    def _mesh_forces(window: Window, linear: bool) -> list[Array]:
-        """Return what the mesh makes of forces: by frequencies, and of a nonlinear theory what it leaves out of them.
-
-        The one is 2 ε c̈: of the forces of inertia, whose static answer the mesh puts off by 2 ε.
-        """
-        a = settled(window.t, window.motion[2], np.array(window.samples.pieces))
-        out = [np.zeros_like(a) for _ in ("vibrating", "missing")[: 1 if linear else 2]]
-        r = len(window.epsilon)
-        out[0][:, :r] = 2.0 * window.epsilon * a[:, :r]
-        if window.missing is not None:
-            out[1][:, :r] = window.missing
+        tracks = len(stiffness[0])
+        parts = ["time"] * tracks + ["space", "missing"][: 1 + self.bounded]
+        self.lanes = np.array([*range(tracks), *[0] * (len(parts) - tracks)])
+        best = [(0.0, 0.0)] * len(parts)
+        for stretch, which in stretches(windows):
+            matrices = [stretch.stiffness(track) for track in zip(*stiffness[which], strict=True)]
+            for found in self._through(stretch, np.stack(matrices, axis=1)):
+                best = [max(pair) for pair in zip(best, found, strict=True)]
+        out = [{"time": error} for error in best[:tracks]]
+        out[0] |= {"space": (0.0, 0.0), "missing": (0.0, 0.0), **dict(zip(parts[tracks:], best[tracks:], strict=True))}
         return out
+
+    def _through(self, stretch: Stretch, K: Array) -> Iterator[list[tuple[float, float]]]:
+        """Go on with the errors through the windows of a stretch; yield the largest of the tip and when they are."""
+        exact = Propagator(stretch.C, K, stretch.lengths, stretch.of, self.bounded)
+        defects, turns, tips = self._defects(exact, stretch, K), stretch.turns, stretch.tips
+        factors, phases = exact.carried[:, self.lanes], np.tile(stretch.bends, 2)
+        tracks, r = K.shape[1:3]
+        if not self.carried.size:
+            self.carried = np.zeros((len(self.lanes), 2 * r))
+        for i, steps in enumerate(stretch.steps):
+            turned = (self.carried.reshape(-1, 2, r) @ turns[i].T).reshape(-1, 2 * r)
+            start = exact.started(i, self.lanes, turned)
+            errors = accumulated(start, factors[steps], defects[steps])
+            self.carried = exact.sampled(i, self.lanes, errors[-1]) * phases[i]  # what stretches has none to lose
+            moved = exact.displacements(i, self.lanes, errors)
+            # A vibration of another frequency is off by twice its amplitude at most.
+            most = 2.0 * np.abs(stretch.motion[0][stretch.samples[i]]).max(axis=0)
+            np.clip(moved[tracks:], -most, most, out=moved[tracks:])
+            sizes = np.linalg.norm(moved @ tips[i], axis=2)
+            at, times = sizes.argmax(axis=1), stretch.t[stretch.end[steps]]
+            yield [(float(size[k]), float(times[k])) for size, k in zip(sizes, at, strict=True)]
+
+    def _defects(self, exact: Propagator, stretch: Stretch, K: Array) -> Complex:
+        """Return what steps and mesh add to the errors in every step, shape (n, lanes, m)."""
+        begin, end = stretch.begin, stretch.end
+        c, rate, _ = stretch.motion
+        states = exact.modal(c, rate, stretch.samples)
+        forced = exact.forced(drives(stretch, stretch.C, K, self.scheme), stretch.steps)
+        off = stretch.mesh_forces(not self.bounded)
+        by_mesh = exact.forced(np.stack([off[begin], off[end] - off[begin]]), stretch.steps)
+        return np.concatenate([states[end] - exact.factors * states[begin] - forced, by_mesh], axis=1)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.error_recursion import Index, Spans
+from rotfem.analysis.error_recursion import Index
 from rotfem.analysis.mesh_force import MeshForce
 from rotfem.analysis.reduced_tangents import Tangents
 from rotfem.analysis.refined_mesh import RefinedMesh
@@ -187,23 +187,6 @@ class Window:
         """Of the steps, s."""
         begin, end = self.ends
         return np.asarray(self.t[end] - self.t[begin])
-
-    @property
-    def at_ends(self) -> Spans:
-        """The steps, and the samples around them."""
-        begin, _ = self.ends
-        piece = np.searchsorted(self.samples.pieces, begin, side="right") - 1
-        first = np.array(self.samples.pieces)[piece]
-        last = np.array([*self.samples.pieces[1:], len(self.t)])[piece] - 1
-        return Spans(self.t[begin], self.lengths, begin, first, last)
-
-    @property
-    def in_middles(self) -> Spans:
-        """The steps, and samples that lie in their middles: one fewer in each piece."""
-        spans, begin = self.at_ends, self.ends[0]
-        piece = np.searchsorted(self.samples.pieces, begin, side="right") - 1
-        number = np.arange(len(begin))
-        return Spans(spans.starts, spans.lengths, number, spans.first - piece, spans.last - piece - 1)
 
     def _coordinates(self, arrays: Any) -> Array:
         """Return Vᵀ M x of local dof arrays, (n, r); of a free hub with its angle."""

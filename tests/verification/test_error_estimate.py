@@ -48,19 +48,26 @@ def test_moments_are_integrals() -> None:
 
 
 def test_exact_motion_has_no_error() -> None:
-    """A motion under a force that is a cubic in time is propagated exactly, in unequal steps and with damping."""
-    C, K = np.array([[0.2, 0.5], [-0.5, 0.1]]), np.array([[4.0, 1.0], [1.0, 30.0]])
+    """A motion under a force that is a cubic in time is propagated exactly, in unequal steps and with damping.
+
+    Two windows have matrices of their own, with damping beyond the critical one in the second, and two tracks the same.
+    """
+    C = np.array([[[0.2, 0.5], [-0.5, 0.1]], [[9.0, 0.0], [0.0, 0.3]]])
+    K = np.array([[[4.0, 1.0], [1.0, 30.0]], [[2.0, 0.0], [0.0, 25.0]]])
     t = np.cumsum(np.r_[0.0, 0.1 + 0.05 * np.sin(np.arange(20))])
     powers = np.array([t**3 - t, 0.5 * t**2]).T  # c(t), from which the force follows
     rates, accelerations = np.array([3 * t**2 - 1, t]).T, np.array([6 * t, np.ones_like(t)]).T
-    gamma = accelerations + rates @ C.T + powers @ K.T
     n, begin = len(t) - 1, np.arange(len(t) - 1)
     spans = Spans(t[:-1], np.diff(t), begin, np.zeros(n, int), np.full(n, n))
-    exact = Propagator(C, K, np.diff(t))
-    states = exact.modal(powers, rates)
-    defects = states[1:] - exact.factors * states[:-1] - exact.forced(interpolated(t, gamma, spans, 4))
-    errors = accumulated(np.zeros((1, states.shape[1]), complex), exact.factors, defects[:, None])[:, 0]
-    assert np.abs(exact.displacements(errors)).max() < 1e-12
+    steps = [slice(0, 8), slice(8, n)]
+    exact = Propagator(C, np.stack([K, K], axis=1), np.diff(t), np.repeat([0, 1], [8, n - 8]))
+    start, end = (exact.modal(powers[at], rates[at], steps) for at in (begin, begin + 1))
+    gamma = [interpolated(t, accelerations + rates @ c.T + powers @ k.T, spans, 4) for c, k in zip(C, K, strict=True)]
+    driven = np.where(begin[:, None, None] < 8, *gamma)
+    defects = end - exact.factors * start - exact.forced(np.stack([np.moveaxis(driven, 1, 0)] * 2, axis=2), steps)
+    for window, rows in enumerate(steps):
+        z = accumulated(np.zeros((2, exact.factors.shape[2]), complex), exact.factors[rows], defects[rows])
+        assert np.abs(exact.displacements(window, np.array([0, 1]), z)).max() < 1e-12
 
 
 def test_phase_of_the_trapezoidal_rule() -> None:
@@ -68,11 +75,11 @@ def test_phase_of_the_trapezoidal_rule() -> None:
     omega, h, n = 3.0, 0.3, 200
     t, slow = h * np.arange(n + 1), 2 / h * np.arctan(0.5 * omega * h)
     c, rate = np.cos(slow * t)[:, None], -omega * np.sin(slow * t)[:, None]
-    exact = Propagator(np.zeros((1, 1)), np.array([[omega**2]]), np.full(n, h))
-    states = exact.modal(c, rate)
-    defects = states[1:] - exact.factors * states[:-1]
-    errors = accumulated(np.zeros((1, 1), complex), exact.factors, defects[:, None])[:, 0]
-    np.testing.assert_allclose(exact.displacements(errors)[:, 0], (c[:, 0] - np.cos(omega * t))[1:], atol=1e-12)
+    exact = Propagator(np.zeros((1, 1, 1)), np.full((1, 1, 1, 1), omega**2), np.full(n, h), np.zeros(n, int))
+    states = exact.modal(c, rate, [slice(0, n + 1)])
+    errors = accumulated(np.zeros((1, 1), complex), exact.factors, states[1:] - exact.factors * states[:-1])
+    found = exact.displacements(0, np.array([0]), errors)[0, :, 0]
+    np.testing.assert_allclose(found, (c[:, 0] - np.cos(omega * t))[1:], atol=1e-12)
 
 
 def test_rough_samples_are_joined_by_lines() -> None:
