@@ -10,9 +10,10 @@ from rotfem.analysis.roots import came_true, check_root, turned_with_clamp
 from rotfem.analysis.schemes import Array, Shifts, Stage, State
 from rotfem.errors import ComputationError
 from rotfem.numerics.newton import REACH, Newton
+from rotfem.numerics.old_factor import OldFactor
 
-#: Iterations with an old factor after which the next step gets a new one.
-LONG = 5
+#: Iterations with an old factor after which the next step gets a new one, of a linear and of a nonlinear system.
+LONG, NONLINEAR = 5, 8
 
 #: After an old factor has failed k times in a row, none is tried for 2^k steps; k grows to this.
 PATIENCE = 5
@@ -72,11 +73,14 @@ class StageSolver:
 
     def solve(self, stage: Stage, state: State) -> None:
         """Solve a stage of a step from a state, with the factor of an earlier one if that serves."""
-        if self._held == stage.shifts and self.system.keeps_factor and not self._new_factor_pays(stage.t):
+        factor = self._old_factor(stage)
+        if factor is not None:
             if self._pause == 0:
                 predicted = stage.q.copy(), stage.v.copy(), stage.a.copy()
                 try:
-                    self._iterate(stage, state, chord=True)
+                    self._iterate(stage, state, factor)
+                    if factor.made and self.newton.strayed:
+                        check_root(self.system, stage, state)
                 except ComputationError:  # the old factor does not serve here; nor will the next ones, perhaps
                     self._held, self._failed = None, min(self._failed + 1, PATIENCE)
                     self._pause = 2**self._failed
@@ -106,6 +110,18 @@ class StageSolver:
         if self._share < WHOLE or iterations > MANY:
             self._share = came_true(self.system, stage.q - state.q, move)
 
+    def _old_factor(self, stage: Stage) -> OldFactor | None:
+        """Return who says for how long a factor serves; None where every iteration of a stage has one of its own.
+
+        A nonlinear stage may begin with a new one; a long way, and a balance of energy, need one in every iteration.
+        """
+        held = self._held == stage.shifts
+        if not self.system.keeps_factor or self._new_factor_pays(stage.t):
+            return None
+        if not held and (self.system.linear or stage.over is not None or self._far or self._share < WHOLE):
+            return None
+        return OldFactor(held)
+
     def _root(self, stage: Stage, state: State) -> int:
         """Solve a stage of a nonlinear system, see that it is the motion's and return the iterations."""
         iterations = self._iterate(stage, state)
@@ -121,8 +137,8 @@ class StageSolver:
         s.set_time(t)
         return bool(s.settled and not s.current)
 
-    def _iterate(self, stage: Stage, state: State, chord: bool = False) -> int:
-        """Solve a stage by Newton's method, or with the factor of an earlier step throughout; return the iterations."""
+    def _iterate(self, stage: Stage, state: State, factor: OldFactor | None = None) -> int:
+        """Solve a stage by Newton's method, with old factors as long as they serve if any do; return the iterations."""
         span = None if self.system.linear else stage.over
         s, before = self.system if span is None else self.system.balance, state.q
         followed = 0
@@ -135,7 +151,8 @@ class StageSolver:
             nonlocal before, followed
             s.set_state(stage.q, stage.v, stage.a)
             self._far |= followed >= SOON or self.newton.strayed
-            dq = s.chord() if chord else s.correction(stage.shifts, before if self._far else None)
+            is_old = factor is not None and factor.took()
+            dq = s.chord() if is_old else s.correction(stage.shifts, before if self._far else None)
             followed += 1
             size = float(s.increment_size(dq))
             if not s.solved_at_once:
@@ -145,13 +162,14 @@ class StageSolver:
 
         try:
             if s.solved_at_once:
-                iterations = self._solve_linear(increment, stage, chord)
+                iterations = self._solve_linear(increment, stage, factor is not None)
             else:
-                iterations = self.newton.solve(increment, lambda: s.size(stage.q), chord)
+                iterations = self.newton.solve(increment, lambda: s.size(stage.q), factor)
         except ComputationError as error:
             raise ComputationError(error.what, time=stage.t, advice=error.advice) from None
-        self._held = stage.shifts if s.keeps_factor and not (chord and iterations > LONG) else None
-        self._far = iterations > SOON
+        used = 0 if factor is None else factor.used
+        self._held = stage.shifts if s.keeps_factor and used <= (LONG if s.linear else NONLINEAR) else None
+        self._far = iterations > SOON if factor is None else factor.made > MANY
         if span is not None:
             stage.memory = s.finish(stage)
         return iterations

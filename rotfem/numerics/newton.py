@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rotfem.errors import ComputationError
+from rotfem.numerics.old_factor import OldFactor
 
 #: Part of the tolerance up to which iterations with an old factor go on. Newton's last increment leaves an error of its
 #: square; theirs leave a part of themselves, the same way in every step, which adds up.
@@ -63,14 +64,14 @@ class Newton:
         """Return the control that settings (`increment_tolerance`, `max_iterations`) ask for."""
         return cls(settings.increment_tolerance, settings.max_iterations)
 
-    def solve(self, increment: Callable[[], float], size: Callable[[], float], chord: bool = False) -> int:
+    def solve(self, increment: Callable[[], float], size: Callable[[], float], chord: OldFactor | None = None) -> int:
         """Repeat `increment` (solve, apply, return the scaled increment) until it is small; return the iterations.
 
         Args:
             increment: one linear solve; applies it and returns its scaled maximum norm.
             size: scaled maximum norm of the unknown, against which round-off is judged.
-            chord: whether the factor is an old one; increments then shrink by a constant rate only, and nothing is
-                predicted from the first.
+            chord: who decides which increments are made with an old factor, if any are; these shrink by a constant
+                rate only, and nothing is predicted from the first.
 
         Raises:
             ComputationError: not finite, growing, or too many iterations; says which.
@@ -84,16 +85,17 @@ class Newton:
                 raise ComputationError(f"Newton iteration {k} gave an increment that is not finite")
             if k == 1:
                 first = d
-            if k == 2 and first > 0 and not chord:
+            if k == 2 and first > 0 and chord is None:
                 self._kappa = max(0.5 * self._kappa if np.isfinite(self._kappa) else 0.0, d / first**2)
-            if chord:
+            if chord is not None:
                 enough = max(CHORD * self.tolerance, min(self.tolerance, SMALLEST))
                 if d <= enough or (d <= self.tolerance and d > 0.3 * previous):
                     return k
+                chord.judge(d, enough)
             elif d <= self.tolerance or (k == 1 and 4 * self._kappa * d**2 <= self.tolerance):
                 return k
-            stalled = stalled + 1 if d > 0.3 * previous else 0
-            if chord and stalled >= 2:
+            stalled = stalled + 1 if d > 0.3 * previous and (chord is None or not chord.serves) else 0
+            if chord is not None and chord.hopeless:
                 raise ComputationError(f"the old factor gives increments that stay at {d:.1e} (scaled)")
             if stalled >= 3 and d <= LOST * max(size(), self.tolerance):
                 self.roundoff = max(self.roundoff, d)

@@ -95,4 +95,4 @@ class MeshAhead:
         inside = np.exp(np.interp(np.log(np.maximum(omega, self.omega[0])), np.log(self.omega), np.log(self.off)))
         beyond = self.off[-1] * np.exp(self.degree * np.maximum(slope, 0.0))
         off = np.minimum(1.0, np.where(omega > self.omega[-1], beyond, inside) / growth ** (2 * self.degree))
-        return motion.whole.error_of_mesh(off)
+        return motion.whole.error_of_mesh(off, float(self.omega[0]))

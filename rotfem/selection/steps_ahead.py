@@ -36,6 +36,10 @@ SAFE, DAMPED = 1.2, 4.0
 #: little more in the step that damps it.
 LOST = 1.25
 
+#: Part of the lowest frequency below which a motion follows its loads, and how many times as far as that frequency it is
+#: off then: stiffnesses are off by twice as much, 2/(1 − FOLLOWING²).
+FOLLOWING, FOLLOWED = 0.5, 8 / 3
+
 #: Power of the frequency by which a filter leaves out what is slow; a sharp one would see the end from the start.
 SMOOTH = 8
 
@@ -102,9 +106,16 @@ class Spectrum:
         each = SAFE * coefficient * (self.omega[moves] * h) ** power * self.duration / h
         return float(self.amplitudes[moves] @ np.minimum(2.0, each)) + self.lost(h)
 
-    def error_of_mesh(self, off: Array) -> float:
-        """Return the relative error that frequencies which are off by so much (relative, (n,)) make."""
-        return float(self.amplitudes @ np.minimum(2.0, SAFE * off * self.omega * self.duration))
+    def error_of_mesh(self, off: Array, lowest: float) -> float:
+        """Return the relative error that frequencies which are off by so much make.
+
+        Args:
+            off: relative, (n,).
+            lowest: frequency of the structure, rad/s; what is far below it follows its loads and has no phase to lose.
+        """
+        turned = self.omega * self.duration
+        turned = np.where(self.omega < FOLLOWING * lowest, np.minimum(turned, FOLLOWED), turned)
+        return float(self.amplitudes @ np.minimum(2.0, SAFE * off * turned))
 
 
 def longest(error: Callable[[float], float], duration: float, allowed: float) -> float:
