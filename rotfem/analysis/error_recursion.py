@@ -85,22 +85,20 @@ class Propagator:
         parts = [y[part] @ A.reshape(-1, A.shape[-1]).T for part, A in zip(rows, self._inverse, strict=True)]
         return np.asarray(np.concatenate(parts).reshape(len(y), *self._values.shape[1:]))
 
-    def forced(self, polynomials: Array, rows: Sequence[slice]) -> Complex:
-        """Return ∫ e^{λ(h−s)} γ(s) ds over the steps, shape (n, tracks of γ, m).
+    def forced(self, polynomials: Array, rows: Sequence[slice], tracks: Index) -> Complex:
+        """Return ∫ e^{λ(h−s)} γ(s) ds over the steps, shape (n, l, m).
 
         Args:
-            polynomials: coefficients of γ in powers of s/h on all tracks, or on the first one again and again, shape
-                (powers, n, tracks, r).
+            polynomials: coefficients of every γ in powers of s/h, shape (powers, n, l, r).
             rows: of the windows.
+            tracks: that each γ is on, (l,).
         """
-        count, n, tracks, r = polynomials.shape
+        count, n, number, r = polynomials.shape
         weights = moments(self._lengths, count)
-        out = np.empty((n, tracks, self._values.shape[2]), dtype=complex)
+        out = np.empty((n, number, self._values.shape[2]), dtype=complex)
         for part, inverse in zip(rows, self._inverse, strict=True):
-            into = inverse[:, :, r:] if tracks == len(inverse) else inverse[[0] * tracks, :, r:]
-            forces = np.swapaxes(polynomials[:, part], 1, 2) @ np.swapaxes(into, 1, 2)
-            own = weights[:, self._of_length[part]]
-            own = own if tracks == len(inverse) else own[:, :, :1]
+            forces = np.swapaxes(polynomials[:, part], 1, 2) @ np.swapaxes(inverse[tracks, :, r:], 1, 2)
+            own = weights[:, self._of_length[part, None], tracks]
             out[part] = np.einsum("qnkm,qknm->nkm", own, forces)
         out *= self._h[:, None, None]
         return out

@@ -109,19 +109,21 @@ class Stretch:
         number = np.arange(len(self.begin))
         return Spans(spans.starts, spans.lengths, number, spans.first - piece, spans.last - piece - 1)
 
-    def mesh_forces(self, linear: bool) -> Array:
-        """Return what the mesh makes of forces, shape (N, 1 or 2, r).
+    def forces_off(self, names: Sequence[str]) -> Array:
+        """Return what mesh and theory make of forces, shape (N, names, r).
 
-        By frequencies it is 2 ε c̈: of the forces of inertia, whose static answer the mesh puts off by 2 ε. Of a
-        nonlinear theory the second is what it leaves out of them.
+        By frequencies (`space`) it is 2 ε c̈: of the forces of inertia, whose static answer the mesh puts off by 2 ε;
+        by a theory (`model`) likewise. In large motions (`missing`) it is what the mesh leaves out of them.
         """
-        out = np.zeros((len(self.t), 1 if linear else 2, self.size))
+        out = np.zeros((len(self.t), len(names), self.size))
         a = settled(self.t, self.motion[2], self.pieces)
         for window, rows in zip(self.windows, self.samples, strict=True):
             r = len(window.epsilon)
             out[rows, 0, :r] = 2.0 * window.epsilon * a[rows, :r]
-            if window.missing is not None and not linear:
-                out[rows, 1, :r] = window.missing
+            if window.missing is not None and "missing" in names:
+                out[rows, names.index("missing"), :r] = window.missing
+            if window.theory is not None and "model" in names:
+                out[rows, names.index("model"), :r] = 2.0 * window.theory * window.bends * a[rows, :r]
         return out
 
     def _rows(self, arrays: Sequence[Array]) -> Array:

@@ -38,7 +38,7 @@ FACTORS, SMALL = (0.0, -1.0, 1.0), 1e-3
 def largest_errors(
     windows: Sequence[Window], scheme: Any, linear: bool, scale: float, length: float
 ) -> dict[str, tuple[float, float]]:
-    """Return the largest errors of the tip, `time` and `space`: size (m) and when (s).
+    """Return the largest errors of the tip, `time`, `space` and, by phases, `model`: size (m) and when (s).
 
     Args:
         windows: the motion.
@@ -68,9 +68,9 @@ def largest_errors(
 
 
 def _both(found: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-    """Return errors of time and space: of the latter the larger one, by frequencies or by what the motion lacks."""
-    size, when = found.get("missing", (0.0, 0.0))
-    return {"time": found["time"], "space": max(found["space"], (MARGIN * size, when))}
+    """Return errors: of space the larger one, by frequencies or by what the motion lacks."""
+    size, when = found["missing"]
+    return {"time": found["time"], "space": max(found["space"], (MARGIN * size, when)), "model": found["model"]}
 
 
 def smoothed(windows: Sequence[Window]) -> tuple[tuple[list[Array], list[Array]], float]:
@@ -129,7 +129,7 @@ def drives(stretch: Stretch, C: Array, K: Array, scheme: Any) -> Array:
 
 
 class Tracks:
-    """Errors that go from window to window, of time on several tracks and of space on the first one.
+    """Errors that go from window to window, of time on several tracks, of space and model on the first one.
 
     Args:
         scheme: that made the motion.
@@ -140,26 +140,29 @@ class Tracks:
         self.scheme, self.bounded = scheme, not linear
         #: Errors c and ċ at the end of the last window, (lanes, 2 r); a lane is an error on a track.
         self.carried: Array = np.zeros((0, 0))
+        #: Names of the errors beside that of time.
+        self.beside: list[str] = []
 
     def errors(
         self, windows: Sequence[Window], stiffness: Sequence[Sequence[Array]]
     ) -> list[dict[str, tuple[float, float]]]:
-        """Return the largest errors of the tip on every track, size (m) and when (s), those of space on the first.
+        """Return the largest errors of the tip on every track, size (m) and when (s), the others on the first.
 
         Args:
             windows: the motion.
             stiffness: K of every window on every track.
         """
         tracks = len(stiffness[0])
-        parts = ["time"] * tracks + ["space", "missing"][: 1 + self.bounded]
-        self.lanes = np.array([*range(tracks), *[0] * (len(parts) - tracks)])
-        best = [(0.0, 0.0)] * len(parts)
+        by_theory = windows[0].theory is not None
+        self.beside = ["space", *["missing"] * self.bounded, *["model"] * by_theory]
+        self.lanes = np.array([*range(tracks), *[0] * len(self.beside)])
+        best = [(0.0, 0.0)] * len(self.lanes)
         for stretch, which in stretches(windows):
             matrices = [stretch.stiffness(track) for track in zip(*stiffness[which], strict=True)]
             for found in self._through(stretch, np.stack(matrices, axis=1)):
                 best = [max(pair) for pair in zip(best, found, strict=True)]
         out = [{"time": error} for error in best[:tracks]]
-        out[0] |= {"space": (0.0, 0.0), "missing": (0.0, 0.0), **dict(zip(parts[tracks:], best[tracks:], strict=True))}
+        out[0] |= dict.fromkeys(("missing", "model"), (0.0, 0.0)) | dict(zip(self.beside, best[tracks:], strict=True))
         return out
 
     def _through(self, stretch: Stretch, K: Array) -> Iterator[list[tuple[float, float]]]:
@@ -184,11 +187,11 @@ class Tracks:
             yield [(float(size[k]), float(times[k])) for size, k in zip(sizes, at, strict=True)]
 
     def _defects(self, exact: Propagator, stretch: Stretch, K: Array) -> Complex:
-        """Return what steps and mesh add to the errors in every step, shape (n, lanes, m)."""
+        """Return what steps, mesh and theory add to the errors in every step, shape (n, lanes, m)."""
         begin, end = stretch.begin, stretch.end
-        c, rate, _ = stretch.motion
+        (c, rate, _), tracks = stretch.motion, K.shape[1]
         states = exact.modal(c, rate, stretch.samples)
-        forced = exact.forced(drives(stretch, stretch.C, K, self.scheme), stretch.steps)
-        off = stretch.mesh_forces(not self.bounded)
-        by_mesh = exact.forced(np.stack([off[begin], off[end] - off[begin]]), stretch.steps)
-        return np.concatenate([states[end] - exact.factors * states[begin] - forced, by_mesh], axis=1)
+        forced = exact.forced(drives(stretch, stretch.C, K, self.scheme), stretch.steps, self.lanes[:tracks])
+        off = stretch.forces_off(self.beside)
+        beside = exact.forced(np.stack([off[begin], off[end] - off[begin]]), stretch.steps, self.lanes[tracks:])
+        return np.concatenate([states[end] - exact.factors * states[begin] - forced, beside], axis=1)

@@ -37,12 +37,14 @@ class TipErrors:
     Attributes:
         time: of the steps, m, and when (s); None where it is not known.
         space: of the mesh, as far as inertia moves it, m, and when (s).
+        model: of the theory, as far as phases are lost by it, m, and when (s).
         shape: of the mesh at the largest deflection, relative.
         scale: largest displacement of the tip, m.
     """
 
     time: tuple[float, float] | None
     space: tuple[float, float]
+    model: tuple[float, float]
     shape: float
     scale: float
 
@@ -106,14 +108,15 @@ class ErrorWatch:
             state = last if self._view is None else self._view.state(last)
             size = float(self._tip_sizes([state.q])[0])
         shape = self._shape(state, size)
-        found: dict[str, tuple[float, float]] = {"time": (0.0, 0.0), "space": (0.0, 0.0)}
+        nothing = dict.fromkeys(("time", "space", "model"), (0.0, 0.0))
+        found = nothing
         if self._windows and self._sound:
             held = self.system.held
             with np.errstate(all="ignore"):  # where damping or growth is beyond numbers nothing is known
                 found = largest_errors(self._windows, self.scheme, held.linear, size, held.structure.length)
-            self._sound = bool(np.isfinite([found["time"], found["space"]]).all())
-            found = found if self._sound else {"time": (0.0, 0.0), "space": (0.0, 0.0)}
-        return TipErrors(found["time"] if self._sound else None, found["space"], shape, size)
+            self._sound = bool(np.isfinite(list(found.values())).all())
+            found = found if self._sound else nothing
+        return TipErrors(found["time"] if self._sound else None, found["space"], found["model"], shape, size)
 
     def _shape(self, state: State, size: float) -> float:
         """Return the error of a state by the mesh, relative to the largest deflection (m).

@@ -39,6 +39,8 @@ def error_of_run(run: Simulation) -> ErrorEstimate | None:
     assert run.last is not None
     watch = run.watch or ErrorWatch(run.system)
     tip = watch.errors(run.last)
+    if model is not None:  # of a shape, and of the phases that vibrations lose
+        model += _relative(tip.model[0], tip.scale)
     shares = {
         "time": None if tip.time is None else _of_steps(run.scene, _relative(tip.time[0], tip.scale)),
         "space": min(1.0, tip.shape + _relative(tip.space[0], tip.scale)),
