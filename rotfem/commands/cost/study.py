@@ -61,8 +61,21 @@ def cost(
         ComputationError: not one setting could be computed.
         OutputError: the folder cannot be written.
     """
-    scene = as_scene(scene)
-    if scene.model.tolerance is not None:  # the study chooses by itself, over all theories
+    scene, output = checked(as_scene(scene), accuracy, repeat, output)
+    seconds = (DEFAULT_QUICK if quick else DEFAULT_FULL) if budget is None else seconds_of(budget, scene.file)
+    chosen = {"theories": theories, "elements": elements, "degrees": degrees, "steps": steps, "schemes": schemes}
+    check_choice(scene, chosen)  # before anything is computed or kept
+    study = Study(scene, output, repeat, Budget(seconds, comm), None if folder is None else Path(folder), resume)
+    return study.run(quick, accuracy, chosen, progress or (lambda share: None))
+
+
+def checked(scene: Scene, accuracy: float, repeat: int, output: str | None) -> tuple[Scene, str]:
+    """Return the scene as it is studied, over all theories without its own choice, and the output that is compared.
+
+    Raises:
+        SceneError: what is asked for is not valid, or has no meaning for the scene.
+    """
+    if scene.model.tolerance is not None:
         scene = scene.replace({"model.tolerance": None})
     if not (np.isfinite(accuracy) and accuracy > 0):
         raise SceneError(scene.file, "cost --accuracy", accuracy, "must be a number greater than 0")
@@ -75,8 +88,4 @@ def cost(
         scene.check_run()
     if output == "campbell":
         sweep_speeds(scene)
-    seconds = (DEFAULT_QUICK if quick else DEFAULT_FULL) if budget is None else seconds_of(budget, scene.file)
-    chosen = {"theories": theories, "elements": elements, "degrees": degrees, "steps": steps, "schemes": schemes}
-    check_choice(scene, chosen)  # before anything is computed or kept
-    study = Study(scene, output, repeat, Budget(seconds, comm), None if folder is None else Path(folder), resume)
-    return study.run(quick, accuracy, chosen, progress or (lambda share: None))
+    return scene, output
