@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rotfem.analysis.alpha_family import GeneralisedAlpha
+from rotfem.analysis.esdirk import ESDIRK4
 from rotfem.analysis.schemes import Array, Equations, Scheme, Stage, State, divided_difference
 from rotfem.errors import ComputationError
 from rotfem.registry import register
@@ -158,9 +159,9 @@ class RadauIIA(Scheme):
         """Return the leading term of the error, by the fourth divided difference of accelerations."""
         return new.memory.error if new.memory is not None else None
 
-    def fallback(self) -> Scheme:
-        """Return generalised-α, whose one stage Newton's method solves from farther away."""
-        return GeneralisedAlpha()
+    def fallbacks(self) -> tuple[Scheme, ...]:
+        """Return schemes whose stages are solved one after the other, from farther away: the most exact one first."""
+        return ESDIRK4(), GeneralisedAlpha()
 
 
 def iterate(stages: Together, h: float, equations: Equations, linearised: Any, last: bool) -> float | None:

@@ -210,9 +210,9 @@ class Scheme(ABC):
         """Return an estimate of the error of q that the step from old to new made; None if there is none."""
         return None
 
-    def fallback(self) -> Scheme | None:
-        """Return a more robust scheme that takes the steps that this one cannot; None if there is none."""
-        return None
+    def fallbacks(self) -> tuple[Scheme, ...]:
+        """Return more robust schemes that take the steps that this one cannot, in the order they are tried."""
+        return ()
 
     def resized(self, new: State, old: State, h: float) -> State:
         """Return a state after which steps of another length h (s) follow than the one that led there from old."""

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from rotfem.analysis.patience import Patience
 from rotfem.analysis.roots import came_true, check_root, turned_with_clamp
 from rotfem.analysis.schemes import Array, Shifts, Stage, State
 from rotfem.errors import ComputationError
@@ -14,9 +15,6 @@ from rotfem.numerics.old_factor import OldFactor
 
 #: Iterations with an old factor after which the next step gets a new one, of a linear and of a nonlinear system.
 LONG, NONLINEAR = 5, 8
-
-#: After an old factor has failed k times in a row, none is tried for 2^k steps; k grows to this.
-PATIENCE = 5
 
 #: Newton iterations after which a way is long.
 SOON = 6
@@ -47,8 +45,8 @@ class StageSolver:
         self._hard = self._balanced = False
         #: Share of the last predicted move that came true.
         self._share = 1.0
-        #: How often in a row an old factor has failed, and for how many steps none is tried for that.
-        self._failed = self._pause = 0
+        #: With old factors.
+        self._patience = Patience()
 
     def predicted(self, stage: Stage, state: State) -> Array:
         """Return q of a stage that turns with the clamp where that moves: it is the better prediction."""
@@ -74,21 +72,19 @@ class StageSolver:
     def solve(self, stage: Stage, state: State) -> None:
         """Solve a stage of a step from a state, with the factor of an earlier one if that serves."""
         factor = self._old_factor(stage)
-        if factor is not None:
-            if self._pause == 0:
-                predicted = stage.q.copy(), stage.v.copy(), stage.a.copy()
-                try:
-                    self._iterate(stage, state, factor)
-                    if factor.made and self.newton.strayed:
-                        check_root(self.system, stage, state)
-                except ComputationError:  # the old factor does not serve here; nor will the next ones, perhaps
-                    self._held, self._failed = None, min(self._failed + 1, PATIENCE)
-                    self._pause = 2**self._failed
-                    stage.q, stage.v, stage.a = predicted
-                else:
-                    self._failed = 0
-                    return
-            self._pause = max(self._pause - 1, 0)
+        if factor is not None and self._patience.over():
+            predicted = stage.q.copy(), stage.v.copy(), stage.a.copy()
+            try:
+                self._iterate(stage, state, factor)
+                if factor.made and self.newton.strayed:
+                    check_root(self.system, stage, state)
+            except ComputationError:  # the old factor does not serve here; nor will the next ones, perhaps
+                self._held = None
+                self._patience.failed()
+                stage.q, stage.v, stage.a = predicted
+            else:
+                self._patience.worked()
+                return
         if self.system.solved_at_once:
             self._iterate(stage, state)
             return

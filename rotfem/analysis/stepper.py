@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
+from rotfem.analysis.patience import Patience
 from rotfem.analysis.roots import fed
 from rotfem.analysis.schemes import Array, Scheme, State, Watch
 from rotfem.analysis.stage_solver import StageSolver
@@ -16,8 +18,11 @@ from rotfem.errors import ComputationError
 from rotfem.mechanics.courses import View
 from rotfem.numerics.newton import Newton
 
-#: Halvings left with which a step is taken though it feeds the motion, or by a fallback; parts that one takes it in.
-STUBBORN, PARTS = 3, 4
+#: Halvings left with which a step is taken though it feeds the motion.
+STUBBORN = 3
+
+#: Parts in which another scheme takes a step that the scheme cannot: it is of lower order.
+PARTS = 2
 
 #: Relative jump of what is prescribed that is none.
 STEADY = 1e-7
@@ -43,7 +48,7 @@ class Stepper(StageSolver):
 
     Attributes:
         substeps, rejected: steps that were halved (Newton failed, or energy rose), and adaptive ones taken back.
-        stood_in: steps that the scheme could not take, and its fallback did.
+        stood_in: steps that the scheme could not take, by the name of the one that did.
         pace: length of the next adaptive step (s), largest displacement so far (scaled), and length that the errors so
             far allow (s); None before the first.
         watch: told of every step that counts; None tells nobody.
@@ -52,7 +57,10 @@ class Stepper(StageSolver):
     def __init__(self, system: Any, scheme: Scheme, newton: Newton):
         super().__init__(system, newton)
         self.scheme = scheme
-        self.substeps = self.rejected = self.stood_in = 0
+        self.substeps = self.rejected = 0
+        self.stood_in: Counter[str] = Counter()
+        #: In the scheme, where others may stand in for it.
+        self._trust = Patience()
         self.pace: tuple[float, float, float] | None = None
         self.watch: Watch | None = None
         #: Energy at the first step that was hard, and ranges of the energies that were seen since (see `fed`).
@@ -138,39 +146,40 @@ class Stepper(StageSolver):
         """
         if keep_rotations_small(self.system, self.scheme, state, h):
             self._held = None
-        try:
-            new = self.step(state, h, end)
-            if halvings <= STUBBORN or not self._feeds(new, state):
-                return new
-        except ComputationError as error:
-            fallback = self.scheme.fallback()
-            if fallback is not None and 0 < halvings <= STUBBORN:
-                return self._stood_in(fallback, state, h, end)
-            if self.system.solved_at_once and fallback is None:
-                raise
-            if halvings == 0:
-                raise ComputationError(
-                    f"{error.what} (the step was cut down to {h:.3g} s)",
-                    time=error.time,
-                    advice='a smaller time.step, time.scheme = "energy_conserving", or a look at load and speed then',
-                ) from None
+        others, failure, feeds = self.scheme.fallbacks(), None, False
+        if halvings == 0 or not others or self._trust.over():
+            try:
+                new = self.step(state, h, end)
+            except ComputationError as error:
+                failure = error
+                self._trust.failed()
+            else:
+                self._trust.worked()
+                feeds = halvings > STUBBORN and self._feeds(new, state)
+                if not feeds:
+                    return new
+        if halvings > 0 and not feeds and (stood := self._stood_in(others, state, h, end)) is not None:
+            return stood
+        if failure is not None and (halvings == 0 or (self.system.solved_at_once and not others)):
+            raise _cut_down(failure, h) if halvings == 0 else failure
         self.substeps += 1
         middle = self.advance(state, h / 2, None, halvings - 1)
         return self.advance(middle, h / 2, state.t + h if end is None else end, halvings - 1)
 
-    def _stood_in(self, fallback: Scheme, state: State, h: float, end: float | None) -> State:
-        """Return the state at the end of a step that another scheme takes, in parts.
-
-        Raises:
-            ComputationError: it fails, too.
-        """
-        other = Stepper(self.system, fallback, self.newton)
-        now, last = fallback.start(state), state.t + h if end is None else end
-        for part in range(1, PARTS + 1):
-            now = other.advance(now, h / PARTS, last if part == PARTS else None)
-        self.stood_in += 1
-        self.substeps += other.substeps
-        return self.scheme.start(now)
+    def _stood_in(self, others: Sequence[Scheme], state: State, h: float, end: float | None) -> State | None:
+        """Return the state at the end of a step that one of other schemes takes, in parts; None if none can."""
+        for scheme in others:
+            other = Stepper(self.system, scheme, self.newton)
+            now, last = scheme.start(state), state.t + h if end is None else end
+            try:
+                for part in range(1, PARTS + 1):
+                    now = other.advance(now, h / PARTS, last if part == PARTS else None)
+            except ComputationError:
+                continue
+            self.stood_in[scheme.name] += 1
+            self.substeps += other.substeps
+            return self.scheme.start(now)
+        return None
 
     def _feeds(self, new: State, state: State) -> bool:
         """Return whether a step that was hard to solve raises an energy that is too large already (see `fed`)."""
@@ -182,9 +191,16 @@ class Stepper(StageSolver):
     def said(self) -> list[str]:
         """Return what a run says of its steps."""
         out = [f"{self.substeps} steps were halved where Newton failed or energy rose"] if self.substeps else []
-        if self.stood_in:
-            other = self.scheme.fallback()
-            assert other is not None
-            taken = f"{self.stood_in} steps that {self.scheme.name} could not solve were taken by {other.name}"
+        for name, number in self.stood_in.items():
+            taken = f"{number} steps that {self.scheme.name} could not solve were taken by {name}"
             out.append(f"{taken}: their errors are those of that scheme")
         return out
+
+
+def _cut_down(error: ComputationError, h: float) -> ComputationError:
+    """Return the error of a step that failed however short, with its length (s)."""
+    return ComputationError(
+        f"{error.what} (the step was cut down to {h:.3g} s)",
+        time=error.time,
+        advice='a smaller time.step, time.scheme = "energy_conserving", or a look at load and speed then',
+    )

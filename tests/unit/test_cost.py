@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from rotfem.commands.cost.front import Row, pareto, recommend
+from rotfem.commands.cost.plot import ERRORS
 from rotfem.commands.cost.record import Measurement, Record, fingerprint
 from rotfem.commands.cost.reference import Samples, combined, distance, limit, observed_order
 from rotfem.commands.cost.refinement import Plan, Refinement, finer_meshes
-from rotfem.commands.cost.settings import Setting, check_choice, grid, ladder, own_setting
+from rotfem.commands.cost.settings import OUTPUTS, Setting, check_choice, grid, ladder, own_setting
 from rotfem.commands.cost.tuned import write_tuned
 from rotfem.errors import SceneError
 from rotfem.scene import Scene, load_scene
@@ -341,6 +342,10 @@ def test_estimates_of_the_tiniest_beam_are_numbers() -> None:
     """A fourth power of its length is none any more."""
     tiny = Scene.from_dict(BEAM).replace({"structure.length": 1e-90, "structure.hub_radius": 0.0})
     assert all(mode.frequency > 0.0 for mode in estimates(tiny, 6.0, 4))
+
+
+def test_the_figure_names_the_error_of_every_output() -> None:
+    assert set(ERRORS) == set(OUTPUTS)
 
 
 def test_record_lines_are_json(tmp_path: Path) -> None:

@@ -102,11 +102,14 @@ def test_a_stiff_vibration_is_damped(scheme: str, left: float) -> None:
 
 
 def test_steps_that_cannot_be_solved_are_taken_by_the_fallback() -> None:
-    """A beam let go from a tenth of its length, in steps of a quarter of its period; the summary says so."""
+    """A beam let go from a tenth of its length, in steps of a quarter of its period; the summary says so.
+
+    The method does not try all of them in vain: it takes less than twice the iterations of the fallback by itself.
+    """
     tables = {"structure": STRUCTURE, "motion": STILL, "initial": {"tip_displacement": 1.0}, "mesh": {"elements": 4}}
     result = run({**tables, "time": {"end": 2.0, "step": 0.4, "scheme": "radau5"}})
-    assert any(
-        "steps that radau5 could not solve were taken by generalised_alpha" in w for w in result.summary["warnings"]
-    )
+    assert any("steps that radau5 could not solve were taken by esdirk4" in w for w in result.summary["warnings"])
     fine = run({**tables, "time": {"end": 2.0, "step": 0.01, "scheme": "esdirk4"}}).history["tip_u2"][::40]
     np.testing.assert_allclose(result.history["tip_u2"], fine, atol=0.05)
+    other = run({**tables, "time": {"end": 2.0, "step": 0.2, "scheme": "esdirk4"}}).summary
+    assert result.summary["newton_iterations"] < 2 * other["newton_iterations"]

@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady
 from rotfem.commands.campbell import Diagram
+from rotfem.commands.cost.budget import cpu_time
 from rotfem.commands.cost.memory import PeakMemory
 from rotfem.commands.cost.record import Measurement
 from rotfem.commands.cost.reference import Samples
@@ -81,7 +82,7 @@ class Bench:
         key = (variant.model.theory, variant.mesh.degree, variant.time.scheme if marching and variant.time else None)
         if key in self._warm:
             return
-        started = perf_counter()
+        started = cpu_time()
         short = variant
         if marching and variant.time is not None and variant.time.step is not None:
             end = min(WARM_STEPS * variant.time.step, variant.time.end)
@@ -91,7 +92,7 @@ class Bench:
         else:
             self._start(short)(lambda share: None)
         self._warm.add(key)
-        self.compiling += perf_counter() - started
+        self.compiling += cpu_time() - started
 
     def _once(self, variant: Scene, out: Measurement, limit: float) -> None:
         self.memory.restart()

@@ -21,6 +21,7 @@ NAME_SIZE, ABOVE = (0.0085, 0.026), 0.013
 ERRORS = {
     "tip": "error of the tip's motion, relative to its largest displacement (–)",
     "frequencies": "largest relative error of a frequency (–)",
+    "campbell": "largest relative error of a frequency at any speed (–)",
 }
 
 
