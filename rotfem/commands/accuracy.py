@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from time import perf_counter
-from typing import Any, TypeVar
-
-from mpi4py import MPI
+from typing import Any, Generic, TypeVar
 
 from rotfem.analysis.error_estimate import WORDS
 from rotfem.commands.ahead import ADAPTIVE, Ahead
+from rotfem.commands.pace import TOO_LITTLE, Pace, TooDear
 from rotfem.errors import ComputationError, SceneError
 from rotfem.mechanics.theories import theories
 from rotfem.results.result import Result
@@ -24,6 +25,9 @@ MOST_ATTEMPTS, STALLED = 6, 0.9
 
 #: Error that a reduced model may add to that of its theory, as a part of the accuracy.
 PROJECTED = 0.05
+
+#: Loosest accuracy that is tried where a budget allows no better one.
+LOOSEST = 0.1
 
 #: Rows of a history that does not say it.
 ROWS = 1000
@@ -75,7 +79,7 @@ def models_of(scene: Scene, moving: bool) -> tuple[dict[str, Any], ...]:
 
 
 def pursue(
-    scene: Scene, settings: Settings, attempt: Callable[[Settings], R], comm: MPI.Comm, ahead: Ahead | None = None
+    scene: Scene, settings: Settings, attempt: Callable[[Settings], R], pace: Pace, ahead: Ahead | None = None
 ) -> R:
     """Return the first result whose estimated error meets the accuracy of a scene.
 
@@ -83,20 +87,31 @@ def pursue(
         scene: with an accuracy.
         settings: to begin with.
         attempt: settings ↦ their result, with an `error` in its summary.
-        comm: of the processes that compute it, which go on together.
+        pace: of the attempts, with the communicator of the processes that compute them.
         ahead: what the attempts have shown of a motion; None without one.
 
     Raises:
         Missed: it was not met; its attribute `result` holds the best that was reached.
         ComputationError: the richest model failed.
     """
-    accuracy, started, tried = scene.accuracy, perf_counter(), list[dict[str, Any]]()
+    accuracy, started, tried, comm = scene.accuracy, perf_counter(), list[dict[str, Any]](), pace.comm
     assert accuracy is not None
-    done: R | None = None
+    best: Best[R] | None = None
     while True:
         began = perf_counter()
         try:
+            pace.begins(settings, len(tried) + 1)
             done = attempt(settings)
+            pace.ends()
+        except TooDear as failure:
+            tried.append({**settings.summary(), "failed": failure.what, "seconds": perf_counter() - began})
+            cheaper = None if len(tried) == MOST_ATTEMPTS else pace.cheaper(partial(looser, scene, settings, ahead))
+            if cheaper is not None:
+                settings = cheaper
+                continue
+            if best is None:
+                raise
+            break
         except ComputationError as failure:
             richer = settings.richer()
             if richer is None or len(tried) == MOST_ATTEMPTS:
@@ -109,21 +124,52 @@ def pursue(
             ahead.judge(done, settings)
         tried.append({**settings.summary(), "error": error["total"], "seconds": perf_counter() - began})
         is_met = known(error) and error["total"] <= accuracy
+        best = Best(done, settings, perf_counter() - began).or_before(best)
         is_over = is_met or len(tried) == MOST_ATTEMPTS or stalled(tried)
         following = comm.bcast(None if is_over else next_of(scene, settings, done, ahead))
         if following is None:
             break
         settings = following
+    assert best is not None
+    done, error = best.done, best.done.summary["error"]
+    is_met = known(error) and error["total"] <= accuracy
     done.summary["scene"] = scene.digest()
-    done.summary["accuracy"] = told(scene, settings, error, is_met, tried)
+    done.summary["accuracy"] = told(scene, best.settings, is_met, error, tried)
+    if pace.budget is not None:
+        done.summary["accuracy"]["budget"] = pace.summary()
     if ahead is not None:
         done.summary["accuracy"]["effects"] = ahead.effects(error)
     timings = done.summary["timings"]
-    timings["choice"] = began - started
+    timings["choice"] = perf_counter() - started - best.seconds
     timings["total"] += timings["choice"]
     if not is_met:
-        raise missed(scene, done)
+        raise missed(scene, done, pace)
     return done
+
+
+@dataclass(frozen=True)
+class Best(Generic[R]):
+    """The best result so far.
+
+    Attributes:
+        done: the result.
+        settings: that it was computed with.
+        seconds: that it took.
+    """
+
+    done: R
+    settings: Settings
+    seconds: float
+
+    def or_before(self, before: Best[R] | None) -> Best[R]:
+        """Return the better one of this and one before it, which must be better to stay."""
+        return self if before is None or rank(self.done) <= rank(before.done) else before
+
+
+def rank(done: Result) -> tuple[bool, float]:
+    """Return by what results are better: those whose error is known come first, by their error."""
+    error = done.summary["error"]
+    return (not known(error), float("inf") if error["total"] is None else error["total"])
 
 
 def next_of(scene: Scene, settings: Settings, done: Result, ahead: Ahead | None) -> Settings | None:
@@ -136,6 +182,15 @@ def next_of(scene: Scene, settings: Settings, done: Result, ahead: Ahead | None)
     if following.models == settings.models:
         return ahead.meshed(following, error)
     return ahead.prepared(following, error)
+
+
+def looser(scene: Scene, settings: Settings, ahead: Ahead | None, factor: float) -> Settings | None:
+    """Return settings of a history for an accuracy that is so many times looser; None where there are none."""
+    assert scene.accuracy is not None
+    if not settings.moving or settings.models[0].get("reduced") or factor * scene.accuracy > LOOSEST:
+        return None
+    planned = settings if ahead is None else ahead.looser(settings, factor)
+    return planned if planned != settings else settings.looser(factor)
 
 
 def stalled(tried: list[dict[str, Any]]) -> bool:
@@ -184,7 +239,7 @@ def changes_of(scene: Scene, settings: Settings) -> dict[str, Any]:
 
 
 def told(
-    scene: Scene, settings: Settings, error: dict[str, Any], is_met: bool, tried: list[dict[str, Any]]
+    scene: Scene, settings: Settings, is_met: bool, error: dict[str, Any], tried: list[dict[str, Any]]
 ) -> dict[str, Any]:
     """Return what a summary says of how an accuracy was pursued."""
     accuracy = scene.accuracy
@@ -200,8 +255,8 @@ def told(
     }
 
 
-def missed(scene: Scene, done: Result) -> Missed:
-    """Return the error that says what was reached instead of an accuracy."""
+def missed(scene: Scene, done: Result, pace: Pace) -> Missed:
+    """Return the error that says what was reached instead of an accuracy, and what would have taken too long."""
     error, chosen = done.summary["error"], done.summary["accuracy"]["chosen"]
     worst = max(WORDS, key=lambda name: part(error, name))
     advice = {
@@ -213,8 +268,8 @@ def missed(scene: Scene, done: Result) -> Missed:
     shown = "an unknown error" if error["total"] is None else f"{error['total']:.2g}"
     failure = Missed(
         f"an accuracy of {scene.accuracy:g} was not met: {shown} was reached, most of it ({WORDS[worst]}) "
-        f"{part(error, worst):.2g}",
-        advice=advice,
+        f"{part(error, worst):.2g}{pace.why()}",
+        advice=advice if pace.dear is None else TOO_LITTLE,
     )
     done.summary["status"] = "failed"
     done.summary["failure"] = {"what": failure.what, "time": None, "advice": advice}

@@ -150,6 +150,10 @@ class Ahead:
             grown = finest(settings.elements, grown)
         return replace(settings, elements=grown), off
 
+    def looser(self, settings: Settings, factor: float) -> Settings:
+        """Return settings with the steps of an accuracy that is so many times looser, if the motion is known."""
+        return self.stepped(settings, factor * shares({"time": 1.0}, self.accuracy)["time"])
+
     def stepped(self, settings: Settings, allowed: float) -> Settings:
         """Return settings with the steps of an error that is allowed."""
         known = [scheme for scheme in Scheme.registry if scheme.name in SCHEMES]

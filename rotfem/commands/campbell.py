@@ -22,6 +22,7 @@ from rotfem.commands.known_error import error_of_modes
 from rotfem.commands.loads import held
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
 from rotfem.commands.modes import analysis_of, hints_of, theory_error
+from rotfem.commands.pace import Pace
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import SceneError, input_of
@@ -115,7 +116,7 @@ def campbell(
         if scene.accuracy is None:
             return attempt()
         refuse(scene, ("frequencies",), "campbell")
-        return pursue(scene, settings_of(scene, scene.modes.count), attempt, comm)
+        return pursue(scene, settings_of(scene, scene.modes.count), attempt, Pace(scene.accuracy_budget, comm))
 
 
 class Diagram:

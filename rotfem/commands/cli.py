@@ -45,8 +45,9 @@ def run(
         )
         return
     try:
-        with todo.progress() as progress:
-            result = simulate(todo.scene, keeper, progress, todo.hint)
+        bar = todo.progress()
+        with bar as progress:
+            result = simulate(todo.scene, keeper, progress, todo.hint if todo.scene.accuracy is None else bar.says)
     except (ComputationError, KeyboardInterrupt) as error:
         so_far = getattr(error, "result", None)
         if so_far is not None:

@@ -123,7 +123,8 @@ class Session:
 
     def progress(self, title: str) -> ProgressBar:
         """Return the progress bar: on a terminal only, and only where the command may speak."""
-        return ProgressBar(title, self.first and not self.quiet and not self.as_json and sys.stderr.isatty())
+        speaks = self.first and not self.quiet and not self.as_json
+        return ProgressBar(title, speaks and sys.stderr.isatty(), speaks)
 
     def hint(self, unwanted: bool) -> Callable[[str], None] | None:
         """Return what prints advice on stderr, rank 0 only; None where it is not wanted."""
@@ -170,12 +171,20 @@ class ProgressBar:
     Args:
         title: text before the bar.
         on: whether to draw it.
+        speaks: whether lines may be printed.
     """
 
-    def __init__(self, title: str, on: bool):
+    def __init__(self, title: str, on: bool, speaks: bool):
         self._bar: Any = None
         self._title = title
-        self._on = on
+        self._on, self._speaks = on, speaks
+
+    def says(self, line: str) -> None:
+        """Print a line, above the bar if there is one."""
+        if self._bar is not None:
+            self._bar.console.print(line, markup=False, highlight=False)
+        elif self._speaks:
+            print(line, file=sys.stderr, flush=True)
 
     def __enter__(self) -> Callable[[float], None]:
         if not self._on:

@@ -77,6 +77,9 @@ def job(
     accuracy: Annotated[
         float | None, typer.Option("--accuracy", metavar="E", help="relative error wanted: the rest follows from it")
     ] = None,
+    budget: Annotated[
+        str | None, typer.Option("--budget", metavar="TIME", help="that an accuracy may take: 60s, 2min, 1h")
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="print the summary as JSON, and nothing else, on stdout")
     ] = False,
@@ -88,6 +91,10 @@ def job(
     """Give a command its job; these are, but for its name, the options of all commands."""
     with Session(as_json, quiet, debug) as session:
         wanted = [] if accuracy is None else [f"accuracy={accuracy!r}"]
+        if budget is not None:
+            from rotfem.commands.cost.budget import seconds_of
+
+            wanted.append(f"accuracy_budget={seconds_of(budget, 'command line', '--budget')!r}")
         loaded = load_scene(scene, [*(overrides or ()), *wanted])
         folder = session.folder(output or Path("results") / folder_name(loaded.name), command)
         yield Job(loaded, folder, session, not no_plots, session.hint(no_advice))
@@ -102,7 +109,7 @@ def command(computes: bool = True) -> Callable[[Callable[..., None]], Callable[.
 
     def decorate(work: Callable[..., None]) -> Callable[..., None]:
         options_of_all = list(signature(job, eval_str=True).parameters.values())[1:]
-        shared = [p for p in options_of_all if computes or p.name not in ("no_advice", "accuracy")]
+        shared = [p for p in options_of_all if computes or p.name not in ("no_advice", "accuracy", "budget")]
         own = list(signature(work, eval_str=True).parameters.values())[1:]
 
         def call(**given: Any) -> None:

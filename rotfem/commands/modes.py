@@ -27,6 +27,7 @@ from rotfem.commands.finite import check_rows
 from rotfem.commands.known_error import error_of_modes
 from rotfem.commands.loads import held
 from rotfem.commands.mode_tables import advice, mode_tables, scaled
+from rotfem.commands.pace import Pace
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import ComputationError, SceneError, input_of
@@ -90,7 +91,7 @@ def modes(
         if scene.accuracy is None:
             return attempt()
         refuse(scene, ("frequencies",), "modes")
-        return pursue(scene, settings_of(scene, scene.modes.count), attempt, comm)
+        return pursue(scene, settings_of(scene, scene.modes.count), attempt, Pace(scene.accuracy_budget, comm))
 
 
 def _modes(

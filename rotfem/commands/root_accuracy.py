@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.commands.accuracy import settings_of
+from rotfem.commands.pace import TooDear
 from rotfem.errors import ComputationError
 from rotfem.results.run import RunResult
 from rotfem.scene import Scene
@@ -78,6 +79,8 @@ def compared(fine: RunResult, settings: Settings, aside: Callable[[Settings], Ru
     """Return what coarser settings change in the moments, relative to a scale; 1 where they cannot be computed."""
     try:
         return difference(fine, aside(settings), scale)
+    except TooDear:
+        raise
     except ComputationError:
         return 1.0
 

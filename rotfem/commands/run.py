@@ -14,6 +14,7 @@ from rotfem.analysis.equilibrium import check_steady
 from rotfem.commands.accuracy import changes_of, pursue, refuse, settings_of
 from rotfem.commands.ahead import Ahead
 from rotfem.commands.keeper import Interval, Keeper
+from rotfem.commands.pace import Pace
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.result_folder import ResultFolder
 from rotfem.commands.root_accuracy import ROOT_MOMENT, first_settings, judged
@@ -48,7 +49,8 @@ def run(
         scene: scene, path of a scene file, or nested tables.
         comm: communicator the structure is distributed over; every rank gets the whole result.
         progress: called with the share of the work done, between 0 and 1.
-        hint: called with every line of advice before the computation starts; None asks for none.
+        hint: called with every line of advice before the computation starts, and on attempts at an accuracy that take
+            long; None asks for none.
         terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form (see `rotfem.Effect`).
         outputs: functionals to record, by name, mechanics ↦ UFL form; columns of the history.
         folder: where the results go, the history as it grows, all of them but figures at the end; None writes nothing.
@@ -95,7 +97,7 @@ def simulate(
         if scene.time is None or scene.initial.state == "steady":
             check_steady(problem)
         if scene.accuracy is not None:
-            return run_to_accuracy(scene, keeper, progress, terms, outputs)
+            return run_to_accuracy(scene, keeper, (progress, hint), terms, outputs)
         if scene.model.tolerance is not None:
             return run_chosen(scene, problem, keeper, progress, hint)
         return hinted(Simulation(scene, problem, comm, keeper=keeper), hint).run(progress)
@@ -110,7 +112,7 @@ def hinted(simulation: Simulation, hint: Hint | None) -> Simulation:
 def run_to_accuracy(
     scene: Scene,
     keeper: Keeper,
-    progress: Progress | None,
+    listeners: tuple[Progress | None, Hint | None],
     terms: Mapping[str, Work] | None,
     outputs: Mapping[str, Functional] | None,
 ) -> RunResult:
@@ -121,14 +123,15 @@ def run_to_accuracy(
         ComputationError: the richest model failed.
     """
     refuse(scene, ("tip", ROOT_MOMENT), "run")
-
+    progress, hint = listeners
     assert scene.accuracy is not None
     ahead = Ahead(scene.accuracy)
+    pace = Pace(scene.accuracy_budget, keeper.comm, hint, 0.0 if scene.time is None else scene.time.end)
 
     def attempt(settings: Settings) -> RunResult:
         variant = scene.replace(changes_of(scene, settings))
         simulation = Simulation(variant, Problem.of(variant, terms=terms, outputs=outputs), keeper.comm, keeper=keeper)
-        simulation.settings = settings
+        simulation.settings, simulation.pace = settings, pace
         try:
             return simulation.run(progress)
         finally:
@@ -136,12 +139,14 @@ def run_to_accuracy(
 
     def aside(settings: Settings) -> RunResult:
         variant = scene.replace(changes_of(scene, settings))
-        return Simulation(variant, Problem.of(variant, terms=terms, outputs=outputs), keeper.comm).run()
+        simulation = Simulation(variant, Problem.of(variant, terms=terms, outputs=outputs), keeper.comm)
+        simulation.pace = pace.beside
+        return simulation.run()
 
     if scene.accuracy_of == ROOT_MOMENT:
         first = keeper.settings() or first_settings(scene)
-        return pursue(scene, first, lambda settings: judged(settings, attempt, aside), keeper.comm)
-    return pursue(scene, keeper.settings() or settings_of(scene), attempt, keeper.comm, ahead)
+        return pursue(scene, first, lambda settings: judged(settings, attempt, aside), pace)
+    return pursue(scene, keeper.settings() or settings_of(scene), attempt, pace, ahead)
 
 
 def run_chosen(

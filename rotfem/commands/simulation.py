@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from time import perf_counter
 from typing import Any
 
@@ -73,6 +74,7 @@ class Simulation:
         self.keeper = keeper or Keeper(comm)
         self.scene, self.comm, self.choice = scene, comm, choice
         self.settings: Settings | None = None
+        self.pace: Callable[[int, float], None] | None = None
         self.warnings: list[str] = [] if choice is None else choice.upgrade_warnings()
         self.advice: list[str] = []
         if scene.time is None and problem.frame == "inertial":
@@ -199,6 +201,8 @@ class Simulation:
             progress(row.t / time.end)
         self.last = state
         self.keeper.stepped(self, state)
+        if self.pace is not None:
+            self.pace(self.steps, state.t / time.end)
 
     # --- what is watched ---------------------------------------------------------------------------------------------
 

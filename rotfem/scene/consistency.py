@@ -174,6 +174,16 @@ def check_accuracy(model: Model, output: OutputTable, accuracy: float | None) ->
         raise problem("output.error", False, "cannot be combined with accuracy, which is met by what is estimated")
 
 
+def check_budget(accuracy: float | None, budget: float | None) -> None:
+    """Refuse a budget of no accuracy.
+
+    Raises:
+        PydanticCustomError: there is none.
+    """
+    if budget is not None and accuracy is None:
+        raise problem("accuracy_budget", budget, "is what an accuracy may take, and needs accuracy")
+
+
 def check_limits(limits: Limits, time: Time | None, modes: Modes) -> None:
     """Refuse more steps and modes than the scene's limits allow."""
     if time is not None and time.step is not None:

@@ -26,6 +26,7 @@ from rotfem.errors import SceneError
 from rotfem.scene.beams import Structure
 from rotfem.scene.consistency import (
     check_accuracy,
+    check_budget,
     check_first_state,
     check_frame,
     check_initial,
@@ -47,8 +48,9 @@ from rotfem.scene.toml import apply_overrides, read_toml, set_key, to_builtin
 from rotfem.scene.units import in_si
 from rotfem.scene.values import Bounds, SceneModel
 
-#: A relative error that may be asked for.
+#: A relative error that may be asked for, and CPU seconds that it may take.
 Accuracy = Annotated[float, PlainValidator(Bounds(ge=1e-8, le=0.5).number)]
+Budget = Annotated[float, PlainValidator(Bounds(gt=0, le=1e9).number)]
 
 
 class _PlateTable(dict[str, Any]):
@@ -77,6 +79,7 @@ class Scene(SceneModel):
         accuracy: error that is wanted, relative to the largest displacement of the tip, or to each frequency; theory,
             effects, mesh, scheme and step follow from it. None where the scene says them itself.
         accuracy_of: what it is the accuracy of; None what a command computes first of all.
+        accuracy_budget: CPU time (s) that it may take; None without a limit.
     """
 
     structure: Structure = Field(description="a table [structure]")
@@ -92,6 +95,7 @@ class Scene(SceneModel):
     limits: Limits = Limits()
     accuracy: Accuracy | None = None
     accuracy_of: Literal["tip", "root_moment", "frequencies"] | None = None
+    accuracy_budget: Budget | None = None
 
     _name: str = PrivateAttr("scene")
     _file: str = PrivateAttr("scene")
@@ -250,6 +254,7 @@ class Scene(SceneModel):
         check_initial(self.structure, self.motion, self.initial)
         check_limits(self.limits, self.time, self.modes)
         check_accuracy(self.model, self.output, self.accuracy)
+        check_budget(self.accuracy, self.accuracy_budget)
         check_first_state(self.model, self.initial, self.accuracy)
         self.output.check(self.structure.type, self.structure.length)
         return self

@@ -45,6 +45,7 @@ UNITS: dict[str, Unit] = {
     "structure.damping.kelvin_voigt": "s",
     "structure.damping.rayleigh": ("1/s", "s"),
     "structure.damping.modal": "dimensionless",
+    "accuracy_budget": "s",
     "motion.speed": "rad/s",
     "motion.duration": "s",
     "motion.hub_inertia": "kg*m**2",

@@ -91,6 +91,12 @@ class Settings:
         """Return these settings with the next richer model; None if this is the richest."""
         return replace(self, models=self.models[1:]) if len(self.models) > 1 else None
 
+    def looser(self, factor: float) -> Self:
+        """Return these settings with steps whose error is expected to be so many times larger."""
+        if self.step is not None and self.scheme is not None:
+            return replace(self, step=self.step * factor ** (1 / Scheme.registry[self.scheme].order))
+        return self if self.tolerance is None else replace(self, tolerance=self.tolerance * factor)
+
     def better(self, error: Mapping[str, Any], accuracy: float) -> Self | None:
         """Return settings whose errors are expected to meet an accuracy that these have missed.
 

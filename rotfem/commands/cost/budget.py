@@ -24,8 +24,13 @@ MEMORY_SHARE = 0.6
 UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
 
 
-def seconds_of(text: str | float, file: str = "") -> float:
+def seconds_of(text: str | float, file: str = "", key: str = "cost --budget") -> float:
     """Return seconds from a number, or text such as "60s", "2min", "1h".
+
+    Args:
+        text: what was given.
+        file: name for error messages.
+        key: what it was given for.
 
     Raises:
         SceneError: it is neither, or not greater than 0.
@@ -36,7 +41,7 @@ def seconds_of(text: str | float, file: str = "") -> float:
     except ValueError:
         value = 0.0
     if not 0.0 < value < 1e9:
-        raise SceneError(file, "cost --budget", text, "must be a time greater than 0, such as 60s, 2min or 1h")
+        raise SceneError(file, key, text, "must be a time greater than 0, such as 60s, 2min or 1h")
     return value
 
 
