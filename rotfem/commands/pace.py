@@ -32,8 +32,8 @@ LONG, SHOWN, CHANGED = 5.0, 1.0, 1.5
 #: well enough for it, and part of it that a cheaper attempt is to take.
 SURE, ADAPTED, FILLED = 1.1, 0.3, 0.7
 
-#: Steps of a run beside from one look at the clock to the next.
-STRIDE = 16
+#: Steps of a run beside from one look at the clock to the next, and adaptive steps that are those of a start.
+STRIDE, FIRST = 16, 100
 
 #: By how much looser accuracies are tried, and what to do where a budget does not do.
 LOOSER = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 1e4)
@@ -91,7 +91,8 @@ class Pace:
     def _forget(self) -> None:
         """Start the clocks of an attempt."""
         self._marching: float | None = None
-        self._next, self._told, self._steps, self._share = 0, 0.0, 0, 0.0
+        self._next, self._told, self._steps = 0, 0.0, 0
+        self._look = (0.0, 0.0)
 
     def _used(self) -> float:
         return float(self.comm.bcast(cpu_time() - self._started))
@@ -164,7 +165,7 @@ class Pace:
         Raises:
             TooDear: the attempt is predicted to take more than what is left.
         """
-        self._steps, self._share = steps, share
+        self._steps = steps
         if steps < self._next:
             return
         elapsed = self._used() - self._began
@@ -172,13 +173,17 @@ class Pace:
             self._marching = elapsed
         march = elapsed - self._marching
         self._next = 2 * steps + 1 if march < SHOWN else steps + max(1, int(steps * SHOWN / march))
-        if march < SHOWN or share <= 0.0:
-            return
-        predicted = self._marching + march / share
-        self._learn(elapsed)
-        self._say(predicted, march)
         assert self._settings is not None
-        known = self._settings.step is not None or elapsed > ADAPTED * self._left
+        is_adaptive = self._settings.step is None
+        if march < SHOWN or (is_adaptive and steps < FIRST):
+            return
+        (before, gone), self._look = self._look, (elapsed, share)
+        if share <= gone:
+            return
+        predicted = elapsed + (elapsed - max(before, self._marching)) * (1.0 - share) / (share - gone)
+        self._learn(elapsed, (predicted - self._marching) / march)
+        self._say(predicted, march)
+        known = not is_adaptive or elapsed > ADAPTED * self._left
         if elapsed > self._left or (known and predicted > SURE * self._left):
             raise self._dear(predicted)
 
@@ -195,13 +200,12 @@ class Pace:
         """Take note that an attempt has been done, with the steps that it took."""
         if self._settings is None:
             return
-        self._learn(self._used() - self._began)
+        self._learn(self._used() - self._began, 1.0)
 
-    def _learn(self, elapsed: float) -> None:
-        """Take up what the attempt has taken so far (s), as a part of the whole that it would be."""
+    def _learn(self, elapsed: float, whole: float) -> None:
+        """Take up what the attempt has taken so far (s), and how many times as long all of its march would take."""
         assert self._settings is not None
         setup = elapsed if self._marching is None else self._marching
-        whole = 1.0 / self._share if self._share > 0.0 else 1.0
         steps = whole * self._steps
         rate = Rate(setup, whole * (elapsed - setup), work(self._settings, steps), steps, self._settings)
         self._rates[key(self._settings)] = rate
