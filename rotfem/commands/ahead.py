@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,7 @@ from rotfem.results.run import RunResult
 from rotfem.selection.accuracy import AIM, Elements, Settings, finer, finest, part, shares
 from rotfem.selection.effects_ahead import effects_ahead
 from rotfem.selection.mesh_ahead import MeshAhead
-from rotfem.selection.steps_ahead import Motion, error_ahead, plan
+from rotfem.selection.steps_ahead import Motion, error_ahead, plan, unresolved_ahead
 
 if TYPE_CHECKING:
     from rotfem.commands.simulation import Simulation
@@ -108,7 +108,7 @@ class Ahead:
                 put(error, "time", error["time"] + (quick or 0.0))
             less(error, error_ahead(self.motions, scheme, settings.step))
         if self._last is not None:
-            compare(done, settings, *self._last)
+            compare(done, settings, *self._last, self.motions)
         self._last = (settings, done)
 
     def prepared(self, settings: Settings, error: Mapping[str, Any]) -> Settings:
@@ -190,18 +190,22 @@ def put(error: dict[str, Any], name: str, found: float) -> None:
     error[name] = found
 
 
-def compare(done: RunResult, settings: Settings, before: Settings, coarse: RunResult) -> None:
+def compare(
+    done: RunResult, settings: Settings, before: Settings, coarse: RunResult, motions: Sequence[Motion]
+) -> None:
     """Write the error of steps that two runs of one model show of the finer one, if other estimates are beside it.
 
     Steps of h_1 and h_2 < h_1 differ by e (1 − (h_2/h_1)^p) with e the error of the coarser one; p = 2 is on the safe
-    side for schemes of higher order, where the two are well apart: what neither resolves does not differ. With the
-    order of the scheme it is the least that the finer one is off, what a motion amplifies with it, as no spectrum has.
+    side for schemes of higher order, where the two are well apart. What neither resolves does not differ: it is added,
+    as spectra know it. With the order of the scheme it is the least that the finer one is off, what a motion amplifies
+    with it, as no spectrum has.
 
     Args:
         done: the finer run.
         settings: of it.
         before: those of the run before it.
         coarse: that run.
+        motions: that are known.
     """
     if settings.models != before.models or settings.step is None or before.step is None:
         return
@@ -212,7 +216,8 @@ def compare(done: RunResult, settings: Settings, before: Settings, coarse: RunRe
     if scale > 0.0:
         apart = float(np.linalg.norm(fine - rough, axis=1).max()) / scale
         error, ratio, scheme = done.summary["error"], before.step / settings.step, settings.scheme
-        less(error, apart / (ratio**2 - 1))
+        if scheme is not None:
+            less(error, apart / (ratio**2 - 1) + unresolved_ahead(motions, Scheme.registry[scheme], settings.step))
         if scheme is not None and scheme == before.scheme:
             put(error, "time", max(error["time"], apart / (ratio ** Scheme.registry[scheme].order - 1)))
 

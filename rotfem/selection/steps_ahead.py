@@ -32,12 +32,15 @@ Array = npt.NDArray[np.float64]
 #: The factor s for safety, with which true errors have been below the sum, and ωh from which a scheme damps.
 SAFE, DAMPED = 1.2, 4.0
 
+#: Angle (rad) from which a vibration is out of phase.
+OUT = 1.0
+
 #: Part of its amplitude that a vibration which is damped out counts with: all of it is missing from then on, and a
 #: little more in the step that damps it.
 LOST = 1.25
 
-#: Part of the lowest frequency below which a motion follows its loads, and how many times as far as that frequency it is
-#: off then: stiffnesses are off by twice as much, 2/(1 − FOLLOWING²).
+#: Part of the lowest frequency below which a motion follows its loads, and how many times as far as that frequency it
+#: is off then: stiffnesses are off by twice as much, 2/(1 − FOLLOWING²).
 FOLLOWING, FOLLOWED = 0.5, 8 / 3
 
 #: Power of the frequency by which a filter leaves out what is slow; a sharp one would see the end from the start.
@@ -99,12 +102,13 @@ class Spectrum:
         """Return the error by what steps of h (s) damp out, with all amplitudes together."""
         return LOST * float(self.amplitudes[self.omega * h >= DAMPED].sum())
 
-    def error(self, scheme: Any, h: float) -> float:
-        """Return e(h) of a scheme, relative."""
+    def error(self, scheme: Any, h: float, turned: float = 0.0) -> float:
+        """Return e(h) of a scheme, relative, of what its steps are off by so much (in rad at the end) at least."""
         coefficient, power, _ = scheme.estimate
         moves = self.omega * h < DAMPED
         each = SAFE * coefficient * (self.omega[moves] * h) ** power * self.duration / h
-        return float(self.amplitudes[moves] @ np.minimum(2.0, each)) + self.lost(h)
+        counts = each >= turned
+        return float(self.amplitudes[moves][counts] @ np.minimum(2.0, each[counts])) + self.lost(h)
 
     def error_of_mesh(self, off: Array, lowest: float) -> float:
         """Return the relative error that frequencies which are off by so much make.
@@ -176,20 +180,22 @@ class Motion:
         windows = np.array_split(np.arange(len(self.t)), WINDOWS)
         return [Spectrum.of(self.t[i], self.tips[i], self.scale, SHARP) for i in windows]
 
-    def error(self, scheme: Any, h: float, above: float = 0.0) -> float:
+    def error(self, scheme: Any, h: float, above: float = 0.0, turned: float = 0.0) -> float:
         """Return the relative error of steps of h (s): what they damp out counts where there is most of it.
 
         Args:
             scheme: of the steps.
             h: their length.
             above: frequency from which vibrations count, rad/s.
+            turned: angle (rad) that they must be off by at the end to count, if they are not damped out.
         """
         omega, amplitudes = np.array(self.struck).reshape(-1, 2).T
         struck = Spectrum(omega, amplitudes / self.scale, self.whole.duration).above(above)
         whole, parts = self.whole.above(above), [part.above(above) for part in self.parts]
         start = LOST * self.start(max(DAMPED / h, above)) / self.scale
         lost = max(start, struck.lost(h), *(part.lost(h) for part in parts)) - whole.lost(h)
-        return whole.error(scheme, h) + struck.error(scheme, h) - struck.lost(h) + max(0.0, lost)
+        moving = whole.error(scheme, h, turned) + struck.error(scheme, h, turned)
+        return moving - struck.lost(h) + max(0.0, lost)
 
     def start(self, omega: float) -> float:
         """Return the largest displacement (m) at the start of what is quicker than a frequency (rad/s).
@@ -250,6 +256,15 @@ def plan(motions: Sequence[Motion], allowed: float, schemes: Iterable[Any]) -> P
         return None
     each = [max((motion.plan(scheme, allowed) for motion in motions), key=lambda p: p.work) for scheme in schemes]
     return min(each, key=lambda found: found.work, default=None)
+
+
+def unresolved_ahead(motions: Sequence[Motion], scheme: Any, step: float) -> float:
+    """Return what fixed steps (s) of a scheme do not resolve of the most demanding motion, relative; 0 if none tells.
+
+    That is what they damp out, and vibrations that are out of phase by the end: shorter steps may do no better, so
+    that two runs do not show it.
+    """
+    return max((motion.error(scheme, step, turned=OUT) for motion in motions if motion.tells), default=0.0)
 
 
 def error_ahead(motions: Sequence[Motion], scheme: Any, step: float, above: float = 0.0) -> float | None:

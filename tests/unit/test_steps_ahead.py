@@ -7,7 +7,7 @@ import pytest
 
 from rotfem.analysis.esdirk import ESDIRK4
 from rotfem.selection.mesh_ahead import MeshAhead
-from rotfem.selection.steps_ahead import LOST, SAFE, Motion, error_ahead, plan
+from rotfem.selection.steps_ahead import LOST, SAFE, Motion, error_ahead, plan, unresolved_ahead
 
 
 def vibration(omega: float, amplitude: float = 1.0, end: float = 100.0) -> Motion:
@@ -38,6 +38,14 @@ def test_what_is_fast_and_damped_counts_with_its_amplitude() -> None:
     assert loose is not None
     assert tight is not None
     assert tight.step < 0.1 < 0.4 < loose.step
+
+
+def test_what_two_lengths_of_steps_leave_out_is_known_all_the_same() -> None:
+    """Steps of 0.3 and 0.6 s damp the vibration out alike; those of 0.04 s follow it, to 0.03 rad at the end."""
+    motion = vibration(20.0, 0.01)
+    assert unresolved_ahead([motion], ESDIRK4, 0.3) == pytest.approx(LOST * 0.01 / 1.01, rel=0.1)
+    assert unresolved_ahead([motion], ESDIRK4, 0.1) == pytest.approx(2 * 0.01 / 1.01, rel=0.1)
+    assert unresolved_ahead([motion], ESDIRK4, 0.02) < 1e-6
 
 
 def test_a_start_that_is_over_soon_counts() -> None:
