@@ -1,12 +1,14 @@
 """What an accuracy costs and gives: the true error of what it chose, and its time beside other ways to the same answer.
 
-    ./with-fenicsx python benchmarks/accuracy_answers.py [--cache FOLDER] [--grid] [--accuracy E …] [NAME …]
+    ./with-fenicsx python benchmarks/accuracy_answers.py [--cache FOLDER] [--grid] [--accuracy E …] [--long] [NAME …]
 
-The scenes are those of accuracy_scenes.py, without the theory that some of them name. Of every scene and accuracy it
+The scenes are those of accuracy_scenes.py, without the theory that some of them name, or with --long those of
+long_scenes.py. Of every scene and accuracy it
 prints the true error over the accuracy, and CPU seconds, those of choosing included: of the answer, of the scene's own
 setting with its error, and, with --grid, of the cheapest fixed settings that are as good as was asked: of all of a grid
 over theory, scheme, step and mesh, and of the exact theory by the scheme of default (where no step of the grid is short
-enough of that, what a shorter one is expected to take by its order). Forms are compiled before.
+enough of that, what a shorter one is expected to take by its order). Of long scenes the grid has the exact theory by
+the scheme of default only. Forms are compiled before.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from accuracy_scenes import SCENES, Tables, Truth, finer, tips
+from long_scenes import SCENES as LONG_SCENES
 from scipy.interpolate import CubicSpline
 
 import rotfem
@@ -33,12 +36,15 @@ ACCURACIES = (1e-2, 1e-3, 1e-4)
 #: Steps, elements along every edge and further degree of the truth, of beams and of plates, and of what says how good
 #: that is.
 TRUTHS = {False: ((32, 2, 1), (16, 2, 0)), True: ((2, 2, 1), (2, 2, 0))}
+LONG_TRUTHS = {False: ((4, 2, 0), (2, 2, 0)), True: ((2, 1, 0), (1, 1, 0))}
 
 #: How many times more steps truths have of scenes whose motion is quicker than their own steps are, or slower;
 #: increments of Newton's method in truths, whose errors add up over many steps, and fewest elements of a beam there.
 QUICK = dict.fromkeys(("moment pulse", "resonance once a turn", "torque reversed in each step", "spin-down"), 4.0) | {
     "step load, adaptive": 8.0,
     "gusts on a long blade": 0.125,
+    "plate of 6125 unknowns, pulse at the tip": 4.0,
+    "plate of 6125 unknowns, under pressure": 2.0,
 }
 INCREMENT, ELEMENTS = 1e-12, 16
 
@@ -73,14 +79,15 @@ class Judge:
         tables: the scene, without its theory.
         truth: where truths are kept.
         quick: how many times more steps they take than those of others.
+        truths: steps, elements and further degree (see TRUTHS).
 
     Attributes:
         unsure: how far the truth is off, relative, by another one that is less fine.
     """
 
-    def __init__(self, tables: Tables, truth: Truth, quick: float = 1.0):
+    def __init__(self, tables: Tables, truth: Truth, quick: float = 1.0, truths: Any = TRUTHS):
         self.tables = tables
-        (steps, *best), (fewer, *other) = TRUTHS[tables["structure"]["type"] == "plate"]
+        (steps, *best), (fewer, *other) = truths[tables["structure"]["type"] == "plate"]
         self.t, self.tip = truth(finest(tables, quick * steps, *best))
         self.unsure = self.error(*truth(finest(tables, quick * fewer, *other)))
 
@@ -133,13 +140,21 @@ def grid(tables: Tables) -> list[list[Tables]]:
     return out
 
 
-def tried_out(judge: Judge, tables: Tables, least: float) -> list[tuple[Tables, Answer]]:
+def tried_out(judge: Judge, tables: Tables, least: float, full: bool = False) -> list[tuple[Tables, Answer]]:
     """Return the settings of a grid that were tried, with their answers.
 
     A row ends where it is good enough for the least accuracy, or where half the step has not made it better.
+
+    Args:
+        judge: of the scene.
+        tables: the scene.
+        least: accuracy.
+        full: whether those of the full model only are tried.
     """
     out = []
     for row in grid(tables):
+        if full and not is_full(row[0]):
+            continue
         before = np.inf
         for setting in row:
             answer = judge(setting)
@@ -170,18 +185,21 @@ def main() -> None:
     parser.add_argument("--cache", type=Path, default=Path(tempfile.gettempdir()) / "rotfem-accuracy")
     parser.add_argument("--accuracy", type=float, nargs="*", default=list(ACCURACIES))
     parser.add_argument("--grid", action="store_true")
-    parser.add_argument("names", nargs="*", default=list(SCENES), metavar="NAME")
+    parser.add_argument("--long", action="store_true")
+    parser.add_argument("names", nargs="*", metavar="NAME")
     arguments = parser.parse_args()
     truth, ratios, own, best, faster = Truth(arguments.cache), [], [], [], []
-    for name in arguments.names:
-        tables = {key: value for key, value in SCENES[name].items() if key != "model"}
-        judge = Judge(tables, truth, QUICK.get(name, 1.0))
+    scenes, truths = (LONG_SCENES, LONG_TRUTHS) if arguments.long else (SCENES, TRUTHS)
+    for name in arguments.names or scenes:
+        tables = {key: value for key, value in scenes[name].items() if key != "model"}
+        judge = Judge(tables, truth, QUICK.get(name, 1.0), truths)
         for compiled in (tables, {**tables, "accuracy": max(arguments.accuracy)}):
             judge(compiled)
         default = judge(tables)
         print(f"{name}: its own setting {default.error:.1e} in {default.seconds:.2f} s", end="")
         print(f" (truth known to {judge.unsure:.0e})", flush=True)
-        tried = tried_out(judge, tables, max(LEAST, min(arguments.accuracy))) if arguments.grid else []
+        least = max(LEAST, min(arguments.accuracy))
+        tried = tried_out(judge, tables, least, arguments.long) if arguments.grid else []
         for accuracy in arguments.accuracy:
             answer = judge({**tables, "accuracy": accuracy})
             line = f"    {accuracy:.0e}: true/asked {answer.error / accuracy:8.2e} in {answer.seconds:6.2f} s"

@@ -9,8 +9,9 @@ would throw the quintic far off: it gives way to the cubic's, and where it is be
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
-from scipy.interpolate import BPoly
 
 from rotfem.analysis.schemes import Array, State, Watch
 
@@ -73,16 +74,45 @@ def between(old: State, new: State, times: list[float], order: int) -> list[Stat
     """
     if not times:
         return []
-    known = [[s.q, s.v] for s in (old, new)] if order <= LOW else resolved(old, new)
-    q = BPoly.from_derivatives([old.t, new.t], known)
-    v, a = q.derivative(1), q.derivative(2)
+    h, known = new.t - old.t, [[s.q, s.v] for s in (old, new)] if order <= LOW else resolved(old, new)
+    shares = (np.array(times, dtype=np.float64) - old.t) / np.float64(h)
+    data = np.array([h**k * x for end in known for k, x in enumerate(end)])
+    moved = [values @ data / h**k for k, values in enumerate(hermite(shares, len(known[0])))]
     out = []
-    for t in times:
-        share, given = (t - old.t) / (new.t - old.t), None
+    for t, share, q, v, a in zip(times, shares, *moved, strict=True):
+        given = None
         if old.given is not None and new.given is not None:
             given = np.asarray(old.given + share * (new.given - old.given))
-        out.append(new.changed(t=t, q=q(t), v=v(t), a=a(t), memory=None, given=given))
+        out.append(new.changed(t=t, q=q, v=v, a=a, memory=None, given=given))
     return out
+
+
+def hermite(shares: Array, known: int) -> list[Array]:
+    """Return values and two derivatives of the polynomials that are 1 in one datum of two ends and 0 in the others.
+
+    Args:
+        shares: where, from 0 to 1, (n,).
+        known: data of an end: value, first derivative, ….
+
+    Returns:
+        Three arrays (n, 2 known), the columns those of the first end, then those of the second.
+    """
+    return [monomials(shares, 2 * known, k) @ _coefficients(known) for k in range(3)]
+
+
+@cache
+def _coefficients(known: int) -> Array:
+    """Return the coefficients of these polynomials, by power and datum."""
+    ends = np.array([0.0, 1.0])
+    at = np.stack([monomials(ends, 2 * known, k) for k in range(known)], axis=1)
+    return np.asarray(np.linalg.inv(at.reshape(2 * known, 2 * known)), dtype=np.float64)
+
+
+def monomials(x: Array, number: int, k: int) -> Array:
+    """Return the k-th derivatives of 1, x, x² …, so many of them, (n, number)."""
+    powers = np.arange(number)
+    falling = np.prod([powers - i for i in range(k)], axis=0)
+    return np.asarray(x[:, None] ** np.maximum(powers - k, 0) * falling)
 
 
 def resolved(old: State, new: State) -> list[list[Array]]:

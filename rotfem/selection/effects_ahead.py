@@ -15,7 +15,7 @@ from rotfem.analysis.reduced.response import Response
 from rotfem.errors import ComputationError
 
 #: Steps of the reduced model, once for every effect, that may be spent on it.
-MOST = 10_000
+MOST = 3_000
 
 #: Error of a reduced model from which it does not say what effects are worth.
 POOR = 0.5

@@ -88,11 +88,13 @@ class FreeSolution(Solution):
         super().__init__(drive, times)
         self.constant = False
         self.moment: HubMoment | None = None
+        #: The trajectory of last time, from which the next one starts: by coarser steps, or by other effects.
+        self._known: Steps | None = None
 
     def again(self) -> FreeSolution:
         """Return a solution by the same steps, for equations some of whose effects are switched off or on."""
         other = free_solution(self.drive.bordered, self.times)
-        other.parts, other._steps = self.parts, self._steps
+        other.parts, other._steps, other._known = self.parts, self._steps, self._known
         return other
 
     def solve(self, model: ReducedModel, q: Array, v: Array) -> Trajectory:
@@ -104,6 +106,8 @@ class FreeSolution(Solution):
         if self.moment is None or self.moment.size != model.size:
             self.moment = HubMoment(model, self.drive.bordered.row)
         ends = self.ends(model)
+        if self._known is not None and self._known.q.shape[1] != model.size + 1:
+            self._known = None
         y, dy = np.append(q, 0.0), np.append(v, self.drive.hub.speed)
         parts: list[Steps] = []
         first, width = 0, WINDOW
@@ -123,7 +127,7 @@ class FreeSolution(Solution):
             np.vstack([parts[0].v[:1], *(p.v[1:] for p in parts)]),
             np.concatenate([p.a for p in parts]),
         )
-        self.drive.steps = steps
+        self.drive.steps = self._known = steps
 
         def at(t: Array) -> tuple[Array, Array]:
             x, rates = steps.at(t)
@@ -133,10 +137,7 @@ class FreeSolution(Solution):
 
     def _window(self, model: ReducedModel, ends: Array, y: Array, dy: Array) -> Steps | None:
         """Return the solution over some steps; None where Newton's method does not find it."""
-        elapsed = ends[:-1, None] + np.diff(ends)[:, None] * NODES - ends[0]
-        q: Array = y + elapsed[..., None] * np.append(0 * dy[:-1], dy[-1])
-        v: Array = np.broadcast_to(np.append(0 * dy[:-1], dy[-1]), q.shape)
-        a = np.zeros_like(q)
+        q, v, a = self._expected(ends, y, dy)
         before = np.inf
         for _ in range(ITERATIONS):
             state = (q.reshape(-1, len(y)), v.reshape(-1, len(y)), a.reshape(-1, len(y)))
@@ -147,10 +148,26 @@ class FreeSolution(Solution):
             change = float(np.abs(new[1][..., -1] - v[..., -1]).max())
             size = float(np.abs(new[1][..., -1]).max())
             q, v, a = new
-            if change <= CLOSE * size or (change <= 1e-7 * size and change >= 0.5 * before):
+            following = change * (change / before) ** 2 if before < np.inf else change  # by a quadratic law
+            if min(change, following) <= CLOSE * size or (change <= 1e-7 * size and change >= 0.5 * before):
                 return steps
             before = change
         return None
+
+    def _expected(self, ends: Array, y: Array, dy: Array) -> tuple[Array, Array, Array]:
+        """Return coordinates and angle, rates and accelerations at the nodes of steps, (n, nodes, m + 1) each.
+
+        They are those of the trajectory of last time; without one the hub goes on at its speed, the structure at rest.
+        """
+        if self._known is not None:
+            t = self.drive.within(ends[:-1], ends[1:], NODES)
+            found = (*self._known.at(t.ravel()), self._known.rates_of(t.ravel()))
+            q, v, a = (x.reshape(*t.shape, len(y)) for x in found)
+            return q, v, a
+        elapsed = ends[:-1, None] + np.diff(ends)[:, None] * NODES - ends[0]
+        turns = np.append(0 * dy[:-1], dy[-1])
+        q = y + elapsed[..., None] * turns
+        return q, np.broadcast_to(turns, q.shape), np.zeros_like(q)
 
     def linearised(
         self, model: ReducedModel, state: tuple[Array, Array, Array], t: Array
