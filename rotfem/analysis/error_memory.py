@@ -32,6 +32,7 @@ def kept(watch: ErrorWatch, state: State) -> Tree:
         watch: of a march.
         state: that the march has reached.
     """
+    watch.catch_up(state)
     nodes = _nodes(watch)
     reached = watch._reached
     goes_on = reached is not None and reached.q is state.q and reached.a is state.a

@@ -26,7 +26,8 @@ from rotfem.errors import ComputationError
 
 Array = npt.NDArray[np.float64]
 
-#: Windows of a history, fewest steps in one by unknowns, and most bytes of states that are kept.
+#: Windows of a history, fewest steps in one by unknowns, and bytes of states up to which one goes on, and with which
+#: those before are looked at while the march is under way.
 WINDOWS, FEWEST, LARGE, MEMORY = 8, (40, 100), 2000, 64_000_000
 
 
@@ -65,8 +66,10 @@ class ErrorWatch:
         self._mesh = MeshErrors.of(self.system)
         self._fewest = FEWEST[system.A.getSize()[0] > LARGE]
         self._now = Samples([], [], [])
+        #: Windows that have ended, to be looked at together: a march that is left alone is quicker.
+        self._ended: list[Samples] = []
         self._windows: list[Window] = []
-        self._bytes = self._closed = 0
+        self._bytes = self._waiting = self._closed = 0
         self._landed = False
         #: The state that the last step has led to, as the march has it.
         self._reached: State | None = None
@@ -88,7 +91,9 @@ class ErrorWatch:
         self._bytes += 3 * new.q.nbytes
         due = new.t >= (self._closed + 1) * self.end / WINDOWS and len(now.steps) >= self._fewest
         if due or self._bytes > MEMORY:
-            self._close(new)
+            self._close(new.t)
+            if self._waiting > MEMORY:
+                self.catch_up(new)
 
     def _seen(self, state: State) -> tuple[float, Array, Array, Array, Any]:
         """Return t, q, v, a of a state in the frame that turns, and what rotations are counted from."""
@@ -102,7 +107,8 @@ class ErrorWatch:
     def errors(self, last: Any) -> TipErrors:
         """Return the errors so far, the last state given."""
         if self._now.steps:
-            self._close(last)
+            self._close(last.t)
+        self.catch_up(last)
         size, state = self._farthest
         if state is None:
             state = last if self._view is None else self._view.state(last)
@@ -127,24 +133,37 @@ class ErrorWatch:
             return fine / size
         return self._mesh.shape.of_shape(state.q[: len(self.system.held.zeros())], state.datum)
 
-    def _close(self, last: Any) -> None:
-        """End a window with the last state."""
-        now = self._now
-        sizes = self._tip_sizes([state[1] for state in now.states])
+    def _close(self, t: float) -> None:
+        """End a window at a time (s)."""
+        self._ended.append(self._now)
+        self._waiting += self._bytes
+        self._closed = int(t / self.end * WINDOWS + 1e-9)
+        self._now, self._bytes = Samples([], [], []), 0
+
+    def catch_up(self, last: Any) -> None:
+        """Look at the windows that have ended, the last state given."""
+        if not self._ended:
+            return
+        for samples in self._ended:
+            self._look_at(samples)
+        self._ended, self._waiting = [], 0
+        self.system.count_rotations_from(last.datum)
+        self.system.set_time(last.t)
+
+    def _look_at(self, samples: Samples) -> None:
+        """Look at a window."""
+        sizes = self._tip_sizes([state[1] for state in samples.states])
         i = int(np.argmax(sizes))
         if sizes[i] > self._farthest[0]:
-            self._farthest = (float(sizes[i]), now.state(i))
-        if self._sound:
-            before = self._windows[-1] if self._windows else None
-            try:
-                with np.errstate(all="ignore"):
-                    self._windows.append(Window(self.system, self._mesh, now, self.end, before))
-            except (ComputationError, np.linalg.LinAlgError):
-                self._sound = False
-            self.system.count_rotations_from(last.datum)
-            self.system.set_time(last.t)
-        self._closed = int(last.t / self.end * WINDOWS + 1e-9)
-        self._now, self._bytes = Samples([], [], []), 0
+            self._farthest = (float(sizes[i]), samples.state(i))
+        if not self._sound:
+            return
+        before = self._windows[-1] if self._windows else None
+        try:
+            with np.errstate(all="ignore"):
+                self._windows.append(Window(self.system, self._mesh, samples, self.end, before))
+        except (ComputationError, np.linalg.LinAlgError):
+            self._sound = False
 
     def _tip_sizes(self, shapes: list[Array]) -> Array:
         """Return the displacement of the tip in shapes (local dof arrays), m."""
