@@ -25,7 +25,7 @@ PERIODS, SLOW = 2.0, 0.7
 #: Part of a turn in a history by which the angle of a free hub is held, so that no eigenvalue is double.
 HELD = 0.01
 
-#: Factor of the squares of the LOWEST frequencies up to which the errors that the mesh makes of them are kept.
+#: Factor of the squares of the LOWEST frequencies up to which a linear theory keeps the space of the shapes.
 LIKE, LOWEST = 9.0, 3
 
 #: Relative error of frequencies in theories of moderate rotations, in squares of the largest rotation: 0.13 to 0.32 in
@@ -149,7 +149,7 @@ class Window:
         """Find shapes and matrices."""
         middle = self.samples.state(self.samples.middle[0]).q[: len(system.held.zeros())]
         along = mesh.shape.directions(middle)
-        self.shapes, tangents = self._tangents(system, mesh, along)
+        self.shapes, tangents = self._tangents(system, mesh, along, before)
         self.speed = tangents.speed
         M, C, K = tangents.reduced(self.shapes)
         if self.free:
@@ -157,20 +157,13 @@ class Window:
         self.C, self.K = (np.asarray(np.linalg.solve(M, A), dtype=float) for A in (C, K))
         self.bends = mesh.shape.bend(self.shapes, along)
         self.epsilon = self._errors_by_mesh(mesh, before)
-        self.shapes.release()
         if before is not None:
             self.turn = self._turned(before.shapes)
 
     def _errors_by_mesh(self, mesh: MeshErrors, before: Window | None) -> Array:
-        """Return the relative errors of the frequencies: those of the window before where they are much the same.
-
-        Of a nonlinear theory they are those at rest, once and for all.
-        """
-        mine = self.shapes.squares
-        if before is not None and len(before.epsilon) == len(mine):
-            ratio = np.abs(mine[:LOWEST]) / np.maximum(np.abs(before.shapes.squares[:LOWEST]), TINY)
-            if mesh.force is not None or np.all((ratio <= LIKE) & (ratio >= 1.0 / LIKE)):
-                return before.epsilon
+        """Return the relative errors of the frequencies, those at rest, once and for all."""
+        if before is not None and len(before.epsilon) == len(self.shapes.squares):
+            return before.epsilon
         found = mesh.refined.of_frequencies(self.shapes, np.pi / float(np.median(self.lengths)))
         return mesh.shape.of_modes(self.shapes) if found is None else found
 
@@ -226,14 +219,16 @@ class Window:
 
     # --- the tangent -------------------------------------------------------------------------------------------------
 
-    def _tangents(self, system: Any, mesh: MeshErrors, along: Array) -> tuple[RitzVectors, Tangents]:
+    def _tangents(
+        self, system: Any, mesh: MeshErrors, along: Array, before: Window | None
+    ) -> tuple[RitzVectors, Tangents]:
         """Return shapes and matrices in the middle of the window, where the structure has directions `along`."""
         number, h = self.samples.middle
         state = self.samples.state(number)
         tangents = Tangents(system, state)
-        shapes = tangents.shapes()
         if system.held.linear:
-            return shapes, tangents
+            return self._shapes_of_before(tangents, before) or tangents.shapes(), tangents
+        shapes = tangents.shapes()
         bends = mesh.shape.bend(shapes, along)
         quick = self._vibrating(shapes, bends, number, h)
         if not np.any(quick):
@@ -242,6 +237,15 @@ class Window:
         tangents = Tangents(system, state.changed(q=q, v=v, a=a))
         shapes.turn_to(tangents.matrices["M"], tangents.matrices["K"])
         return shapes, tangents
+
+    @staticmethod
+    def _shapes_of_before(tangents: Tangents, before: Window | None) -> RitzVectors | None:
+        """Return those of the window before, combined anew, where frequencies are much like those they were made at."""
+        if before is None or not before.shapes.squares.size:
+            return None
+        shapes = before.shapes.turned_to(tangents.matrices["M"], tangents.matrices["K"], tangents.speed**2)
+        ratio = np.abs(shapes.squares[:LOWEST]) / np.maximum(np.abs(shapes.made[:LOWEST]), TINY)
+        return shapes if np.all((ratio <= LIKE) & (ratio >= 1.0 / LIKE)) else None
 
     def _vibrating(self, shapes: RitzVectors, bends: Any, number: int, h: float) -> Array:
         """Return q, v and a (owned) of quick vibrations in the state of a number, with steps of h (s) around it.

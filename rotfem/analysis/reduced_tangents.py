@@ -57,17 +57,12 @@ class Tangents:
         return RitzVectors(self.system.held, self.matrices["M"], self.matrices["K"], self.speed**2)
 
     def reduced(self, shapes: RitzVectors) -> tuple[Array, Array, Array]:
-        """Return M, C, K in shapes, (r, r) each; of a free hub (r + 1, r + 1)."""
-        out = []
-        for name, A in self.matrices.items():
-            product = np.stack([shapes.times(A, x) for x in shapes.V.T], axis=1)
-            small = shapes.sum(shapes.V.T @ product)
-            if name == "C" and self.by_mode is not None:
-                along = self.by_mode.along(shapes.V)
-                small = small + along.T @ along
-            if name in self.borders:
-                border = self.borders[name]
-                row, column = shapes.sum(np.array([border.row @ shapes.V, border.column @ shapes.V]))
-                small = np.block([[small, column[:, None]], [row[None, :], np.array([[border.corner]])]])
-            out.append(small)
-        return out[0], out[1], out[2]
+        """Return M, C, K in shapes that were made or turned by M and K, (r, r) each; of a free hub (r + 1, r + 1)."""
+        parts = {"M": np.eye(len(shapes.squares)), "C": shapes.product(self.matrices["C"]), "K": shapes.stiffness}
+        if self.by_mode is not None:
+            along = self.by_mode.along(shapes.V)
+            parts["C"] = parts["C"] + along.T @ along
+        for name, border in self.borders.items():
+            row, column = shapes.sum(np.array([border.row @ shapes.V, border.column @ shapes.V]))
+            parts[name] = np.block([[parts[name], column[:, None]], [row[None, :], np.array([[border.corner]])]])
+        return parts["M"], parts["C"], parts["K"]

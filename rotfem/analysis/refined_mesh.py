@@ -4,9 +4,10 @@
 that balance them, by Newton's method with velocities and accelerations as they are, are the error of the coarser mesh.
 
 *Frequencies.* Shapes X of the coarse mesh become Y = (K + sM)⁻¹ M X on either mesh, by which what the cells cannot
-follow is out of them, and the frequencies of the two meshes in Y are compared one by one: of a nonlinear theory those
-of the undeformed structure at rest. About a state that moves they say less: a tangent is off by stress in the points of
-integration, and the path of the motion is not. What motions bend sharply is for `rotfem.analysis.mesh_force`.
+follow is out of them, and the frequencies of the two meshes in Y are compared one by one: those of the undeformed
+structure at rest, with s = 0 where K is regular. About a state that moves they say less: a tangent is off by stress in
+the points of integration, and the path of the motion is not. What motions bend sharply is for
+`rotfem.analysis.mesh_force`.
 
 Both leave out the error of the finer mesh, a small part: (½)^{2k} of it in smooth shapes.
 """
@@ -19,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 from dolfinx import fem
+from petsc4py import PETSc
 
 from rotfem.analysis.ritz_vectors import RitzVectors
 from rotfem.analysis.schemes import State
@@ -34,6 +36,9 @@ CORRECTIONS, SMALL, ENOUGH = 15, 0.02, 2
 
 #: Number of the lowest shapes whose frequencies are always compared.
 LOWEST = 3
+
+#: Part of the square of a frequency that is left at rest below which it is that of a rigid turn about a hinge.
+RIGID = 1e-3
 
 #: Most unknowns of the refined mesh.
 MOST = 40_000
@@ -96,9 +101,7 @@ class RefinedMesh:
         return None
 
     def of_frequencies(self, shapes: RitzVectors, most: float = np.inf) -> Array | None:
-        """Return (ω − ω_fine)/ω of shapes, shape (r,), at the time that is set in the system if its theory is linear.
-
-        None where it cannot be found.
+        """Return (ω − ω_fine)/ω of shapes at rest, shape (r,); None where it cannot be found.
 
         Args:
             shapes: of the system's own mesh.
@@ -108,25 +111,25 @@ class RefinedMesh:
             return None
         inner = self.system.held
         try:
-            if not inner.linear:
-                self.system.count_rotations_from(None)
-                inner.set_time(0.0, inner.motion.at_speed(0.0), 0.0)
-                inner.set_state(inner.zeros())
-            fine.take()
-            M, K = inner.matrix(0.0, 0.0, 1.0, 0.0), inner.matrix(1.0, 0.0, 0.0, 1.0)
-            number = max(LOWEST, int(np.sum(shapes.squares <= most**2)))
-            V = shapes.V[:, :number]
-            # A linear theory has the tangent of the shapes, whose factor is there.
-            solver = shapes.solver if inner.linear else DirectSolver(_shifted(K, shapes.shift, M))
+            self.system.count_rotations_from(None)
+            inner.set_time(0.0, inner.motion.at_speed(0.0), 0.0)
+            inner.set_state(inner.zeros())
+            fine.take(stressed=False)
+            V = shapes.V[:, : max(LOWEST, int(np.sum(shapes.squares <= most**2)))]
+            K, M = inner.matrix(1.0, 0.0, 0.0, 1.0), inner.matrix(0.0, 0.0, 1.0, 0.0)
+            regular = inner.linear and inner.only_strains  # and solvers of it are there
+            solver = inner.material_solver if regular else DirectSolver(_shifted(K, shapes.shift, M))
             here = shapes.sum(_energies((M, K, inner.clamped), solver, V))
-            M, K = fine.matrix("M"), fine.matrix("K")
+            K, M = fine.at_rest(), fine.matrix("M")
             X = fine.carried(_local(inner, V))
-            there = _energies((M, K, fine.clamped), fine.solver(_shifted(K, shapes.shift, M)), X)
+            solver = fine.material[1] if regular else fine.solver(_shifted(K, shapes.shift, M))
+            there = _energies((M, K, fine.clamped), solver, X)
             here, there = (scipy.linalg.eigh(*energies, eigvals_only=True) for energies in (here, there))
         except (ComputationError, NotRefined, np.linalg.LinAlgError):
             return None
         out = np.zeros(shapes.V.shape[1])
-        errors = 0.5 * (here - there) / np.maximum(np.abs(here), np.finfo(float).tiny)
+        least = RIGID * np.abs(shapes.squares[: len(here)]) + np.finfo(float).tiny
+        errors = 0.5 * (here - there) / np.maximum(np.abs(here), least)
         out[: len(errors)] = np.clip(errors, -1.0, 1.0)
         return out if np.all(np.isfinite(errors)) else None
 
@@ -145,7 +148,7 @@ def _local(system: Any, owned: Array) -> Array:
 def _shifted(K: Any, shift: float, M: Any) -> Any:
     """Return K + shift M, a new matrix."""
     A = K.copy()
-    A.axpy(shift, M)
+    A.axpy(shift, M, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
     return A
 
 

@@ -7,6 +7,7 @@ vectors: Wilson, Yuan & Dickens 1982).
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -38,58 +39,101 @@ class RitzVectors:
         V: shape (n, r).
         massed: M V.
         squares: diagonal of Vᵀ K V, 1/s², increasing.
+        stiffness: Vᵀ K V, (r, r), of which only the symmetric part is diagonal.
         tip: displacement of the tip of each column, shape (d, r), on every rank.
         shift: as it was given.
-        solver: of K + shift M, until it is released.
+        made: squares of the columns as they were made.
         block: number of unknowns of a node.
     """
 
     def __init__(self, system: Any, M: Any, K: Any, shift: float):
         self.comm: Any = system.comm
-        self.block = int(system.V.dofmap.index_map_bs)
+        self.block, self.shift = int(system.V.dofmap.index_map_bs), shift
         self._x, self._y = M.createVecs()
         A = K.copy()
         A.axpy(shift, M, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        self.shift, self._M = shift, M
-        self.solver, self._clamped = DirectSolver(A), system.clamped
-        moves = [i for i, name in enumerate(system.structure.unknowns) if name.startswith("u")]
-        columns: list[Array] = []
-        massed: list[Array] = []
-        for i in moves:
-            x, depth = self._solved(self._force(system, i)), ALONG if i == 0 else ACROSS
-            for _ in range(depth):
-                if (new := self._new(x, columns, massed)) is None:
-                    break
-                columns.append(new[0])
-                massed.append(new[1])
-                x = self._solved(new[1])
-        V = np.array(columns).T
-        KV = np.stack([self.times(K, x) for x in columns], axis=1)
-        self.squares, turn = np.linalg.eigh(_symmetric(self.sum(V.T @ KV)))
-        self.V, self.massed = V @ turn, np.array(massed).T @ turn
-        values = [system.structure.tip_values(_local(system, x)) for x in self.V.T]
-        self.tip = np.array(values).T[moves]
+        self.V: Array = self._spanned(system, M, DirectSolver(A))
+        self.tip: Array = self._at_tip(system)
+        self.massed: Array
+        self.stiffness: Array
+        self.squares: Array
+        self._turn_by(K, self._all_times(M))
+        self.made = self.squares
 
     def turn_to(self, M: Any, K: Any) -> None:
         """Combine the columns so that those of another M and K near by are diagonal."""
-        MV, KV = (np.stack([self.times(A, x) for x in self.V.T], axis=1) for A in (M, K))
-        stiffness, mass = (_symmetric(self.sum(self.V.T @ AV)) for AV in (KV, MV))
-        self.squares, turn = scipy.linalg.eigh(stiffness, mass)
-        self.V, self.massed, self.tip = self.V @ turn, MV @ turn, self.tip @ turn
+        self._turn_by(K, self._all_times(M))
+
+    def turned_to(self, M: Any, K: Any, shift: float) -> RitzVectors:
+        """Return combinations of the columns with which another M and K near by are diagonal."""
+        out = copy(self)
+        out.shift, (out._x, out._y) = shift, M.createVecs()
+        out.turn_to(M, K)
+        return out
 
     def sum(self, local: Array) -> Array:
         """Return the sum over all ranks."""
         return local if self.comm.size == 1 else np.asarray(self.comm.allreduce(local))
-
-    def release(self) -> None:
-        """Let go of the factor and the matrix, which nothing asks for any more."""
-        del self.solver, self._M
 
     def times(self, A: Any, x: Array) -> Array:
         """Return A x of owned unknowns."""
         self._x.array[:] = x
         A.mult(self._x, self._y)
         return np.array(self._y.array)
+
+    def product(self, A: Any) -> Array:
+        """Return Vᵀ A V, shape (r, r)."""
+        return self.sum(self.V.T @ self._all_times(A))
+
+    def _all_times(self, A: Any) -> Array:
+        """Return A V."""
+        x, y, out = self._x.array, self._y.array, np.empty_like(self.V)
+        for i, column in enumerate(self.V.T):
+            x[:] = column
+            A.mult(self._x, self._y)
+            out[:, i] = y
+        return out
+
+    def _turn_by(self, K: Any, massed: Array) -> None:
+        """Combine the columns, of which M V is given, so that M and K are diagonal."""
+        stiffness, mass = self.sum(np.array([self.V.T @ self._all_times(K), self.V.T @ massed]))
+        self.squares, turn = scipy.linalg.eigh(_symmetric(stiffness), _symmetric(mass))
+        self.stiffness = turn.T @ stiffness @ turn
+        self.V, self.massed, self.tip = self.V @ turn, massed @ turn, self.tip @ turn
+
+    def _spanned(self, system: Any, M: Any, solver: DirectSolver) -> Array:
+        """Return the columns before they are combined."""
+        moves = [i for i, name in enumerate(system.structure.unknowns) if name.startswith("u")]
+        V, massed = np.empty((2, ALONG + ACROSS * len(moves), self._x.getLocalSize()))
+        r = 0
+        for i in moves:
+            b = self._force(system, i)
+            for _ in range(ALONG if i == 0 else ACROSS):
+                x = self._solved(solver, b, system.clamped)
+                Mx = self.times(M, x)
+                size = float(self.sum(np.array(x @ Mx)))
+                if not size > 0.0:
+                    break
+                for _ in range(2):
+                    x -= self.sum(massed[:r] @ x) @ V[:r]
+                Mx = self.times(M, x)
+                left = float(self.sum(np.array(x @ Mx)))
+                if not left > DEPENDENT**2 * size:  # nothing is left of it without the others
+                    break
+                V[r], massed[r] = x / np.sqrt(left), Mx / np.sqrt(left)
+                b, r = massed[r], r + 1
+        return np.ascontiguousarray(V[:r].T)
+
+    def _at_tip(self, system: Any) -> Array:
+        """Return the displacement of the tip of every column, (d, r)."""
+        values, names = system.structure.tip_values, system.structure.unknowns
+        dofs = [values.dofs.start + i for i, name in enumerate(names) if name.startswith("u")]
+        out: Array = np.zeros((len(dofs), self.V.shape[1]))
+        if self.comm.rank == values.owner:
+            out[:] = self.V[dofs]
+        if self.comm.size > 1:
+            self.comm.Bcast(out, root=values.owner)
+        return out
 
     def _force(self, system: Any, component: int) -> Array:
         """Return a unit force at the tip, owned unknowns."""
@@ -98,35 +142,12 @@ class RitzVectors:
             out[values.dofs.start + component] = 1.0
         return out
 
-    def _solved(self, b: Array) -> Array:
+    def _solved(self, solver: DirectSolver, b: Array, clamped: Any) -> Array:
         self._x.array[:] = b
-        self._x.array[self._clamped] = 0.0
-        self.solver.solve(self._x, self._y)
+        self._x.array[clamped] = 0.0
+        solver.solve(self._x, self._y)
         return np.array(self._y.array)
-
-    def _new(self, x: Array, columns: list[Array], massed: list[Array]) -> tuple[Array, Array] | None:
-        """Return x (and M x) of unit mass, without what is in the columns; None if nothing is left."""
-        Mx = self.times(self._M, x)
-        size = float(self.sum(np.array(x @ Mx)))
-        if not size > 0.0:
-            return None
-        for _ in range(2):
-            if columns:
-                shares = self.sum(np.array(massed) @ x)
-                x = x - shares @ np.array(columns)
-        Mx = self.times(self._M, x)
-        left = float(self.sum(np.array(x @ Mx)))
-        if not left > DEPENDENT**2 * size:
-            return None
-        return x / np.sqrt(left), Mx / np.sqrt(left)
 
 
 def _symmetric(A: Array) -> Array:
     return 0.5 * (A + A.T)
-
-
-def _local(system: Any, owned: Array) -> Array:
-    """Return owned unknowns with room for those of other ranks."""
-    out: Array = system.zeros()
-    out[: len(owned)] = owned
-    return out

@@ -63,7 +63,7 @@ class AffineSystem(AffineEnergies):
         self._coefficients: Array | None = None
         self._shift: tuple[float, float, float] | None = None
         self._changed = True
-        self._at_rest: tuple[DirectSolver, Increment] | None = None
+        self._increment: Increment | None = None
         self.settled = False
         return pattern.duplicate()
 
@@ -112,10 +112,9 @@ class AffineSystem(AffineEnergies):
 
     def displaced(self) -> Array:
         """Return the displacement (local dof array) of the structure at rest under the loads at the time set."""
-        if self._at_rest is None:
-            self._at_rest = DirectSolver(self.material, symmetric=True), Increment(self.V)
-        solver, x = self._at_rest
-        return -x.solve(solver, self._load)
+        if self._increment is None:
+            self._increment = Increment(self.V)
+        return -self._increment.solve(self.material_solver, self._load)
 
     def scale_prestress(self, factor: float) -> None:
         """Multiply the geometric stiffness by a factor, until effects are switched."""
@@ -126,6 +125,17 @@ class AffineSystem(AffineEnergies):
     def material(self) -> Any:
         """Stiffness of the strains alone, clamped rows 1."""
         return self._decomposed.material
+
+    @cached_property
+    def material_solver(self) -> DirectSolver:
+        """Solver of the `material`."""
+        return DirectSolver(self.material, symmetric=True)
+
+    @property
+    def only_strains(self) -> bool:
+        """Whether the stiffness at rest is that of the strains alone, and regular."""
+        at_rest = [p for p in self.pieces if p.kind == "K" and not p.key and PRESTRESS not in p.of]
+        return not self.structure.hinges and all("internal" in p.of for p in at_rest)
 
     def geometric(self, u: Any, w: Any, base: Any, theory: Theory | None = None) -> Any:
         """Return ∫ N⁰ D²Γ₁[u, w], a UFL form (see `Pieces.geometric`)."""

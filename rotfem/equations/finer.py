@@ -49,9 +49,10 @@ class FinerEquations:
         self.q, self.v, self.a = (fem.Function(self.V) for _ in range(3))
         self._functions: dict[Any, fem.Function] = {system.q: self.q, system.v: self.v, system.a: self.a}
         self._forms: dict[str, Any] = {}
-        #: Of a linear theory: matrices at the time that was taken, and the factor of the strains' stiffness.
+        #: Of a linear theory: matrices at the time that was taken.
         self._matrices: dict[str, Any] = {}
-        self._material: DirectSolver | None = None
+        #: A matrix with the pattern of all.
+        self._pattern: Any = None
         #: A factor of before; all matrices are near its one.
         self._near: DirectSolver | None = None
         nodes, structure = self._refined.clamped(system.structure.clamped), system.structure
@@ -59,27 +60,32 @@ class FinerEquations:
         self._bcs = structure.clamp_conditions(self.V, nodes=nodes)
         self.tip = TipValues(self.V, _tip(system))
 
-    def take(self) -> None:
-        """Take the state, and all fields, that are set in the system."""
+    def take(self, stressed: bool = True) -> None:
+        """Take the state, and all fields, that are set in the system; where it is not stressed, without its stress."""
         self._matrices = {kind: A for kind, A in self._matrices.items() if kind == "M"}
         for f, g in self._functions.items():
             g.x.array[:] = self._refined.carried(f.function_space, f.x.array, g.function_space)
-        if self.system.linear and self.system.prestressed:
+        if stressed and self.system.linear and self.system.prestressed:
             self._prestress()
 
     def _prestress(self) -> None:
         """Set the displacement that stresses a linear theory to that of the finer mesh."""
         s = self.system
         base = self._functions.setdefault(s.prestressing, fem.Function(self.V))
-        if self._material is None:
-            with s.of_material():
-                K = self._assembled(("K",), 1.0)
-            held(K, self._hinged)
-            self._material = self._near = DirectSolver(K, symmetric=True)
         load = compat.create_vector(self.V)
         fem_petsc.assemble_vector(load, self._form("F"))
         load.array[self.clamped] = 0.0
-        base.x.array[:] = -Increment(self.V).solve(self._material, load)
+        base.x.array[:] = -Increment(self.V).solve(self.material[1], load)
+
+    @cached_property
+    def material(self) -> tuple[Any, DirectSolver]:
+        """Of a linear theory the stiffness of the strains alone, and a solver of it that holds hinges, too."""
+        with self.system.of_material():
+            K = A = self._assembled(("K",), 1.0)
+        if len(self._hinged):
+            held(A := K.copy(), self._hinged)
+        self._near = DirectSolver(A, symmetric=True)
+        return K, self._near
 
     def carried(self, columns: Array) -> Array:
         """Return columns (n, r) of local dof arrays of the system on the refined mesh."""
@@ -99,8 +105,14 @@ class FinerEquations:
             self._matrices[kind] = self._assembled(names, diagonal)
         return self._matrices[kind]
 
+    def at_rest(self) -> Any:
+        """Return K of the undeformed structure, if that is the state that was taken, with 1 at clamped unknowns."""
+        if not self.system.linear:
+            return self.matrix("K")
+        return self.material[0] if self.system.only_strains else self._assembled(("K",), 1.0)
+
     def _assembled(self, names: tuple[str, ...], diagonal: float) -> Any:
-        A = fem_petsc.create_matrix(self._form(names[0]))
+        A = fem_petsc.create_matrix(self._form(names[0])) if self._pattern is None else self._pattern.duplicate()
         for name in names:
             fem_petsc.assemble_matrix(A, self._form(name), self._bcs, 0.0)
             A.assemble()
@@ -108,6 +120,8 @@ class FinerEquations:
         d = A.getDiagonal()
         d.array[self.clamped] = diagonal
         A.setDiagonal(d)
+        if self._pattern is None and names[0] == self.system.tangent_forms("K")[0][0]:
+            self._pattern = A
         return A
 
     def solver(self, A: Any) -> DirectSolver | NearbySolver:
