@@ -188,7 +188,10 @@ class Tracer:
     def _point(self, q: Array, s: float, before: Point | None) -> Point:
         """Return an equilibrium with the tangent of the path there, in the direction from the one before."""
         z = self._solutions(q, s)[1].copy()
-        size = np.sqrt(self._product(z, z) + 1.0)
+        with np.errstate(all="ignore"):
+            size = np.sqrt(self._product(z, z) + 1.0)
+        if not np.isfinite(size):
+            raise ComputationError("the slope of the path is beyond all numbers")
         t_q, t_s = z / size, 1.0 / size
         if before is not None and self._product(t_q, before.t_q) + t_s * before.t_s < 0.0:
             t_q, t_s = -t_q, -t_s

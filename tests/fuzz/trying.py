@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 import rotfem
 from rotfem.errors import InputError
 
-#: Seconds that a validation and a computation of two elements may take, compilation included.
+#: Seconds of the processor that a validation and a computation of two elements may take.
 VALIDATION, COMPUTATION = 5, 60
 
 
@@ -24,18 +24,18 @@ class Endless(Exception):
 
 @contextmanager
 def within(seconds: int) -> Iterator[None]:
-    """Interrupt what takes longer, as soon as Python has a say."""
+    """Interrupt what takes longer, as soon as Python has a say; a machine with other work to do takes no time of it."""
 
     def late(signum: int, frame: Any) -> NoReturn:
         raise Endless(f"not ended in {seconds} s")
 
-    before = signal.signal(signal.SIGALRM, late)
-    signal.alarm(seconds)
+    before = signal.signal(signal.SIGPROF, late)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
     finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def check_message(error: InputError) -> None:

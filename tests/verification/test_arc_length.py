@@ -55,6 +55,14 @@ def test_column_without_a_side_stays_straight_and_is_said_to_be_unstable() -> No
     assert float(line.split(" at ")[1].split(" of ")[0]) == pytest.approx(np.pi**2 / 4 * EI / LENGTH**2 / 520, rel=1e-5)
 
 
+def test_loads_beyond_all_numbers() -> None:
+    """The slope of the path overflows: no equilibrium, in the words of the program and without a warning of numpy."""
+    scene = column(0.0, motion={"type": "constant", "speed": -6e60}, loads={})
+    scene["structure"]["hub_radius"] = 5e59
+    with pytest.raises(rotfem.ComputationError, match="no steady state at -6e\\+60 rad/s"):
+        rotfem.run(scene)
+
+
 def test_newton_does_not_jump_to_another_stable_branch() -> None:
     """One step of the whole load ends at the buckled shape of the other side, stable too: u₂ = −7.55 m.
 
