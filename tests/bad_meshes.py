@@ -21,6 +21,11 @@ def no_plate(path: Path) -> None:
     write_msh(path, POINTS, {"wing": GROUPS["plate"], "clamped": GROUPS["clamped"]})
 
 
+def latin(path: Path) -> None:
+    write_msh(path, POINTS, {"Flugel": GROUPS["plate"], "clamped": GROUPS["clamped"]})
+    path.write_bytes(path.read_bytes().replace(b"Flugel", "Flügel".encode("latin-1")))
+
+
 def mixed(path: Path) -> None:
     a, b, c, d = GROUPS["plate"][0]
     cells = [[a, b, c], [a, c, d]]
@@ -109,6 +114,7 @@ BAD: dict[str, tuple[Callable[[Path], None] | None, str]] = {
     "folded cell": (folded, "corner of 180° or more"),
     "solid": (solid, "dimension 3"),
     "out of the plane": (curved, "leaves the plane"),
+    "no UTF-8": (latin, "the name of its physical group 1 of dimension 2 is not UTF-8"),
     "no surface": (line, 'no physical surface "plate"'),
     "not a mesh": (rubbish, "structure.mesh"),
     "missing": (None, "file not found"),

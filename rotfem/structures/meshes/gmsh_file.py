@@ -60,9 +60,7 @@ def read(gmsh: Any, path: Path, surfaces: Sequence[str]) -> Groups:
     if (how := mishap(lambda: _load(gmsh, path), SECONDS + size / BYTES_PER_SECOND, MEMORY + 200 * size)) is not None:
         raise BadMesh(how)
     _load(gmsh, path)
-    groups: Groups = {0: {}, 1: {}, 2: {}, 3: {}}
-    for dimension, tag in gmsh.model.getPhysicalGroups():
-        groups[dimension][gmsh.model.getPhysicalName(dimension, tag) or f"{tag}"] = tag
+    groups = _groups(gmsh)
     numbers, x, _ = gmsh.model.mesh.getNodes()
     if len(numbers) == 0:
         raise BadMesh("it holds no mesh")
@@ -119,6 +117,18 @@ def _merge(gmsh: Any, path: Path) -> None:
             gmsh.merge(str(link))
         except Exception as error:
             raise BadMesh(f"gmsh cannot read it: {str(error).replace(str(link), path.name)}") from None
+
+
+def _groups(gmsh: Any) -> Groups:
+    """Return the physical groups of the file; one without a name has its number."""
+    groups: Groups = {0: {}, 1: {}, 2: {}, 3: {}}
+    for dimension, tag in gmsh.model.getPhysicalGroups():
+        try:
+            name = gmsh.model.getPhysicalName(dimension, tag)
+        except UnicodeDecodeError:
+            raise BadMesh(f"the name of its physical group {tag} of dimension {dimension} is not UTF-8") from None
+        groups[dimension][name or f"{tag}"] = tag
+    return groups
 
 
 def _check_names(groups: Groups, surfaces: Sequence[str]) -> None:
