@@ -16,6 +16,7 @@ import numpy as np
 from explain_scenes import FRESH, scene
 
 import rotfem
+from rotfem.commands.explain import compared
 from rotfem.scene import Scene
 from rotfem.selection.distance import modes_change, tip_change
 from rotfem.selection.estimate import LARGE, NOTICEABLE
@@ -51,7 +52,7 @@ def truth_of(of: Scene, result: Any) -> dict[str, Any]:
                 continue
             hub = of.motion.type == "torque"
             turning = of.replace({"motion.speed": result.summary["speeds"][0]}) if hub else of
-            rows = [row for row in rotfem.modes(turning).rows if row["label"] != "rigid body"]
+            rows = compared(rotfem.modes(turning).rows)
             out[name] = np.array([complex(row["growth"], row["frequency"]) for row in rows])
         except rotfem.ComputationError:
             out[name] = None

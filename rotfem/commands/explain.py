@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -188,6 +188,11 @@ def finer_mesh(scene: Scene) -> Scene:
     return scene.replace({"mesh.elements": [2 * n for n in elements] if isinstance(elements, tuple) else 2 * elements})
 
 
+def compared(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Return the rows of modes that models are compared by: no rigid body, of an overdamped mode the slow one."""
+    return [row for row in rows if row["label"] != "rigid body" and not row["label"].endswith(", fast")]
+
+
 def full_outputs(scene: Scene, trial: Trial, comm: MPI.Comm) -> Outputs:
     """Return the outputs of a scene as `rotfem run` and `rotfem modes` give them, the latter at the trial's speed."""
     wanted = trial.wanted
@@ -209,7 +214,7 @@ def full_outputs(scene: Scene, trial: Trial, comm: MPI.Comm) -> Outputs:
             history = done.history if done is not None else {"tip_u": np.zeros(1)}
         else:
             found = attempt(MODES, lambda: modes(turning, comm=comm))
-            rows = [row for row in found.rows if row["label"] != "rigid body"] if found is not None else []
+            rows = compared(found.rows) if found is not None else []
     out = outputs_of(wanted, history, rows)
     out.failed = failed
     return out

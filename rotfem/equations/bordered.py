@@ -248,7 +248,7 @@ class BorderedSystem:
 
     def moment(self, state: Any) -> float:
         """Return the moment of all forces from outside but torque and brake at a state (N·m)."""
-        if self.row._outside is None:
+        if not self.row.has_outside:
             return 0.0
         self.set_time(state.t)
         self.set_state(state.q, state.v, state.a)

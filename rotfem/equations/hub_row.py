@@ -27,27 +27,29 @@ class HubRow:
         self.angle, self.hub = system.model.hub, system.model.hub.hub
         self.coupled = "hub_coupling" in self.model.effects
         moments = self.model.work(self.model.turn)
-        self._moment = forms.form(sum(moments.values()))
+        moment, self._shifts = sum(moments.values()), [system.structure.constant(0.0) for _ in range(3)]
+        self._by_spin = BySpin(self.model, moment)
         outside = [term for name, term in moments.items() if not self.model.acting[name].momentum]
-        self._outside = forms.form(sum(outside)) if outside else None
-        self._work = sum(moments.values())
+        wanted = {
+            "moment": moment,
+            "spin": self._by_spin.ufl,
+            "row": self._row_of(moment) if self.coupled else None,
+            "outside": sum(outside) if outside else None,
+        }
+        there = {name: form for name, form in wanted.items() if form is not None}
+        self._forms = dict(zip(there, forms.together(list(there.values())), strict=True))
         self._vector = compat.create_vector(system.V)
         self.hub.torque.attach(self._seen)
+
+    def _row_of(self, moment: Any) -> Any:
+        """Return c_k ∂/∂q + c_v ∂/∂v + c_m ∂/∂a of the moment, a UFL form."""
+        *state, dq = self.system.structure.k.functions
+        parts = (ufl.derivative(moment, x, dq) for x in state)
+        return sum(c * part for c, part in zip(self._shifts, parts, strict=True))
 
     @cached_property
     def _momentum(self) -> Any:
         return forms.form(work.momentum(self.model.mechanics, self.model.turn))
-
-    @cached_property
-    def _by_spin(self) -> BySpin:
-        return BySpin(self.model, self._work)
-
-    @cached_property
-    def _row(self) -> tuple[list[Any], Any]:
-        *state, dq = self.system.structure.k.functions
-        shifts = [self.system.structure.constant(0.0) for _ in range(3)]
-        parts = (ufl.derivative(self._work, x, dq) for x in state)
-        return shifts, forms.form(sum(c * part for c, part in zip(shifts, parts, strict=True)))
 
     def _value(self, form: Any) -> float:
         """Evaluate a functional; of an uncoupled hub with the structure undeformed and at rest in the frame."""
@@ -79,13 +81,15 @@ class HubRow:
 
     def work(self) -> float:
         """Return the work of the structure in the rigid turn, N·m."""
-        return self._value(self._moment)
+        return self._value(self._forms["moment"])
 
     def diagonal(self, c_v: float, c_m: float) -> float:
         """Return ∂(residual)/∂psi: c_v ∂/∂psi' + c_m ∂/∂psi''."""
-        form = self._by_spin.form(c_v, c_m)
         own = c_v * self.hub.damping + c_m * self.hub.inertia
-        return own if form is None else own + self._value(form)
+        if "spin" not in self._forms:
+            return own
+        self._by_spin.set(c_v, c_m)
+        return own + self._value(self._forms["spin"])
 
     def rest_inertia(self) -> float:
         """Return the moment of inertia of hub and undeformed structure about the axis, kg·m²; writes that state."""
@@ -97,14 +101,18 @@ class HubRow:
         if not self.coupled:
             self._vector.zeroEntries()
             return self._vector
-        constants, form = self._row
-        for constant, value in zip(constants, shifts, strict=True):
+        for constant, value in zip(self._shifts, shifts, strict=True):
             constant.value = value
-        return assembled(form, self.system.V, self.system.clamped, self._vector)
+        return assembled(self._forms["row"], self.system.V, self.system.clamped, self._vector)
+
+    @property
+    def has_outside(self) -> bool:
+        """Whether there are forces that are no change of momentum."""
+        return "outside" in self._forms
 
     def outside(self) -> float:
         """Return the moment of all forces that are no change of momentum, with torque and brake left out (N·m)."""
-        return -self._value(self._outside) if self._outside is not None else 0.0
+        return -self._value(self._forms["outside"]) if self.has_outside else 0.0
 
     def angular_momentum(self) -> float:
         """Return the angular momentum of hub and structure about the axis, kg·m²/s (rigid structure if uncoupled)."""

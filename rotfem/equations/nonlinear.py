@@ -41,11 +41,16 @@ class NonlinearSystem(System):
     def _compile(self) -> Any:
         self._shift_values: tuple[float, ...] = (1.0, 0.0, 1.0)
         self._shifts = [self.structure.constant(c) for c in self._shift_values]
+        self._spin: Any = None
         if self.moving:
             self._residuals = self.model.by_strains() if self._parted else [self._residual_form]
-            self._F = [forms.form(F) for F in self._residuals]
             self._tangents = [self._tangent_of(F) for F in self._residuals] if self._parted else [self._tangent_form]
-            self._J = [forms.form(J) for J in self._tangents]
+            libraries = [list(part) for part in zip(self._residuals, self._tangents, strict=True)]
+            if self.model.hub is not None and self._by_spin.ufl is not None:
+                libraries[-1].append(self._by_spin.ufl)
+            compiled = [forms.together(library) for library in libraries]
+            self._F, self._J = [part[0] for part in compiled], [part[1] for part in compiled]
+            self._spin = compiled[-1][2] if len(compiled[-1]) > 2 else None
             self._pattern = self._J[0]
         else:
             self._F = [forms.form(self._at_rest["f"], once=True)]
@@ -248,19 +253,23 @@ class NonlinearSystem(System):
 
     def spin_derivative(self, c_v: float, c_m: float) -> Any:
         """Return c_v ∂F/∂Omega + c_m ∂F/∂Omega' at the state, a PETSc vector (reused), zero at clamped unknowns."""
-        form = self._by_spin.form(c_v, c_m)
-        if form is None:
+        if self._by_spin.ufl is None:
             self._spun.zeroEntries()
             return self._spun
-        return assembled(form, self.V, self.clamped, self._spun)
+        self._spin = forms.form(self._by_spin.ufl) if self._spin is None else self._spin
+        self._by_spin.set(c_v, c_m)
+        return assembled(self._spin, self.V, self.clamped, self._spun)
 
 
 class BySpin:
-    """c_v ∂/∂Omega + c_m ∂/∂Omega' of a form, the speed along the axis of the motion varied, compiled.
+    """c_v ∂/∂Omega + c_m ∂/∂Omega' of a form, the speed along the axis of the motion varied.
 
     Args:
         model: the constants of the frame.
         form: UFL form; only its integrals with the speed or its rate are differentiated.
+
+    Attributes:
+        ufl: the derivative, a UFL form; None if the speed is not in the form.
     """
 
     def __init__(self, model: Any, form: Any):
@@ -277,13 +286,12 @@ class BySpin:
             derivative = expand_derivatives(ufl.diff(ufl.replace(ufl.Form(within), {constant: shifted}), s))
             if not derivative.empty():
                 parts.append(factor * derivative)
-        self._form = forms.form(added(parts)) if parts else None
+        self.ufl = added(parts) if parts else None
 
-    def form(self, c_v: float, c_m: float) -> Any:
-        """Return it with these factors, compiled; None if the speed is not in the form."""
+    def set(self, c_v: float, c_m: float) -> None:
+        """Set the factors."""
         for constant, value in zip(self._factors, (c_v, c_m), strict=True):
             constant.value = value
-        return self._form
 
 
 def assembled(form: Any, V: fem.FunctionSpace, clamped: Any, b: Any = None) -> Any:

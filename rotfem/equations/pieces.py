@@ -91,7 +91,8 @@ class Pieces:
         self.at_rest = self._forms_at_rest()
         self.constants: dict[str, Any] = {**model.frame.constants, **loads}
         self.axis: Array = model.motion.axis[2:] if self.structure.planar else model.motion.axis
-        self._forms = {kind: forms.form(form, once=True) for kind, form in self.at_rest.items()}
+        compiled = forms.together(list(self.at_rest.values()), once=True)
+        self._forms = dict(zip(self.at_rest, compiled, strict=True))
         self.pattern = fem_petsc.create_matrix(self._forms["K"])
         fem_petsc.assemble_matrix(self.pattern, self._forms["K"], self.bcs)
         self.pattern.assemble()

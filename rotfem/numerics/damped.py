@@ -76,11 +76,16 @@ def shape_frequencies(X: Array, MX: Array, KX: Array) -> Array:
     return np.asarray(np.sqrt(stiffness / mass))
 
 
+def are_fast(values: Array, omega: Array) -> npt.NDArray[np.bool_]:
+    """Return which eigenvalues are the fast ones of overdamped modes, by the frequencies of their shapes."""
+    return np.asarray((values.imag == 0.0) & (values.real < 0.0) & (np.abs(values) >= omega))
+
+
 def place(values: Array, X: Array, MX: Array, KX: Array) -> Array:
     """Return what to sort eigenvalues by: ω of their shape, of the fast one of two real ones that of the slow one."""
     omega = shape_frequencies(X, MX, KX)
-    real = (values.imag == 0.0) & (values.real < 0.0)
-    slow, fast = np.flatnonzero(real & (np.abs(values) < omega)), np.flatnonzero(real & (np.abs(values) >= omega))
+    gone = are_fast(values, omega)
+    slow, fast = np.flatnonzero((values.imag == 0.0) & (values.real < 0.0) & ~gone), np.flatnonzero(gone)
     if len(slow) and len(fast):
         sizes = np.sqrt(np.abs(np.sum(X.conj() * MX, axis=0)))
         alike = np.abs(X[:, fast].conj().T @ MX[:, slow]) / np.outer(sizes[fast], sizes[slow])
@@ -126,13 +131,14 @@ class RitzPairs:
         matrices: M, C, K, and what damping by mode adds to C, None without.
         start: first directions, columns of owned unknowns.
         target: where K + σ C + σ² M is factorised, 0 or beside the zero eigenvalue of a free hub.
+        fast: whether the fast eigenvalues of overdamped modes are wanted.
 
     Attributes:
         values, right, left, errors: λ, vectors of owned unknowns, and the larger backward error of both.
     """
 
-    def __init__(self, matrices: Matrices, start: Array, target: float):
-        self.matrices, self.by_mode, self.target = matrices[:3], matrices[3], target
+    def __init__(self, matrices: Matrices, start: Array, target: float, fast: bool = True):
+        self.matrices, self.by_mode, self.target, self.fast = matrices[:3], matrices[3], target, fast
         self.comm: MPI.Comm = matrices[2].comm.tompi4py()
         self.norms = np.array([A.norm(PETSc.NormType.INFINITY) for A in self.matrices])
         if self.by_mode is not None:
@@ -173,6 +179,8 @@ class RitzPairs:
         values, x, y = quadratic(m, c, k, self.target)
         turn_equal(values, (x, y), (m, c, k))
         upper = (values.imag >= 0.0) & (np.abs(np.sum(x.conj() * (m @ x), axis=0)) > 0.0)
+        if not self.fast:
+            upper &= ~are_fast(values, shape_frequencies(x, m @ x, k @ x))
         values, x, y = values[upper], x[:, upper], y[:, upper]
         order = np.lexsort((np.abs(values), place(values, x, m @ x, k @ x)))[:count]
         self.values, x, y = values[order], x[:, order], y[:, order]
@@ -209,7 +217,9 @@ class RitzPairs:
         return self.add(np.array(new).T) if new else 0
 
 
-def damped_pairs(matrices: Matrices, undamped: Array, count: int, target: float) -> tuple[Array, Array, Array, Array]:
+def damped_pairs(
+    matrices: Matrices, undamped: Array, count: int, target: float, fast: bool = True
+) -> tuple[Array, Array, Array, Array]:
     """Return (λ, x, y, backward errors) of the shapes that vibrate slowest without damping.
 
     Args:
@@ -217,9 +227,10 @@ def damped_pairs(matrices: Matrices, undamped: Array, count: int, target: float)
         undamped: vectors of the pencil without damping, columns of owned unknowns.
         count: number of pairs.
         target: see `RitzPairs`.
+        fast: see `RitzPairs`.
     """
     start = np.hstack([undamped.real, undamped.imag])
-    ritz = RitzPairs(matrices, start, target)
+    ritz = RitzPairs(matrices, start, target, fast)
     for _ in range(ROUNDS):
         ritz.solve(count)
         if float(np.max(ritz.errors)) <= DONE or ritz.V.shape[1] > COLUMNS or ritz.grow() == 0:

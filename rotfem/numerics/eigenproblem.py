@@ -87,6 +87,8 @@ class Pencil:
         #: Scale of the unknowns, powers of two (None: that of the diagonal), and whether a factor needs pivots.
         self.unknowns: Any = None
         self.pivots = False
+        #: Whether fast eigenvalues of overdamped modes are told too, and whether pairs that are off are refused.
+        self._fast = self._judged = True
         #: Time of factorisations, s.
         self.factored = 0.0
         self.spectrum_error: float | None = None
@@ -142,6 +144,22 @@ class Pencil:
         except ComputationError:  # K is singular or nearly so (a critical speed, a rigid-body mode): aim beside zero
             return self._solve(count, 0.1 * self._smallest)
 
+    def lasting(self, count: int, target: float = 0.0) -> Array:
+        """Return λ of the first modes, of an overdamped one the slow eigenvalue alone: the fast one is gone at once.
+
+        Args:
+            count: number of modes (fewer are returned if there are no more).
+            target: see `solve`.
+
+        Raises:
+            ComputationError: see `solve`.
+        """
+        self._fast = False
+        try:
+            return self.solve(count, target).values[:count]
+        finally:
+            self._fast = True
+
     def _solve(self, count: int, target: float) -> Eigenpairs:
         if self.by_mode is not None:
             return self._damped(count, target)
@@ -184,12 +202,14 @@ class Pencil:
         gyroscopic.aypx(-1.0, self.C)
         gyroscopic.scale(0.5)
         undamped = Pencil(self.M, gyroscopic, self.K)
+        undamped._judged = False  # they only begin the basis
         shapes = undamped.solve(count + MORE, target).right
         self.unit, self._smallest = undamped.unit or 1.0, undamped._smallest
         with balanced(self.M, self.C, self.K, self.unit) as d:
             by_mode = None if self.by_mode is None else self.by_mode.scaled(np.sqrt(self.unit) * d)
             matrices, more = (self.M, self.C, self.K, by_mode), min(2 * count, count + MORE)
-            values, right, left, errors = damped_pairs(matrices, shapes / d[:, None], more, target / self.unit)
+            start = shapes / d[:, None]
+            values, right, left, errors = damped_pairs(matrices, start, more, target / self.unit, self._fast)
         vectors = d[:, None] * right, d[:, None] * left
         return self._checked(self.unit * values, vectors, errors, ZERO * self.unit if target > 0.0 else 0.0)
 
@@ -202,7 +222,7 @@ class Pencil:
         right, left = vectors
         # A double zero eigenvalue (a rigid-body mode) is known beforehand, and never met to full accuracy.
         worst = float(np.max(errors[np.abs(values) > small], initial=0.0))
-        if worst > BACKWARD_TOLERANCE:
+        if worst > BACKWARD_TOLERANCE and self._judged:
             raise ComputationError(
                 f"an eigenpair has the backward error {worst:.1e}, above {BACKWARD_TOLERANCE:.0e}",
                 advice="fewer modes.count or another mesh",

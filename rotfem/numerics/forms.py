@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import basix
+import ffcx
+import ffcx.codegeneration.jit as ffcx_jit
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
+from dolfinx import jit as dolfinx_jit
 from ufl.algorithms import expand_derivatives, extract_coefficients
 from ufl.algorithms.map_integrands import map_integrand_dags
 from ufl.constantvalue import Zero
@@ -22,6 +25,9 @@ ELSEWHERE = "Compilation failed on root node"
 #: Flags of the C compiler for what is assembled often, and for what is assembled a few times on a few cells.
 OFTEN, SELDOM = ["-O2", "-g0", "-w"], ["-O0", "-g0", "-w"]
 
+#: Compiles several forms, (communicator, forms, …) ↦ (forms, module, code): rank 0 first, as dolfinx does one.
+_library: Any = dolfinx_jit.mpi_jit_decorator(lambda *args, **more: ffcx_jit.compile_forms(*args, **more))
+
 
 def form(f: Any, once: bool = False) -> Any:
     """Return a UFL form compiled, over the communicator of its mesh.
@@ -34,9 +40,45 @@ def form(f: Any, once: bool = False) -> Any:
         RuntimeError: the compiler failed.
     """
     domain = f.ufl_domains()[0].ufl_cargo()
-    flags = SELDOM if once and domain.topology.dim == 1 else OFTEN
-    more = {"cffi_extra_compile_args": flags}
+    more = {"cffi_extra_compile_args": _flags(domain, once)}
     return _compiled(lambda options: fem.form(f, jit_options=options | more), domain.comm, f.signature())
+
+
+def together(several: Sequence[Any], once: bool = False) -> list[Any]:
+    """Return UFL forms compiled as one library, which the compiler is started once for.
+
+    Args:
+        several: the forms, none of them empty, of one mesh.
+        once: see `form`.
+
+    Raises:
+        RuntimeError: the compiler failed.
+    """
+    domain = several[0].ufl_domains()[0].ufl_cargo()
+    more = {"cffi_extra_compile_args": _flags(domain, once)}
+
+    def compile_all(options: dict[str, Any]) -> list[Any]:
+        jit_options = dolfinx_jit.get_options(options | more)
+        library = _library(domain.comm, list(several), options=ffcx.get_options({}), **jit_options)
+        return [_taken(f, i, library) for i, f in enumerate(several)]
+
+    out: list[Any] = _compiled(compile_all, domain.comm, " ".join(f.signature() for f in several))
+    return out
+
+
+def _flags(domain: Any, once: bool) -> list[str]:
+    return SELDOM if once and domain.topology.dim == 1 else OFTEN
+
+
+def _taken(f: Any, i: int, library: tuple[Any, Any, Any]) -> Any:
+    """Return a UFL form with the code of the i-th of a library, which dolfinx would look for by itself."""
+    compiled, module, code = library
+    real = dolfinx_jit.ffcx_jit
+    dolfinx_jit.ffcx_jit = lambda *_, **__: (compiled[i], module, code)
+    try:
+        return fem.form(f)
+    finally:
+        dolfinx_jit.ffcx_jit = real
 
 
 def constant(domain: Any, value: npt.NDArray[Any]) -> fem.Constant:

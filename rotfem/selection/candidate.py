@@ -110,9 +110,9 @@ class Candidate:
         matrices = held.mass_damping_stiffness()
         pencil = Pencil(*matrices, by_mode=held.by_mode)
         if self.system.hub is None:
-            return pencil.solve(count).values[:count]
+            return pencil.lasting(count)
         whole = Pencil(*self.system.with_hub(matrices), by_mode=self.system.by_mode)
-        values: Array = whole.solve(count, pencil.scale()).values
+        values: Array = whole.lasting(count, pencil.scale())
         flexible: Array = np.abs(values) > ZERO * np.median(np.abs(values))
         return values[flexible][: count - int(not flexible.all())]
 

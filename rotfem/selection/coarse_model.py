@@ -37,8 +37,8 @@ DEAR = 0.5
 #: Times at which the speed of a free hub is looked at.
 HUB_LOOKS = 2001
 
-#: Newton stops here: small differences of two solutions are wanted.
-INCREMENT = 1e-12
+#: Newton stops here: small differences of two solutions are wanted. Its last increment is far larger than its error.
+INCREMENT = 1e-10
 
 
 def coarse(case: Case, modes: bool = True) -> Case:

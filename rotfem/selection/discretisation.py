@@ -1,8 +1,10 @@
 """What steps and mesh of a case put its outputs off, told as every run tells it.
 
 A march on the case's own mesh with its own steps is watched (`rotfem.analysis.error_watch`). Where there are very many
-steps it takes longer ones, and the error is scaled by the order of the scheme. Where the mesh makes that dear, the
-coarse model marches, and what its mesh puts off is scaled (`rotfem.selection.mesh_share`), which also tells the modes.
+steps it takes longer ones, and the error is scaled by the order of the scheme. What the mesh puts a history off two
+reduced models tell where they serve (`rotfem.selection.history_on_meshes`), else the same march. Where the mesh makes
+that dear, the coarse model marches, and what its mesh puts off is scaled (`rotfem.selection.mesh_share`), which also
+tells the modes.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from rotfem.errors import ComputationError, InputError
 from rotfem.selection.candidate import Candidate
 from rotfem.selection.coarse_model import Trial
 from rotfem.selection.distance import HISTORY, MODES, STEADY
+from rotfem.selection.history_on_meshes import error_of_history
 from rotfem.selection.mesh_share import error_of_modes, share_of_mesh
 
 #: Steps of a march at most, beyond which one stands for several, and corrections of an equilibrium.
@@ -29,8 +32,8 @@ MOST_STEPS, CORRECTIONS = 800, 20
 #: Most steps (or corrections) times unknowns of what is computed on the mesh of the case.
 AFFORDABLE = 1e6
 
-#: Error of the steps with which that of the mesh can be seen beside it, and most steps for one that see it.
-SEEING, MOST_FINER = 4e-3, 5
+#: Error of the steps from which that of the mesh is asked of finer ones, what theirs may be, and most of them for one.
+HIDING, SEEING, MOST_FINER = 2e-2, 4e-3, 5
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,10 @@ def discretisation(trial: Trial, theory: str, without: Collection[str] = ()) -> 
             continue
         if name == HISTORY and errors.time is not None:
             out.steps[name] = errors.time[0] / errors.scale
+            known = None if without else error_of_history(trial, theory)
+            if known is not None:
+                out.mesh[name] = known
+                continue
             errors = _in_finer_steps(trial, candidate, theory, out.steps[name]) or errors
         share = 1.0 if near else share_of_mesh(own.switched(), trial.poorest)
         if share is not None:
@@ -98,7 +105,7 @@ def _in_finer_steps(trial: Trial, candidate: Candidate, theory: str, off: float)
     steps, scheme = trial.full.steps, trial.full.scheme
     assert steps is not None
     assert scheme is not None
-    if steps.step is None or off <= SEEING:
+    if steps.step is None or off <= HIDING:
         return None
     finer = min(MOST_FINER, ceil((off / SEEING) ** (1 / scheme.order)))
     if finer * _number(trial) * len(candidate.system.held.zeros()) > AFFORDABLE:

@@ -103,4 +103,4 @@ def _eigenvalues(held: Any, fine: FinerEquations, speed: float, count: int) -> t
     else:
         C = K.duplicate()
         C.assemble()
-    return tuple(Pencil(*matrices).solve(count).values[:count] for matrices in (here, (M, C, K)))
+    return tuple(Pencil(*matrices).lasting(count) for matrices in (here, (M, C, K)))

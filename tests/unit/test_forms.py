@@ -46,6 +46,21 @@ def test_branches_that_vanish_leave_no_conditional(space: Any) -> None:
     assert forms.form(at_rest).rank == 2
 
 
+def test_forms_of_one_library_are_those_compiled_one_by_one(space: Any) -> None:
+    """A functional, a vector and a matrix, of the same function and of different constants."""
+    u, v, w = fem.Function(space), ufl.TestFunction(space), ufl.TrialFunction(space)
+    u.x.array[:] = np.arange(1.0, 1.0 + len(u.x.array))
+    c, d = (forms.constant(space.mesh, np.float64(x)) for x in (2.0, 3.0))
+    several = [c * ufl.dot(u, u) * ufl.dx, d * ufl.dot(u, v) * ufl.dx, c * d * ufl.dot(u, u) * ufl.dot(v, w) * ufl.dx]
+    apart, together = [forms.form(f) for f in several], forms.together(several)
+    for assemble in (
+        lambda f: fem.assemble_scalar(f[0]),
+        lambda f: fem.assemble_vector(f[1]).array,
+        lambda f: fem.assemble_matrix(f[2]).to_dense(),
+    ):
+        np.testing.assert_array_equal(assemble(together), assemble(apart))
+
+
 def test_functionals_are_those_assembled_one_by_one(space: Any) -> None:
     """In the cells, at their ends, and of nothing in one pass; sums over three cells differ by round-off."""
     u = fem.Function(space)

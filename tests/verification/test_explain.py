@@ -252,7 +252,7 @@ def test_row_of_the_steps_is_their_true_error() -> None:
 
 
 @pytest.mark.parametrize("time", [{"time": COARSE_STEPS["time"]}, {}], ids=["history", "steady"])
-def test_row_of_the_mesh_is_what_a_run_says_of_it(time: dict[str, Any]) -> None:
+def test_row_of_the_mesh_is_what_a_run_says_of_it(time: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """The trial has six of the ten elements, but the same march is watched, on all ten in steps that see their error.
 
     The steps are off by 4.1 %, so four take the place of one to get below 0.4 %. Newton's increments end elsewhere.
@@ -261,6 +261,7 @@ def test_row_of_the_mesh_is_what_a_run_says_of_it(time: dict[str, Any]) -> None:
     motion = COARSE_STEPS["motion"] if time else {"type": "constant", "speed": 3.0}
     tables = {"structure": STRUCTURE, "motion": motion, "loads": {"tip_force": [0.0, 10.0]}, **time}
     scene = Scene.from_dict({**tables, "modes": {"count": 2}, "mesh": {"elements": 10, "degree": 2}})
+    monkeypatch.setattr("rotfem.selection.discretisation.error_of_history", lambda *_: None)  # no reduced model serves
     trial = Trial(case_of(scene))
     row = Estimates(trial, "reissner", trial.effects).discretisations()[-1]
     assert row.name == "mesh.elements"
@@ -270,6 +271,42 @@ def test_row_of_the_mesh_is_what_a_run_says_of_it(time: dict[str, Any]) -> None:
     finer = (scene, scene.replace({"mesh.elements": 20}))
     rough, fine = (np.array([row["frequency"] for row in rotfem.modes(s).rows]) for s in finer)
     assert row.estimate[MODES] == pytest.approx(np.max(np.abs(fine / rough - 1)), rel=0.1)  # of another theory
+
+
+def test_error_of_a_mesh_that_long_steps_hide_is_told() -> None:
+    """A kick of 2 ms makes higher modes move, which steps as long as the kick hardly see, and a coarse mesh less.
+
+    The truth is of twice the elements, both in a tenth of the steps. A reduced model tells it within a factor of 2.
+    """
+    kick = [[0, 0, 0], [0.1, 0, 0], [0.101, 0, 20.0], [0.102, 0, 0]]
+    tables = {"structure": STRUCTURE, "motion": {"type": "constant", "speed": 3.0}, "loads": {"tip_force": kick}}
+    scene = Scene.from_dict({**tables, "mesh": {"elements": 3}, "time": {"end": 1.0, "step": 0.005}})
+    trial = Trial(case_of(scene))
+    told = Estimates(trial, "reissner", trial.effects).off.mesh[HISTORY]
+    exact = scene.replace({"time.step": 5e-4, "time.output_every": 10, "output.error": False})
+    runs = [rotfem.run(exact.replace({"mesh.elements": n})).history for n in (6, 3)]
+    truth = tip_change(*(np.column_stack([h["tip_u1"], h["tip_u2"]]) for h in runs))
+    assert 0.5 < told / truth < 2
+
+
+def test_overdamped_modes_are_compared_by_their_slow_eigenvalues() -> None:
+    """A hinge with a damper has a mode that does not vibrate. Its fast eigenvalue is the mesh's, 1e5 times as large.
+
+    What the effects change is what they change on twice the elements, where other modes come between.
+    """
+    root = {"lag_stiffness": 400.0, "lag_damping": 15.0, "hinge_offset": 0.2}
+    section = {"E": 6.9e10, "nu": 0.3, "rho": 2766.0, "area": 7.3e-5, "second_moment": 8.22e-9}
+    hinged = {"type": "planar_beam", "length": 6.0, "section": section, "hub_radius": 0.3, "root": root}
+    scene = Scene.from_dict(
+        {"structure": hinged, "motion": {"type": "constant", "speed": 7.0}, "mesh": {"elements": 4}}
+    )
+    rows = [rotfem.explain(scene.replace({"mesh.elements": n})).rows for n in (4, 8)]
+    for rough, fine in zip(*rows, strict=True):
+        if rough["kind"] == "effect":
+            assert rough["estimate"][MODES] == pytest.approx(fine["estimate"][MODES], rel=0.1, abs=2e-4), rough["name"]
+    values = Trial(case_of(scene), (MODES,)).outputs("reissner").values
+    assert np.abs(values).max() < 1e3
+    assert np.sum(values.imag == 0.0) == 1
 
 
 @pytest.mark.parametrize("file", [False, True])

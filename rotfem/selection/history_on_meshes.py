@@ -1,0 +1,62 @@
+"""What the mesh of a case puts a history off, by a reduced linear model on it and on cells of half the size.
+
+Both are solved by the same steps, short enough for all that moves in them, so that what the steps of the case damp out
+or never excite is seen too. That holds where effects are told by a reduced model (`rotfem.selection.reduced_effects`):
+the motion of the hub is prescribed, and bending is not large.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.reduced.response import Response, largest, reduced_response, tips_of
+from rotfem.analysis.refined_mesh import MOST
+from rotfem.errors import ComputationError, InputError
+from rotfem.selection.coarse_model import Trial, from_file
+from rotfem.selection.mesh_share import halved
+from rotfem.selection.reduced_effects import ACCURACY, linear_of
+
+Array = npt.NDArray[np.float64]
+
+#: Displacement of the tip over the length from which a linear model does not say what a mesh makes of it.
+LARGE = 0.5
+
+
+def error_of_history(trial: Trial, theory: str) -> float | None:
+    """Return the change of the tip's displacement from cells of half the size to those of the case, relative.
+
+    Args:
+        trial: the case that is tried out, with a history; all effects in its model.
+        theory: of the model.
+
+    Returns:
+        None where a reduced linear model does not tell it, or not quickly.
+    """
+    linear, motion, mesh = linear_of(trial, theory), trial.case.problem.motion, trial.full.problem.mesh
+    if linear is None or trial.samples is None or motion.hub is not None or motion.pitch is not None:
+        return None
+    if from_file(trial.case.problem):
+        return None
+    times: Array = np.linspace(0.0, trial.samples.end, len(trial.samples.parts) + 1, dtype=np.float64)
+    try:
+        own = _response(trial, mesh, linear.name, times)
+        unknowns = 2**own.model.system.structure.mesh.topology.dim * len(own.model.system.zeros())
+        size = largest(own.model, own.tips)
+        if unknowns > MOST or not 0.0 < size <= LARGE * own.model.system.structure.length:
+            return None
+        fine = _response(trial, halved(mesh), linear.name, times)
+    except (ComputationError, InputError, np.linalg.LinAlgError):
+        return None
+    if max(own.projection_error, fine.projection_error) > ACCURACY:
+        return None
+    change = largest(own.model, own.q @ tips_of(own.model).T - fine.q @ tips_of(fine.model).T)
+    return change / size
+
+
+def _response(trial: Trial, mesh: Any, theory: str, times: Array) -> Response:
+    """Return the history of a linear theory on a mesh."""
+    candidate = trial.on_mesh(mesh, theory)
+    return reduced_response(candidate.switched(), times, trial.start(candidate, theory), ACCURACY)
