@@ -7,6 +7,8 @@ few rounds are enough.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -15,7 +17,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.reduced.collocation import NODES, Steps, collocate
 from rotfem.analysis.reduced.drive import Drive
-from rotfem.analysis.reduced.hub_moment import HubMoment
+from rotfem.analysis.reduced.hub_moment import Directions, HubMoment
 from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.analysis.reduced.solution import Solution, Trajectory
 from rotfem.errors import ComputationError
@@ -104,7 +106,7 @@ class FreeSolution(Solution):
             ComputationError: no trajectory is found, or it is not finite.
         """
         if self.moment is None or self.moment.size != model.size:
-            self.moment = HubMoment(model, self.drive.bordered.row)
+            self.moment = HubMoment(Directions.of(model), self.drive.bordered.row)
         ends = self.ends(model)
         if self._known is not None and self._known.q.shape[1] != model.size + 1:
             self._known = None
@@ -208,6 +210,48 @@ class FreeSolution(Solution):
         F[:, m] = moment.value(w, *x) + hub.inertia * a[:, -1] + hub.damping * v[:, -1] - hub.torque.many(t)
         f = F - sum(np.einsum("nij,nj->ni", A, y) for A, y in ((M, a), (C, v), (K, q)))
         return M, C, K, f
+
+    def moment_along(self, shapes: Array) -> Callable[[Array, Array, Array, Array], Array]:
+        """Return what the hub feels of shapes beside the basis, to first order in them.
+
+        Args:
+            shapes: local dof arrays (n, p).
+
+        Returns:
+            times (n,), s, with coordinates of the shapes, their rates and accelerations (n, p) ↦ moment (n,), N·m.
+        """
+        assert self.moment is not None
+        felt = HubMoment(replace(self.moment.basis, V=shapes), self.drive.bordered.row, first_order=True)
+
+        def moment(t: Array, s: Array, v: Array, a: Array) -> Array:
+            drive, speed, rate = self.drive, self.drive.speed(t), self.drive.rate(t)
+            weights = felt.weights(drive.constants(t, drive.angle(t), speed, rate), speed, rate)
+            return felt.value(weights, s, v, a) - felt.value(weights, 0 * s, 0 * v, 0 * a)
+
+        return moment
+
+    def answer(self, model: ReducedModel, forces: Callable[[Array], Array]) -> Trajectory:
+        """Return the history from rest of a model and its hub under other forces than their own, to first order.
+
+        Args:
+            model: the reduced model.
+            forces: t (n,) ↦ f (n, m + 1), the moment on the hub last, in the equations linearised about the trajectory.
+        """
+        ends, nothing, path = self.ends(model), np.zeros(model.size + 1), self.drive.steps
+        assert path is not None
+        t = self.drive.within(ends[:-1], ends[1:], NODES)
+        f = forces(t.ravel()).reshape(*t.shape, model.size + 1)
+
+        def operators(t: Array) -> tuple[Array, Array, Array, Array]:
+            return self.linearised(model, (*path.at(t), path.rates_of(t)), t)
+
+        steps = collocate(operators, self.drive.within, ends, nothing, nothing, f)
+
+        def at(t: Array) -> tuple[Array, Array]:
+            x, rates = steps.at(t)
+            return x[:, :-1], rates[:, :-1]
+
+        return Trajectory(*at(self.times), len(ends) - 1, False, at)
 
     def _force(self, model: ReducedModel, c: Array, q: Array, v: Array, a: Array) -> Array:
         """Return M a + C v + K q + f with these factors, (n, m)."""

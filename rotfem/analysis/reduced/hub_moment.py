@@ -52,12 +52,32 @@ class Polynomial:
         )
 
 
+@dataclass(frozen=True)
+class Directions:
+    """Shapes V, local dof arrays (n, m), of a system; owned are the unknowns of this process."""
+
+    system: Any
+    V: Array
+    owned: Any
+
+    @classmethod
+    def of(cls, model: ReducedModel) -> Directions:
+        """Return the basis of a reduced model."""
+        return cls(model.system, model.V, model.owned)
+
+    @property
+    def size(self) -> int:
+        """Number of shapes."""
+        return int(self.V.shape[1])
+
+
 class HubMoment:
     """The polynomials of all constants, with the effects that are on.
 
     Args:
-        model: reduced model of the structure.
+        basis: of the structure.
         row: the hub's equation.
+        first_order: leaves out what is of second order in the coordinates.
 
     Attributes:
         parts: polynomials by the constant and its component that they are multiplied by; ("", 0) by 1, ("ww", 0) by
@@ -65,8 +85,9 @@ class HubMoment:
         size: number of coordinates.
     """
 
-    def __init__(self, model: ReducedModel, row: Any):
-        self.model, self.row, self.system, self.size = model, row, model.system, model.size
+    def __init__(self, basis: Directions, row: Any, first_order: bool = False):
+        self.basis, self.row, self.system, self.size = basis, row, basis.system, basis.size
+        self._first_order = first_order
         self.constants = dict(self.system.model.frame.constants)
         self.constants |= {name: c for name, (c, _) in self.system.structure.load_constants.items()}
         kept = {name: constant.value.copy() for name, constant in self.constants.items()}
@@ -103,38 +124,38 @@ class HubMoment:
         elif name:
             self.constants[name].value.flat[component] = value
         self.system.structure.update_loads()
-        system, m = self.system, self.model.size
+        system, m = self.system, self.size
         zero = system.zeros()
         system.set_state(zero)
         moment = self.row.work()
         rest = {kind: self._slope(kind, zero, zero) for kind in SHIFTS}
         matrices: dict[str, Array] = {pair: np.zeros((m, m)) for pair in PAIRS}
-        if self.row.coupled and m:
+        if self.row.coupled and m and not self._first_order:
             matrices = {pair: self._matrix(pair[0], pair[1], rest) for pair in PAIRS}
         return Polynomial(moment, rest, matrices)
 
     def _slope(self, kind: str, q: Array, v: Array) -> Array:
         """Return the row's derivative by q, v or a along the basis at a state, (m,)."""
         if not self.row.coupled:
-            return np.zeros(self.model.size)
+            return np.zeros(self.size)
         self.system.set_state(q, v)
-        vector, V = self.row.row(SHIFTS[kind]).array, self.model.V[self.model.owned]
-        return np.asarray(summed(self.system.comm, V.T @ vector[self.model.owned]))
+        vector, V = self.row.row(SHIFTS[kind]).array, self.basis.V[self.basis.owned]
+        return np.asarray(summed(self.system.comm, V.T @ vector[self.basis.owned]))
 
     def _matrix(self, kind: str, along: str, rest: dict[str, Array]) -> Array:
         """Return a second derivative along the basis; zeros where a direction at random shows none."""
-        V, zero = self.model.V, self.system.zeros()
+        V, zero = self.basis.V, self.system.zeros()
 
         def change(shape: Array) -> Array:
             size = SMALL / max(self.system.size(shape), 1e-300)
             state = (size * shape, zero) if along == "q" else (zero, size * shape)
             return np.asarray((self._slope(kind, *state) - rest[kind]) / size)
 
-        weights = np.cos(np.arange(1.0, self.model.size + 1))
+        weights = np.cos(np.arange(1.0, self.size + 1))
         any_direction = change(V @ weights)
         scale = float(np.abs(rest[kind]).max(initial=0.0)) / SMALL
         if not np.any(np.abs(any_direction) > ROUND_OFF * scale):
-            return np.zeros((self.model.size,) * 2)
+            return np.zeros((self.size,) * 2)
         return np.array([change(column) for column in V.T]).T
 
     # --- at many times -----------------------------------------------------------------------------------------------

@@ -163,17 +163,24 @@ class Manifold:
     def correction(self, solution: Solution, path: Trajectory, third: bool = True) -> Array:
         """Return the answer of the linear equations to the forces that they lack on a trajectory, (rows, m).
 
+        A free hub feels the second-order displacements, too, and moves otherwise than on the trajectory for both.
+
         Args:
             solution: of the trajectory.
             path: one by collocation, which has no vibrations faster than its steps: their forces average to nothing.
             third: see `forces`.
         """
-        model = self.model
+        model, felt = self.model, solution.moment_along(self.Theta)
 
         def lacking(t: Array) -> Array:
             q, v = path.at(t)
             c = solution.drive.factors(t)
-            return self.forces(c, q, v, model.accelerations(c, q, v), third)
+            a = model.accelerations(c, q, v)
+            found = self.forces(c, q, v, a, third)
+            if felt is None:
+                return found
+            motion = self.second(q, v, a)
+            return np.column_stack([found, felt(t, motion.s, motion.v, motion.a)])
 
         return solution.answer(model, lacking).q
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -141,6 +142,10 @@ class Solution:
         f = forces(t.ravel()).reshape(*t.shape, model.size)
         steps = collocate(self._operators(model), self.drive.within, ends, nothing, nothing, f)
         return Trajectory(*steps.at(self.times), len(ends) - 1, False, steps.at)
+
+    def moment_along(self, shapes: Array) -> Any:
+        """Return what a free hub feels of shapes (see `FreeSolution`); None where none is free."""
+        return None
 
     def _operators(self, model: ReducedModel) -> Operators:
         return lambda t: model.operators(self.drive.factors(t))
