@@ -123,7 +123,7 @@ class Stretch:
             if window.missing is not None and "missing" in names:
                 out[rows, names.index("missing"), :r] = window.missing
             if window.theory is not None and "model" in names:
-                out[rows, names.index("model"), :r] = 2.0 * window.theory * window.bends * a[rows, :r]
+                out[rows, names.index("model"), :r] = 2.0 * window.theory * a[rows, :r]
         return out
 
     def _rows(self, arrays: Sequence[Array]) -> Array:

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.error_recursion import Complex, Propagator, accumulated, interpolated, settled
 from rotfem.analysis.error_stretch import Stretch, in_windows, stretches
+from rotfem.analysis.error_unresolved import largest_unresolved
 from rotfem.analysis.error_window import Window
 
 Array = npt.NDArray[np.float64]
@@ -30,6 +31,10 @@ WIDTH, UNSURE, LOWEST, MOST = 1.5, 0.3, 3, 0.3
 #: By what the largest of several tracks is multiplied: the true frequencies lie between them, or vary. Motions as large
 #: as the structure feed errors by more than a tangent knows, even where all tracks agree: by as much again.
 MARGIN = 1.3
+
+#: Part of the length from which a motion is large; of smaller ones the mesh leaves out less of what large ones have, by
+#: its square, and frequencies say the rest, as in linear theories.
+LARGE = 0.3
 
 #: Tracks: in which part of their scatter frequencies are tried, and the relative error below which none is.
 FACTORS, SMALL = (0.0, -1.0, 1.0), 1e-3
@@ -48,7 +53,7 @@ def largest_errors(
         length: of the structure, m.
     """
     if linear:
-        return _both(Tracks(scheme, linear).errors(windows, [[window.K] for window in windows])[0])
+        return _both(windows, Tracks(scheme, linear).errors(windows, [[window.K] for window in windows])[0])
     (changes, spreads), phase = smoothed(windows)
     sure = phase < UNSURE
     factors = FACTORS[:1] if sure else FACTORS
@@ -57,6 +62,8 @@ def largest_errors(
         for window, x, y in zip(windows, changes, spreads, strict=True)
     ]
     best, *others = Tracks(scheme, linear).errors(windows, stiffness)
+    size, when = best["missing"]
+    best["missing"] = (size * min(1.0, (scale / (LARGE * length)) ** 2), when)
     if not sure and best["time"][0] >= SMALL * scale:
         times = [best["time"], *(found["time"] for found in others)]
         fed = 1.0 + scale / length
@@ -64,13 +71,15 @@ def largest_errors(
         best["time"] = (MARGIN * max(largest, fed * least), when)
         best["space"] = (MARGIN * fed * best["space"][0], best["space"][1])
         best["missing"] = (fed * best["missing"][0], best["missing"][1])
-    return _both(best)
+    return _both(windows, best)
 
 
-def _both(found: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-    """Return errors: of space the larger one, by frequencies or by what the motion lacks."""
+def _both(windows: Sequence[Window], found: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    """Return errors: of space the largest one, by frequencies, resolved or not, or by what the motion lacks."""
     size, when = found["missing"]
-    return {"time": found["time"], "space": max(found["space"], (MARGIN * size, when)), "model": found["model"]}
+    (resolved, at), (unresolved, later) = found["space"], largest_unresolved(windows)
+    vibrating = (float(np.hypot(resolved, unresolved)), at if resolved > unresolved else later)
+    return {"time": found["time"], "space": max(vibrating, (MARGIN * size, when)), "model": found["model"]}
 
 
 def smoothed(windows: Sequence[Window]) -> tuple[tuple[list[Array], list[Array]], float]:

@@ -29,7 +29,7 @@ HELD = 0.01
 LIKE, LOWEST = 9.0, 3
 
 #: Relative error of frequencies in theories of moderate rotations, in squares of the largest rotation: 0.13 to 0.32 in
-#: free vibrations of beams and plates, half of that where it is the spin that stiffens.
+#: free vibrations of beams and plates, less where it is the spin that stiffens.
 MODERATE = 0.22
 
 #: Product of two shapes from which they are one, and a square of a frequency that is none, 1/s².
@@ -112,7 +112,7 @@ class Window:
         speed: of the frame in the middle, rad/s.
         bends: which shapes bend, (r of the structure,).
         epsilon: relative errors of their frequencies by the mesh.
-        theory: relative error of the frequencies by the theory, of nonlinear ones that are not exact; else None.
+        theory: relative errors of the frequencies by the theory, of nonlinear ones that are not exact; else None.
         missing: forces that the mesh leaves out in a large motion, (N, r of the structure); None where not known.
         turn: Vᵀ M V_before, by which errors are handed on; None for the first.
     """
@@ -127,13 +127,13 @@ class Window:
         self.K: Array
         self.bends: npt.NDArray[np.bool_]
         self.epsilon: Array
-        self.theory = self._error_by_theory(system, mesh)
         if before is not None and self._alike(system, before):
             for name in ("shapes", "speed", "C", "K", "bends", "epsilon"):
                 setattr(self, name, getattr(before, name))
             self.turn = np.eye(len(self.K))
         else:
             self._reduce(system, mesh, end, before)
+        self.theory = self._errors_by_theory(system, mesh)
         self.missing = self._missing(system, mesh)
         self.motion = tuple(self._coordinates(x) for x in list(zip(*samples.states, strict=True))[1:4])
         samples.states.clear()
@@ -167,10 +167,10 @@ class Window:
         found = mesh.refined.of_frequencies(self.shapes, np.pi / float(np.median(self.lengths)))
         return mesh.shape.of_modes(self.shapes) if found is None else found
 
-    def _error_by_theory(self, system: Any, mesh: MeshErrors) -> float | None:
-        """Return the relative error of frequencies by the theory: rotations are in its strains to the second order.
+    def _errors_by_theory(self, system: Any, mesh: MeshErrors) -> Array | None:
+        """Return the relative errors of frequencies by the theory: rotations are in its strains to the second order.
 
-        Of linear theories it is small: what they lack of bending and of inertia nearly cancels.
+        Of linear theories they are small: what they lack of bending and of inertia nearly cancels.
         """
         theory, size = system.held.model.theory, len(system.held.structure.unknowns)
         if theory.exact or theory.linear:
@@ -180,7 +180,8 @@ class Window:
         largest = float(np.abs(turned).max(initial=0.0))
         if system.comm.size > 1:
             largest = max(system.comm.allgather(largest))
-        return MODERATE * largest**2
+        squares = np.abs(self.shapes.squares)
+        return np.asarray(MODERATE * largest**2 * self.bends * squares / (squares + self.speed**2 + TINY))
 
     def _missing(self, system: Any, mesh: MeshErrors) -> Array | None:
         """Return the forces on shapes that bend which the mesh leaves out, where rotations are those of the motion."""

@@ -21,6 +21,9 @@ WANTED, AIM = 0.01, 0.5
 #: Tolerances that adaptive steps are taken to hold.
 HELD = 2.0
 
+#: Largest share of the steps: two motions of one size are no farther apart, however many phases are lost.
+APART = 2.0
+
 #: Part of the sum from which a share is told.
 TELLING = 0.1
 
@@ -54,6 +57,7 @@ def error_of_run(run: Simulation) -> ErrorEstimate | None:
 
 def _of_steps(scene: Scene, share: float) -> float:
     """Return the share of the steps: of adaptive ones at most HELD tolerances, as they judge every step themselves."""
+    share = min(share, APART)
     tolerance = None if scene.time is None else scene.time.tolerance
     return share if tolerance is None else min(share, HELD * tolerance)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 import rotfem
 from rotfem.analysis.error_recursion import Propagator, Spans, accumulated, interpolated, moments, settled
+from rotfem.analysis.error_unresolved import largest_unresolved
 
 BEAM = {
     "type": "planar_beam",
@@ -82,6 +84,21 @@ def test_phase_of_the_trapezoidal_rule() -> None:
     errors = accumulated(np.zeros((1, 1), complex), exact.factors, states[1:] - exact.factors * states[:-1])
     found = exact.displacements(0, np.array([0]), errors)[0, :, 0]
     np.testing.assert_allclose(found, (c[:, 0] - np.cos(omega * t))[1:], atol=1e-12)
+
+
+@pytest.mark.parametrize("epsilon", [1e-4, 0.1])
+def test_mesh_in_vibrations_that_steps_do_not_resolve(epsilon: float) -> None:
+    """Two vibrations of the trapezoidal rule, ωh = 3 and ω off by ε, differ by a phase, or by twice the amplitude."""
+    omega, h, n = 30.0, 0.1, 400
+    t = h * np.arange(n + 1)
+    c, other = (np.cos(2 / h * np.arctan(0.5 * w * h) * t) for w in (omega, (1 + epsilon) * omega))
+    shapes = SimpleNamespace(squares=np.array([omega**2]), tip=np.array([[0.0], [2.0]]))
+    ends, motion = (np.arange(n), np.arange(1, n + 1)), (3.0 * c[:, None],)
+    window: Any = SimpleNamespace(t=t, lengths=np.full(n, h), ends=ends, motion=motion, shapes=shapes)
+    window.epsilon = np.array([epsilon])
+    size, when = largest_unresolved([window])
+    assert size == pytest.approx(6.0 * np.abs(c - other).max(), rel=0.02)  # samples pass the peaks by
+    assert when == t[-1]
 
 
 def test_rough_samples_are_joined_by_lines() -> None:
