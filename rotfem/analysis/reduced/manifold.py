@@ -197,7 +197,8 @@ def recover(response: Response) -> Foreshortened:
     tips = manifold.tip(response.q + second)
     size = largest(response.model, tips)
     off = largest(response.model, manifold.tip(response.q + all_of_them) - tips) / size if size > 0.0 else 0.0
-    return Foreshortened(response, manifold, response.q + second, off + (_stretched(response) / size if size else 0.0))
+    more = _stretched(response) + _ringing(response, path)
+    return Foreshortened(response, manifold, response.q + second, off + (more / size if size else 0.0))
 
 
 def _stretched(response: Response) -> float:
@@ -210,6 +211,22 @@ def _stretched(response: Response) -> float:
     finally:
         solution.drive.whole.leave_out(())
     return largest(model, (other - response.q) @ tips_of(model).T)
+
+
+def _ringing(response: Response, slow: Trajectory) -> float:
+    """Return what the tip may be off, m, as the force along the structure rings where linear theories have it steady.
+
+    What is struck by the ringing itself, as the bending by its Coriolis forces, sees that force change as fast. The
+    part of a bending stiffness that is of it is at most the square of the speed over the frequency.
+    """
+    model, drive, times = response.model, response.solution.drive, response.times
+    if not response.trajectory.exact or model.size == 0:
+        return 0.0
+    rings = (response.q - slow.q) @ tips_of(model).T[:, 0]
+    M, _, K, _ = model.operators(response.factors()[:1])
+    squares = np.linalg.eigvals(np.linalg.solve(M[0], K[0])).real
+    lowest, speed = float(squares[squares > 0.0].min(initial=np.inf)), float(np.abs(drive.speed(times)).max())
+    return float(np.abs(rings).max()) * min(1.0, speed**2 / lowest)
 
 
 @dataclass(frozen=True)
