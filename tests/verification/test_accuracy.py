@@ -90,7 +90,7 @@ def test_two_runs_say_what_their_steps_do() -> None:
     )
     model = ({"theory": "reissner"},)
     fine.summary["error"] |= {"time": 1.0, "total": 1.0 + fine.summary["error"]["space"]}
-    compare(fine, Settings(model, 6, 3, "esdirk4", 0.05), Settings(model, 6, 3, "esdirk4", 0.1), rough)
+    compare(fine, Settings(model, 6, 3, "esdirk4", 0.05), Settings(model, 6, 3, "esdirk4", 0.1), rough, [])
     error = fine.summary["error"]
     assert true_error(fine, truth("spin-up")) < error["time"] < 1e-2
     assert error["total"] == pytest.approx(error["time"] + error["space"])
