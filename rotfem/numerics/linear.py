@@ -18,6 +18,9 @@ Array = npt.NDArray[np.float64]
 #: Up to this size, on one process, PETSc's own LU is quicker than MUMPS (findings: 43 against 377 µs at 603 dofs).
 SMALL = 5000
 
+#: Where a symmetric matrix has so many entries in a row, as of plates, MUMPS is quicker from this size on already.
+MANY, MIDDLE = 50, 1000
+
 #: Relative difference of two solutions from which a matrix is singular.
 LOST = 1e-2
 
@@ -52,7 +55,7 @@ def transposed(A: Any) -> Any:
     return A.transpose(PETSc.Mat())
 
 
-def use_direct_solver(ksp: Any, size: int, symmetric: bool = False, pivots: bool = False) -> None:
+def use_direct_solver(ksp: Any, size: int, symmetric: bool = False, pivots: bool = False, small: int = SMALL) -> None:
     """Make a KSP apply one factorisation: PETSc's own LU up to SMALL unknowns, MUMPS above.
 
     Args:
@@ -60,6 +63,7 @@ def use_direct_solver(ksp: Any, size: int, symmetric: bool = False, pivots: bool
         size: number of unknowns.
         symmetric: whether the matrix is (it may be indefinite); MUMPS then needs half the memory.
         pivots: whether rows must change places, as where zeros are on the diagonal: PETSc's own LU does not.
+        small: another number than SMALL.
     """
     ksp.setType(PETSc.KSP.Type.PREONLY)
     pc = ksp.getPC()
@@ -67,15 +71,15 @@ def use_direct_solver(ksp: Any, size: int, symmetric: bool = False, pivots: bool
         pc.setType(PETSc.PC.Type.LU)
         pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
         return
-    if ksp.comm.size > 1 and size <= SMALL:
+    if ksp.comm.size > 1 and size <= small:
         # Every process factors the whole small matrix: far quicker than sharing it out.
         pc.setType(PETSc.PC.Type.REDUNDANT)
         PETSc.Options()[f"{ksp.getOptionsPrefix() or ''}redundant_pc_factor_zeropivot"] = 0.0  # as below
         ksp.setFromOptions()
         return
-    pc.setType(PETSc.PC.Type.CHOLESKY if symmetric and size > SMALL else PETSc.PC.Type.LU)
+    pc.setType(PETSc.PC.Type.CHOLESKY if symmetric and size > small else PETSc.PC.Type.LU)
     pc.setFactorPivot(0.0)  # what is small depends on the units; a singular matrix is seen in the solution
-    if size > SMALL:
+    if size > small:
         pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
 
 
@@ -94,7 +98,9 @@ class DirectSolver:
         self._ksp = PETSc.KSP().create(A.comm)
         if symmetric:
             A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        use_direct_solver(self._ksp, A.getSize()[0], symmetric)
+        size = A.getSize()[0]
+        wide = symmetric and A.comm.size == 1 and A.getInfo()["nz_used"] > MANY * size
+        use_direct_solver(self._ksp, size, symmetric, small=MIDDLE if wide else SMALL)
         self._ksp.setErrorIfNotConverged(False)
         self._stale = True
 
