@@ -269,6 +269,16 @@ def test_critical_speed_of_the_linear_theory(unit_beam: Any, hub_beam: Any, spin
         assert any(text.startswith("static instability from") for text in result.summary["warnings"])
 
 
+def test_speed_beyond_all_others_is_none(spin_up: Any) -> None:
+    """A beam that hardly stretches is softened along its axis only: no speed is critical, which is known at once.
+
+    Its stretching would be at π/2 √(EA/m)/L = 4.5e4 rad/s, bending is stiffened from 4 rad/s on.
+    """
+    section = {"structure.section.EA": 1e11, "structure.section.GA": 3e10}
+    scene = spin_up({**section, "model.theory": "consistent_linear", "mesh.elements": 60})
+    assert critical_speed(ModalAnalysis(Problem.of(scene).spinning()).system) is None
+
+
 def test_stiffening(hub_beam: Any) -> None:
     """The first frequency falls to zero with `linear`, and rises with the consistent and the exact theories."""
     speeds = np.linspace(0.0, 2.8, 8)
