@@ -223,6 +223,8 @@ class Model:
     def inside_out(self) -> bool:
         """Return whether the structure is anywhere compressed to less than nothing at the state in q: none real is."""
         mesh = self.structure.mesh
+        if self.comm.allreduce(self.structure.hardly_moved(), op=MPI.LAND):
+            return False
         if self._stretch is None:
             points = forms.quadrature_points(mesh, self.structure.V.element.basix_element.degree)
             self._stretch = forms.expression(self.structure.stretch(self.mechanics.strains), points, self.comm)

@@ -22,12 +22,12 @@ from rotfem.selection.distance import Beyond, Bound, Outputs
 Array = npt.NDArray[Any]
 T = TypeVar("T")
 
-#: Share of halved steps from which on steps are too long to be trusted.
-HALVED = 0.01
+#: Share of halved steps, and of steps in which Newton strayed, from which on steps are too long to be trusted.
+HALVED, STRAYED = 0.01, 0.1
 
 
 class Halved(ComputationError):
-    """So many steps had to be halved that the others are too long to be trusted."""
+    """So many steps had to be halved, or Newton strayed in so many, that the others are too long to be trusted."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,9 @@ class Candidate:
     def _history(self, steps: Steps, q: Array | None, out: Outputs, watch: Watch) -> None:
         system, scheme = self.switched(), self.case.scheme
         assert scheme is not None
-        march = March(system, scheme, steps, self.case.newton(), q)
+        newton, strayed = self.case.newton(), 0
+        march = March(system, scheme, steps, newton, q)
+        most = STRAYED * len(steps.parts or ()) if np.isfinite(watch.halved) else np.inf
         tips: list[Array] = []
         out.sizes = np.zeros(len(system.structure.components))
         try:
@@ -154,6 +156,9 @@ class Candidate:
                     raise ComputationError(f"it diverges at t = {state.t:.4g} s")
                 if march.stepper.substeps > watch.halved:
                     raise Halved(f"{march.stepper.substeps} steps were halved by t = {state.t:.4g} s")
+                strayed += newton.strayed
+                if strayed > most:  # where it ends may be no motion of this model, and no energy may tell
+                    raise Halved(f"Newton strayed in {strayed} steps by t = {state.t:.4g} s")
         finally:
             out.tip = np.array(tips) if tips else out.tip
 

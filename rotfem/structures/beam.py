@@ -14,6 +14,7 @@ from mpi4py import MPI
 from rotfem.mechanics.bodies import RootSpring, Strain
 from rotfem.mechanics.loads import stations
 from rotfem.mechanics.problem import Problem
+from rotfem.numerics.forms import quadrature_points
 from rotfem.structures.memory import check_memory
 from rotfem.structures.meshes.line import END, apart, beam_nodes
 from rotfem.structures.mode_names import in_phase, sign_changes
@@ -23,6 +24,9 @@ from rotfem.structures.tip_values import TipValues
 
 #: Polynomial degree that holds any section property of linearly tapered dimensions (I of a tube: fourth degree).
 TAPER_DEGREE = 4
+
+#: Rotation (rad) and slope far below those that turn a beam inside out, and what rotations may change over a length.
+SMALL, TURNS = 0.4, 10.0
 
 
 class Beam(Structure):
@@ -100,6 +104,25 @@ class Beam(Structure):
     def stretch(self, strains: list[Strain]) -> Any:
         """Return 1 + Γ₁, Γ₁ the axial strain."""
         return 1 + next(s.value for s in strains if s.name == "axial")
+
+    def hardly_moved(self) -> bool:
+        """Return whether the state in q is surely not inside out, as far as this process sees without compiling.
+
+        Every theory's 1 + Γ₁ is at least about cos α − |u'|, and rotation and slope are small at all quadrature points.
+        """
+        if self.turns is not None and self.turns.datum is not None:
+            return False
+        basis, cells = self.V.element.basix_element, np.arange(self.mesh.topology.index_map(1).size_local)
+        at, by_x = basis.tabulate(1, quadrature_points(self.mesh, basis.degree))[..., 0]
+        nodes = self.k.q.x.array.reshape(-1, len(self.unknowns))[self.V.dofmap.list[cells]]
+        values = np.einsum("pn,cni->cpi", at, nodes)
+        slopes = np.einsum("pn,cni->cpi", by_x, nodes) / self.mesh.h(1, cells.astype(np.int32))[:, None, None]
+        moves = np.array([name.startswith("u") for name in self.unknowns])
+        largest = (
+            float(np.linalg.norm(x, axis=2).max(initial=0.0))
+            for x in (values[..., ~moves], slopes[..., moves], self.length * slopes[..., ~moves] / TURNS)
+        )
+        return all(size < SMALL for size in largest)
 
     def section_strains(self, measures: Callable[..., tuple[Any, ...]]) -> Any:
         """Return the strains of a section as one vector, in the order of `rotfem.section_quantities.STRAINS`."""
