@@ -200,7 +200,10 @@ CASES = [
         planar("von_karman", loads={"tip_moment": EI * np.pi / LENGTH}),
         expected="failed",
         words=r"at 0\.32",
-        source="(1 + u')² + v'² = 1, v' = alpha = M x/EI: from 1/π of the load on 1 + u' = 0, a singular tangent",
+        # Beyond, alpha = 1 + sinh k(x − a)/ka and v' = (EA + GA alpha)/(EA + GA) from x = a on, k² = EA GA/(EA + GA)EI,
+        # where 1 + u' = 0: stable, and on no path on which 1 + u' has a sign.
+        source="(1 + u')² + v'² = 1, v' = alpha = M x/EI: at 1/π of the load the path meets its mirror image, "
+        "1 + u' < 0, at the tip; beyond there 1 + u' = 0",
         nightly=True,
     ),
     *(
