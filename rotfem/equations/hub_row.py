@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import ufl
 
-from rotfem.equations.nonlinear import BySpin, assembled
+from rotfem.equations.by_spin import BySpin
+from rotfem.equations.nonlinear import assembled
 from rotfem.equations.system import System
 from rotfem.mechanics import work
 from rotfem.numerics import compat, forms

@@ -10,9 +10,8 @@ import numpy.typing as npt
 import ufl
 from dolfinx import fem, la
 from dolfinx.fem import petsc as fem_petsc
-from ufl.algorithms import expand_derivatives
-from ufl.algorithms.analysis import extract_constants
 
+from rotfem.equations.by_spin import BySpin
 from rotfem.equations.clamp_work import ClampWork
 from rotfem.equations.energy_balance import EnergyBalance
 from rotfem.equations.model import Model
@@ -148,7 +147,7 @@ class NonlinearSystem(System):
         return self.b
 
     def sum_of(self, parts: list[Any]) -> Array:
-        """Return compiled linear forms added up, on the owned unknowns; the array is reused."""
+        """Return compiled linear forms added up, a local dof array (reused) whose owned part counts."""
         b: Array = self._b_array
         b[:] = 0.0
         for form in parts:
@@ -259,39 +258,6 @@ class NonlinearSystem(System):
         self._spin = forms.form(self._by_spin.ufl) if self._spin is None else self._spin
         self._by_spin.set(c_v, c_m)
         return assembled(self._spin, self.V, self.clamped, self._spun)
-
-
-class BySpin:
-    """c_v ∂/∂Omega + c_m ∂/∂Omega' of a form, the speed along the axis of the motion varied.
-
-    Args:
-        model: the constants of the frame.
-        form: UFL form; only its integrals with the speed or its rate are differentiated.
-
-    Attributes:
-        ufl: the derivative, a UFL form; None if the speed is not in the form.
-    """
-
-    def __init__(self, model: Any, form: Any):
-        self._factors = [model.structure.constant(0.0) for _ in range(2)]
-        parts = []
-        for name, factor in zip(("w", "dw"), self._factors, strict=True):
-            constant = model.frame.constants.get(name)
-            if constant is None:
-                continue
-            within = [part for part in form.integrals() if constant in extract_constants(part.integrand())]
-            s = ufl.variable(model.structure.constant(0.0))
-            axis = model.motion.axis[-constant.value.size :]
-            shifted = ufl.as_vector([constant[i] + s * float(e) for i, e in enumerate(axis)])
-            derivative = expand_derivatives(ufl.diff(ufl.replace(ufl.Form(within), {constant: shifted}), s))
-            if not derivative.empty():
-                parts.append(factor * derivative)
-        self.ufl = added(parts) if parts else None
-
-    def set(self, c_v: float, c_m: float) -> None:
-        """Set the factors."""
-        for constant, value in zip(self._factors, (c_v, c_m), strict=True):
-            constant.value = value
 
 
 def assembled(form: Any, V: fem.FunctionSpace, clamped: Any, b: Any = None) -> Any:
