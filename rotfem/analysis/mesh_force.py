@@ -71,6 +71,8 @@ class MeshForce:
 
     def _whole(self, owned: Array) -> Array:
         """Return owned columns (n, r) as local dof arrays (r, unknowns), with the values of ghosts."""
+        if self.system.comm.size == 1:
+            return np.ascontiguousarray(owned.T)
         function = self.system.held.q.copy()
         out = np.empty((owned.shape[1], len(function.x.array)))
         for i, column in enumerate(owned.T):

@@ -86,7 +86,10 @@ class ShapeError:
         gradients = self.estimate.coefficients(place[None])[0, :, 0]
         nodes: Array = np.zeros((len(x), *gradients.shape[1:]))
         np.add.at(nodes, self.estimate.cells, gradients[:, None])
-        return np.asarray(np.linalg.qr(nodes[: V.dofmap.index_map.size_local])[0])
+        owned = nodes[: V.dofmap.index_map.size_local]
+        if owned.shape[2] == 1:
+            return np.asarray(owned / np.linalg.norm(owned, axis=1, keepdims=True))
+        return np.asarray(np.linalg.qr(owned)[0])
 
     def _oriented(self, values: Array) -> Array:
         """Return all components along the undeformed structure of nodal values (n, unknowns of a node, r)."""

@@ -7,7 +7,7 @@ Every process holds the whole refined mesh.
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import product
 from typing import Any
 
@@ -123,12 +123,24 @@ class Refinement:
         """
         bs, dofmap = space.dofmap.index_map_bs, space.dofmap.list[: self._owned]
         columns = values.reshape(-1, bs * (values.shape[1] if values.ndim > 1 else 1))
-        cells = np.concatenate(self._comm.allgather(columns[dofmap]))
-        out = np.empty((to.dofmap.index_map.size_local, columns.shape[1]))
-        for i, weights in enumerate(self._weights(space)):
-            mine = self._part == i
-            out[to.dofmap.list[mine]] = np.einsum("jn,cnk->cjk", weights, cells[self._parent[mine]])
+        cells = columns[dofmap] if self._comm.size == 1 else np.concatenate(self._comm.allgather(columns[dofmap]))
+        parent, weights = self._carriers if to is self.V else self._carriers_to(space, to)
+        out: Array = (weights[:, None] @ cells[parent])[:, 0]
         return out.reshape(-1, *values.shape[1:])
+
+    @cached_property
+    def _carriers(self) -> tuple[npt.NDArray[np.int64], Array]:
+        return self._carriers_to(self._coarse, self.V)
+
+    def _carriers_to(self, space: Any, to: Any) -> tuple[npt.NDArray[np.int64], Array]:
+        """Return for every node of a space on the new mesh a cell that it lies in, and the basis of a space there."""
+        parent = np.empty(to.dofmap.index_map.size_local, dtype=np.int64)
+        part = np.empty_like(parent)
+        parent[to.dofmap.list] = self._parent[:, None]
+        number = np.empty_like(parent)
+        number[to.dofmap.list] = np.arange(to.dofmap.list.shape[1])
+        part[to.dofmap.list] = self._part[:, None]
+        return parent, np.stack(self._weights(space))[part, number]
 
     def function(self, f: fem.Function) -> fem.Function:
         """Return a function on the refined mesh with the values of one on the coarse mesh."""
