@@ -32,6 +32,9 @@ class Tangents:
     Args:
         system: equations of motion; time and state are set in it.
         state: where.
+
+    Attributes:
+        matrices: M and K, PETSc matrices.
     """
 
     def __init__(self, system: Any, state: Any):
@@ -44,25 +47,34 @@ class Tangents:
             for x in (inner.q, inner.v, inner.a):
                 x.x.scatter_forward()
         self.speed = abs(float(system.motion.speed(state.t)))
-        self.matrices = {n: inner.matrix(*shift, 1.0 if n == "K" else 0.0) for n, shift in SHIFTS.items()}
         self.by_mode = inner.by_mode
-        self.borders: dict[str, Border] = {}
-        if system.hub is not None:
-            for name, shift in SHIFTS.items():
-                row, column = system.row.row(shift).array.copy(), inner.spin_derivative(*OF_SPIN[name]).array.copy()
-                self.borders[name] = Border(row, column, system.row.diagonal(*OF_SPIN[name]))
+        self.matrices = {name: self._matrix(name) for name in "MK"}
+
+    def _matrix(self, name: str) -> Any:
+        return self.system.held.matrix(*SHIFTS[name], 1.0 if name == "K" else 0.0)
 
     def shapes(self) -> RitzVectors:
         """Return the shapes that move the tip here."""
         return RitzVectors(self.system.held, self.matrices["M"], self.matrices["K"], self.speed**2)
 
     def reduced(self, shapes: RitzVectors) -> tuple[Array, Array, Array]:
-        """Return M, C, K in shapes that were made or turned by M and K, (r, r) each; of a free hub (r + 1, r + 1)."""
-        parts = {"M": np.eye(len(shapes.squares)), "C": shapes.product(self.matrices["C"]), "K": shapes.stiffness}
+        """Return M, C, K in shapes that were made or turned by M and K, (r, r) each; of a free hub (r + 1, r + 1).
+
+        The state must still be the one that is set in the system.
+        """
+        C = self._matrix("C")
+        parts = {"M": np.eye(len(shapes.squares)), "C": shapes.product(C), "K": shapes.stiffness}
         if self.by_mode is not None:
             along = self.by_mode.along(shapes.V)
             parts["C"] = parts["C"] + along.T @ along
-        for name, border in self.borders.items():
+        for name in parts if self.system.hub is not None else ():
+            border = self._border(name)
             row, column = shapes.sum(np.array([border.row @ shapes.V, border.column @ shapes.V]))
             parts[name] = np.block([[parts[name], column[:, None]], [row[None, :], np.array([[border.corner]])]])
         return parts["M"], parts["C"], parts["K"]
+
+    def _border(self, name: str) -> Border:
+        """Return what the angle of a free hub adds to a matrix."""
+        system, of_spin = self.system, OF_SPIN[name]
+        row = system.row.row(SHIFTS[name]).array.copy()
+        return Border(row, system.held.spin_derivative(*of_spin).array.copy(), system.row.diagonal(*of_spin))
