@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.reduced.manifold import Manifold
 from rotfem.analysis.reduced.response import Response, tips_of
 from rotfem.analysis.reduced.struck import struck
 from rotfem.analysis.schemes import Scheme
@@ -17,7 +18,7 @@ from rotfem.results.run import RunResult
 from rotfem.selection.accuracy import AIM, Elements, Settings, finer, finest, part, shares
 from rotfem.selection.effects_ahead import effects_ahead
 from rotfem.selection.mesh_ahead import MeshAhead
-from rotfem.selection.steps_ahead import Motion, error_ahead, plan, unresolved_ahead
+from rotfem.selection.steps_ahead import UNKNOWN, Motion, Vibrating, error_ahead, plan, unresolved_ahead
 
 if TYPE_CHECKING:
     from rotfem.commands.simulation import Simulation
@@ -40,14 +41,14 @@ NEWTON, SMALL, MANY = 1e-4, 1e-2, 2000
 #: estimate on free hubs, twice on plates.
 TRUST = 3.0
 
-#: By how much larger elements may be off than those of an answer, which they follow if that is allowed.
-LARGER = 20.0
-
 #: Part of the lowest frequency of what stretches from which a vibration may be one that stretches.
 STRETCHING = 0.7
 
 #: Error of a model from which its motion is another one, and the part of the accuracy that is aimed at then.
 POOR, DOUBTED = 0.1, 0.5
+
+#: How many times more steps that may take: more do where a vibration is resolved that could have been damped out.
+DEAR = 2.0
 
 #: Columns of the displacement of the tip.
 TIPS = ("tip_u1", "tip_u2", "tip_u3")
@@ -66,6 +67,7 @@ class Ahead:
         self.own: Motion | None = None
         self.mesh: MeshAhead | None = None
         self.response: Response | None = None
+        self.manifold: Manifold | None = None
         self.length, self.off = 1.0, np.inf
         self._last: tuple[Settings, RunResult] | None = None
 
@@ -78,11 +80,17 @@ class Ahead:
         """Take note of how the tip has moved in a run."""
         self.length = float(run.system.structure.length)
         if run.response is not None:
-            self.response, self.linear = run.response, sampled(run.response)
             mesh = run.scene.mesh
-            self.mesh = MeshAhead.of(run.response, mesh.elements, mesh.degree)
+            self.response, self.mesh = run.response, MeshAhead.of(run.response, mesh.elements, mesh.degree)
+            self.manifold = None if run.foreshortened is None else run.foreshortened.manifold
+            self.linear = sampled(run.response, self._structure)
         elif run.track is not None and len((path := run.track.path())[0]) > 1:
-            self.own = Motion.between(*path)
+            self.own = Motion.between(*path, self._structure)
+
+    @property
+    def _structure(self) -> Vibrating:
+        """What is known of the vibrations of the structure."""
+        return UNKNOWN if self.mesh is None else self.mesh.structure
 
     def judge(self, done: RunResult, settings: Settings) -> None:
         """Write into the error of a result what the spectra and the run before say of it.
@@ -123,7 +131,14 @@ class Ahead:
         error["space"] = max(part(error, "space"), off)
         # what is known by a poor model only may be less demanding than the motion is
         trusted = self.own is not None or self.off < POOR
-        return self.stepped(settings, (1.0 if trusted else DOUBTED) * shares(error, self.accuracy)["time"])
+        allowed = shares(error, self.accuracy)["time"]
+        return self.stepped(settings, allowed if trusted or self._dear(allowed) else DOUBTED * allowed)
+
+    def _dear(self, allowed: float) -> bool:
+        """Return whether steps of DOUBTED of what is allowed are so many more that the others are tried first."""
+        known = [scheme for scheme in Scheme.registry if scheme.name in SCHEMES]
+        found, doubted = (plan(self.motions, part * allowed, known) for part in (1.0, DOUBTED))
+        return found is not None and doubted is not None and doubted.work > DEAR * found.work
 
     def meshed(self, settings: Settings, error: Mapping[str, Any]) -> Settings:
         """Return settings of the model of before with at least the mesh that its motion needs, if the mesh is to grow.
@@ -137,7 +152,8 @@ class Ahead:
 
     def effects(self, error: Mapping[str, Any]) -> Any:
         """Return what effects are worth in an answer of an error (see `rotfem.selection.effects_ahead`)."""
-        return effects_ahead(self.response, self.off, shares({**error, "model": 1.0}, self.accuracy)["model"])
+        allowed = shares({**error, "model": 1.0}, self.accuracy)["model"]
+        return effects_ahead(self.response, self.off, allowed, self.manifold)
 
     def _grown(self, settings: Settings, error: Mapping[str, Any]) -> tuple[Settings, float]:
         """Return settings with elements as the motion needs them, and the relative error that these leave."""
@@ -145,8 +161,9 @@ class Ahead:
             return settings, 0.0
         allowed = AIM * shares({**error, "space": 1.0}, self.accuracy)["space"]
         growth, off = self.mesh.growth(self.motions, allowed)
+        growth = max(growth, (part(error, "space") / allowed) ** (0.5 / self.mesh.degree)) if growth < 1.0 else growth
         grown: Elements = finer(self.mesh.elements, growth)
-        if growth >= 1.0 or part(error, "space") > allowed / LARGER:
+        if growth >= 1.0:
             grown = finest(settings.elements, grown)
         return replace(settings, elements=grown), off
 
@@ -169,11 +186,17 @@ class Ahead:
         return replace(settings, scheme=found.scheme, step=found.step, tolerance=None, increment=increment)
 
 
-def sampled(response: Response) -> Motion:
-    """Return the motion of a reduced answer, at times that are close enough for what is fast in it."""
+def sampled(response: Response, structure: Vibrating) -> Motion:
+    """Return the motion of a reduced answer, at times that are close enough for what is fast in it.
+
+    Args:
+        response: the answer.
+        structure: what is known of its vibrations.
+    """
     t: Array = np.linspace(response.times[0], response.times[-1], LOOKS)
     moves = [name.startswith("u") for name in response.model.system.structure.components]
-    return Motion(t, (response.trajectory.at(t)[0] @ tips_of(response.model).T)[:, moves], struck(response))
+    tips = (response.trajectory.at(t)[0] @ tips_of(response.model).T)[:, moves]
+    return Motion(t, tips, struck(response), structure)
 
 
 def less(error: dict[str, Any], found: float | None) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from rotfem.analysis.reduced.effect_sizes import effect_sizes
+from rotfem.analysis.reduced.manifold import Manifold
 from rotfem.analysis.reduced.response import Response
 from rotfem.errors import ComputationError
 
@@ -21,13 +22,14 @@ MOST = 3_000
 POOR = 0.5
 
 
-def effects_ahead(response: Response | None, off: float, allowed: float) -> Any:
+def effects_ahead(response: Response | None, off: float, allowed: float, manifold: Manifold | None = None) -> Any:
     """Return `sizes` of all effects, relative changes of the tip's displacement without each; which are `negligible`.
 
     Args:
         response: of the reduced model; None without one.
         off: its error, relative.
         allowed: what effects that are called negligible may come to together.
+        manifold: of the response, if it is known.
 
     Returns:
         None where a reduced model does not say it, or not quickly; of a free hub it does not.
@@ -38,7 +40,7 @@ def effects_ahead(response: Response | None, off: float, allowed: float) -> Any:
     if system.hub is not None or (1 + len(system.model.effects)) * response.trajectory.steps > MOST:
         return None
     try:
-        sizes = effect_sizes(response)
+        sizes = effect_sizes(response, manifold=manifold)
     except (ComputationError, np.linalg.LinAlgError):
         return None
     negligible, together = [], 0.0

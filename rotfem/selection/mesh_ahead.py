@@ -16,12 +16,19 @@ import numpy.typing as npt
 
 from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.shape_error import ShapeError
-from rotfem.selection.steps_ahead import Motion
+from rotfem.selection.steps_ahead import UNKNOWN, Motion, Vibrating
 
 Array = npt.NDArray[np.float64]
 
+#: Elements along an edge that a mesh of a plate keeps at least, where it becomes coarser, and what one of a beam may
+#: become, which costs little as it is.
+FEWEST, COARSER = 4, 0.6
+
 #: Modes whose errors are told, smallest error of one, and growths of the number of elements that are tried.
-MODES, LEAST, GROWTHS = 12, 1e-14, np.append([0.6, 0.8], np.geomspace(1.0, 8.0, 25))
+MODES, LEAST, GROWTHS = 12, 1e-14, np.append([0.3, 0.4, 0.5, 0.6, 0.8], np.geomspace(1.0, 8.0, 25))
+
+#: Instants at which the lowest frequency and the least damping are looked for.
+LOOKS = 17
 
 
 @dataclass
@@ -43,6 +50,7 @@ class MeshAhead:
         stretches: which modes stretch rather than bend, (n,).
         elements: number of elements, (nx, ny) of a plate.
         degree: of the elements.
+        structure: what is known of its vibrations in the whole history.
     """
 
     omega: Array
@@ -50,6 +58,7 @@ class MeshAhead:
     stretches: npt.NDArray[np.bool_]
     elements: int | tuple[int, int]
     degree: int
+    structure: Vibrating = UNKNOWN
 
     @classmethod
     def of(cls, response: Response, elements: int | tuple[int, int], degree: int) -> MeshAhead | None:
@@ -67,7 +76,8 @@ class MeshAhead:
         X = modes[:, chosen].real
         found = ModeShapes(model.V[model.owned] @ X, model.forces("M", c[0]) @ X, model.comm)
         off = np.maximum(LEAST, shapes.of_modes(found))
-        return cls(np.sqrt(squares.real[chosen]), off, ~shapes.bend(found), elements, degree)
+        omega = np.sqrt(squares.real[chosen])
+        return cls(omega, off, ~shapes.bend(found), elements, degree, vibrating(response))
 
     @property
     def stretching(self) -> float:
@@ -81,8 +91,9 @@ class MeshAhead:
             motions: of the tip, whose most demanding one counts.
             allowed: relative error.
         """
-        left = np.inf
-        for growth in GROWTHS:
+        left, fewest = np.inf, int(np.min(self.elements))
+        coarsest = min(1.0, FEWEST / fewest) if isinstance(self.elements, tuple) else COARSER
+        for growth in GROWTHS[GROWTHS >= coarsest]:
             left = max((self.error(motion, growth) for motion in motions), default=0.0)
             if left <= allowed:
                 break
@@ -95,4 +106,15 @@ class MeshAhead:
         inside = np.exp(np.interp(np.log(np.maximum(omega, self.omega[0])), np.log(self.omega), np.log(self.off)))
         beyond = self.off[-1] * np.exp(self.degree * np.maximum(slope, 0.0))
         off = np.minimum(1.0, np.where(omega > self.omega[-1], beyond, inside) / growth ** (2 * self.degree))
-        return motion.whole.error_of_mesh(off, float(self.omega[0]))
+        return motion.whole.error_of_mesh(off)
+
+
+def vibrating(response: Response) -> Vibrating:
+    """Return the lowest frequency and the least damping of a reduced model in its history; 0 where it has none."""
+    c, m = response.factors(), response.model.size
+    M, C, K, _ = response.model.operators(c[np.unique(np.linspace(0, len(c) - 1, LOOKS).astype(int))])
+    rates = np.zeros((len(M), 2 * m, 2 * m))
+    rates[:, :m, m:] = np.eye(m)
+    rates[:, m:, :m], rates[:, m:, m:] = -np.linalg.solve(M, K), -np.linalg.solve(M, C)
+    squares, values = np.linalg.eigvals(-rates[:, m:, :m]), np.linalg.eigvals(rates)
+    return Vibrating(float(np.sqrt(max(0.0, squares.real.min()))), max(0.0, -float(values.real.max())))

@@ -6,7 +6,7 @@ amplitudes A_k of the tip's motion at ω_k and a factor s for safety,
 
     e(h) = Σ_k A_k min(2 or 1, s C (ω_k h)^m T/h),
 
-so what is fast but small need not be resolved.
+so what is fast but small need not be resolved, and T at most the time in which vibrations fade.
 
 Amplitudes are those of the Fourier transform under Hann's window, which makes a vibration half its amplitude in two
 neighbours of its line, and a jump from the end to the start nearly nothing. The sum is above the truth, as vibrations
@@ -18,7 +18,7 @@ without the slow part counts. A mesh that puts the frequency ω off by ε(ω) mo
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
@@ -46,8 +46,8 @@ FOLLOWING, FOLLOWED = 0.5, 8 / 3
 #: Power of the frequency by which a filter leaves out what is slow; a sharp one would see the end from the start.
 SMOOTH = 8
 
-#: Longest step, as a part of the history, and halvings that find one.
-LONGEST, HALVINGS = 1 / 20, 40
+#: Longest step, as a part of the history, by what a shorter one is tried, and how many are.
+LONGEST, FINER, SHORTER = 1 / 20, 0.7, 70
 
 #: Windows in which a motion is looked at by itself, and how many times the steps of windows of their own it may cost to
 #: go with those of the worst one through all.
@@ -64,6 +64,22 @@ BESIDE = 1.0
 
 
 @dataclass(frozen=True)
+class Vibrating:
+    """What is known of the vibrations of a structure.
+
+    Attributes:
+        lowest: frequency, rad/s; what is far below it follows its loads and has no phase to lose. 0 where unknown.
+        fading: rate at which vibrations fade at least, 1/s: a phase that is lost is forgotten after 1/fading.
+    """
+
+    lowest: float = 0.0
+    fading: float = 0.0
+
+
+UNKNOWN = Vibrating()
+
+
+@dataclass(frozen=True)
 class Spectrum:
     """Amplitudes of a motion.
 
@@ -71,14 +87,16 @@ class Spectrum:
         omega: rad/s, (n,).
         amplitudes: relative to the largest displacement of the whole motion, (n,).
         duration: of the motion, s.
+        structure: of the structure that moves so.
     """
 
     omega: Array
     amplitudes: Array
     duration: float
+    structure: Vibrating = UNKNOWN
 
     @classmethod
-    def of(cls, t: Array, motion: Array, scale: float, power: int = 1) -> Spectrum:
+    def of(cls, t: Array, motion: Array, scale: float, power: int = 1, structure: Vibrating = UNKNOWN) -> Spectrum:
         """Return the spectrum of a motion at equal distances of time.
 
         Args:
@@ -86,17 +104,24 @@ class Spectrum:
             motion: of the tip, (n, components), m.
             scale: its largest displacement, m.
             power: of Hann's window; what a slow motion leaves at high frequencies falls with it.
+            structure: of the structure.
         """
         n, step = len(t), float(t[1] - t[0])
         window = np.hanning(n)[:, None] ** power
         lines = np.fft.rfft(window * (motion - motion.mean(axis=0)), axis=0)
         beside = np.abs(np.fft.fft(window[:, 0])).sum() / window.sum()  # a line has neighbours
         amplitudes = np.linalg.norm(lines, axis=1) * 2 / window.sum() / scale / beside
-        return cls(2 * np.pi * np.fft.rfftfreq(n, step), amplitudes, n * step)
+        return cls(2 * np.pi * np.fft.rfftfreq(n, step), amplitudes, n * step, structure)
 
     def above(self, omega: float) -> Spectrum:
         """Return the part of it at frequencies from one (rad/s) on."""
-        return Spectrum(self.omega, np.where(self.omega >= omega, self.amplitudes, 0.0), self.duration)
+        return replace(self, amplitudes=np.where(self.omega >= omega, self.amplitudes, 0.0))
+
+    @cached_property
+    def turned(self) -> Array:
+        """Angle (rad) through which a vibration adds up what it is off, (n,)."""
+        whole = self.omega * min(self.duration, 1.0 / max(self.structure.fading, 1e-300))
+        return np.where(self.omega < FOLLOWING * self.structure.lowest, np.minimum(whole, FOLLOWED), whole)
 
     def lost(self, h: float) -> float:
         """Return the error by what steps of h (s) damp out, with all amplitudes together."""
@@ -106,36 +131,32 @@ class Spectrum:
         """Return e(h) of a scheme, relative, of what its steps are off by so much (in rad at the end) at least."""
         coefficient, power, _ = scheme.estimate
         moves = self.omega * h < DAMPED
-        each = SAFE * coefficient * (self.omega[moves] * h) ** power * self.duration / h
+        each = SAFE * coefficient * (self.omega[moves] * h) ** (power - 1) * self.turned[moves]
         counts = each >= turned
         return float(self.amplitudes[moves][counts] @ np.minimum(2.0, each[counts])) + self.lost(h)
 
-    def error_of_mesh(self, off: Array, lowest: float) -> float:
-        """Return the relative error that frequencies which are off by so much make.
-
-        Args:
-            off: relative, (n,).
-            lowest: frequency of the structure, rad/s; what is far below it follows its loads and has no phase to lose.
-        """
-        turned = self.omega * self.duration
-        turned = np.where(self.omega < FOLLOWING * lowest, np.minimum(turned, FOLLOWED), turned)
-        return float(self.amplitudes @ np.minimum(2.0, SAFE * off * turned))
+    def error_of_mesh(self, off: Array) -> float:
+        """Return the relative error that frequencies which are off by so much (relative, (n,)) make."""
+        return float(self.amplitudes @ np.minimum(2.0, SAFE * off * self.turned))
 
 
 def longest(error: Callable[[float], float], duration: float, allowed: float) -> float:
-    """Return the longest step (s) whose error is below what is allowed, as far as it falls with the step."""
-    long, short = LONGEST * duration, 0.0
-    if error(long) <= allowed:
-        return long
-    for _ in range(HALVINGS):
-        middle = 0.5 * (long + short) if short > 0.0 else 0.5 * long
+    """Return the longest step (s) found whose error is below what is allowed.
+
+    Errors need not fall with the step: what long steps damp out, shorter ones may put out of phase.
+    """
+    long, short = LONGEST * duration, LONGEST * duration
+    for _ in range(SHORTER):
+        if error(short) <= allowed:
+            break
+        long, short = short, FINER * short
+    while long > 1.05 * short:
+        middle = 0.5 * (long + short)
         if error(middle) <= allowed:
             short = middle
-            if long < 1.05 * short:
-                break
         else:
             long = middle
-    return short or long
+    return short
 
 
 @dataclass(frozen=True)
@@ -147,17 +168,20 @@ class Motion:
         tips: displacements, (n, components), m.
         struck: vibrations that jumps of what drives the motion start, (frequency in rad/s, amplitude in m) each, where
             the answer itself has not resolved them.
+        structure: of the structure.
     """
 
     t: Array
     tips: Array
     struck: tuple[tuple[float, float], ...] = ()
+    structure: Vibrating = UNKNOWN
 
     @classmethod
-    def between(cls, t: Array, tips: Array) -> Motion:
+    def between(cls, t: Array, tips: Array, structure: Vibrating = UNKNOWN) -> Motion:
         """Return the motion through displacements (n, components) at increasing times (n,) at any distances."""
         even = np.linspace(t[0], t[-1], len(t))
-        return cls(even, np.asarray(CubicSpline(t, tips)(even)))  # straight lines would have frequencies of their own
+        # straight lines would have frequencies of their own
+        return cls(even, np.asarray(CubicSpline(t, tips)(even)), structure=structure)
 
     @property
     def scale(self) -> float:
@@ -172,13 +196,13 @@ class Motion:
     @cached_property
     def whole(self) -> Spectrum:
         """Spectrum of all of it."""
-        return Spectrum.of(self.t, self.tips, self.scale)
+        return Spectrum.of(self.t, self.tips, self.scale, structure=self.structure)
 
     @cached_property
     def parts(self) -> list[Spectrum]:
         """Spectra of windows."""
         windows = np.array_split(np.arange(len(self.t)), WINDOWS)
-        return [Spectrum.of(self.t[i], self.tips[i], self.scale, SHARP) for i in windows]
+        return [Spectrum.of(self.t[i], self.tips[i], self.scale, SHARP, self.structure) for i in windows]
 
     def error(self, scheme: Any, h: float, above: float = 0.0, turned: float = 0.0) -> float:
         """Return the relative error of steps of h (s): what they damp out counts where there is most of it.

@@ -22,17 +22,20 @@ Array = npt.NDArray[np.float64]
 MOST = 0.5
 
 
-def effect_sizes(response: Response, effects: Collection[str] | None = None) -> dict[str, float]:
+def effect_sizes(
+    response: Response, effects: Collection[str] | None = None, manifold: Manifold | None = None
+) -> dict[str, float]:
     """Return effect ↦ relative change of the displacement of the tip without it; infinite where nothing holds then.
 
     Args:
         response: history of a linear theory with all effects.
         effects: those that are asked for; all of the model if None.
+        manifold: of the response, if it is known.
 
     Raises:
         ComputationError: the answer to second-order forces is no small part of the motion, so that it is none.
     """
-    model, manifold = response.model, Manifold(response)
+    model, manifold = response.model, manifold or Manifold(response)
     system = response.solution.drive.whole
     wanted = system.model.effects if effects is None else effects
     whole = _tips(response, manifold)
