@@ -94,8 +94,7 @@ def pursue(
         Missed: it was not met; its attribute `result` holds the best that was reached.
         ComputationError: the richest model failed.
     """
-    accuracy, started, tried, comm = scene.accuracy, perf_counter(), list[dict[str, Any]](), pace.comm
-    assert accuracy is not None
+    started, tried, comm = perf_counter(), list[dict[str, Any]](), pace.comm
     best: Best[R] | None = None
     while True:
         began = perf_counter()
@@ -106,12 +105,12 @@ def pursue(
         except TooDear as failure:
             tried.append({**settings.summary(), "failed": failure.what, "seconds": perf_counter() - began})
             cheaper = None if len(tried) == MOST_ATTEMPTS else pace.cheaper(partial(looser, scene, settings, ahead))
-            if cheaper is not None:
-                settings = cheaper
-                continue
-            if best is None:
+            if cheaper is None and best is None:
                 raise
-            break
+            if cheaper is None:
+                break
+            settings = cheaper
+            continue
         except ComputationError as failure:
             richer = settings.richer()
             if richer is None or len(tried) == MOST_ATTEMPTS:
@@ -123,28 +122,14 @@ def pursue(
         if ahead is not None and isinstance(done, RunResult):
             ahead.judge(done, settings)
         tried.append({**settings.summary(), "error": error["total"], "seconds": perf_counter() - began})
-        is_met = known(error) and error["total"] <= accuracy
         best = Best(done, settings, perf_counter() - began).or_before(best)
-        is_over = is_met or len(tried) == MOST_ATTEMPTS or stalled(tried)
+        is_over = is_met(scene, error) or len(tried) == MOST_ATTEMPTS or stalled(tried)
         following = comm.bcast(None if is_over else next_of(scene, settings, done, ahead))
         if following is None:
             break
         settings = following
     assert best is not None
-    done, error = best.done, best.done.summary["error"]
-    is_met = known(error) and error["total"] <= accuracy
-    done.summary["scene"] = scene.digest()
-    done.summary["accuracy"] = told(scene, best.settings, is_met, error, tried)
-    if pace.budget is not None:
-        done.summary["accuracy"]["budget"] = pace.summary()
-    if ahead is not None:
-        done.summary["accuracy"]["effects"] = ahead.effects(error)
-    timings = done.summary["timings"]
-    timings["choice"] = perf_counter() - started - best.seconds
-    timings["total"] += timings["choice"]
-    if not is_met:
-        raise missed(scene, done, pace)
-    return done
+    return concluded(scene, best, tried, started, (pace, ahead))
 
 
 @dataclass(frozen=True)
@@ -238,16 +223,50 @@ def changes_of(scene: Scene, settings: Settings) -> dict[str, Any]:
     return out
 
 
-def told(
-    scene: Scene, settings: Settings, is_met: bool, error: dict[str, Any], tried: list[dict[str, Any]]
-) -> dict[str, Any]:
+def is_met(scene: Scene, error: dict[str, Any]) -> bool:
+    """Return whether an error is known and within the accuracy of a scene."""
+    assert scene.accuracy is not None
+    return known(error) and bool(error["total"] <= scene.accuracy)
+
+
+def concluded(
+    scene: Scene, best: Best[R], tried: list[dict[str, Any]], started: float, course: tuple[Pace, Ahead | None]
+) -> R:
+    """Return the best result with what its summary says of how it was found.
+
+    Args:
+        scene: with an accuracy.
+        best: the result.
+        tried: what the attempts were and gave.
+        started: `perf_counter()` before the first of them.
+        course: pace of the attempts, and what they have shown of a motion or None.
+
+    Raises:
+        Missed: it does not meet the accuracy.
+    """
+    done, error, (pace, ahead) = best.done, best.done.summary["error"], course
+    done.summary["scene"] = scene.digest()
+    done.summary["accuracy"] = told(scene, best.settings, error, tried)
+    if pace.budget is not None:
+        done.summary["accuracy"]["budget"] = pace.summary()
+    if ahead is not None:
+        done.summary["accuracy"]["effects"] = ahead.effects(error)
+    timings = done.summary["timings"]
+    timings["choice"] = perf_counter() - started - best.seconds
+    timings["total"] += timings["choice"]
+    if not is_met(scene, error):
+        raise missed(scene, done, pace)
+    return done
+
+
+def told(scene: Scene, settings: Settings, error: dict[str, Any], tried: list[dict[str, Any]]) -> dict[str, Any]:
     """Return what a summary says of how an accuracy was pursued."""
     accuracy = scene.accuracy
     assert accuracy is not None
     return {
         "asked": accuracy,
         "of": scene.accuracy_of or ("tip" if "time" in error else "frequencies"),
-        "met": is_met,
+        "met": is_met(scene, error),
         "estimated": error["total"],
         "allowed": shares(error, accuracy),
         "chosen": settings.summary(),
