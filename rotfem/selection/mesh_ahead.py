@@ -93,7 +93,7 @@ class MeshAhead:
         """
         left, fewest = np.inf, int(np.min(self.elements))
         coarsest = min(1.0, FEWEST / fewest) if isinstance(self.elements, tuple) else COARSER
-        for growth in GROWTHS[GROWTHS >= coarsest]:
+        for growth in (g for g in GROWTHS if g >= coarsest):
             left = max((self.error(motion, growth) for motion in motions), default=0.0)
             if left <= allowed:
                 break
