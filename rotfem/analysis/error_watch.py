@@ -104,8 +104,13 @@ class ErrorWatch:
         """Take note that what drives the motion is not smooth where the last step has ended."""
         self._landed = True
 
-    def errors(self, last: Any) -> TipErrors:
-        """Return the errors so far, the last state given."""
+    def errors(self, last: Any, lacking: float = 0.0) -> TipErrors:
+        """Return the errors so far.
+
+        Args:
+            last: state of the march.
+            lacking: part of the stiffness of what bends that a linear theory lacks.
+        """
         if self._now.steps:
             self._close(last.t)
         self.catch_up(last)
@@ -117,6 +122,8 @@ class ErrorWatch:
         nothing = dict.fromkeys(("time", "space", "model"), (0.0, 0.0))
         found = nothing
         if self._windows and self._sound:
+            for window in self._windows if lacking > 0.0 else ():
+                window.lacks(lacking)
             held = self.system.held
             with np.errstate(all="ignore"):  # where damping or growth is beyond numbers nothing is known
                 found = largest_errors(self._windows, self.scheme, held.linear, size, held.structure.length)

@@ -112,7 +112,8 @@ class Window:
         speed: of the frame in the middle, rad/s.
         bends: which shapes bend, (r of the structure,).
         epsilon: relative errors of their frequencies by the mesh.
-        theory: relative errors of the frequencies by the theory, of nonlinear ones that are not exact; else None.
+        theory: relative errors of the frequencies by the theory, of nonlinear ones that are not exact; else None,
+            unless it is known to lack stiffness (`lacks`).
         missing: forces that the mesh leaves out in a large motion, (N, r of the structure); None where not known.
         turn: Vᵀ M V_before, by which errors are handed on; None for the first.
     """
@@ -182,6 +183,14 @@ class Window:
             largest = max(system.comm.allgather(largest))
         squares = np.abs(self.shapes.squares)
         return np.asarray(MODERATE * largest**2 * self.bends * squares / (squares + self.speed**2 + TINY))
+
+    def lacks(self, stiffness: float) -> None:
+        """Take into account which part of the stiffness of the lowest shape the theory lacks.
+
+        What stress stiffens grows with the square of the wave number, what bending does with its fourth power.
+        """
+        omega = np.sqrt(np.abs(self.shapes.squares))
+        self.theory = 0.5 * stiffness * self.bends * omega[:LOWEST].min() / np.maximum(omega, TINY)
 
     def _missing(self, system: Any, mesh: MeshErrors) -> Array | None:
         """Return the forces on shapes that bend which the mesh leaves out, where rotations are those of the motion."""

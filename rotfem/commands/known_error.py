@@ -41,7 +41,7 @@ def error_of_run(run: Simulation) -> ErrorEstimate | None:
         return ErrorEstimate({"time": time, "space": shape, "model": model})
     assert run.last is not None
     watch = run.watch or ErrorWatch(run.system)
-    tip = watch.errors(run.last)
+    tip = watch.errors(run.last, 0.0 if run.theory_error is None else run.theory_error.lacking)
     if model is not None:  # of a shape, and of the phases that vibrations lose
         model += _relative(tip.model[0], tip.scale)
     shares = {

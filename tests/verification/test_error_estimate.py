@@ -141,6 +141,17 @@ def test_phases_lost_by_a_theory_are_judged(theory: str) -> None:
     assert exact.summary["error"]["model"] == 0.0
 
 
+@pytest.mark.parametrize("speed", [0.25, 0.5])
+def test_phases_lost_without_stress_are_judged(speed: float) -> None:
+    """A linear theory that stress does not stiffen loses its phase: told within 2, where the shape is off by 1 %."""
+    tables = scene(None, motion={"type": "constant", "speed": speed}, loads=PULSE, mesh={"elements": 2})
+    tables["time"] = {"end": 16.0, "step": 0.1, "scheme": "esdirk4"}
+    own, right = (rotfem.run({**tables, "model": {"theory": name}}) for name in ("linear", "consistent_linear"))
+    off = np.abs(own.tip["u2"] - right.tip["u2"]).max() / np.abs(own.tip["u2"]).max()
+    told = own.summary["error"]["model"] - own.summary["theory_error"]["estimate"]
+    assert 0.5 * off < told < 2.0 * off
+
+
 def test_estimate_has_the_order_of_the_scheme() -> None:
     """Half the step, a quarter of the estimate, where the motion is resolved (within a tenth)."""
     found = [rotfem.run(scene(h, motion=SPIN_UP, time={"end": 20.0})).summary["error"]["time"] for h in (0.02, 0.01)]
