@@ -41,12 +41,16 @@ class Bench:
         scene: validated scene.
         output: "tip", "frequencies" or "campbell".
         comm: MPI communicator.
+
+    Attributes:
+        compiling, warming: CPU time (s) of all runs that warmed up, and of the longest one.
+        memory: at the height.
     """
 
     def __init__(self, scene: Scene, output: str, comm: MPI.Comm = MPI.COMM_WORLD):
         self.scene, self.output, self.comm = scene, output, comm
         self._warm: set[tuple[str, int, str | None]] = set()
-        self.compiling = 0.0
+        self.compiling = self.warming = 0.0
         self.memory = PeakMemory()
 
     def measure(
@@ -92,7 +96,8 @@ class Bench:
         else:
             self._start(short)(lambda share: None)
         self._warm.add(key)
-        self.compiling += cpu_time() - started
+        took = cpu_time() - started
+        self.compiling, self.warming = self.compiling + took, max(self.warming, took)
 
     def _once(self, variant: Scene, out: Measurement, limit: float) -> None:
         self.memory.restart()

@@ -146,6 +146,8 @@ class Study:
         mesh = self.own.elements if any(s.elements == self.own.elements for s in settings) else finest
         own = replace(self.own, elements=mesh, degree=max(s.degree for s in settings))
         plan = Plan(own, self.each, least_mesh=None if quick else scaled(finest, 2.0))
+        comm, bench = self.laboratory.comm, self.laboratory.bench
+        plan.warming = lambda: float(comm.bcast(bench.warming))  # all processes decide alike
         if base is None:
             return plan
         plan.interval = sample_interval(self.scene, base)

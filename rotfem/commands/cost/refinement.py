@@ -6,9 +6,10 @@ schemes the one is refined that promises to get there soonest: a reference costs
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from rotfem import registry
 from rotfem.commands.cost.chain import MOST_FAILURES, MOST_LEVELS, Chain, Get
 from rotfem.commands.cost.prediction import order
 from rotfem.commands.cost.reference import Limit, Reference, combined, distance, unlike
@@ -23,6 +24,10 @@ MORE_EXACT = 0.3
 #: Part of the wanted uncertainty that the product of both errors may have for a coarser mesh to serve in time.
 MIXED_SHARE = 0.25
 
+#: Parts of the share that a mesh may take in the long steps with which meshes are first looked at, and in those that
+#: have turned out to be needed: without them nothing is known.
+LOOK, NEEDED = 0.5, 1.75
+
 
 @dataclass
 class Plan:
@@ -36,6 +41,7 @@ class Plan:
         least_step: the reference has one at most this long, s; None where the uncertainty alone decides.
         least_mesh: likewise, the coarsest mesh at the end of a chain.
         schemes: that may be refined.
+        warming: returns the longest CPU time (s) so far of what comes before a first computation, as compilation.
     """
 
     own: Setting
@@ -45,6 +51,7 @@ class Plan:
     least_step: float | None = None
     least_mesh: Elements = None
     schemes: Sequence[str] = ()
+    warming: Callable[[], float] = lambda: 0.0
 
 
 class Refinement:
@@ -97,25 +104,20 @@ class Refinement:
             return None
         base, error = scout.settings[-1], min(scout.limit().error, 1.0)
         self.base[theory], self.errors[theory] = base, error
-        meshes = self._meshes(base, goal / 2, share)
+        meshes = self._meshes(base, goal / 2, LOOK * share)
         if not meshes.samples:
             self.reasons[theory] = meshes.reason
             return None
         space = meshes.limit()
         chain = self._cheaper(scout, meshes, space, goal, error)
-        others = [self._steps(replace(chain.settings[0] if chain.settings else own, scheme=s)) for s in schemes]
-        best = self._refined([chain, *others], goal / 2, share)
-        mixed = self._unlike(best, meshes, share)
-        for finer in (self._close(best, MIXED_SHARE * goal), best.settings[-1]):
-            if mixed <= MIXED_SHARE * goal:
-                break
-            again = self._meshes(replace(finer, elements=base.elements), goal / 2, share)
-            if len(again.samples) < 2:
-                break
-            meshes, space, base, error = again, again.limit(), finer, min(error, goal)
-            mixed = self._unlike(best, meshes, share)
-        at = replace(base, elements=best.settings[0].elements)
-        there = self.get(at, share)
+        best = self._refined(chain, schemes, goal / 2, share)
+        near = self._close(best, MIXED_SHARE * goal)
+        mixed = self._unlike(near, best, meshes, share)
+        if mixed > MIXED_SHARE * goal or space.uncertainty > goal / 2:
+            again = self._meshes(replace(near, elements=own.elements), goal / 2, NEEDED * share, near.elements)
+            if len(again.samples) > 1 and again.limit().uncertainty < space.uncertainty + mixed:
+                space, base, error, mixed = again.limit(), near, min(error, goal), 0.0
+        there = self.get(replace(base, elements=best.settings[0].elements), share)
         if there is None or there.samples is None:
             return None
         return combined(best.limit(), there.samples, space, error, self.plan.each, mixed)
@@ -126,13 +128,13 @@ class Refinement:
         near = (s for s, samples in levels if distance(samples, known, self.plan.each) <= goal)
         return next(near, chain.settings[-1])
 
-    def _unlike(self, chain: Chain, meshes: Chain, share: float) -> float:
-        """Return by how much a finer mesh changes less or more in a chain's shortest steps than in those of meshes.
+    def _unlike(self, fine: Setting, chain: Chain, meshes: Chain, share: float) -> float:
+        """Return by how much a finer mesh changes less or more in short steps of a chain than in those of meshes.
 
         What steps do not resolve moves otherwise on every mesh, by more than the product of both errors says. 0 where
         it cannot be known.
         """
-        fine, pairs = chain.settings[-1], list(zip(meshes.settings, meshes.samples, strict=True))
+        pairs = list(zip(meshes.settings, meshes.samples, strict=True))
         rough = next((x for s, x in pairs if s.elements == fine.elements), None)
         finer = next(((s, x) for s, x in pairs if cells(s.elements) > cells(fine.elements)), None)
         if rough is None or finer is None or (fine.scheme, fine.step) == (finer[0].scheme, finer[0].step):
@@ -140,20 +142,41 @@ class Refinement:
         here = self.get(replace(fine, elements=finer[0].elements), share)
         if here is None or here.samples is None:
             return 0.0
-        return unlike((chain.samples[-1], here.samples), (rough, finer[1]), self.plan.each)
+        return unlike(
+            (dict(zip(chain.settings, chain.samples, strict=True))[fine], here.samples),
+            (rough, finer[1]),
+            self.plan.each,
+        )
 
-    def _refined(self, chains: list[Chain], goal: float, share: float) -> Chain:
-        """Refine whatever chain promises to reach the goal soonest; return the one whose limit is known best."""
-        first = chains[0]
+    def _refined(self, first: Chain, schemes: Sequence[str], goal: float, share: float) -> Chain:
+        """Refine whatever chain promises to reach the goal soonest; return the one whose limit is known best.
+
+        Schemes of higher order start before others, and these only where none of those is more exact. From the second
+        one on, a scheme that may have to be compiled first must have more to save than that takes.
+        """
         while not first.ended and (len(first.samples) < 3 or not self._long_enough(first)):
             first.extend(self.get, share)
-        able = [first, *(chain for chain in chains[1:] if self._promising(chain, first, share))]
+        able, own, late = [first], first.settings[0], sorted(schemes, key=self._rank(order(first.settings[0])))
+        for i, scheme in enumerate(late):
+            lower = registry.schemes[scheme].order <= order(own)
+            if (lower and any(self._more_exact(chain, first) for chain in able[1:])) or (
+                i > 0 and min(chain.to_go(goal) for chain in able) < self.plan.warming()
+            ):
+                break
+            chain = self._steps(replace(own, scheme=scheme))
+            if self._promising(chain, first, share):
+                able.append(chain)
         while True:
             best = min(able, key=lambda chain: chain.limit().uncertainty)
             soonest = min(able, key=lambda chain: chain.to_go(goal))
             if best.limit().uncertainty <= goal or soonest.to_go(goal) == float("inf"):
                 return self._agreed(best, able)
             soonest.extend(self.get, share)
+
+    @staticmethod
+    def _rank(own: int) -> Callable[[str], tuple[bool, int]]:
+        """Return the key by which schemes start: those of higher order than the own one first, the lowest of them."""
+        return lambda scheme: (registry.schemes[scheme].order <= own, registry.schemes[scheme].order)
 
     def _agreed(self, best: Chain, others: Sequence[Chain]) -> Chain:
         """Return the best chain, as uncertain as its limit is off from what the other schemes claim to know."""
@@ -169,13 +192,16 @@ class Refinement:
         chain.extend(self.get, share)
         if not chain.samples:
             return False
-        known, each = first.limit().samples, self.plan.each
-        better = distance(chain.samples[0], known, each) < MORE_EXACT * distance(first.samples[0], known, each)
-        if not better and order(chain.settings[0]) <= order(first.settings[0]):
+        if not self._more_exact(chain, first) and order(chain.settings[0]) <= order(first.settings[0]):
             return False
         while len(chain.samples) < 2 and not chain.ended:
             chain.extend(self.get, share)
         return True
+
+    def _more_exact(self, chain: Chain, first: Chain) -> bool:
+        """Return whether a chain is much more exact than the first one in steps of the same length."""
+        known, each = first.limit().samples, self.plan.each
+        return distance(chain.samples[0], known, each) < MORE_EXACT * distance(first.samples[0], known, each)
 
     def _long_enough(self, chain: Chain) -> bool:
         least = self.plan.least_step
@@ -195,19 +221,18 @@ class Refinement:
                 return chain if chain.samples else scout
         return scout
 
-    def _meshes(self, base: Setting, goal: float, share: float) -> Chain:
-        """Return the chain of meshes with the other values of a setting."""
-        chain = Chain(iter(finer_meshes(base)), self.plan.each)
+    def _meshes(self, base: Setting, goal: float, share: float, first: Elements = None) -> Chain:
+        """Return the chain of meshes with the other values of a setting, from a first one on if that is given."""
+        chain = Chain((s for s in finer_meshes(base) if cells(s.elements) >= cells(first)), self.plan.each)
         while not chain.ended:
             chain.extend(self.get, share)
             if len(chain.samples) >= 3 and chain.limit().uncertainty <= goal and self._fine_enough(chain):
                 break
         if chain.samples:
-            space = chain.limit()
-            self.meshes[base.theory] = [
-                (setting, distance(samples, space.samples, self.plan.each))
-                for setting, samples in zip(chain.settings, chain.samples, strict=True)
-            ]
+            space, known = chain.limit(), self.meshes.get(base.theory, [])
+            errors = [distance(samples, space.samples, self.plan.each) for samples in chain.samples]
+            coarser = [(s, e) for s, e in known if cells(s.elements) < cells(first)]
+            self.meshes[base.theory] = [*coarser, *zip(chain.settings, errors, strict=True)]
         return chain
 
     def _fine_enough(self, chain: Chain) -> bool:
