@@ -111,6 +111,38 @@ def test_reference_is_refined_with_the_scheme_that_gets_there_first() -> None:
     assert shortest["esdirk4"] < shortest["generalised_alpha"]
 
 
+def test_schemes_that_may_need_forms_wait_for_one_that_gets_there_without() -> None:
+    """Where compiling takes long, one of higher order starts; the lower ones do where none is more exact."""
+    own = Setting("reissner", 8, 3, "generalised_alpha", 0.02)
+    plan = Plan(own, each=False, first_step=0.08, interval=0.02, schemes=("newmark", "esdirk4"), warming=lambda: 1e9)
+    asked: set[str | None] = set()
+
+    def get(setting: Setting, share: float) -> Measurement:
+        asked.add(setting.scheme)
+        return measured(setting)
+
+    assert Refinement(plan, get).reference("reissner", 1e-6, 0.5, plan.schemes) is not None
+    assert asked == {"generalised_alpha", "esdirk4"}
+
+
+def test_meshes_are_refined_again_in_steps_that_resolve_what_they_move() -> None:
+    """A finer mesh moves something in steps below 0.03 s that longer ones damp: 4⁻⁶ in four elements."""
+    own = Setting("reissner", 8, 3, "newmark", 0.02)
+    plan = Plan(own, each=False, first_step=0.32, interval=0.32, schemes=("esdirk4",))
+
+    def get(setting: Setting, share: float) -> Measurement:
+        found = measured(setting)
+        assert isinstance(setting.elements, int)
+        if (setting.step or 0.0) < 0.03:
+            found.samples.values += 50 * setting.elements**-6.0 * np.sin(7 * TIMES)[:, None]
+        return found
+
+    found = Refinement(plan, get).reference("reissner", 1e-5, 0.5, plan.schemes)
+    assert found is not None
+    exact = Samples(np.sin(TIMES)[:, None], TIMES)
+    assert distance(found.samples, exact, each=False) <= found.uncertainty < 1e-4
+
+
 def test_reference_says_what_the_budget_leaves_uncertain() -> None:
     plan = Plan(Setting("reissner", 8, 3, "newmark", 0.02), each=False, first_step=0.08, interval=0.02)
     found = Refinement(plan, lambda s, share: measured(s) if s.elements in (2, 4, 8) else None)

@@ -16,6 +16,7 @@ from rotfem.commands.cost.record import Measurement
 from rotfem.commands.cost.reference import Samples
 from rotfem.commands.cost.refinement import Plan
 from rotfem.commands.cost.settings import Setting
+from rotfem.commands.cost.summary import closest
 from rotfem.errors import SceneError
 
 END = 10.0
@@ -87,6 +88,12 @@ def test_no_theory_is_proposed_that_is_not_exact_enough() -> None:
     assert proposal is not None
     assert proposal.setting.theory == "reissner"
     assert knowledge(STEPS, uncertainty=1e-4).best(1e-4) is None
+
+
+def test_nothing_is_proposed_where_what_is_uncertain_has_no_bound() -> None:
+    """After one level of a reference, for want of time, no error is known."""
+    assert knowledge(STEPS, uncertainty=np.inf).best(np.inf) is None
+    assert closest([row_of(s) | {"total_error": 1e-3} for s in STEPS], 1e-4, np.inf) is None
 
 
 def test_listed_meshes_and_steps_are_not_departed_from() -> None:

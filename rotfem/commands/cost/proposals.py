@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import ceil, exp, floor, log
+from math import ceil, exp, floor, inf, log
 
 from rotfem.commands.cost.front import Row, setting_of
 from rotfem.commands.cost.prediction import Prediction, order, power_law
@@ -83,7 +83,7 @@ class Knowledge:
     def _of_theory(self, theory: str, accuracy: float) -> Iterator[Proposal]:
         floor_error = self.model_errors[theory] + self.uncertainty
         room = AIM * accuracy - floor_error
-        if room <= 0.0:
+        if not 0.0 < room < inf:  # what is uncertain without bound leaves none
             return
         for elements, degree, error in self._meshes(theory, room):
             base = replace(self.plan.own, theory=theory, elements=elements, degree=degree)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from rotfem.commands.cost.front import Row, describe, judged, model_errors, recommend, truth_of
@@ -90,9 +91,12 @@ def largest(rows: list[Row]) -> dict[str, float]:
 
 
 def closest(rows: list[Row], accuracy: float, uncertainty: float) -> dict[str, Any] | None:
-    """Return `within`, the least accuracy above the one asked for that is known to be met, and the `row` that does."""
+    """Return `within`, the least accuracy above the one asked for that is known to be met, and the `row` that does.
+
+    None where nothing could be judged.
+    """
     errors = [error for error in map(judged, rows) if error is not None]
-    if not errors:
+    if not errors or not isfinite(uncertainty):
         return None
     within = float(f"{NEAR * max(min(errors) + uncertainty, accuracy):.1e}")
     return {"within": within, "row": recommend(rows, within, uncertainty)}
@@ -101,7 +105,8 @@ def closest(rows: list[Row], accuracy: float, uncertainty: float) -> dict[str, A
 def missing(rows: list[Row], accuracy: float, uncertainty: float, refused: list[dict[str, Any]]) -> str:
     """Return what it takes to recommend a setting where there is none."""
     errors = [error for error in map(judged, rows) if error is not None]
-    said = f"the best error is {min(errors):.1e}, known to {uncertainty:.0e}" if errors else "nothing could be judged"
+    known = errors and isfinite(uncertainty)
+    said = f"the best error is {min(errors):.1e}, known to {uncertainty:.0e}" if known else "nothing could be judged"
     wanted = [entry for entry in refused if entry["time"] is not None]
     if wanted:
         least = min(wanted, key=lambda entry: entry["time"])
