@@ -130,6 +130,17 @@ def test_time_and_memory_are_continued_over_unknowns() -> None:
     assert ahead[1]["time"] == pytest.approx(1e-6 * (16 * 65**2) ** 1.5, rel=0.01)
 
 
+def test_what_every_size_takes_is_told_apart_from_what_grows() -> None:
+    """Campbell diagrams of a tapered plate: 0.88 s and 1.89 s are measured of two sizes, 8.3 s of the next one."""
+    prediction = Prediction(2, 0.0)
+    for n, dofs, spent in ((5, 385, 0.875), (10, 1365, 1.888)):
+        setting = Setting("consistent_linear", (n, n), 2)
+        prediction.learn(setting, Measurement("done", "", None, [1.0], [spent], [0.0], [0.0], 3e7, dofs, 0))
+    assert prediction.time("consistent_linear", 1365) == pytest.approx(1.888)
+    assert prediction.time("consistent_linear", 5125) == pytest.approx(8.28, rel=0.05)
+    assert 0.5 < prediction.time("consistent_linear", 30) < 0.875
+
+
 def test_budget_refuses_what_takes_too_long_or_too_much_memory() -> None:
     budget = Budget(60.0, MPI.COMM_WORLD)
     one, two, three = (Setting("reissner", n, 3) for n in (1, 2, 3))

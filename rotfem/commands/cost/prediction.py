@@ -16,8 +16,8 @@ from rotfem.commands.cost.settings import Setting
 #: fixed width, or a factor of a plane graph by nested dissection.
 TIME_EXPONENT, MEMORY_EXPONENT = {1: 1.0, 2: 1.4}, {1: 1.0, 2: 1.15}
 
-#: What measured exponents of time are taken to be within: small systems take the same whatever their size.
-TIME_RANGE = (0.0, 2.2)
+#: Exponent of time that is believed at most.
+STEEPEST = 2.2
 
 #: Bytes for an unknown at least, where small systems show nothing but what every one needs.
 LEAST_MEMORY = 1500.0
@@ -55,21 +55,31 @@ class Prediction:
             return {"cpu": None, "memory": None}
         near = min(self.known, key=lambda other: self._far(setting, other))
         m, larger = self.known[near], nodes(setting, self.dimension) / nodes(near, self.dimension)
-        march = larger ** self.exponent(near.theory) * self._steps(setting, near) * stages(setting) / stages(near)
+        dofs = max(m.dofs, 1)
+        grown = self.time(near.theory, dofs * larger) / self.time(near.theory, dofs)
+        march = grown * self._steps(setting, near) * stages(setting) / stages(near)
         return {
             "cpu": m.median("setup_cpu") * max(larger, 1.0) + m.median("cpu") * march,
             "memory": self.memory(near.theory, m.dofs * larger),
         }
 
-    def exponent(self, theory: str) -> float:
-        """Return the power of the number of unknowns with which the time, of a step where there are some, grows."""
-        sizes = self._sizes(theory)
-        large = sizes[-1] if sizes else {"dofs": 0.0, "time": 0.0}
-        small = [size for size in sizes if SPREAD * size["dofs"] <= large["dofs"]]
-        if not small or not small[-1]["time"] > 0.0:
-            return TIME_EXPONENT[self.dimension]
-        slope = log(large["time"] / small[-1]["time"]) / log(large["dofs"] / small[-1]["dofs"])
-        return float(np.clip(slope, *TIME_RANGE))
+    def time(self, theory: str, dofs: float) -> float:
+        """Return the CPU time (s) of so many unknowns, of a step where there are some: what every size takes, and more.
+
+        The rest grows with the power of large systems, or a steeper one that was measured: two small sizes alone would
+        seem to grow with next to none.
+        """
+        sizes, p = self._sizes(theory), TIME_EXPONENT[self.dimension]
+        large = sizes[-1] if sizes else {"dofs": 1.0, "time": 1.0}
+        n, t = large["dofs"], max(large["time"], 1e-9)
+        small = [size for size in sizes if SPREAD * size["dofs"] <= n and size["time"] > 0.0]
+        if small:
+            n0, t0 = small[-1]["dofs"], small[-1]["time"]
+            p = max(p, min(log(t / t0) / log(n / n0), STEEPEST))
+            growing = min(max(t - t0, 0.0) / (1.0 - (n0 / n) ** p), t)
+        else:
+            growing = t
+        return float(t - growing + growing * (dofs / n) ** p)
 
     def memory(self, theory: str, dofs: float) -> float | None:
         """Return the bytes that so many unknowns need: what every size does, and a power of their number."""
@@ -87,14 +97,14 @@ class Prediction:
         """
         out = []
         for theory in dict.fromkeys(s.theory for s in self.known):
-            sizes, power = self._sizes(theory), self.exponent(theory)
+            sizes = self._sizes(theory)
             if len(sizes) < 2:
                 continue
             out += [{"theory": theory, **size, "predicted": False} for size in sizes]
             for factor in AHEAD:
-                dofs, time = factor * sizes[-1]["dofs"], sizes[-1]["time"] * factor**power
-                memory = self.memory(theory, dofs)
-                out.append({"theory": theory, "dofs": dofs, "time": time, "memory": memory, "predicted": True})
+                dofs = factor * sizes[-1]["dofs"]
+                ahead = {"time": self.time(theory, dofs), "memory": self.memory(theory, dofs)}
+                out.append({"theory": theory, "dofs": dofs, **ahead, "predicted": True})
         return out
 
     def _sizes(self, theory: str) -> list[dict[str, float]]:
