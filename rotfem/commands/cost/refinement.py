@@ -26,7 +26,7 @@ MIXED_SHARE = 0.25
 
 #: Parts of the share that a mesh may take in the long steps with which meshes are first looked at, and in those that
 #: have turned out to be needed: without them nothing is known.
-LOOK, NEEDED = 0.5, 1.75
+LOOK, NEEDED = 0.5, 2.0
 
 
 @dataclass
