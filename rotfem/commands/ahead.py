@@ -37,6 +37,10 @@ APART = 1.4
 #: Newton's increments: as a part of an accuracy, for a displacement of a part of the length, and for so many steps.
 NEWTON, SMALL, MANY = 1e-4, 1e-2, 2000
 
+#: Part of the accuracy that increments of a stage may come to where a hub is free: one of d is d/h of a speed that
+#: nothing brings back, n of them n²d at the end of n steps.
+FREE = 0.3
+
 #: By what the error of a reduced linear model as an answer is multiplied: true ones have been up to eight times the
 #: estimate on free hubs, twice on plates.
 TRUST = 3.0
@@ -68,7 +72,7 @@ class Ahead:
         self.mesh: MeshAhead | None = None
         self.response: Response | None = None
         self.manifold: Manifold | None = None
-        self.length, self.off = 1.0, np.inf
+        self.length, self.off, self.free = 1.0, np.inf, False
         self._last: tuple[Settings, RunResult] | None = None
 
     @property
@@ -78,7 +82,7 @@ class Ahead:
 
     def look(self, run: Simulation) -> None:
         """Take note of how the tip has moved in a run."""
-        self.length = float(run.system.structure.length)
+        self.length, self.free = float(run.system.structure.length), run.system.hub is not None
         if run.response is not None:
             mesh = run.scene.mesh
             self.response, self.mesh = run.response, MeshAhead.of(run.response, mesh.elements, mesh.degree)
@@ -182,6 +186,8 @@ class Ahead:
         moved = max(motion.scale for motion in self.motions) / self.length
         duration = max(motion.whole.duration for motion in self.motions)
         increment = NEWTON * self.accuracy * min(1.0, moved / SMALL) * min(1.0, MANY * found.step / duration)
+        if self.free:
+            increment = min(increment, FREE * self.accuracy * moved * (found.step / duration) ** 2)
         increment = max(increment, SMALLEST)
         return replace(settings, scheme=found.scheme, step=found.step, tolerance=None, increment=increment)
 

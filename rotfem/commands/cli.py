@@ -21,7 +21,7 @@ from rotfem.commands.printed import (
     run_report,
 )
 from rotfem.commands.result_folder import Writer
-from rotfem.errors import ComputationError, input_of
+from rotfem.errors import input_of
 
 
 @command()
@@ -44,15 +44,9 @@ def run(
             [f"{todo.results.path} holds the finished run already; a later time.end is what --resume can go on to"]
         )
         return
-    try:
-        bar = todo.progress()
-        with bar as progress:
-            result = simulate(todo.scene, keeper, progress, todo.hint if todo.scene.accuracy is None else bar.says)
-    except (ComputationError, KeyboardInterrupt) as error:
-        so_far = getattr(error, "result", None)
-        if so_far is not None:
-            todo.session.write(so_far, todo.plots)
-        raise
+    bar = todo.progress()
+    with bar as progress:
+        result = simulate(todo.scene, keeper, progress, todo.hint if todo.scene.accuracy is None else bar.says)
     todo.finish(result, run_report)
 
 

@@ -14,6 +14,7 @@ import typer
 from rotfem.commands.console import Session
 from rotfem.commands.options import as_path, folder_name
 from rotfem.commands.result_folder import ResultFolder, Writer
+from rotfem.errors import ComputationError
 from rotfem.scene import Scene, load_scene
 
 app = typer.Typer(
@@ -97,7 +98,13 @@ def job(
             wanted.append(f"accuracy_budget={seconds_of(budget, 'command line', '--budget')!r}")
         loaded = load_scene(scene, [*(overrides or ()), *wanted])
         folder = session.folder(output or Path("results") / folder_name(loaded.name), command)
-        yield Job(loaded, folder, session, not no_plots, session.hint(no_advice))
+        try:
+            yield Job(loaded, folder, session, not no_plots, session.hint(no_advice))
+        except (ComputationError, KeyboardInterrupt) as error:
+            so_far = getattr(error, "result", None)
+            if so_far is not None:
+                session.write(so_far, not no_plots)
+            raise
 
 
 def command(computes: bool = True) -> Callable[[Callable[..., None]], Callable[..., None]]:

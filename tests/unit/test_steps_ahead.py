@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from rotfem.analysis.esdirk import ESDIRK4
+from rotfem.commands.ahead import FREE, Ahead
+from rotfem.selection.accuracy import Settings
 from rotfem.selection.mesh_ahead import MeshAhead
 from rotfem.selection.steps_ahead import LOST, SAFE, Motion, error_ahead, plan, unresolved_ahead
 
@@ -68,6 +70,22 @@ def test_steps_between_times_at_any_distances() -> None:
     motion = Motion.between(t, np.cos(t)[:, None])
     assert np.ptp(np.diff(motion.t)) < 1e-9
     assert error_ahead([motion], ESDIRK4, 0.2) == pytest.approx(SAFE * of_one(1.0, 0.2, 50.0), rel=0.5)
+
+
+def test_increments_of_a_free_hub_do_not_run_away() -> None:
+    """A stage that is d off is d/h off in speed; with nothing that brings it back, n of these are n²d at the end."""
+    settings, ahead = Settings(({"theory": "reissner"},), 6, 3, "esdirk4", tolerance=1e-3), Ahead(1e-2)
+    ahead.linear, ahead.length = vibration(2.0), 10.0
+    held = ahead.stepped(settings, 4e-3)
+    ahead.free = True
+    free = ahead.stepped(settings, 4e-3)
+    assert held.step == free.step
+    assert held.step is not None
+    assert free.increment is not None
+    assert held.increment is not None
+    number = 100.0 / held.step
+    assert free.increment * number**2 == pytest.approx(FREE * 1e-2 * 2.0 / 10.0, rel=0.01)
+    assert held.increment > 10 * free.increment
 
 
 def test_nothing_is_planned_where_nothing_moves() -> None:
