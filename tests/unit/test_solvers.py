@@ -12,6 +12,7 @@ from rotfem.errors import ComputationError
 from rotfem.numerics.left_vectors import mirror_error
 from rotfem.numerics.linear import DirectSolver, NearbySolver, SingularSolver, combine, is_regular
 from rotfem.numerics.newton import Newton
+from rotfem.numerics.old_factor import OldFactor
 
 
 class Scalar:
@@ -35,6 +36,22 @@ def test_converges_quadratically_and_counts() -> None:
     assert root.x == pytest.approx(np.sqrt(2), abs=1e-15)
     assert count <= 4
     assert newton.iterations == count
+
+
+@pytest.mark.parametrize(("slope", "made"), [(14.0, 0), (60.0, 1)])
+def test_an_old_slope_is_kept_as_long_as_it_serves(slope: float, made: int) -> None:
+    """x³ = 8, where the slope is 12: errors shrink to a seventh each time with one of 14, to 0.8 with one of 60."""
+    slopes, factor = [slope], OldFactor(True)
+    root = Scalar(lambda x: x**3 - 8, lambda x: slopes[-1], 2.01)
+
+    def increment() -> float:
+        if not factor.took():
+            slopes.append(3 * root.x**2)
+        return root.increment()
+
+    Newton(tolerance=1e-3).solve(increment, root.size, factor)
+    assert root.x == pytest.approx(2.0, abs=1e-4)
+    assert factor.made == made
 
 
 def test_a_linear_problem_takes_two_iterations_at_first_and_one_then() -> None:

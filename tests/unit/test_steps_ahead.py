@@ -9,7 +9,7 @@ from rotfem.analysis.esdirk import ESDIRK4
 from rotfem.commands.ahead import FREE, Ahead
 from rotfem.selection.accuracy import Settings
 from rotfem.selection.mesh_ahead import MeshAhead
-from rotfem.selection.steps_ahead import LOST, SAFE, Motion, error_ahead, plan, unresolved_ahead
+from rotfem.selection.steps_ahead import LOST, SAFE, Motion, Vibrating, error_ahead, plan, unresolved_ahead
 
 
 def vibration(omega: float, amplitude: float = 1.0, end: float = 100.0) -> Motion:
@@ -28,6 +28,21 @@ def test_the_error_of_one_vibration_is_that_of_its_phase() -> None:
     """Half of the motion moves at 1 rad/s twice over; the transform may be a few per cent off between its lines."""
     found = error_ahead([vibration(1.0)], ESDIRK4, 0.5)
     assert found == pytest.approx(SAFE * of_one(1.0, 0.5), rel=0.1)
+
+
+def test_a_phase_that_fades_or_follows_its_loads_does_not_add_up() -> None:
+    """The same motion of a structure that forgets in 10 s is off by a tenth of it, of one that follows by 8/3 rad.
+
+    Of that which fades, what the window leaves below half the lowest frequency follows, a hundredth of it.
+    """
+    t = np.linspace(0.0, 100.0, 8001)
+    free, fading, following = (
+        error_ahead([Motion(t, np.cos(t)[:, None], structure=structure)], ESDIRK4, 0.5)
+        for structure in (Vibrating(), Vibrating(lowest=1.0, fading=0.1), Vibrating(lowest=50.0))
+    )
+    assert free is not None
+    assert fading == pytest.approx(free * 10 / 100, rel=0.03)
+    assert following == pytest.approx(free * (8 / 3) / 100, rel=0.1)
 
 
 def test_what_is_fast_and_damped_counts_with_its_amplitude() -> None:
