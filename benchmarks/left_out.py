@@ -35,7 +35,7 @@ PLATE = {"type": "plate", "length": 2.0, "width": 1.0, "thickness": 0.01, "E": 7
 FLAT = {"type": "planar_beam", "length": 10.0, "section": {"EA": 2.8e7, "GA": 1e7, "EI": 1.4e4, "mass_per_length": 1.2}}
 FLAT["section"]["rotary_inertia"] = 6.0e-4  # type: ignore[index]
 SPIN_UP = {"type": "spin_up", "speed": 6.0, "duration": 15.0}
-GUST = {"distributed": {"table": [[0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 20.0], [2.0, 0.0, 0.0, 0.0]]}}
+GUST = {"distributed": {"over_time": [[0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 20.0], [2.0, 0.0, 0.0, 0.0]]}}
 STILL = {"type": "constant", "speed": 0.0}
 
 #: How often each history is run, and steps between rows where these are not to count.

@@ -96,6 +96,7 @@ class Beside:
         spread = {n for n, (amplitude, _) in s.load_constants.items() if amplitude.spread}
         for name, constant in constants.items():
             each = driven.get(name, np.ones(1)) if name not in spread else np.ones(1)
+            each = each[-1:] if constant.value.size == 1 else each  # a pressure is along axis 3, a spin about it
             which = np.broadcast_to(each, constant.value.shape)
             constant.value[...] = which * random.uniform(0.5, 1.5, constant.value.shape)
         s.update_loads()

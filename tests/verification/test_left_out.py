@@ -108,6 +108,17 @@ STIRRED = {
 }
 
 
+def test_a_pressure_lets_a_plate_bend_alone() -> None:
+    """It has one component, that along the normal."""
+    loads = {"pressure": {"over_time": [[0.0, 0.0], [0.3, 2.0]]}}
+    bends, within = (
+        leave_out(Problem.of(as_scene(scene(PLATE, "linear", spin, loads=loads))))[0].left_out
+        for spin in (STILL, spun([0, 0, 1]))
+    )
+    assert set(bends) == {"u1", "u2"}
+    assert within == ()
+
+
 @pytest.mark.parametrize("case", STIRRED)
 def test_what_may_be_moved_stays_in(case: str) -> None:
     """Symmetric but for one thing, however small, of loads, spin or structure."""
