@@ -12,6 +12,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
+#: Signals that end a study.
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
 #: Where Linux says what a process has in memory, now and at most, and where the latter is set back by writing 5.
 STATUS, RESET = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 
@@ -29,18 +32,23 @@ def release() -> None:
 
 @contextmanager
 def held_back() -> Iterator[None]:
-    """Let Ctrl-C wait: what it raises is lost in the finalisers that a collection runs."""
+    """Let Ctrl-C and SIGTERM wait: what they raise is lost in the finalisers that a collection runs."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    heard: list[FrameType | None] = []
-    before = signal.signal(signal.SIGINT, lambda number, frame: heard.append(frame))
+    heard: list[tuple[int, FrameType | None]] = []
+    before = {n: signal.signal(n, lambda number, frame: heard.append((number, frame))) for n in SIGNALS}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
-    if heard and callable(before):
-        before(signal.SIGINT, heard[0])
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    for first, frame in heard[:1]:
+        handler = before[signal.Signals(first)]
+        if callable(handler):
+            handler(first, frame)
+        elif handler == signal.SIG_DFL:
+            signal.raise_signal(first)
 
 
 class PeakMemory:
