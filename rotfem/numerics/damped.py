@@ -25,6 +25,9 @@ from rotfem.numerics.projection import times
 Array = npt.NDArray[Any]
 Matrices: TypeAlias = tuple[Any, Any, Any, LowRank | None]
 
+#: A size that is none.
+TINY = 1e-300
+
 #: Part −Re λ/|λ| from which damping is heavy.
 HEAVY = 0.3
 
@@ -57,7 +60,7 @@ def quadratic(m: Array, c: Array, k: Array, target: float) -> tuple[Array, Array
         ComputationError: the stiffness matrix is singular.
     """
     n = len(k)
-    unit = np.sqrt(max(float(np.trace(k)) / max(float(np.trace(m)), 1e-300), 1e-300))
+    unit = np.sqrt(max(float(np.trace(k)) / max(float(np.trace(m)), TINY), TINY))
     shifted = [k + target * c + target**2 * m, unit * (c + 2 * target * m), unit**2 * m]
     try:
         right_side = np.linalg.solve(shifted[0], np.hstack(shifted[1:]))
@@ -67,7 +70,9 @@ def quadratic(m: Array, c: Array, k: Array, target: float) -> tuple[Array, Array
         x, y = right[n:, order], np.linalg.solve(shifted[0].conj().T, left[:n, order])
     except np.linalg.LinAlgError:  # of a matrix or of its transpose: round-off may tell them apart
         raise ComputationError("the stiffness matrix is singular", advice="a slightly different speed") from None
-    return target + unit / nu[order], x / np.linalg.norm(x, axis=0), y / np.linalg.norm(y, axis=0)
+    # A vector that is too small for numbers stays zero: it has no mass, and is none.
+    x, y = (vectors / np.maximum(np.linalg.norm(vectors, axis=0), TINY) for vectors in (x, y))
+    return target + unit / nu[order], x, y
 
 
 def shape_frequencies(X: Array, MX: Array, KX: Array) -> Array:
@@ -162,7 +167,7 @@ class RitzPairs:
 
     def add(self, columns: Array) -> int:
         """Put what is new in real columns into the orthonormal basis; return how many directions that were."""
-        W = columns / np.maximum(np.sqrt(self._sum(np.sum(columns**2, axis=0))), 1e-300)
+        W = columns / np.maximum(np.sqrt(self._sum(np.sum(columns**2, axis=0))), TINY)
         for limit in (NEW, 0.5):  # twice, as once leaves round-off of what was taken away
             W = W - self.V @ self._sum(self.V.T @ W)
             sizes, turns = np.linalg.eigh(self._sum(W.T @ W))

@@ -17,7 +17,8 @@ import numpy.typing as npt
 import pytest
 import scipy.linalg as sl
 
-from rotfem import campbell, modes
+from rotfem import ComputationError, campbell, modes
+from tests.beams import STRUCTURE
 
 Array = npt.NDArray[Any]
 
@@ -127,3 +128,14 @@ def test_campbell() -> None:
     assert np.all(np.isfinite(result.frequencies))
     single = modes(beam(5e-3, 1.0, 6.0, 6))
     np.testing.assert_allclose(result.frequencies[-1], single.frequencies, rtol=1e-8)
+
+
+def test_damping_beyond_all_proportion() -> None:
+    """Vectors that underflow are no modes: what is left fails in the words of the program, not in those of numpy."""
+    scene = {
+        "structure": STRUCTURE | {"damping": {"rayleigh": [0.1, 1e56]}},
+        "motion": {"type": "constant", "speed": 6.0},
+        "mesh": {"elements": 2, "degree": 2},
+    }
+    with pytest.raises(ComputationError, match="backward error"):
+        modes(scene)
