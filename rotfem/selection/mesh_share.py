@@ -8,6 +8,7 @@ hub with a mesh file the hub is held.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from rotfem.analysis.shape_error import LIKELY, ShapeError
 from rotfem.equations.finer import FinerEquations
 from rotfem.errors import ComputationError
 from rotfem.numerics.eigenproblem import Pencil
+from rotfem.numerics.refinement import NotRefined
 from rotfem.selection.candidate import Candidate
 from rotfem.selection.coarse_model import Trial, from_file
 from rotfem.selection.distance import modes_change
@@ -76,12 +78,13 @@ def error_of_modes(trial: Trial, own: Candidate) -> float:
         twice = trial.poorest_on(halved(trial.full.problem.mesh))
         return modes_change(own.eigenvalues(trial.speeds), twice.eigenvalues(trial.speeds))
     fine = RefinedMesh(system).equations if system.held.linear else None
-    if fine is None:
-        analysis = ModalAnalysis(system.model.problem, trial.case.about, trial.case.newton(), trial.comm, system)
-        told = [analysis.mesh_errors(analysis.at(speed, count))[:count] for speed in trial.speeds]
-        return LIKELY / SAFE * max(map(max, told))
-    found = [_eigenvalues(system.held, fine, speed, count) for speed in trial.speeds]
-    return max(modes_change(here, there) for here, there in found)
+    if fine is not None:
+        with suppress(NotRefined):  # a point mass that is inside a finer cell
+            found = [_eigenvalues(system.held, fine, speed, count) for speed in trial.speeds]
+            return max(modes_change(here, there) for here, there in found)
+    analysis = ModalAnalysis(system.model.problem, trial.case.about, trial.case.newton(), trial.comm, system)
+    told = [analysis.mesh_errors(analysis.at(speed, count))[:count] for speed in trial.speeds]
+    return LIKELY / SAFE * max(map(max, told))
 
 
 def halved(mesh: Any) -> Any:
