@@ -33,6 +33,9 @@ class StageSolver:
     Args:
         system: equations of motion; its functions q, v, a are overwritten.
         newton: iteration control, shared by all steps so that it learns the quadratic constant.
+
+    Attributes:
+        patience: with old factors.
     """
 
     def __init__(self, system: Any, newton: Newton):
@@ -45,8 +48,7 @@ class StageSolver:
         self._hard = self._balanced = False
         #: Share of the last predicted move that came true.
         self._share = 1.0
-        #: With old factors.
-        self._patience = Patience()
+        self.patience = Patience()
 
     def predicted(self, stage: Stage, state: State) -> Array:
         """Return q of a stage that turns with the clamp where that moves: it is the better prediction."""
@@ -72,7 +74,7 @@ class StageSolver:
     def solve(self, stage: Stage, state: State) -> None:
         """Solve a stage of a step from a state, with the factor of an earlier one if that serves."""
         factor = self._old_factor(stage)
-        if factor is not None and self._patience.over():
+        if factor is not None and self.patience.over():
             predicted = stage.q.copy(), stage.v.copy(), stage.a.copy()
             try:
                 self._iterate(stage, state, factor)
@@ -80,10 +82,10 @@ class StageSolver:
                     check_root(self.system, stage, state)
             except ComputationError:  # the old factor does not serve here; nor will the next ones, perhaps
                 self._held = None
-                self._patience.failed()
+                self.patience.failed()
                 stage.q, stage.v, stage.a = predicted
             else:
-                self._patience.worked()
+                self.patience.worked()
                 return
         if self.system.solved_at_once:
             self._iterate(stage, state)

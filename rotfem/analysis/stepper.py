@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -49,6 +48,7 @@ class Stepper(StageSolver):
     Attributes:
         substeps, rejected: steps that were halved (Newton failed, or energy rose), and adaptive ones taken back.
         stood_in: steps that the scheme could not take, by the name of the one that did.
+        trust: in the scheme, where others may stand in for it.
         pace: length of the next adaptive step (s), largest displacement so far (scaled), and length that the errors so
             far allow (s); None before the first.
         watch: told of every step that counts; None tells nobody.
@@ -58,9 +58,8 @@ class Stepper(StageSolver):
         super().__init__(system, newton)
         self.scheme = scheme
         self.substeps = self.rejected = 0
-        self.stood_in: Counter[str] = Counter()
-        #: In the scheme, where others may stand in for it.
-        self._trust = Patience()
+        self.stood_in: dict[str, int] = {}
+        self.trust = Patience()
         self.pace: tuple[float, float, float] | None = None
         self.watch: Watch | None = None
         #: Energy at the first step that was hard, and ranges of the energies that were seen since (see `fed`).
@@ -147,14 +146,14 @@ class Stepper(StageSolver):
         if keep_rotations_small(self.system, self.scheme, state, h):
             self._held = None
         others, failure, feeds = self.scheme.fallbacks(), None, False
-        if halvings == 0 or not others or self._trust.over():
+        if halvings == 0 or not others or self.trust.over():
             try:
                 new = self.step(state, h, end)
             except ComputationError as error:
                 failure = error
-                self._trust.failed()
+                self.trust.failed()
             else:
-                self._trust.worked()
+                self.trust.worked()
                 feeds = halvings > STUBBORN and self._feeds(new, state)
                 if not feeds:
                     return new
@@ -176,7 +175,7 @@ class Stepper(StageSolver):
                     now = other.advance(now, h / PARTS, last if part == PARTS else None)
             except ComputationError:
                 continue
-            self.stood_in[scheme.name] += 1
+            self.stood_in[scheme.name] = self.stood_in.get(scheme.name, 0) + 1
             self.substeps += other.substeps
             return self.scheme.start(now)
         return None

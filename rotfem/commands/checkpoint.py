@@ -20,6 +20,7 @@ import numpy as np
 
 from rotfem.analysis import error_memory
 from rotfem.analysis.schemes import State
+from rotfem.analysis.stepper import Stepper
 from rotfem.errors import SceneError
 from rotfem.scene import Scene
 from rotfem.structures.numbering import Numbering
@@ -118,7 +119,7 @@ class Memory:
             "state": self._packed({k: v for k, v in vars(state).items() if k != "given"}),
             "factored": self._packed(run.system.held.factored),
             "stepper": plain(run.stepper),
-            "newton": plain(run.stepper.newton),
+            "learnt": {name: plain(part) for name, part in learning(run.stepper).items()},
             "run": {name: getattr(run, name) for name in CHANGING},
             "seen": self._packed({"farthest": run.farthest.seen, "stability": run.stability}),
             "watch": None if run.watch is None else self._packed(error_memory.kept(run.watch, state)),
@@ -151,8 +152,10 @@ class Memory:
         system.count_rotations_from(state.datum)
         run.system.set_time(state.t)
         system.factored_before = tree["factorisations"] - system.factorisations
-        for target, values in ((stepper, tree["stepper"]), (stepper.newton, tree["newton"]), (run, tree["run"])):
+        for target, values in ((stepper, tree["stepper"]), (run, tree["run"])):
             vars(target).update(values)
+        for name, part in learning(stepper).items():
+            vars(part).update(tree["learnt"][name])
         seen = self._unpacked(tree["seen"])
         run.farthest.seen, run.stability = seen["farthest"], seen["stability"]
         if run.watch is not None:
@@ -209,12 +212,19 @@ def record_of(name: str) -> Any:
     return found
 
 
+def learning(stepper: Stepper) -> dict[str, Any]:
+    """Return the parts of a stepper that learn from its steps, by name."""
+    return {"newton": stepper.newton, "patience": stepper.patience, "trust": stepper.trust}
+
+
 def plain(thing: Any) -> Tree:
-    """Return the attributes of an object that are numbers, texts, truth values, None, or tuples of such."""
+    """Return the attributes of an object that are numbers, texts, truth values, None, or tuples and dicts of such."""
 
     def is_plain(value: Any) -> bool:
         if isinstance(value, tuple):
             return all(map(is_plain, value))
+        if isinstance(value, dict):
+            return all(map(is_plain, value.values()))
         return value is None or isinstance(value, bool | int | float | str | np.generic)
 
     return {name: value for name, value in vars(thing).items() if is_plain(value)}

@@ -299,8 +299,8 @@ def test_numbers_learnt_are_all_in_the_checkpoint(tmp_path: Path) -> None:
         rotfem.run(scene_of({"time.end": 0.05}))
     finally:
         Simulation.result = real  # type: ignore[method-assign]
-    from rotfem.commands.checkpoint import plain
+    from rotfem.commands.checkpoint import learning, plain
 
     stepper = result[0].stepper
-    assert set(vars(stepper)) - set(plain(stepper)) == {"system", "scheme", "newton", "watch"}
-    assert set(vars(stepper.newton)) == set(plain(stepper.newton))
+    assert set(vars(stepper)) - set(plain(stepper)) == {"system", "scheme", "watch", *learning(stepper)}
+    assert all(set(vars(part)) == set(plain(part)) for part in learning(stepper).values())
