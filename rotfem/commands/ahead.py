@@ -41,9 +41,9 @@ NEWTON, SMALL, MANY = 1e-4, 1e-2, 2000
 #: nothing brings back, n of them n²d at the end of n steps.
 FREE = 0.3
 
-#: By what the error of a reduced linear model as an answer is multiplied: true ones have been up to eight times the
-#: estimate on free hubs, twice on plates.
-TRUST = 3.0
+#: By what the error of a reduced linear model as an answer is multiplied where a hub is free, as true ones have been
+#: up to eight times the estimate there, and elsewhere, but for what the stretch makes of it, whose law is known.
+TRUST, HELD = 3.0, 2.0
 
 #: Part of the lowest frequency of what stretches from which a vibration may be one that stretches.
 STRETCHING = 0.7
@@ -73,6 +73,7 @@ class Ahead:
         self.response: Response | None = None
         self.manifold: Manifold | None = None
         self.length, self.off, self.free = 1.0, np.inf, False
+        self.stretching = 0.0
         self._last: tuple[Settings, RunResult] | None = None
 
     @property
@@ -86,7 +87,9 @@ class Ahead:
         if run.response is not None:
             mesh = run.scene.mesh
             self.response, self.mesh = run.response, MeshAhead.of(run.response, mesh.elements, mesh.degree)
-            self.manifold = None if run.foreshortened is None else run.foreshortened.manifold
+            given = run.foreshortened
+            self.manifold = None if given is None else given.manifold
+            self.stretching = 0.0 if given is None or self.free else given.stretching
             self.linear = sampled(run.response, self._structure)
         elif run.track is not None and len((path := run.track.path())[0]) > 1:
             self.own = Motion.between(*path, self._structure)
@@ -109,7 +112,8 @@ class Ahead:
         """
         error = done.summary["error"]
         if settings.models[0].get("reduced"):
-            put(error, "model", TRUST * part(error, "model"))
+            doubtful = max(0.0, part(error, "model") - self.stretching)
+            put(error, "model", part(error, "model") + ((TRUST if self.free else HELD) - 1) * doubtful)
             self.off = part(error, "model") if error["model"] is not None else np.inf
             if self.mesh is not None and self.linear is not None and self.linear.tells:
                 put(error, "space", max(part(error, "space"), self.mesh.error(self.linear)))

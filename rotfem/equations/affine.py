@@ -116,9 +116,10 @@ class AffineSystem(AffineEnergies):
             self._increment = Increment(self.V)
         return -self._increment.solve(self.material_solver, self._load)
 
-    def scale_prestress(self, factor: float) -> None:
-        """Multiply the geometric stiffness by a factor, until effects are switched."""
-        self._weights = np.array([factor if PRESTRESS in p.of else 1.0 for p in self.pieces]) * self._weights
+    def scale_stiffness(self, strains: float, prestress: float) -> None:
+        """Multiply the stiffness of the strains and the geometric one by factors, until effects are switched."""
+        of = [strains if p.kind == "K" and "internal" in p.of else 1.0 for p in self.pieces]
+        self._weights *= [prestress if PRESTRESS in p.of else f for f, p in zip(of, self.pieces, strict=True)]
         self._coefficients = None
 
     @property

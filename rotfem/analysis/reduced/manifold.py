@@ -36,10 +36,6 @@ Array = npt.NDArray[np.float64]
 #: Amplitude of a shape, relative to the largest, from which its foreshortening matters, and most shapes.
 MATTERS, MOST = 2e-3, 6
 
-#: By how many times its stretch the geometric stiffness of a structure may be off: forces N⁰ change stiffnesses by N⁰
-#: over that of shear, a few times less than that of the membrane, and the tip shows the mean of the stretch only.
-STRETCHED = 4.0
-
 
 @dataclass(frozen=True)
 class Motion2:
@@ -197,15 +193,15 @@ def recover(response: Response) -> Foreshortened:
     tips = manifold.tip(response.q + second)
     size = largest(response.model, tips)
     off = largest(response.model, manifold.tip(response.q + all_of_them) - tips) / size if size > 0.0 else 0.0
-    more = _stretched(response) + _ringing(response, path)
-    return Foreshortened(response, manifold, response.q + second, off + (more / size if size else 0.0))
+    stretching, ringing = (more / size if size else 0.0 for more in (_stretched(response), _ringing(response, path)))
+    return Foreshortened(response, manifold, response.q + second, off + stretching + ringing, stretching)
 
 
 def _stretched(response: Response) -> float:
-    """Return how far the tip is with a geometric stiffness that is off by what the stretch may do to it, m."""
+    """Return how far the tip is with stiffnesses that are off by what the stretch does to them, m."""
     model, solution = response.model, response.solution
     stretch = float(np.abs(response.tips[:, 0]).max(initial=0.0)) / model.system.structure.length
-    model.system.scale_prestress(1 + STRETCHED * stretch)
+    model.system.scale_stiffness(*(1 + times_off * stretch for times_off in model.system.structure.stretched))
     try:
         other = solution.again().solve(model, response.q[0], response.v[0]).q
     finally:
@@ -238,12 +234,14 @@ class Foreshortened:
         manifold: on which it moves.
         q: coordinates in the rows, (n, m), with what the forces of second order add to those of the response.
         error: estimate of what the foreshortened displacements are off, relative to the largest of the tip.
+        stretching: that part of it which the stretch makes; its law is known, that of the rest is not.
     """
 
     response: Response
     manifold: Manifold
     q: Array
     error: float
+    stretching: float
 
     @property
     def tips(self) -> Array:
