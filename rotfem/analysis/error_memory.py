@@ -22,7 +22,8 @@ Tree = dict[str, Any]
 
 #: Attributes of a watch, of a window and of its shapes that are plain or the same on every process.
 OF_WATCH = ("_bytes", "_closed", "_landed", "_sound", "_farthest")
-OF_WINDOW, OF_SHAPES = ("t", "C", "K", "bends", "epsilon", "theory", "missing", "turn"), ("squares", "tip", "made")
+OF_WINDOW = ("t", "C", "K", "bends", "epsilon", "theory", "missing", "turn", "rates")
+OF_SHAPES = ("squares", "tip", "made")
 
 
 def kept(watch: ErrorWatch, state: State) -> Tree:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.error_bursts import ORDER, Burst, burst_in
 from rotfem.analysis.error_tracks import largest_errors
 from rotfem.analysis.error_window import MeshErrors, Samples, Window
 from rotfem.analysis.schemes import State
@@ -41,6 +42,7 @@ class TipErrors:
         model: of the theory, as far as phases are lost by it, m, and when (s).
         shape: of the mesh at the largest deflection, relative.
         scale: largest displacement of the tip, m.
+        burst: of the motion, with whose growth that of the steps is told; None if there is none.
     """
 
     time: tuple[float, float] | None
@@ -48,6 +50,7 @@ class TipErrors:
     model: tuple[float, float]
     shape: float
     scale: float
+    burst: Burst | None = None
 
 
 class ErrorWatch:
@@ -129,7 +132,21 @@ class ErrorWatch:
                 found = largest_errors(self._windows, self.scheme, held.linear, size, held.structure.length)
             self._sound = bool(np.isfinite(list(found.values())).all())
             found = found if self._sound else nothing
-        return TipErrors(found["time"] if self._sound else None, found["space"], found["model"], shape, size)
+        if not self._sound:
+            return TipErrors(None, found["space"], found["model"], shape, size)
+        time, burst = found["time"], self._burst()
+        if burst is not None:
+            time = (time[0] * burst.growth, burst.t)
+        return TipErrors(time, found["space"], found["model"], shape, size, burst)
+
+    def _burst(self) -> Burst | None:
+        """Return the burst that errors of the steps grow in; None if there is none, or they are told without it."""
+        if not self._windows or self.scheme.order > ORDER:
+            return None
+        lengths, rates = (np.concatenate([getattr(w, name) for w in self._windows]) for name in ("lengths", "rates"))
+        ends = np.concatenate([w.t[w.ends[1]] for w in self._windows])
+        slowest = np.median([np.sqrt(np.abs(w.shapes.squares).min()) for w in self._windows])
+        return burst_in(ends, lengths, rates, float(slowest))
 
     def _shape(self, state: State, size: float) -> float:
         """Return the error of a state by the mesh, relative to the largest deflection (m).

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.error_bursts import turning_rates
 from rotfem.analysis.error_recursion import Index
 from rotfem.analysis.mesh_force import MeshForce
 from rotfem.analysis.reduced_tangents import Tangents
@@ -115,6 +116,7 @@ class Window:
         theory: relative errors of the frequencies by the theory, of nonlinear ones that are not exact; else None,
             unless it is known to lack stiffness (`lacks`).
         missing: forces that the mesh leaves out in a large motion, (N, r of the structure); None where not known.
+        rates: of rotation in the steps, rad/s, (n,), of a nonlinear theory (see `turning_rates`); else zeros.
         turn: Vᵀ M V_before, by which errors are handed on; None for the first.
     """
 
@@ -136,6 +138,9 @@ class Window:
             self._reduce(system, mesh, end, before)
         self.theory = self._errors_by_theory(system, mesh)
         self.missing = self._missing(system, mesh)
+        self.rates: Array = np.zeros(len(samples.steps))
+        if not system.held.linear:
+            self.rates = turning_rates(system.held, samples.states, samples.steps, mesh.shape.turns)
         self.motion = tuple(self._coordinates(x) for x in list(zip(*samples.states, strict=True))[1:4])
         samples.states.clear()
 

@@ -52,6 +52,8 @@ def error_of_run(run: Simulation) -> ErrorEstimate | None:
     found: dict[str, Any] = {"scale": tip.scale}
     if tip.time is not None and run.watch is not None:
         found["time_at"] = tip.time[1]
+    if tip.burst is not None:
+        found["burst"] = {"at": tip.burst.t, "growth": tip.burst.growth}
     return ErrorEstimate(shares, found)
 
 
@@ -102,7 +104,15 @@ def warnings_of_run(run: Simulation, error: ErrorEstimate) -> list[str]:
     shares = {"steps": steps, "mesh": mesh, "model": model}
     telling = [f"{percent(share)} by the {n}" for n, share in shares.items() if share > TELLING * sum(shares.values())]
     off = f"the tip may be off by {percent(error.total)} of its largest displacement (estimated: {', '.join(telling)})"
-    return [f"{off}: {', '.join(cures)}" if cures else off]
+    return [f"{off}: {', '.join(cures)}" if cures else off, *_of_burst(error)]
+
+
+def _of_burst(error: ErrorEstimate) -> list[str]:
+    """Return what is to be said of a burst of the motion."""
+    if (burst := error.found.get("burst")) is None:
+        return []
+    quick = f"around t = {burst['at']:.4g} s the structure turns {burst['growth']:.2g} times as quickly as before"
+    return [f"{quick}: the error of the steps is told as much larger, but may be several times that, or less"]
 
 
 def finer_steps(scene: Scene, stepper: Any, share: float) -> str:
