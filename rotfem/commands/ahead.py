@@ -18,7 +18,8 @@ from rotfem.results.run import RunResult
 from rotfem.selection.accuracy import AIM, Elements, Settings, finer, finest, part, shares
 from rotfem.selection.effects_ahead import effects_ahead
 from rotfem.selection.mesh_ahead import MeshAhead
-from rotfem.selection.steps_ahead import UNKNOWN, Motion, Vibrating, error_ahead, plan, unresolved_ahead
+from rotfem.selection.spectrum import UNKNOWN, Vibrating
+from rotfem.selection.steps_ahead import Motion, error_ahead, plan, unresolved_ahead
 
 if TYPE_CHECKING:
     from rotfem.commands.simulation import Simulation

@@ -16,7 +16,8 @@ import numpy.typing as npt
 
 from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.shape_error import ShapeError
-from rotfem.selection.steps_ahead import UNKNOWN, Motion, Vibrating
+from rotfem.selection.spectrum import UNKNOWN, Vibrating
+from rotfem.selection.steps_ahead import Motion
 
 Array = npt.NDArray[np.float64]
 

@@ -9,7 +9,8 @@ from rotfem.analysis.esdirk import ESDIRK4
 from rotfem.commands.ahead import FREE, Ahead
 from rotfem.selection.accuracy import Settings
 from rotfem.selection.mesh_ahead import MeshAhead
-from rotfem.selection.steps_ahead import LOST, SAFE, Motion, Vibrating, error_ahead, plan, unresolved_ahead
+from rotfem.selection.spectrum import LOST, SAFE, Vibrating
+from rotfem.selection.steps_ahead import Motion, error_ahead, plan, unresolved_ahead
 
 
 def vibration(omega: float, amplitude: float = 1.0, end: float = 100.0) -> Motion:
