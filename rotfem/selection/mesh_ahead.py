@@ -111,11 +111,14 @@ class MeshAhead:
 
 
 def vibrating(response: Response) -> Vibrating:
-    """Return the lowest frequency and the least damping of a reduced model in its history; 0 where it has none."""
+    """Return the lowest frequency and the damping of a reduced model in its history; 0 where it has none."""
     c, m = response.factors(), response.model.size
     M, C, K, _ = response.model.operators(c[np.unique(np.linspace(0, len(c) - 1, LOOKS).astype(int))])
     rates = np.zeros((len(M), 2 * m, 2 * m))
     rates[:, :m, m:] = np.eye(m)
     rates[:, m:, :m], rates[:, m:, m:] = -np.linalg.solve(M, K), -np.linalg.solve(M, C)
     squares, values = np.linalg.eigvals(-rates[:, m:, :m]), np.linalg.eigvals(rates)
-    return Vibrating(float(np.sqrt(max(0.0, squares.real.min()))), max(0.0, -float(values.real.max())))
+    # of those that do not vibrate the one that fades least comes last
+    ordered = [v[np.lexsort((v.real, np.abs(v.imag)))] for v in values]
+    known = tuple((np.abs(v.imag), np.maximum(0.0, -v.real)) for v in ordered)
+    return Vibrating(float(np.sqrt(max(0.0, squares.real.min()))), max(0.0, -float(values.real.max())), known)

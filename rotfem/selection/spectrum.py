@@ -45,10 +45,21 @@ class Vibrating:
     Attributes:
         lowest: frequency, rad/s; what is far below it follows its loads and has no phase to lose. 0 where unknown.
         fading: rate at which vibrations fade at least, 1/s: a phase that is lost is forgotten after 1/fading.
+        rates: frequencies of modes (increasing, rad/s) and at what rates these fade (1/s), at some instants each.
     """
 
     lowest: float = 0.0
     fading: float = 0.0
+    rates: tuple[tuple[Array, Array], ...] = ()
+
+    def fades(self, omega: Array) -> Array:
+        """Return the rate (1/s) at which vibrations of frequencies (n,), rad/s, fade: of the modes beside them."""
+        out = np.full(len(omega), np.inf if self.rates else self.fading)
+        for frequencies, rates in self.rates:
+            above = np.searchsorted(frequencies, omega)
+            beside = [np.clip(above - one, 0, len(frequencies) - 1) for one in (0, 1)]
+            out = np.minimum(out, np.minimum(*(rates[i] for i in beside)))
+        return np.asarray(np.maximum(out, self.fading))
 
 
 UNKNOWN = Vibrating()
@@ -90,12 +101,12 @@ class Spectrum:
 
     def above(self, omega: float) -> Spectrum:
         """Return the part of it at frequencies from one (rad/s) on."""
-        return replace(self, amplitudes=np.where(self.omega >= omega, self.amplitudes, 0.0))
+        return self if omega <= 0.0 else replace(self, amplitudes=np.where(self.omega >= omega, self.amplitudes, 0.0))
 
     @cached_property
     def turned(self) -> Array:
         """Angle (rad) through which a vibration adds up what it is off, (n,)."""
-        whole = self.omega * min(self.duration, 1.0 / max(self.structure.fading, 1e-300))
+        whole = self.omega * np.minimum(self.duration, 1.0 / np.maximum(self.structure.fades(self.omega), 1e-300))
         return np.where(self.omega < FOLLOWING * self.structure.lowest, np.minimum(whole, FOLLOWED), whole)
 
     def lost(self, h: float) -> float:

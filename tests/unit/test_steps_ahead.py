@@ -46,6 +46,13 @@ def test_a_phase_that_fades_or_follows_its_loads_does_not_add_up() -> None:
     assert following == pytest.approx(free * (8 / 3) / 100, rel=0.1)
 
 
+def test_phases_fade_as_those_of_the_modes_beside_them() -> None:
+    """At each frequency the less damped neighbour counts, of all instants that one which fades least."""
+    first, then = ((np.array([2.0, 9.0, 30.0]), np.array(rates)) for rates in ([0.1, 1.0, 8.0], [0.1, 3.0, 6.0]))
+    fades = Vibrating(lowest=2.0, fading=0.1, rates=(first, then)).fades(np.array([0.5, 5.0, 20.0, 50.0]))
+    assert fades == pytest.approx([0.1, 0.1, 1.0, 6.0])
+
+
 def test_what_is_fast_and_damped_counts_with_its_amplitude() -> None:
     """A hundredth of the motion at 20 rad/s: long steps leave just that, and none that is allowed more resolves it."""
     motion = vibration(20.0, 0.01)
