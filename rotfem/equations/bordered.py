@@ -36,14 +36,16 @@ class BorderedSystem:
 
     Args:
         inner: equations of motion of the structure, its model with a free hub.
+        once: whether the forms of the hub's equation are to be compiled in haste.
     """
 
     solved_at_once = False
     keeps_factor = False  # the border changes with the speed
     clamp = None
 
-    def __init__(self, inner: System):
-        self.inner, self._row = inner, (inner.compilations, HubRow(inner))
+    def __init__(self, inner: System, once: bool = False):
+        self.inner, self._once = inner, once
+        self._row = inner.compilations, HubRow(inner, once)
         self.angle = self.row.angle
         self.hub = self.row.hub
         self._dz = Increment(inner.V)
@@ -59,7 +61,7 @@ class BorderedSystem:
         """The hub's equation, made anew where the structure's were."""
         if self._row[0] != self.inner.compilations:
             coupled = self._row[1].coupled
-            self._row = self.inner.compilations, HubRow(self.inner)
+            self._row = self.inner.compilations, HubRow(self.inner, self._once)
             self._row[1].coupled = coupled
         return self._row[1]
 

@@ -12,6 +12,7 @@ from rotfem.equations.by_spin import BySpin
 from rotfem.equations.nonlinear import assembled
 from rotfem.equations.system import System
 from rotfem.mechanics import work
+from rotfem.mechanics.sums import added, weighted
 from rotfem.numerics import compat, forms
 
 
@@ -20,25 +21,26 @@ class HubRow:
 
     Args:
         system: equations of motion of the structure.
+        once: whether its forms are to be compiled in haste (see `rotfem.numerics.forms`).
     """
 
-    def __init__(self, system: System):
+    def __init__(self, system: System, once: bool = False):
         self.system, self.model = system, system.model
         assert system.model.hub is not None
         self.angle, self.hub = system.model.hub, system.model.hub.hub
         self.coupled = "hub_coupling" in self.model.effects
         moments = self.model.work(self.model.turn)
-        moment, self._shifts = sum(moments.values()), [system.structure.constant(0.0) for _ in range(3)]
+        moment, self._shifts = added(moments.values()), [system.structure.constant(0.0) for _ in range(3)]
         self._by_spin = BySpin(self.model, moment)
         outside = [term for name, term in moments.items() if not self.model.acting[name].momentum]
         wanted = {
             "moment": moment,
             "spin": self._by_spin.ufl,
             "row": self._row_of(moment) if self.coupled else None,
-            "outside": sum(outside) if outside else None,
+            "outside": added(outside) if outside else None,
         }
         there = {name: form for name, form in wanted.items() if form is not None}
-        self._forms = dict(zip(there, forms.together(list(there.values())), strict=True))
+        self._forms = dict(zip(there, forms.together(list(there.values()), once), strict=True))
         self._vector = compat.create_vector(system.V)
         self.hub.torque.attach(self._seen)
 
@@ -46,7 +48,7 @@ class HubRow:
         """Return c_k ∂/∂q + c_v ∂/∂v + c_m ∂/∂a of the moment, a UFL form."""
         *state, dq = self.system.structure.k.functions
         parts = (ufl.derivative(moment, x, dq) for x in state)
-        return sum(c * part for c, part in zip(self._shifts, parts, strict=True))
+        return weighted(self._shifts, parts)
 
     @cached_property
     def _momentum(self) -> Any:

@@ -17,7 +17,7 @@ from rotfem.equations.energy_balance import EnergyBalance
 from rotfem.equations.model import Model
 from rotfem.equations.point_stresses import PointStresses
 from rotfem.equations.system import System
-from rotfem.mechanics.sums import added
+from rotfem.mechanics.sums import weighted
 from rotfem.numerics import compat, forms
 
 Array = npt.NDArray[np.float64]
@@ -47,7 +47,7 @@ class NonlinearSystem(System):
             libraries = [list(part) for part in zip(self._residuals, self._tangents, strict=True)]
             if self.model.hub is not None and self._by_spin.ufl is not None:
                 libraries[-1].append(self._by_spin.ufl)
-            compiled = [forms.together(library) for library in libraries]
+            compiled = [forms.together(library, once=self._parted and self.structure.planar) for library in libraries]
             self._F, self._J = [part[0] for part in compiled], [part[1] for part in compiled]
             self._spin = compiled[-1][2] if len(compiled[-1]) > 2 else None
             self._pattern = self._J[0]
@@ -67,7 +67,7 @@ class NonlinearSystem(System):
     def _tangent_of(self, F: Any) -> Any:
         du = ufl.TrialFunction(self.V)
         parts = (ufl.derivative(F, x, du) for x in (self.q, self.v, self.a))
-        return added(c * form for c, form in zip(self._shifts, parts, strict=True))
+        return weighted(self._shifts, parts)
 
     @cached_property
     def balance(self) -> EnergyBalance:

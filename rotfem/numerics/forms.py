@@ -22,7 +22,7 @@ from rotfem.numerics import form_cache
 #: What dolfinx says on the other ranks when rank 0 could not compile a form.
 ELSEWHERE = "Compilation failed on root node"
 
-#: Flags of the C compiler for what is assembled often, and for what is assembled a few times on a few cells.
+#: Flags of the C compiler for what is assembled often, and for what is assembled a few times or on a few cells.
 OFTEN, SELDOM = ["-O2", "-g0", "-w"], ["-O0", "-g0", "-w"]
 
 #: Compiles several forms, (communicator, forms, …) ↦ (forms, module, code): rank 0 first, as dolfinx does one.

@@ -49,6 +49,7 @@ class Newton:
             slender, on the way to the right root too; but that it is close to the start is no argument for it then.
         wandered: whether an increment after the first of the last solve was beyond where its tangent says anything.
         roundoff: largest increment accepted because it had stopped shrinking at round-off level.
+        foreseeing: whether later increments, too, may be the last because the next would be below tolerance.
     """
 
     tolerance: float = 1e-9
@@ -57,6 +58,7 @@ class Newton:
     strayed: bool = False
     wandered: bool = False
     roundoff: float = 0.0
+    foreseeing: bool = False
     _kappa: float = field(default=np.inf, repr=False)
 
     @classmethod
@@ -92,7 +94,7 @@ class Newton:
                 if d <= enough or (d <= self.tolerance and d > 0.3 * previous):
                     return k
                 chord.judge(d, enough)
-            elif d <= self.tolerance or (k == 1 and 4 * self._kappa * d**2 <= self.tolerance):
+            elif d <= self.tolerance or ((k == 1 or self.foreseeing) and 4 * self._kappa * d**2 <= self.tolerance):
                 return k
             stalled = stalled + 1 if d > 0.3 * previous and (chord is None or not chord.serves) else 0
             if chord is not None and chord.hopeless:

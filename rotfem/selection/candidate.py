@@ -141,7 +141,7 @@ class Candidate:
     def _history(self, steps: Steps, q: Array | None, out: Outputs, watch: Watch) -> None:
         system, scheme = self.switched(), self.case.scheme
         assert scheme is not None
-        newton, strayed = self.case.newton(), 0
+        newton, strayed = self.case.newton(foreseeing=True), 0
         march = March(system, scheme, steps, newton, q)
         most = STRAYED * len(steps.parts or ()) if np.isfinite(watch.halved) else np.inf
         tips: list[Array] = []

@@ -45,6 +45,6 @@ class Case:
         """Return a variant with other values of some attributes."""
         return replace(self, **changes)
 
-    def newton(self) -> Newton:
-        """Return the iteration control."""
-        return Newton(self.increment_tolerance, self.max_iterations)
+    def newton(self, foreseeing: bool = False) -> Newton:
+        """Return the iteration control, for histories one that need not see the last increment (see `Newton`)."""
+        return Newton(self.increment_tolerance, self.max_iterations, foreseeing=foreseeing)

@@ -24,7 +24,7 @@ from rotfem.selection.candidate import HALVED, Candidate, Watch, stand_in, theor
 from rotfem.selection.case import Case
 from rotfem.selection.distance import HISTORY, MODES, STEADY, Beyond, Bound, Outputs
 from rotfem.selection.resolution import given
-from rotfem.selection.sampling import FINER, Sampling
+from rotfem.selection.sampling import FINER, LONGER, Sampling, serving
 
 Array = npt.NDArray[Any]
 
@@ -148,16 +148,18 @@ class Trial:
         check_steady(self.full.problem.replace(effects=None))
         raise InputError("", None, self.full.unsteady or "there is nothing to compare models by")
 
-    def shorten(self, error: float) -> None:
-        """Shorten the steps of the histories until no two of them differ by what steps make of the same motion.
+    def fit(self, error: float) -> None:
+        """Fit the steps of the histories to an error, relative, of one in the steps of the case (0: unknown).
 
-        Args:
-            error: relative, of a history in the steps of the case itself, if those are fixed.
+        No two may differ by what steps make of the same motion, and up to `LONGER` they need not be shorter than that.
         """
-        own = self.full.steps
-        if self.samples is None or self.full.scheme is None or own is None or own.step is None or self._done:
+        own, scheme = self.full.steps, self.full.scheme
+        if self.samples is None or scheme is None or own is None or own.step is None or self._done or not error > 0.0:
             return
-        self.samples = self.samples.shortened(error, own.step, self.full.scheme.order)
+        wanted = serving(error, own.step, scheme.order)
+        if (longer := min(LONGER, wanted / self.samples.step)) > 1.0:
+            self.samples = Sampling.of(own, self.at_rest, given(self.case.problem), longer)
+        self.samples = self.samples.shortened(wanted)
 
     def outputs(
         self,
@@ -186,9 +188,8 @@ class Trial:
         hub, end = problem.motion.hub, 0.0 if steps is None else steps.end
         if hub is None or steps is None:
             return problem.motion.final_speed(end)
-        speeds = hub.rigid_speeds(
-            np.unique([*np.linspace(0.0, end, HUB_LOOKS), *hub.torque.knots]), self.poorest.row.rest_inertia()
-        )
+        times = np.unique([*np.linspace(0.0, end, HUB_LOOKS), *hub.torque.knots])
+        speeds = hub.rigid_speeds(times, self.poorest.row.rest_inertia())
         return float(speeds[np.argmax(np.abs(speeds))])
 
     # --- systems ------------------------------------------------------------------------------------------------------

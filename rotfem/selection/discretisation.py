@@ -124,7 +124,7 @@ def _marched(trial: Trial, candidate: Candidate, theory: str, finer: int = 1) ->
     system = candidate.switched()
 
     def march() -> TipErrors | None:
-        states = March(system, scheme, longer, trial.case.newton(), trial.start(candidate, theory))
+        states = March(system, scheme, longer, trial.case.newton(foreseeing=True), trial.start(candidate, theory))
         watch = states.stepper.watch = ErrorWatch(system, longer.end, scheme)
         last = None
         for last in states:

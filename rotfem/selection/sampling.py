@@ -7,6 +7,7 @@ there are as many steps as what is prescribed needs, or Newton, but never more t
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import ceil
 from typing import Any, Self
 
 import numpy as np
@@ -22,6 +23,9 @@ STEPS_A_PERIOD, FEWEST_STEPS, MOST_STEPS = (32, 10), 200, 1500
 
 #: Error by its steps with which a history is still good to see what changes.
 ROUGH = 0.1
+
+#: By how much longer steps may be than the frequencies ask for, where they are known to be off by less than that.
+LONGER = 2.0
 
 #: Steps between two samples of a history, tried one after the other as far as the case has as many steps itself.
 FINER = (1, 4, 16)
@@ -47,18 +51,19 @@ class Sampling:
     parts: Array
 
     @classmethod
-    def of(cls, steps: Steps, at_rest: Array, signals: list[Given]) -> Self:
+    def of(cls, steps: Steps, at_rest: Array, signals: list[Given], longer: float = 1.0) -> Self:
         """Return the samples of a history.
 
         Args:
             steps: of the case itself.
             at_rest: frequencies of the resting structure, rad/s, as far as they are known.
             signals: what is prescribed.
+            longer: by how much the steps are to be longer than the frequencies ask for.
         """
         end = steps.end
         own = None if steps.step is None else int(np.ceil(end / steps.step - 1e-9))
         wanted = max((w * n for w, n in zip(at_rest, STEPS_A_PERIOD, strict=False)), default=np.inf) / (2 * np.pi)
-        number = int(np.clip(np.ceil(min(end * wanted, MOST_STEPS)), FEWEST_STEPS, MOST_STEPS))
+        number = ceil(np.clip(end * wanted, FEWEST_STEPS, MOST_STEPS) / longer)
         step = end / min(number, own or MOST_STEPS)
         times = np.linspace(0.0, end, round(end / step) + 1)
         period = 1 / at_rest[0] if at_rest.size else SAMPLES_A_RADIAN * step
@@ -73,17 +78,10 @@ class Sampling:
             finest -= 1
         return tuple(dict.fromkeys(min(finer, finest) for finer in FINER))
 
-    def shortened(self, error: float, step: float, order: int) -> Self:
-        """Return the same samples with steps between them so short that the error is none to speak of.
-
-        Args:
-            error: relative, of a history in steps of a length.
-            step: that length, s.
-            order: of the scheme.
-        """
-        wanted = step * (ROUGH / error) ** (1 / order) if error > 0.0 else np.inf
+    def shortened(self, wanted: float) -> Self:
+        """Return the same samples with steps between them that are as short as wanted (s), if there may be so many."""
         most = max(1, MOST_STEPS // len(self.parts))
-        finer = min(int(np.ceil(self.step / wanted - 1e-9)), most)
+        finer = min(ceil(self.step / wanted - 1e-9), most)
         if finer <= 1:
             return self
         parts = np.maximum(self.parts, finer)
@@ -96,3 +94,14 @@ class Sampling:
     def steps(self, finer: int) -> Steps:
         """Return the steps of a history with at least so many between two samples."""
         return Steps(self.end, self.step, parts=tuple(max(finer, int(n)) for n in self.parts))
+
+
+def serving(error: float, step: float, order: int) -> float:
+    """Return the length of steps (s) in which a history is just good enough to see what changes.
+
+    Args:
+        error: relative, of a history in steps of a length; more than 0.
+        step: that length, s.
+        order: of the scheme.
+    """
+    return float(step * (ROUGH / error) ** (1 / order))

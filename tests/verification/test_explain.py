@@ -22,6 +22,7 @@ from rotfem.scene import Scene
 from rotfem.selection.coarse_model import Trial
 from rotfem.selection.distance import HISTORY, MODES, STEADY, tip_change
 from rotfem.selection.estimate import NOTICEABLE, Estimates
+from rotfem.selection.mesh_share import error_of_modes
 from rotfem.selection.model_choice import Choice, choose
 from tests.beams import STRUCTURE
 
@@ -309,6 +310,16 @@ def test_overdamped_modes_are_compared_by_their_slow_eigenvalues() -> None:
     assert np.sum(values.imag == 0.0) == 1
 
 
+def test_a_point_mass_inside_a_finer_cell_leaves_frequencies_to_their_shapes() -> None:
+    """Between the nodes of the plate's cells, so that it is inside one of half the size, too."""
+    plate = {"type": "plate", "length": 1.0, "width": 0.5, "thickness": 0.01, "E": 7e10, "nu": 0.3, "rho": 2700.0}
+    tables = {"structure": plate | {"point_masses": [[0.61, 0.11, 0.2]]}, "motion": {"type": "constant", "speed": 5.0}}
+    scene = Scene.from_dict({**tables, "mesh": {"elements": [4, 2]}, "modes": {"count": 2}})
+    trial = Trial(case_of(scene), (MODES,))
+    own = trial.poorest_on(trial.full.problem.mesh)
+    assert 1e-6 < error_of_modes(trial, own) < 1e-1
+
+
 @pytest.mark.parametrize("file", [False, True])
 def test_error_of_a_mesh_far_finer_than_that_of_trials_is_scaled(file: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """What the coarse mesh puts off is scaled by frequencies of both; of modes the hub is held, of a mesh file."""
@@ -365,6 +376,22 @@ def test_a_trial_in_which_newton_strays_is_made_in_shorter_steps() -> None:
     scene = Scene.from_dict({**tables, "mesh": {"elements": 4}, "time": {"end": 2.0, "step": 0.004}})
     trial = Trial(case_of(scene), (HISTORY,))
     assert 7.9e-4 / 3 < Estimates(trial, "reissner", trial.effects).effect("coriolis").estimate[HISTORY] < 3 * 7.9e-4
+
+
+def test_steps_of_trials_are_as_long_as_their_error_allows() -> None:
+    """Of second order: they are off by 10 % where those of the scene, 0.01 s, are by that over (step/0.01 s)²."""
+
+    def steps(error: float) -> tuple[int, float]:
+        trial = Trial(case_of(scene(SPIN_UP)), (HISTORY,))
+        trial.fit(error)
+        assert trial.samples is not None
+        return int(trial.samples.parts.sum()), trial.samples.step
+
+    number, step = steps(0.0)
+    assert steps(0.1 * (0.01 / step) ** 2) == (number, step)
+    assert steps(0.1 * (0.01 / step / 1.5) ** 2)[1] == pytest.approx(1.5 * step, rel=2 / number)
+    assert steps(1e-9)[1] == pytest.approx(2 * step, rel=2 / number)  # never longer
+    assert steps(0.1 * (0.01 / step * 2) ** 2)[0] == 2 * number
 
 
 def test_an_estimate_does_not_depend_on_what_was_tried_before() -> None:
