@@ -1,13 +1,17 @@
-"""The geometric stiffness ∫ σ⁰·D²Γ: what the forces of a loaded state do in further displacements."""
+"""The geometric stiffness ∫ σ⁰·D²Γ: what the forces of a loaded state do in further displacements.
+
+And what the stiff strains have of third order in displacements, which the forces of a linear structure work on.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import ufl
 
 from rotfem.equations.model import Model
-from rotfem.mechanics.theories import Theory
+from rotfem.mechanics.theories import Theory, richest
 from rotfem.numerics import forms
 
 
@@ -35,4 +39,29 @@ def geometric_stiffness(
             force = forms.without(force, *others) if others else force
             curvature = ufl.derivative(ufl.derivative(higher.value, of, u), of, w)
             out += ufl.inner(force, forms.without(curvature, q, *others)) * higher.measure
+    return out
+
+
+def third_order_work(model: Model, displacements: Sequence[Any], test: Any) -> Any:
+    """Return ∫ N(δq)·(D³Γ[a, b, c] + D²Γ[d, e]) at rest, a UFL form, with the exact strains Γ of membrane and shear.
+
+    Args:
+        model: of a linear theory, whose forces N are.
+        displacements: a, b, c, d and e, functions of the unknowns.
+        test: δq.
+    """
+    s, out = model.structure, 0
+    q, exact = s.k.functions[0], {strain.name: strain.value for strain in model.strains(richest().measures(s.type))}
+    first, second = displacements[:3], displacements[3:]
+    for strain in model.mechanics.strains:
+        if strain.name not in {*s.stiff, *s.prestressing}:
+            continue
+        change = 0
+        for directions in (first, second):
+            part = exact[strain.name]
+            for direction in directions:
+                part = ufl.derivative(part, q, direction)
+            change += part
+        force = strain.force(ufl.replace(strain.value, {q: test}))
+        out += ufl.inner(force, forms.without(change, q)) * strain.measure
     return out

@@ -75,14 +75,31 @@ def test_coupling_is_an_effect() -> None:
     assert sizes["rotary_inertia"] < 0.01 * truth
 
 
-def test_a_free_hub_feels_the_foreshortening() -> None:
-    """The tip that is nearer to the axis leaves less inertia: without that reissner's motion would be 5e-3 away."""
+@pytest.mark.parametrize(("factor", "within"), [(1.0, 1.5e-4), (4.0, 8e-3)])
+def test_a_free_hub_feels_the_foreshortening(factor: float, within: float) -> None:
+    """The tip that is nearer to the axis leaves less inertia: without that reissner's motion would be 5e-3 away.
+
+    What is left is of fifth order: with four times the torque 5e-3, and the estimate tells it; with the torque itself
+    it is less than what the steps of the truth are off, 1e-4.
+    """
     torque = [[0.0, 0.0], [0.05, 0.6], [0.15, 0.6], [0.2, -0.6], [0.3, 0.0]]
-    scene = SCENE | {"motion": SCENE["motion"] | {"table": torque}, "time": {"end": 0.3, "step": 1e-3}}
+    table = [[t, factor * moment] for t, moment in torque]
+    scene = SCENE | {"loads": {}, "motion": SCENE["motion"] | {"table": table}, "time": {"end": 0.3, "step": 1e-3}}
     exact = run(scene | {"model": {"theory": "reissner"}, "time": scene["time"] | {"scheme": "esdirk4"}})
     model = {"theory": "consistent_linear", "reduced": 1e-5, "foreshortening": True}
     reduced = run(scene | {"model": model})
     truth = exact.history["tip_u2"]
     off = float(np.abs(reduced.history["tip_u2"] - truth).max() / np.abs(truth).max())
-    assert off < 5e-4
-    assert off < reduced.summary["error"]["model"] < 30 * off
+    assert off < within
+    assert off / 3 < reduced.summary["error"]["model"] < 3 * off
+
+
+def test_loads_that_turn_leave_the_third_order_to_the_estimate() -> None:
+    """A follower force has terms of third order that are not in the equations: what it may do is in the estimate."""
+    model = {"theory": "consistent_linear", "reduced": 1e-5, "foreshortening": True}
+    exact = run(SCENE | {"model": {"theory": "reissner"}, "time": {"end": 0.3, "step": 1e-3, "scheme": "esdirk4"}})
+    reduced = run(SCENE | {"model": model, "time": {"end": 0.3, "step": 1e-3}})
+    truth = exact.history["tip_u2"]
+    off = float(np.abs(reduced.history["tip_u2"] - truth).max() / np.abs(truth).max())
+    assert off < 5e-3
+    assert reduced.summary["error"]["model"] > off / 3

@@ -64,6 +64,14 @@ class Steps:
         v = self.v[i] + h[:, None] * once
         return self.q[i] + (share * h)[:, None] * self.v[i] + (h**2)[:, None] * twice, v
 
+    def state(self, t: Array) -> tuple[Array, ...]:
+        """Return coordinates, rates and accelerations (n, m) at times (n,) within the steps."""
+        return *self.at(t), self.rates_of(t)
+
+    def plus(self, other: Steps) -> Steps:
+        """Return the sum with a solution by the same steps."""
+        return Steps(self.ends, self.q + other.q, self.v + other.v, self.a + other.a)
+
     def nodes(self) -> tuple[Array, Array, Array]:
         """Return coordinates, rates and accelerations at the nodes of all steps, (n, nodes, m) each."""
         h = np.diff(self.ends)[:, None, None]

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.reduced.collocation import NODES, Steps, collocate
+from rotfem.analysis.reduced.collocation import BATCH, NODES, Steps, collocate
 from rotfem.analysis.reduced.drive import Drive
 from rotfem.analysis.reduced.hub_moment import Directions, HubMoment
 from rotfem.analysis.reduced.model import ReducedModel
@@ -27,6 +27,9 @@ Array = npt.NDArray[np.float64]
 
 #: Steps that are solved together, Newton iterations that they may take, and relative change that ends them.
 WINDOW, ITERATIONS, CLOSE = 64, 15, 1e-11
+
+#: Times and states (coordinates with the angle last, rates and accelerations, (n, m + 1)) ↦ forces (n, m + 1).
+Lacking = Callable[[Array, tuple[Array, ...]], Array]
 
 #: Change of an angle, of a speed and of a rate by which derivatives are taken; the last two are exact.
 BESIDE = np.array([1e-6, 1.0, 1.0])
@@ -92,6 +95,11 @@ class FreeSolution(Solution):
         self.moment: HubMoment | None = None
         #: The trajectory of last time, from which the next one starts: by coarser steps, or by other effects.
         self._known: Steps | None = None
+
+    @property
+    def hub(self) -> FreeSolution:
+        """This solution, which has a free hub."""
+        return self
 
     def again(self) -> FreeSolution:
         """Return a solution by the same steps, for equations some of whose effects are switched off or on."""
@@ -171,9 +179,7 @@ class FreeSolution(Solution):
         q = y + elapsed[..., None] * turns
         return q, np.broadcast_to(turns, q.shape), np.zeros_like(q)
 
-    def linearised(
-        self, model: ReducedModel, state: tuple[Array, Array, Array], t: Array
-    ) -> tuple[Array, Array, Array, Array]:
+    def linearised(self, model: ReducedModel, state: tuple[Array, ...], t: Array) -> tuple[Array, Array, Array, Array]:
         """Return M, C, K (n, m + 1, m + 1) and f (n, m + 1) of the equations linearised about states.
 
         Args:
@@ -182,21 +188,17 @@ class FreeSolution(Solution):
             t: times, s.
         """
         q, v, a = state
-        m, drive, hub, moment = model.size, self.drive, self.drive.hub, self.moment
+        m, hub, moment = model.size, self.drive.hub, self.moment
         assert moment is not None
         x, turn = (q[:, :-1], v[:, :-1], a[:, :-1]), np.stack([q[:, -1], v[:, -1], a[:, -1]], axis=1)
 
-        def weighed(turn: Array) -> tuple[Array, Array]:
-            constants = drive.constants(t, *turn.T)
-            return drive.made_of(constants, len(t)), moment.weights(constants, turn[:, 1], turn[:, 2])
-
-        c, w = weighed(turn)
+        c, w = self._weighed(turn, t)
         slopes = moment.slopes(w, *x)
         out = []
         for kind, operator, slope, k in zip("KCM", model.operators(c)[2::-1], slopes, range(3), strict=True):
             step = np.zeros(3)
             step[k] = BESIDE[k]
-            (c_plus, w_plus), (c_minus, w_minus) = weighed(turn + step), weighed(turn - step)
+            (c_plus, w_plus), (c_minus, w_minus) = (self._weighed(turn + side, t) for side in (step, -step))
             by_c, by_w = (c_plus - c_minus) / (2 * step[k]), (w_plus - w_minus) / (2 * step[k])
             A = np.empty((len(t), m + 1, m + 1))
             A[:, :m, :m] = operator
@@ -205,53 +207,65 @@ class FreeSolution(Solution):
             A[:, m, m] = moment.value(by_w, *x) + {"K": 0.0, "C": hub.damping, "M": hub.inertia}[kind]
             out.append(A)
         K, C, M = out
-        F = np.empty((len(t), m + 1))
-        F[:, :m] = self._force(model, c, *x)
-        F[:, m] = moment.value(w, *x) + hub.inertia * a[:, -1] + hub.damping * v[:, -1] - hub.torque.many(t)
+        F = self._unbalanced(model, state, t, (c, w))
         f = F - sum(np.einsum("nij,nj->ni", A, y) for A, y in ((M, a), (C, v), (K, q)))
         return M, C, K, f
 
-    def moment_along(self, shapes: Array) -> Callable[[Array, Array, Array, Array], Array]:
-        """Return what the hub feels of shapes beside the basis, to first order in them.
+    def moment_along(self, shapes: Array, first_order: bool) -> Callable[..., Array]:
+        """Return what the hub feels of shapes, local dof arrays (n, p), as a function.
 
-        Args:
-            shapes: local dof arrays (n, p).
-
-        Returns:
-            times (n,), s, with coordinates of the shapes, their rates and accelerations (n, p) ↦ moment (n,), N·m.
+        Its arguments are times (n,), s, angle, speed and its rate (n, 3), and coordinates, rates and accelerations
+        (n, p); its value the moment (n,), N·m. In first order it leaves out what is of second in the coordinates.
         """
         assert self.moment is not None
-        felt = HubMoment(replace(self.moment.basis, V=shapes), self.drive.bordered.row, first_order=True)
+        felt = HubMoment(replace(self.moment.basis, V=shapes), self.drive.bordered.row, first_order)
 
-        def moment(t: Array, s: Array, v: Array, a: Array) -> Array:
-            drive, speed, rate = self.drive, self.drive.speed(t), self.drive.rate(t)
-            weights = felt.weights(drive.constants(t, drive.angle(t), speed, rate), speed, rate)
-            return felt.value(weights, s, v, a) - felt.value(weights, 0 * s, 0 * v, 0 * a)
+        def moment(t: Array, turn: Array, s: Array, v: Array, a: Array) -> Array:
+            return felt.value(felt.weights(self.drive.constants(t, *turn.T), *turn.T[1:]), s, v, a)
 
         return moment
 
-    def answer(self, model: ReducedModel, forces: Callable[[Array], Array]) -> Trajectory:
-        """Return the history from rest of a model and its hub under other forces than their own, to first order.
+    def corrections(self, model: ReducedModel, lacking: Lacking, rounds: int) -> list[Array]:
+        """Return what forces that the equations lack add to the coordinates, (rows, m), after each round of Newton's.
 
         Args:
             model: the reduced model.
-            forces: t (n,) ↦ f (n, m + 1), the moment on the hub last, in the equations linearised about the trajectory.
+            lacking: of states, forces (n, m + 1), the moment on the hub last.
+            rounds: how many.
         """
-        ends, nothing, path = self.ends(model), np.zeros(model.size + 1), self.drive.steps
+        ends, path, nothing = self.ends(model), self.drive.steps, np.zeros(model.size + 1)
         assert path is not None
         t = self.drive.within(ends[:-1], ends[1:], NODES)
-        f = forces(t.ravel()).reshape(*t.shape, model.size + 1)
 
         def operators(t: Array) -> tuple[Array, Array, Array, Array]:
-            return self.linearised(model, (*path.at(t), path.rates_of(t)), t)
+            return self.linearised(model, path.state(t), t)
 
-        steps = collocate(operators, self.drive.within, ends, nothing, nothing, f)
+        added, out = None, list[Array]()
+        for _ in range(rounds):
+            f = []
+            for at in np.array_split(t.ravel(), len(ends) // BATCH + 1):
+                x = path.state(at)
+                if added is not None:
+                    x = tuple(y + z for y, z in zip(x, added.state(at), strict=True))
+                f.append(lacking(at, x) + (0.0 if added is None else self._unbalanced(model, x, at)))
+            steps = collocate(operators, self.drive.within, ends, nothing, nothing, np.vstack(f).reshape(*t.shape, -1))
+            added = steps if added is None else added.plus(steps)
+            out.append(added.at(self.times)[0][:, :-1])
+        return out
 
-        def at(t: Array) -> tuple[Array, Array]:
-            x, rates = steps.at(t)
-            return x[:, :-1], rates[:, :-1]
+    def _weighed(self, turn: Array, t: Array) -> tuple[Array, Array]:
+        """Return the factors of all pieces, and those of the hub's moment, of angle, speed and its rate (n, 3)."""
+        assert self.moment is not None
+        constants = self.drive.constants(t, *turn.T)
+        return self.drive.made_of(constants, len(t)), self.moment.weights(constants, turn[:, 1], turn[:, 2])
 
-        return Trajectory(*at(self.times), len(ends) - 1, False, at)
+    def _unbalanced(self, model: ReducedModel, state: tuple[Array, ...], t: Array, weighed: Any = None) -> Array:
+        """Return what the equations of structure and hub leave of states, with the angle last, (n, m + 1)."""
+        turn, x, hub = np.stack([y[:, -1] for y in state], axis=1), [y[:, :-1] for y in state], self.drive.hub
+        c, w = weighed or self._weighed(turn, t)
+        assert self.moment is not None
+        own = hub.inertia * turn[:, 2] + hub.damping * turn[:, 1] - hub.torque.many(t)
+        return np.column_stack([self._force(model, c, *x), self.moment.value(w, *x) + own])
 
     def _force(self, model: ReducedModel, c: Array, q: Array, v: Array, a: Array) -> Array:
         """Return M a + C v + K q + f with these factors, (n, m)."""

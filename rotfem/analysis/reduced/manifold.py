@@ -24,9 +24,8 @@ from dolfinx.fem import petsc as fem_petsc
 
 from rotfem.analysis.reduced.response import Response, largest, tips_of
 from rotfem.analysis.reduced.solution import Solution, Trajectory
+from rotfem.analysis.reduced.third_order import Motion, ThirdOrder, expands, inside
 from rotfem.analysis.theory_error import TheoryError, stiffened
-from rotfem.equations.pieces import PRESTRESS
-from rotfem.mechanics.effects import INTERNAL, Effect
 from rotfem.numerics import compat, forms
 from rotfem.numerics.linear import DirectSolver
 from rotfem.numerics.projection import summed, times
@@ -37,28 +36,21 @@ Array = npt.NDArray[np.float64]
 MATTERS, MOST = 2e-3, 6
 
 
-@dataclass(frozen=True)
-class Motion2:
-    """Second-order coordinates s of the pairs (n, p), and their rates and accelerations."""
-
-    s: Array
-    v: Array
-    a: Array
-
-
 class Manifold:
     """The second-order displacements of a response, and the forces of their inertia.
 
     Args:
         response: history of a reduced model.
+        third: whether with what is of third order, of structures that have it.
 
     Attributes:
         shapes: coordinates of the shapes whose pairs are taken, (m, r).
         pairs: numbers (i, j) of these, i ≤ j.
         Theta: answers to the pairs, local dof arrays (n, p).
+        third: displacements of third order, or None.
     """
 
-    def __init__(self, response: Response):
+    def __init__(self, response: Response, third: bool = False):
         self.response, self.model = response, response.model
         _, sizes, turns = np.linalg.svd(response.q, full_matrices=False)
         keep = sizes > MATTERS * sizes[:1].max(initial=0.0)
@@ -69,6 +61,10 @@ class Manifold:
         self.Theta = self._answers()
         self.tips = tips_of(self.model, self.Theta)
         self._project()
+        self.third: ThirdOrder | None = None
+        if third and expands(self.model):
+            seconds = {p: f * x for p, f, x in zip(self.pairs, self._factor, self.Theta.T, strict=True)}
+            self.third = ThirdOrder(self.model, self.shapes, seconds)
 
     def _answers(self) -> Array:
         """Return Θ of all pairs, one solution each."""
@@ -106,23 +102,25 @@ class Manifold:
 
     # --- motion on the manifold --------------------------------------------------------------------------------------
 
-    def second(self, q: Array, v: Array | None = None, a: Array | None = None) -> Motion2:
+    def second(self, q: Array, v: Array | None = None, a: Array | None = None) -> Motion:
         """Return the coordinates of the pairs, and their rates, of coordinates, rates and accelerations (n, m)."""
         x = q @ self.shapes
         i, j, c = self._i, self._j, self._factor
         dx, ddx = (np.zeros_like(x) if y is None else y @ self.shapes for y in (v, a))
         rate = c * (dx[:, i] * x[:, j] + x[:, i] * dx[:, j])
-        return Motion2(
+        return Motion(
             c * x[:, i] * x[:, j], rate, c * (ddx[:, i] * x[:, j] + 2 * dx[:, i] * dx[:, j] + x[:, i] * ddx[:, j])
         )
 
     def tip(self, q: Array) -> Array:
         """Return the unknowns at the tip of coordinates (n, m), foreshortening with them, (n, components)."""
-        return q @ tips_of(self.model).T + self.second(q).s @ self.tips.T
+        out = q @ tips_of(self.model).T + self.second(q).s @ self.tips.T
+        return out if self.third is None else out + self.third.products(q) @ self.third.tips.T
 
     def shape(self, q: Array) -> Array:
         """Return the displacement (local dof array) of coordinates (m,)."""
-        return np.asarray(self.model.V @ q + self.Theta @ self.second(q[None, :]).s[0])
+        out = self.model.V @ q + self.Theta @ self.second(q[None, :]).s[0]
+        return np.asarray(out if self.third is None else out + self.third.Xi @ self.third.products(q[None, :])[0])
 
     def forces(self, c: Array, q: Array, v: Array, a: Array, third: bool) -> Array:
         """Return the forces of inertia and loads that the linear equations lack, on the tangent, (n, m).
@@ -159,40 +157,69 @@ class Manifold:
     def correction(self, solution: Solution, path: Trajectory, third: bool = True) -> Array:
         """Return the answer of the linear equations to the forces that they lack on a trajectory, (rows, m).
 
-        A free hub feels the second-order displacements, too, and moves otherwise than on the trajectory for both.
-
         Args:
             solution: of the trajectory.
             path: one by collocation, which has no vibrations faster than its steps: their forces average to nothing.
             third: see `forces`.
         """
-        model, felt = self.model, solution.moment_along(self.Theta)
+        model = self.model
+        if solution.hub is not None:
+            return self.with_hub(solution.hub, third)[0]
 
         def lacking(t: Array) -> Array:
             q, v = path.at(t)
             c = solution.drive.factors(t)
-            a = model.accelerations(c, q, v)
-            found = self.forces(c, q, v, a, third)
-            if felt is None:
-                return found
-            motion = self.second(q, v, a)
-            return np.column_stack([found, felt(t, motion.s, motion.v, motion.a)])
+            return self.forces(c, q, v, model.accelerations(c, q, v), third)
 
         return solution.answer(model, lacking).q
+
+    def with_hub(self, solution: Any, third: bool = True, rounds: int = 1) -> list[Array]:
+        """Return the answers of structure and free hub to the forces that they lack, of each round, (rows, m).
+
+        The hub feels all displacements beside the basis. With those of third order all forces of that order are there.
+
+        Args:
+            solution: of the trajectory, with a free hub.
+            third: see `forces`.
+            rounds: of Newton's method.
+        """
+        model, more, r = self.model, self.third, self.shapes.shape[1]
+        beside = self.Theta if more is None else np.hstack([model.V @ self.shapes, self.Theta, more.Xi])
+        felt = solution.moment_along(beside, first_order=more is None)
+
+        def lacking(t: Array, state: tuple[Array, ...]) -> Array:
+            turn, (q, v, a) = np.stack([y[:, -1] for y in state], axis=1), (y[:, :-1] for y in state)
+            c, motion = solution.drive.made_of(solution.drive.constants(t, *turn.T), len(t)), self.second(q, v, a)
+            found, whole = self.forces(c, q, v, a, third), [motion.s, motion.v, motion.a]
+            rest = [0 * s for s in whole]
+            if more is not None:
+                found, cubic = found + more.forces(c, q, v, a), more.motion(q, v, a)
+                first, triples = [y @ self.shapes for y in (q, v, a)], (cubic.s, cubic.v, cubic.a)
+                whole = [np.hstack(parts) for parts in zip(first, whole, triples, strict=True)]
+                rest = [np.hstack([x, 0 * y[:, r:]]) for x, y in zip(first, whole, strict=True)]
+            return np.column_stack([found, felt(t, turn, *whole) - felt(t, turn, *rest)])
+
+        answers: list[Array] = solution.corrections(model, lacking, rounds)
+        return answers
 
 
 def recover(response: Response) -> Foreshortened:
     """Return a response with its foreshortening and the answer to the forces of second order.
 
-    The forces of third order, which cubic terms of the strains oppose, move it by what is taken as the error left; to
-    it comes what the stretch may do that linear theories take for none.
+    The forces of third order, which cubic terms of the strains oppose, move it by what is taken as the error left; with
+    these terms it is what a further round of Newton's method moves it by. To it comes what the stretch may do that
+    linear theories take for none.
     """
-    manifold, solution = Manifold(response), response.solution
+    solution = response.solution
+    manifold = Manifold(response, third=solution.hub is not None)
     path = solution.resolved(response.model, response.trajectory)
-    second, all_of_them = (manifold.correction(solution, path, third) for third in (False, True))
+    if manifold.third is None:
+        second, further = (manifold.correction(solution, path, third) for third in (False, True))
+    else:
+        second, further = manifold.with_hub(solution.hub, rounds=2)
     tips = manifold.tip(response.q + second)
     size = largest(response.model, tips)
-    off = largest(response.model, manifold.tip(response.q + all_of_them) - tips) / size if size > 0.0 else 0.0
+    off = largest(response.model, manifold.tip(response.q + further) - tips) / size if size > 0.0 else 0.0
     stretching, ringing = (more / size if size else 0.0 for more in (_stretched(response), _ringing(response, path)))
     return Foreshortened(response, manifold, response.q + second, off + stretching + ringing, stretching)
 
@@ -250,15 +277,10 @@ class Foreshortened:
 
     def theory_error(self) -> TheoryError:
         """Return the error of the theory as far as the foreshortening does not take it away."""
-        basis = "its foreshortening is given back; the forces of third order that it lacks"
+        left = "the forces of third order that it lacks" if self.manifold.third is None else "a further round of it"
+        basis = f"its foreshortening is given back; {left}"
         return TheoryError(self.error, basis, self.response.model.system.model.theory.name)
 
     def summary(self) -> dict[str, Any]:
         """Return what a summary says of it."""
         return {"shapes": self.manifold.shapes.shape[1], "error": self.error}
-
-
-def inside(of: frozenset[str]) -> bool:
-    """Return whether a piece is of stresses, damping or prestress; the manifold leaves the membrane unstrained."""
-    effects = [Effect.registry[name] for name in of if name in Effect.registry]
-    return PRESTRESS in of or INTERNAL.name in of or any(effect.internal for effect in effects)

@@ -124,6 +124,11 @@ class Solution:
         """Return what a free hub was given in the rows (see `FreeSolution`); nothing where none is free."""
         return {}
 
+    @property
+    def hub(self) -> Any:
+        """The solution with its free hub (see `FreeSolution`); None where none is free."""
+        return None
+
     def again(self) -> Solution:
         """Return a solution by the same steps, for equations some of whose effects are switched off or on."""
         other = Solution(self.drive, self.times)
@@ -142,10 +147,6 @@ class Solution:
         f = forces(t.ravel()).reshape(*t.shape, model.size)
         steps = collocate(self._operators(model), self.drive.within, ends, nothing, nothing, f)
         return Trajectory(*steps.at(self.times), len(ends) - 1, False, steps.at)
-
-    def moment_along(self, shapes: Array) -> Any:
-        """Return what a free hub feels of shapes (see `FreeSolution`); None where none is free."""
-        return None
 
     def _operators(self, model: ReducedModel) -> Operators:
         return lambda t: model.operators(self.drive.factors(t))
