@@ -175,6 +175,8 @@ class Pace:
         self._next = 2 * steps + 1 if march < SHOWN else steps + max(1, int(steps * SHOWN / march))
         assert self._settings is not None
         is_adaptive = self._settings.step is None
+        if elapsed > self._left:
+            raise self._dear(None)
         if march < SHOWN or (is_adaptive and steps < FIRST):
             return
         (before, gone), self._look = self._look, (elapsed, share)
@@ -184,7 +186,7 @@ class Pace:
         self._learn(elapsed, (predicted - self._marching) / march)
         self._say(predicted, march)
         known = not is_adaptive or elapsed > ADAPTED * self._left
-        if elapsed > self._left or (known and predicted > SURE * self._left):
+        if known and predicted > SURE * self._left:
             raise self._dear(predicted)
 
     def beside(self, steps: int, share: float) -> None:

@@ -91,6 +91,15 @@ def test_an_attempt_that_is_too_dear_ends_soon(clock: Clock) -> None:
     assert "52 s" in pace.why()
 
 
+def test_a_budget_shorter_than_what_predicts_is_kept_too(clock: Clock) -> None:
+    """Steps of 1 ms are looked at after 1, 3, 7 … of them: at 511 ms the 0.4 s are over."""
+    pace = Pace(0.4, MPI.COMM_SELF, end=END)
+    pace.begins(SETTINGS, 1)
+    with pytest.raises(TooDear, match="0.4 s of accuracy_budget are left"):
+        marched(pace, clock, SETTINGS, each=0.001, setup=0.0)
+    assert clock.now == pytest.approx(0.511)
+
+
 def test_nothing_starts_where_nothing_is_left(clock: Clock) -> None:
     """The first attempt does all the same."""
     pace = Pace(1.0, MPI.COMM_SELF, end=END)
