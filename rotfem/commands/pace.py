@@ -1,29 +1,22 @@
 """How long the attempts at an accuracy take: predicted, told where it is long, and kept to what they may take in all.
 
-An attempt takes what its forms and operators do, once, and from then on a time that goes with its work,
-
-    steps · (stages + 1) · nodes^p,
-
-p = 1 along a beam and 1.4 over a plate (`rotfem.commands.cost.prediction`). What has been computed by a theory predicts
-its next attempt before that starts; the first one by a theory is predicted from its own first steps. All times are CPU
-time of rank 0, so that other programs on the machine do not count and all ranks decide alike.
+An attempt takes what its forms and operators do, once, and from then on a time that goes with its work
+(`rotfem.commands.attempts`). What has been computed by a theory predicts its next attempt before that starts; the first
+one by a theory is predicted from its own first steps. All times are CPU time of rank 0, so that other programs on the
+machine do not count and all ranks decide alike.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from math import prod
 
 from mpi4py import MPI
 
-from rotfem.analysis.schemes import Scheme
+from rotfem.commands.attempts import Rate, key, lasting, order_of, words, work
 from rotfem.commands.cost.budget import cpu_time
-from rotfem.commands.cost.prediction import TIME_EXPONENT
 from rotfem.errors import ComputationError
 from rotfem.listeners import Hint
 from rotfem.selection.accuracy import Settings
-from rotfem.selection.steps_ahead import BESIDE
 
 #: Attempts that are told, s; time of a march from which it predicts itself, s; change of a prediction that is told.
 LONG, SHOWN, CHANGED = 5.0, 1.0, 1.5
@@ -42,25 +35,6 @@ TOO_LITTLE = "a looser accuracy, or a larger accuracy_budget"
 
 class TooDear(ComputationError):
     """An attempt would take more than what is left of the budget."""
-
-
-@dataclass
-class Rate:
-    """What an attempt took.
-
-    Attributes:
-        setup: CPU time before its first step, s.
-        march: CPU time of its steps, s.
-        work: that they were.
-        steps: number of them.
-        settings: what it was.
-    """
-
-    setup: float
-    march: float
-    work: float
-    steps: float
-    settings: Settings
 
 
 class Pace:
@@ -250,52 +224,3 @@ class Pace:
         if settings.tolerance is None or before.tolerance is None or before.step is not None:
             return rate.steps
         return float(rate.steps * (before.tolerance / settings.tolerance) ** (1 / order_of(settings)))
-
-
-def key(settings: Settings) -> str:
-    """Return by what settings take alike for the same work."""
-    model = settings.models[0]
-    return f"{model['theory']}{' reduced' if model.get('reduced') else ''}"
-
-
-def work(settings: Settings, steps: float) -> float:
-    """Return the work of so many steps; of none, that of the mesh."""
-    elements, degree = settings.elements, settings.degree
-    along = elements if isinstance(elements, tuple) else (elements or 1,)
-    nodes: float = float(prod(n * degree + 1 for n in along)) ** TIME_EXPONENT[len(along)]
-    if settings.scheme is None or settings.models[0].get("reduced"):
-        return nodes
-    stages: int = Scheme.registry[settings.scheme].stages
-    return max(1.0, steps) * (stages + BESIDE) * nodes
-
-
-def order_of(settings: Settings) -> int:
-    """Return the order of the scheme of settings with a history."""
-    assert settings.scheme is not None
-    order: int = Scheme.registry[settings.scheme].order
-    return order
-
-
-def words(settings: Settings, end: float) -> str:
-    """Return in words what settings are."""
-    model, elements = settings.models[0], settings.elements
-    if model.get("reduced"):
-        parts = [f"reduced {model['theory']}"]
-    elif settings.step is not None:
-        parts = [model["theory"], f"{end / settings.step:.0f} steps of {settings.step:.2g} s by {settings.scheme}"]
-    elif settings.tolerance is not None:
-        parts = [model["theory"], f"adaptive steps to {settings.tolerance:.1g} by {settings.scheme}"]
-    else:
-        parts = [model["theory"]]
-    if elements is not None:
-        number = f"{elements[0]}×{elements[1]}" if isinstance(elements, tuple) else str(elements)
-        parts.append(f"{number} elements")
-    return ", ".join(parts)
-
-
-def lasting(seconds: float) -> str:
-    """Return seconds as they are read: 40 s, 3.5 min, 2 h."""
-    for unit, size in (("h", 3600.0), ("min", 60.0)):
-        if seconds >= 2 * size:
-            return f"{seconds / size:.2g} {unit}"
-    return f"{seconds:.3g} s" if seconds < 100.0 else f"{seconds:.0f} s"

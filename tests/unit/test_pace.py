@@ -9,7 +9,8 @@ import pytest
 from mpi4py import MPI
 
 from rotfem.commands import pace as module
-from rotfem.commands.pace import LONG, Pace, TooDear, lasting, words
+from rotfem.commands.attempts import lasting, words
+from rotfem.commands.pace import LONG, Pace, TooDear
 from rotfem.errors import SceneError
 from rotfem.scene import Scene
 from rotfem.selection.accuracy import Settings
