@@ -1,6 +1,20 @@
-"""`python -m rotfem`."""
+"""`python -m rotfem`, and the command `rotfem`."""
 
-from rotfem.commands.cli import main
+import sys
+
+from rotfem.commands.signals import held_back
+
+
+def main() -> None:
+    """Run the command line; Ctrl-C waits until all that it is made of is there."""
+    try:
+        with held_back():
+            from rotfem.commands.cli import main as command
+    except KeyboardInterrupt:
+        print("rotfem: interrupted", file=sys.stderr)
+        raise SystemExit(130) from None
+    command()
+
 
 if __name__ == "__main__":
     main()

@@ -16,7 +16,7 @@ from rotfem.analysis.equilibrium import check_steady
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
-from rotfem.commands.accuracy import changes_of, pursue, refuse, settings_of
+from rotfem.commands.accuracy import changes_of, refuse, settings_of
 from rotfem.commands.finite import check_rows
 from rotfem.commands.known_error import error_of_modes
 from rotfem.commands.loads import held
@@ -24,6 +24,7 @@ from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_ro
 from rotfem.commands.modes import analysis_of, hints_of, theory_error
 from rotfem.commands.pace import Pace
 from rotfem.commands.problem import Problem, case_of
+from rotfem.commands.pursuit import pursue
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import SceneError, input_of
 from rotfem.listeners import Hint, Progress, silent

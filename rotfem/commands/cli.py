@@ -65,8 +65,11 @@ def modes(
     animate: Annotated[int | None, typer.Option("--animate", metavar="MODE", help="animate a mode of a plate")] = None,
 ) -> None:
     """Compute the gyroscopic eigenmodes of SCENE at its speed."""
+    from rotfem.commands.modes import check_animated
     from rotfem.commands.modes import modes as analyse
 
+    if animate is not None:
+        check_animated(todo.scene, animate)
     result = analyse(
         todo.scene,
         sensitivities=sensitivities,

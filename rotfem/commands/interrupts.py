@@ -10,12 +10,16 @@ from typing import Any, Self
 
 from mpi4py import MPI
 
-#: The signals that ask a run to end.
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+from rotfem.commands.signals import SIGNALS
 
 
 class Interrupted(KeyboardInterrupt):
     """All ranks have agreed to end, so that what they do together can still be done."""
+
+
+def together(comm: MPI.Comm, stop: KeyboardInterrupt) -> bool:
+    """Return whether all ranks have been interrupted at the same place; otherwise the others may be anywhere."""
+    return comm.size == 1 or isinstance(stop, Interrupted)
 
 
 class Interrupts:

@@ -14,6 +14,7 @@ import typer
 from rotfem.commands.console import Session
 from rotfem.commands.options import as_path, folder_name
 from rotfem.commands.result_folder import ResultFolder, Writer
+from rotfem.commands.signals import held_back
 from rotfem.errors import ComputationError
 from rotfem.scene import Scene, load_scene
 
@@ -98,6 +99,8 @@ def job(
             wanted.append(f"accuracy_budget={seconds_of(budget, 'command line', '--budget')!r}")
         loaded = load_scene(scene, [*(overrides or ()), *wanted])
         folder = session.folder(output or Path("results") / folder_name(loaded.name), command)
+        with held_back():  # in the middle of an import what they raise becomes any error
+            import dolfinx  # noqa: F401
         try:
             yield Job(loaded, folder, session, not no_plots, session.hint(no_advice))
         except (ComputationError, KeyboardInterrupt) as error:

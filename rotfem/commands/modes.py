@@ -22,13 +22,14 @@ from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.participation import participation as masses_of
 from rotfem.analysis.stability import Stability, stability_of_pencil
 from rotfem.analysis.theory_error import TheoryCheck, TheoryError
-from rotfem.commands.accuracy import changes_of, pursue, refuse, settings_of
+from rotfem.commands.accuracy import changes_of, refuse, settings_of
 from rotfem.commands.finite import check_rows
 from rotfem.commands.known_error import error_of_modes
 from rotfem.commands.loads import held
 from rotfem.commands.mode_tables import advice, mode_tables, scaled
 from rotfem.commands.pace import Pace
 from rotfem.commands.problem import Problem, case_of
+from rotfem.commands.pursuit import pursue
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import ComputationError, SceneError, input_of
 from rotfem.listeners import Hint, silent
@@ -148,6 +149,18 @@ def _of_stability(stability: Stability, rows: list[dict[str, Any]]) -> list[str]
     known = GROWS_AS_SAID * max((row["growth"] for row in rows if row["stability"] != "neutral"), default=0.0)
     unsaid = stability.stable is None or stability.held_by_spin or stability.growth > max(known, 0.0)
     return [stability.warning()] if unsaid else []
+
+
+def check_animated(scene: Scene, mode: int) -> None:
+    """See that a mode of a scene can be animated, before anything is computed.
+
+    Raises:
+        SceneError: the structure is no plate, or no such mode is wanted.
+    """
+    if scene.structure.type != "plate":
+        raise SceneError("command line", "--animate", mode, 'needs structure.type = "plate"')
+    if not 1 <= mode <= scene.modes.count:
+        raise SceneError("command line", "--animate", mode, f"must be from 1 to modes.count, {scene.modes.count}")
 
 
 def add_participation(found: ModesResult) -> None:

@@ -119,7 +119,7 @@ class Pace:
             return None
         self._longer, allowed = True, FILLED * self.left()
         for factor in LOOSER:
-            settings = looser(factor)
+            settings: Settings | None = self.comm.bcast(looser(factor))  # all ranks decide alike
             if settings is None:
                 return None
             predicted = self.predicted(settings)

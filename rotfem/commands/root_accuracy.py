@@ -18,8 +18,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from mpi4py import MPI
 
 from rotfem.commands.accuracy import settings_of
+from rotfem.commands.interrupts import together
 from rotfem.commands.pace import TooDear
 from rotfem.errors import ComputationError
 from rotfem.results.run import RunResult
@@ -47,7 +49,7 @@ def first_settings(scene: Scene) -> Settings:
 
 
 def judged(
-    settings: Settings, attempt: Callable[[Settings], RunResult], aside: Callable[[Settings], RunResult]
+    settings: Settings, attempt: Callable[[Settings], RunResult], aside: Callable[[Settings], RunResult], comm: MPI.Comm
 ) -> RunResult:
     """Return the result of settings, with the error of its root moment as that of its summary.
 
@@ -55,19 +57,34 @@ def judged(
         settings: how it is computed.
         attempt: settings ↦ their result.
         aside: the same for results that are only compared.
+        comm: of the processes that compute them.
+
+    Raises:
+        KeyboardInterrupt: of a result that is only compared, with the one that it is compared with.
     """
     done = attempt(settings)
+    try:
+        done.summary["error"] = error_of(done, settings, aside)
+    except KeyboardInterrupt as stop:
+        if together(comm, stop):
+            done.summary["status"] = "interrupted"
+            vars(stop)["result"] = done
+        raise
+    return done
+
+
+def error_of(done: RunResult, settings: Settings, aside: Callable[[Settings], RunResult]) -> dict[str, Any]:
+    """Return the error of the root moment of a result (see `judged`); parts that are not known are None."""
     moment = moments(done)
     scale = float(np.max(np.linalg.norm(moment, axis=1), initial=0.0))
     known = done.summary.get("error", {})
     error: dict[str, Any] = {"model": known.get("model", 0.0)}
     if settings.moving:
-        error["time"] = compared(done, with_longer_steps(settings), aside, scale) / BY_STEPS
+        error["time"] = compared(done, with_longer_steps(settings), aside, scale, BY_STEPS)
     coarse = with_larger_elements(settings)
-    error["space"] = known.get("space") if coarse is None else compared(done, coarse, aside, scale) / BY_ELEMENTS
-    shares = [error[name] for name in ("time", "space", "model") if error.get(name) is not None]
-    done.summary["error"] = {**error, "total": float(sum(shares)), "scale": scale, "of": ROOT_MOMENT}
-    return done
+    error["space"] = known.get("space") if coarse is None else compared(done, coarse, aside, scale, BY_ELEMENTS)
+    total = None if None in error.values() else float(sum(error.values()))
+    return {**error, "total": total, "scale": scale, "of": ROOT_MOMENT}
 
 
 def moments(result: RunResult) -> Array:
@@ -75,14 +92,19 @@ def moments(result: RunResult) -> Array:
     return np.column_stack([values for name, values in result.history.items() if name.startswith("root_m")])
 
 
-def compared(fine: RunResult, settings: Settings, aside: Callable[[Settings], RunResult], scale: float) -> float:
-    """Return what coarser settings change in the moments, relative to a scale; 1 where they cannot be computed."""
+def compared(
+    fine: RunResult, settings: Settings, aside: Callable[[Settings], RunResult], scale: float, by: float
+) -> float | None:
+    """Return the error of moments, relative to a scale: what coarser settings change in them, divided.
+
+    1 divided where these cannot be computed, None where they would take too long.
+    """
     try:
-        return difference(fine, aside(settings), scale)
+        return difference(fine, aside(settings), scale) / by
     except TooDear:
-        raise
+        return None
     except ComputationError:
-        return 1.0
+        return 1.0 / by
 
 
 def difference(fine: RunResult, coarse: RunResult, scale: float) -> float:

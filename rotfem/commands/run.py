@@ -11,11 +11,12 @@ import numpy as np
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady
-from rotfem.commands.accuracy import changes_of, pursue, refuse, settings_of
+from rotfem.commands.accuracy import changes_of, refuse, settings_of
 from rotfem.commands.ahead import Ahead
 from rotfem.commands.keeper import Interval, Keeper
 from rotfem.commands.pace import Pace
 from rotfem.commands.problem import Problem, case_of
+from rotfem.commands.pursuit import pursue
 from rotfem.commands.result_folder import ResultFolder
 from rotfem.commands.root_accuracy import ROOT_MOMENT, first_settings, judged
 from rotfem.commands.simulation import Simulation
@@ -116,7 +117,7 @@ def run_to_accuracy(
     terms: Mapping[str, Work] | None,
     outputs: Mapping[str, Functional] | None,
 ) -> RunResult:
-    """Return the result that meets the accuracy of a scene (see `rotfem.commands.accuracy`).
+    """Return the result that meets the accuracy of a scene (see `rotfem.commands.pursuit`).
 
     Raises:
         Missed: it was not met.
@@ -145,7 +146,7 @@ def run_to_accuracy(
 
     if scene.accuracy_of == ROOT_MOMENT:
         first = keeper.settings() or first_settings(scene)
-        return pursue(scene, first, lambda settings: judged(settings, attempt, aside), pace)
+        return pursue(scene, first, lambda settings: judged(settings, attempt, aside, keeper.comm), pace)
     return pursue(scene, keeper.settings() or settings_of(scene), attempt, pace, ahead)
 
 

@@ -119,6 +119,7 @@ BENT = tuple(
         (("campbell", "missing.toml", "--speeds", "0:1:2"), 2, "missing.toml"),
         (("modes", "beam.toml", "--set", "modes.count=0"), 2, "modes.count"),
         (("modes", "beam.toml", "--set", "modes.about=elsewhere"), 2, "modes.about"),
+        (("modes", "beam.toml", "--animate", "1"), 2, "--animate"),
         (("modes", "beam.toml", "-o", "beam.toml/out"), 2, "beam.toml/out"),
         # One Newton iteration is too few for a bent beam, however small the steps of the load.
         (("modes", "beam.toml", *BENT), 3, "no steady state"),
@@ -130,6 +131,7 @@ def test_what_cannot_be_done(rotfem: Rotfem, arguments: tuple[str, ...], status:
     assert done.out == ""
     assert message in done.err
     assert "Traceback" not in done.err
+    assert not Path("results").exists()
 
 
 @pytest.mark.parametrize("command", [("modes",), ("campbell", "--speeds", "0:4:3")])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import signal
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,6 @@ import numpy as np
 import pytest
 
 from rotfem.commands.cost.front import Row, pareto, recommend
-from rotfem.commands.cost.memory import held_back
 from rotfem.commands.cost.plot import ERRORS
 from rotfem.commands.cost.record import Measurement, Record, fingerprint
 from rotfem.commands.cost.reference import Samples, combined, distance, limit, observed_order
@@ -376,28 +374,6 @@ def test_estimates_of_the_tiniest_beam_are_numbers() -> None:
     """A fourth power of its length is none any more."""
     tiny = Scene.from_dict(BEAM).replace({"structure.length": 1e-90, "structure.hub_radius": 0.0})
     assert all(mode.frequency > 0.0 for mode in estimates(tiny, 6.0, 4))
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_signals_wait_for_the_end_of_a_collection(number: signal.Signals) -> None:
-    def obey(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    went_on = []
-
-    def collect() -> None:
-        with held_back():
-            signal.raise_signal(number)
-            went_on.append(True)
-
-    before = signal.signal(number, obey)
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            collect()
-        assert signal.getsignal(number) is obey
-    finally:
-        signal.signal(number, before)
-    assert went_on
 
 
 def test_the_figure_names_the_error_of_every_output() -> None:

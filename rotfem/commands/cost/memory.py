@@ -5,15 +5,9 @@ from __future__ import annotations
 import ctypes
 import gc
 import resource
-import signal
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 
-#: Signals that end a study.
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+from rotfem.commands.signals import held_back
 
 #: Where Linux says what a process has in memory, now and at most, and where the latter is set back by writing 5.
 STATUS, RESET = Path("/proc/self/status"), Path("/proc/self/clear_refs")
@@ -21,34 +15,13 @@ STATUS, RESET = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 
 def release() -> None:
     """Give back what is no longer used: the last system is large and full of cycles."""
-    with held_back():
+    with held_back():  # what a signal raises is lost in the finalisers that a collection runs
         gc.collect()
     trim = getattr(
         ctypes.CDLL(None), "malloc_trim", None
     )  # of glibc: it keeps what was freed, and the next one uses it
     if trim is not None:
         trim(0)
-
-
-@contextmanager
-def held_back() -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM wait: what they raise is lost in the finalisers that a collection runs."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    heard: list[tuple[int, FrameType | None]] = []
-    before = {n: signal.signal(n, lambda number, frame: heard.append((number, frame))) for n in SIGNALS}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-    for first, frame in heard[:1]:
-        handler = before[signal.Signals(first)]
-        if callable(handler):
-            handler(first, frame)
-        elif handler == signal.SIG_DFL:
-            signal.raise_signal(first)
 
 
 class PeakMemory:
