@@ -127,10 +127,10 @@ class AffineSystem(AffineEnergies):
         """Stiffness of the strains alone, clamped rows 1."""
         return self._decomposed.material
 
-    @cached_property
+    @property
     def material_solver(self) -> DirectSolver:
         """Solver of the `material`."""
-        return DirectSolver(self.material, symmetric=True)
+        return self._decomposed.material_solver
 
     @property
     def only_strains(self) -> bool:

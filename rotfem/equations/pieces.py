@@ -27,7 +27,7 @@ from rotfem.equations.model import Model
 from rotfem.equations.prestress import geometric_pieces
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
-from rotfem.numerics.linear import held, set_diagonal
+from rotfem.numerics.linear import DirectSolver, held, set_diagonal
 from rotfem.structures.root_reaction import RootReaction
 
 Array = npt.NDArray[np.float64]
@@ -234,6 +234,11 @@ class Pieces:
     def material(self) -> Any:
         """Stiffness of the strains alone, clamped rows 1; hinges are held by springs, which N⁰ does not feel."""
         return self.material_without(())
+
+    @cached_property
+    def material_solver(self) -> DirectSolver:
+        """Solver of the `material`."""
+        return DirectSolver(self.material, symmetric=True)
 
     def material_without(self, without: Collection[str]) -> Any:
         """Return the `material` without what these effects add to the strains."""

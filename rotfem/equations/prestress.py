@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 from ufl.algorithms.analysis import extract_constants
 
-from rotfem.numerics import compat
 from rotfem.numerics.linear import DirectSolver
 
 if TYPE_CHECKING:
@@ -84,11 +83,13 @@ def _stressing(pieces: Pieces, compiled: Any) -> list[Piece]:
 
 def _displaced(pieces: Pieces, material: Any, loads: list[Piece]) -> list[Array]:
     """Return what each load displaces the linear structure by, local dof arrays."""
+    if not loads:
+        return []
     q, out = pieces.prestressed, []
-    solver, x = DirectSolver(material, symmetric=True), compat.wrap(q.x)
-    for load in loads:
-        solver.solve(load.operator, x)
-        x.scale(-1.0)
+    solver = pieces.material_solver if material is pieces.material else DirectSolver(material, symmetric=True)
+    solved = solver.solve_all(np.array([load.operator.array for load in loads]).T)
+    for column in solved.T:
+        q.x.array[: len(column)] = -column
         q.x.scatter_forward()
         out.append(q.x.array.copy())
     return out

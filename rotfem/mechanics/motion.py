@@ -93,6 +93,7 @@ class Motion:
         """Return the smooth spin-up from rest to a speed (rad/s) in a time (s); see `smooth_spin_up`."""
         turns = speed != 0.0
         state: dict[str, Any] = {"is_spinning": turns, "changes_speed": turns, "settled": duration}
+        state["arrays"] = True
         state["knots"] = tuple(duration * np.arange(1, SPIN_UP_KNOTS + 1) / SPIN_UP_KNOTS)
         return cls(*smooth_spin_up(speed, duration), about(axis), **(state | more))
 
@@ -188,10 +189,14 @@ def smooth_spin_up(speed: float, duration: float) -> tuple[Scalar, Scalar, Scala
     """
     T, k = duration, 2 * pi / duration
 
-    def omega(t: float) -> float:
+    def omega(t: Any) -> Any:
+        if isinstance(t, np.ndarray):
+            return np.where(t < T, speed * (t / T - np.sin(k * t) / (2 * pi)), speed)
         return float(speed * (t / T - sin(k * t) / (2 * pi))) if t < T else speed
 
-    def rate(t: float) -> float:
+    def rate(t: Any) -> Any:
+        if isinstance(t, np.ndarray):
+            return np.where(t < T, speed / T * (1 - np.cos(k * t)), 0.0)
         return float(speed / T * (1 - cos(k * t))) if t < T else 0.0
 
     def angle(t: float) -> float:

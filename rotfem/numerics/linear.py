@@ -12,6 +12,7 @@ from petsc4py import PETSc
 from rotfem.errors import ComputationError
 from rotfem.numerics import compat
 from rotfem.numerics.low_rank import LowRank, Update
+from rotfem.numerics.projection import dense
 
 Array = npt.NDArray[np.float64]
 
@@ -20,6 +21,9 @@ SMALL = 5000
 
 #: Where a symmetric matrix has so many entries in a row, as of plates, MUMPS is quicker from this size on already.
 MANY, MIDDLE = 50, 1000
+
+#: What makes a factor of its own, with which many right-hand sides are solved at once.
+FACTORS = (PETSc.PC.Type.LU, PETSc.PC.Type.CHOLESKY)
 
 #: Relative difference of two solutions from which a matrix is singular.
 LOST = 1e-2
@@ -123,6 +127,27 @@ class DirectSolver:
         self._apply(b, x)
         if self._update is not None:
             x.array[:] = self._update(x.array)
+
+    def solve_all(self, right: Array) -> Array:
+        """Return the solutions for columns of owned rows, (n, m), which is quicker than one after the other.
+
+        Raises:
+            ComputationError: A is singular to working precision.
+        """
+        out, (x, b) = np.empty_like(right), self.A.createVecs()
+        pc, m = self._ksp.getPC(), right.shape[1]
+        alone = min(1, m) if pc.getType() in FACTORS else m  # the first makes the factor, or fails
+        for j in range(alone):
+            b.array[:] = right[:, j]
+            self.solve(b, x)
+            out[:, j] = x.array
+        if alone < m:
+            rest = dense(self.A.comm, right[:, alone:])
+            found = rest.duplicate()
+            pc.getFactorMatrix().matSolve(rest, found)
+            solved = found.getDenseArray()
+            out[:, alone:] = solved if self._update is None else self._update(solved)
+        return out
 
     def _apply(self, b: Any, x: Any) -> None:
         self._ksp.solve(b, x)

@@ -8,12 +8,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
+from petsc4py import PETSc
 
 Array = npt.NDArray[Any]
 
 #: Directions whose energy is below this part of the largest are dropped: the others hold them to round-off. A larger
 #: part would drop what makes the small differences between modes at two speeds.
 DEPENDENT = 1e-13
+
+#: Kinds of matrices that are multiplied by all columns at once, which reads each entry once.
+ENTRIES = ("seqaij", "mpiaij")
 
 
 def summed(comm: MPI.Comm, local: Any) -> Any:
@@ -23,6 +27,9 @@ def summed(comm: MPI.Comm, local: Any) -> Any:
 
 def times(A: Any, X: Array) -> Array:
     """Return A X of a PETSc matrix and columns (n, m)."""
+    if X.shape[1] > 1 and isinstance(A, PETSc.Mat) and A.getType() in ENTRIES:
+        right, product = dense(A.comm, X), PETSc.Mat()
+        return np.array(A.matMult(right, product).getDenseArray())
     x, y = A.createVecs()
     out = np.empty_like(X)
     for j in range(X.shape[1]):
@@ -30,6 +37,12 @@ def times(A: Any, X: Array) -> Array:
         A.mult(x, y)
         out[:, j] = y.array
     return out
+
+
+def dense(comm: Any, X: Array) -> Any:
+    """Return columns of owned rows (n, m) as a dense PETSc matrix over a communicator."""
+    columns = np.array(X, dtype=PETSc.ScalarType, order="F")
+    return PETSc.Mat().createDense(((len(X), None), (None, X.shape[1])), array=columns, comm=comm)
 
 
 def orthonormal(comm: MPI.Comm, columns: Array, product: Callable[[Array], Array]) -> Array:

@@ -86,6 +86,13 @@ def test_table_from_a_file(tmp_path: Path) -> None:
     assert motion_of(Scene.from_dict(tables, directory=tmp_path)).speed(0.5) == pytest.approx(2.0)
 
 
+def test_a_spin_up_is_the_same_at_many_times_at_once() -> None:
+    motion, t = Motion.spin_up(6.0, 15.0), np.linspace(0.0, 20.0, 41)
+    assert motion.arrays
+    for f in (motion.speed, motion.rate):
+        np.testing.assert_allclose(np.asarray(f(t)), [f(float(s)) for s in t], rtol=1e-13, atol=1e-15)
+
+
 def test_constant_says_so() -> None:
     assert motion(MOTIONS["constant"]).constant
     assert not motion(MOTIONS["spin_up"]).constant

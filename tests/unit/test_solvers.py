@@ -9,10 +9,13 @@ import pytest
 from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
+from rotfem.numerics import linear
 from rotfem.numerics.left_vectors import mirror_error
 from rotfem.numerics.linear import DirectSolver, NearbySolver, SingularSolver, combine, is_regular
+from rotfem.numerics.low_rank import LowRank
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.old_factor import OldFactor
+from rotfem.numerics.projection import times
 
 
 class Scalar:
@@ -169,6 +172,28 @@ def test_the_factor_of_a_matrix_near_by_solves_one_within_iterations_and_its_own
     assert [solver._own is None for solver in solvers] == [True, False]
     direct.solve(b, x)
     np.testing.assert_array_equal(x.array, first)
+
+
+@pytest.mark.parametrize("symmetric", [False, True])
+@pytest.mark.parametrize("small", [True, False])
+def test_solutions_for_many_sides_at_once_are_those_one_by_one(
+    symmetric: bool, small: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By either factorisation, with columns added to the matrix and without; products likewise, to round-off."""
+    monkeypatch.setattr(linear, "SMALL", 5000 if small else 10)
+    monkeypatch.setattr(linear, "MIDDLE", 5000 if small else 10)
+    rng, n = np.random.default_rng(5), 60
+    A, right = spread(rng, n), rng.normal(size=(60, 7))
+    beside = LowRank(rng.normal(size=(n, 2)), A)
+    for part, whole in ((None, A[:, :]), (beside, A[:, :] + 3.0 * beside.B @ beside.B.T)):
+        solver, one = DirectSolver(A, symmetric), DirectSolver(A, symmetric)
+        for each in (solver, one):
+            each.refresh(part, 3.0)
+        X = solver.solve_all(right)
+        assert solver.factorisations == 1
+        np.testing.assert_allclose(whole @ X, right, atol=1e-9)
+        np.testing.assert_allclose(solver.solve_all(right[:, :1]), X[:, :1], rtol=1e-9)
+    np.testing.assert_allclose(times(A, right), A[:, :] @ right, rtol=1e-12, atol=1e-9)
 
 
 def test_a_singular_matrix_is_one_to_a_matrix_near_by_too() -> None:

@@ -38,7 +38,8 @@ def effect_sizes(
     model, manifold = response.model, manifold or Manifold(response)
     system = response.solution.drive.whole
     wanted = system.model.effects if effects is None else effects
-    whole = _tips(response, manifold)
+    known = response.solution.hub is None
+    whole = manifold.tip(response.q + manifold.own[1][-1]) if known else _tips(response, manifold)
     size = largest(model, whole)
     if largest(model, whole - response.tips) > MOST * largest(model, response.tips):
         raise ComputationError("the answer to second-order forces is as large as the motion")
@@ -59,6 +60,11 @@ def effect_sizes(
 def _tips(response: Response, manifold: Manifold) -> Array:
     """Return the unknowns at the tip with the effects that are on, (rows, components)."""
     model, solution = response.model, response.solution.again()
-    path = solution.solve(model, response.q[0], response.v[0])
-    slow = solution.resolved(model, path)
-    return manifold.tip(path.q + manifold.correction(solution, slow))
+    path = None
+    if solution.constant or solution.hub is not None:
+        path = solution.solve(model, response.q[0], response.v[0])
+    if solution.hub is not None:
+        assert path is not None
+        return manifold.tip(path.q + manifold.with_hub(solution.hub)[0])
+    slow, (answer,) = manifold.corrections(solution)
+    return manifold.tip((path or slow).q + answer)

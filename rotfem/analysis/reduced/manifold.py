@@ -12,7 +12,9 @@ the linear equations lack: the answer to them is an estimate of what is left, an
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations_with_replacement
 from typing import Any
 
@@ -27,7 +29,6 @@ from rotfem.analysis.reduced.solution import Solution, Trajectory
 from rotfem.analysis.reduced.third_order import Motion, ThirdOrder, expands, inside
 from rotfem.analysis.theory_error import TheoryError, stiffened
 from rotfem.numerics import compat, forms
-from rotfem.numerics.linear import DirectSolver
 from rotfem.numerics.projection import summed, times
 
 Array = npt.NDArray[np.float64]
@@ -74,15 +75,15 @@ class Manifold:
         out = np.zeros((len(V), len(self.pairs)))
         if not self.pairs:
             return out
-        form, solver = forms.form(work, once=True), DirectSolver(system.material, symmetric=True)
-        for column, (i, j) in zip(out.T, self.pairs, strict=True):
+        form, right = forms.form(work, once=True), out[self.model.owned]
+        for column, (i, j) in zip(right.T, self.pairs, strict=True):
             first.x.array[:], second.x.array[:] = V[:, i], V[:, j]
             b = compat.create_vector(system.V)
             fem_petsc.assemble_vector(b, form)
             b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
             b.array[system.clamped] = 0.0
-            column[:] = -self.model.solve(solver, b.array[self.model.owned])
-        return out
+            column[:] = b.array[self.model.owned]
+        return -self.model.solve(system.material_solver, right)
 
     def _project(self) -> None:
         """Project the pieces of inertia and loads on V and Θ; those of strains and prestress vanish or are linear."""
@@ -154,24 +155,36 @@ class Manifold:
             out[:, j] += force * x[:, i]
         return out @ self.shapes.T
 
-    def correction(self, solution: Solution, path: Trajectory, third: bool = True) -> Array:
-        """Return the answer of the linear equations to the forces that they lack on a trajectory, (rows, m).
+    def corrections(self, solution: Solution, orders: Sequence[bool] = (True,)) -> tuple[Trajectory, list[Array]]:
+        """Return a trajectory, and the answers of the linear equations to the forces that they lack on it, (rows, m).
+
+        The trajectory is one by collocation, which has no vibrations faster than its steps: their forces average to
+        nothing.
 
         Args:
-            solution: of the trajectory.
-            path: one by collocation, which has no vibrations faster than its steps: their forces average to nothing.
-            third: see `forces`.
+            solution: of the trajectory, with no free hub.
+            orders: `third` of `forces`, of each answer.
         """
-        model = self.model
-        if solution.hub is not None:
-            return self.with_hub(solution.hub, third)[0]
+        start = self.response.q[0], self.response.v[0]
 
-        def lacking(t: Array) -> Array:
-            q, v = path.at(t)
+        def lacking(t: Array, q: Array, v: Array, a: Array) -> list[Array]:
             c = solution.drive.factors(t)
-            return self.forces(c, q, v, model.accelerations(c, q, v), third)
+            return [self.forces(c, q, v, a, third) for third in orders]
 
-        return solution.answer(model, lacking).q
+        return solution.answered(self.model, *start, lacking)
+
+    @cached_property
+    def own(self) -> tuple[Trajectory, list[Array]]:
+        """The `corrections` of the response itself, without and with forces of third order.
+
+        With a free hub whose structure has displacements of third order, those of two rounds of Newton's method.
+        """
+        hub, path = self.response.solution.hub, self.response.trajectory
+        if hub is None:
+            return self.corrections(self.response.solution, (False, True))
+        if self.third is not None:
+            return path, self.with_hub(hub, rounds=2)
+        return path, [self.with_hub(hub, third)[0] for third in (False, True)]
 
     def with_hub(self, solution: Any, third: bool = True, rounds: int = 1) -> list[Array]:
         """Return the answers of structure and free hub to the forces that they lack, of each round, (rows, m).
@@ -212,11 +225,7 @@ def recover(response: Response) -> Foreshortened:
     """
     solution = response.solution
     manifold = Manifold(response, third=solution.hub is not None)
-    path = solution.resolved(response.model, response.trajectory)
-    if manifold.third is None:
-        second, further = (manifold.correction(solution, path, third) for third in (False, True))
-    else:
-        second, further = manifold.with_hub(solution.hub, rounds=2)
+    path, (second, further) = manifold.own
     tips = manifold.tip(response.q + second)
     size = largest(response.model, tips)
     off = largest(response.model, manifold.tip(response.q + further) - tips) / size if size > 0.0 else 0.0

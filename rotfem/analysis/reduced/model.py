@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from dolfinx import fem
 
-from rotfem.numerics.linear import DirectSolver, Increment, combine
+from rotfem.numerics.linear import DirectSolver, combine
 from rotfem.numerics.projection import orthonormal, summed, times
 
 Array = npt.NDArray[np.float64]
@@ -16,8 +17,9 @@ Array = npt.NDArray[np.float64]
 SINGULAR = 1e9
 Index = npt.NDArray[np.int64]
 
-#: Part of its energy that a shape must have beside those of the basis, to be told from round-off.
-BESIDE = 1e-20
+#: Part of its energy that a shape must have beside those of the basis, to be told from round-off: what a solution with
+#: a stiffness of condition 1e8 is off, squared.
+BESIDE = 1e-15
 
 
 class ReducedModel:
@@ -42,12 +44,12 @@ class ReducedModel:
         self.V: Array = np.empty((len(system.zeros()), 0))
         owned = self.V[self.owned]
         self._products = {i: owned for kind in "MCK" for i in self.kinds[kind]}
+        self._strained = owned
         loads = [system.pieces[i].operator.array[self.owned] for i in self.kinds["f"]]
         self._loads = np.array(loads).reshape(len(loads), self.owned.stop)
         self.small: dict[str, Array] = {kind: np.empty((len(self.kinds[kind]), 0, 0)) for kind in "MCK"}
         self.small["f"] = np.empty((len(self.kinds["f"]), 0))
-        self._increment = Increment(system.V)
-        self._right = system.A.createVecs()[1]
+        self._ghosted = fem.Function(system.V)
 
     @property
     def size(self) -> int:
@@ -73,25 +75,20 @@ class ReducedModel:
         X, V = columns[self.owned], self.V[self.owned]
         whole = self.energies(X)
         for _ in range(2):
-            X = X - V @ summed(self.comm, self.energy_product(V).T @ X)
+            X = X - V @ summed(self.comm, self._strained.T @ X)
         gram = summed(self.comm, X.T @ self.energy_product(X))
         energies, turns = np.linalg.eigh(0.5 * (gram + gram.T))
         keep = np.flatnonzero(energies > max(least, BESIDE * float(whole.max(initial=0.0))))[::-1][:most]
         if not len(keep):
             return 0
         X = X @ (turns[:, keep] / np.sqrt(energies[keep]))
-        new = orthonormal(self.comm, X - V @ summed(self.comm, self.energy_product(V).T @ X), self.energy_product)
+        new = orthonormal(self.comm, X - V @ summed(self.comm, self._strained.T @ X), self.energy_product)
         self._append(new)
         return new.shape[1]
 
     def _append(self, new: Array) -> None:
-        whole = np.zeros((len(self.V), new.shape[1]))
-        for column, x in zip(whole.T, new.T, strict=True):
-            function = self._increment.function.x
-            function.array[self.owned] = x
-            function.scatter_forward()
-            column[:] = function.array
-        self.V = np.hstack([self.V, whole])
+        self.V = np.hstack([self.V, self._with_ghosts(new)])
+        self._strained = np.hstack([self._strained, self.energy_product(new)])
         V = self.V[self.owned]
         for i, old in self._products.items():
             self._products[i] = np.hstack([old, times(self.system.pieces[i].operator, new)])
@@ -100,6 +97,17 @@ class ReducedModel:
             projected = [summed(self.comm, V.T @ self._products[i]) for i in self.kinds[kind]]
             self.small[kind] = np.array(projected).reshape(-1, m, m)
         self.small["f"] = np.asarray(summed(self.comm, self._loads @ V))
+
+    def _with_ghosts(self, columns: Array) -> Array:
+        """Return local dof arrays (n, k) of columns of owned rows."""
+        if self.comm.size == 1:
+            return columns
+        out, function = np.empty((len(self.V), columns.shape[1])), self._ghosted.x
+        for column, x in zip(out.T, columns.T, strict=True):
+            function.array[self.owned] = x
+            function.scatter_forward()
+            column[:] = function.array
+        return out
 
     def operators(self, c: Array) -> tuple[Array, Array, Array, Array]:
         """Return M, C, K (n, m, m) and f (n, m) from the factors of all pieces (n, pieces)."""
@@ -114,9 +122,20 @@ class ReducedModel:
             return np.asarray(-np.einsum("nij,nj->ni", np.linalg.pinv(M, 1 / SINGULAR, hermitian=True), force))
         return -np.linalg.solve(M, force[:, :, None])[:, :, 0]
 
-    def residual(self, c: Array, q: Array, v: Array, a: Array) -> Array:
-        """Return M a + C v + K q + f of the full system at one instant, owned rows, from the factors (pieces,)."""
-        return self.load(c) + sum(self.forces(kind, c) @ x for kind, x in (("M", a), ("C", v), ("K", q)))
+    def residuals(self, c: Array, q: Array, v: Array, a: Array) -> Array:
+        """Return M a + C v + K q + f of the full system at k instants, owned rows (n, k).
+
+        Args:
+            c: factors of all pieces, (k, pieces).
+            q: coordinates, (k, m).
+            v: rates.
+            a: accelerations.
+        """
+        out = (c[:, self.kinds["f"]] @ self._loads).T
+        for kind, x in (("M", a), ("C", v), ("K", q)):
+            for i in self.kinds[kind]:
+                out += self._products[i] @ (c[:, i, None] * x).T
+        return np.asarray(out)
 
     def forces(self, kind: str, c: Array) -> Array:
         """Return M V, C V or K V of the full system from the factors of all pieces (pieces,), owned rows (n, m)."""
@@ -134,9 +153,8 @@ class ReducedModel:
         return DirectSolver(A)
 
     def solve(self, solver: DirectSolver, right: Array) -> Array:
-        """Return the solution (a new local dof array) with a right-hand side of owned rows."""
-        self._right.array[:] = right
-        return self._increment.solve(solver, self._right).copy()
+        """Return the solutions (local dof arrays (n, k)) with right-hand sides of owned rows, (n, k)."""
+        return self._with_ghosts(solver.solve_all(right))
 
     def load(self, c: Array) -> Array:
         """Return f of the full system, owned rows."""

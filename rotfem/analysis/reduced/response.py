@@ -150,21 +150,22 @@ class Growth:
         """Take the static answers to what drives the system at the extreme speeds, their inertia's, and the start."""
         model = self.model
         columns: list[Array] = [] if self.start is None or not np.any(self.start) else [self.start]
-        for load in self._loads():
-            columns += [model.solve(solver, load) for solver in self._solvers]
+        loads = self._loads().T
+        answers = [model.solve(solver, loads).T for solver in self._solvers]
+        columns += [answer for of_load in zip(*answers, strict=True) for answer in of_load]
         if columns:
             model.grow(np.array(columns).T)
         for kind in "MC":
             strongest = int(np.argmax(np.abs(self._factors[:, model.kinds[kind]]).sum(axis=1)))
             forces = model.forces(kind, self._factors[strongest])
             if forces.size:
-                model.grow(np.array([model.solve(self._solvers[0], f) for f in forces.T]).T)
+                model.grow(model.solve(self._solvers[0], forces))
 
     def _loads(self) -> Array:
         """Return the independent loads of the history, owned rows, (k, n)."""
         model, numbers = self.model, self.model.kinds["f"]
         if not numbers:
-            return np.empty((0, 0))
+            return np.empty((0, model.owned.stop))
         norms = np.array([float(model.system.pieces[i].operator.norm()) for i in numbers])
         _, sizes, parts = np.linalg.svd(self._factors[:, numbers] * norms, full_matrices=False)
         parts = parts[sizes > INDEPENDENT * max(sizes[0], 1e-300)][:LOADS]
@@ -221,11 +222,12 @@ class Growth:
         windows = np.array_split(np.arange(len(rows)), min(INSTANTS, len(rows)))
         chosen = [int(w[np.argmax(strength[w])]) for w in windows]
         speeds = np.abs(self.drive.speed(t[chosen]))
-        out = []
-        for i, speed in zip(chosen, speeds, strict=True):
-            solver = self._solvers[int(np.argmin(np.abs(self._speeds - speed)))]
-            out.append(-model.solve(solver, model.residual(c[i], q[i], v[i], a[i])))
-        return np.array(out)
+        nearest = np.argmin(np.abs(self._speeds - speeds[:, None]), axis=1)
+        residuals = model.residuals(*(x[chosen] for x in (c, q, v, a)))
+        out = np.empty((len(chosen), len(model.V)))
+        for number, solver in enumerate(self._solvers):
+            out[nearest == number] = -model.solve(solver, residuals[:, nearest == number]).T
+        return out
 
     def refine(self, path: Trajectory, accuracy: float) -> tuple[Trajectory, float]:
         """Return the history with steps short enough, and the estimate of their error."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.reduced.collocation import NODES, Operators, collocate
+from rotfem.analysis.reduced.collocation import Lacking, Operators, answered, collocate
 from rotfem.analysis.reduced.drive import Drive
 from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.analysis.reduced.propagator import Propagator, cubics
@@ -116,10 +116,6 @@ class Solution:
         steps = collocate(self._operators(model), self.drive.within, ends, q, v)
         return Trajectory(*steps.at(self.times), len(ends) - 1, False, steps.at)
 
-    def resolved(self, model: ReducedModel, path: Trajectory) -> Trajectory:
-        """Return a trajectory without the vibrations that steps of a collocation do not resolve."""
-        return self._collocated(model, *(x[0] for x in (path.q, path.v))) if path.exact else path
-
     def given(self) -> dict[str, Array]:
         """Return what a free hub was given in the rows (see `FreeSolution`); nothing where none is free."""
         return {}
@@ -135,18 +131,25 @@ class Solution:
         other.parts, other._steps = self.parts, self._steps
         return other
 
-    def answer(self, model: ReducedModel, forces: Callable[[Array], Array]) -> Trajectory:
-        """Return the history from rest of a model under other forces than its own, by collocation.
+    def answered(self, model: ReducedModel, q: Array, v: Array, lacking: Lacking) -> tuple[Trajectory, list[Array]]:
+        """Return the history by collocation, and in its rows (n, m) the answers of the model from rest to other forces.
 
         Args:
             model: the reduced model.
-            forces: t (n,) ↦ f (n, m) in M a + C v + K q + f = 0.
+            q: coordinates at the start, (m,).
+            v: rates at the start, (m,).
+            lacking: of the history, f in M a + C v + K q + f = 0.
+
+        Raises:
+            ComputationError: they are not finite.
         """
-        ends, nothing = self.ends(model), np.zeros(model.size)
-        t = self.drive.within(ends[:-1], ends[1:], NODES)
-        f = forces(t.ravel()).reshape(*t.shape, model.size)
-        steps = collocate(self._operators(model), self.drive.within, ends, nothing, nothing, f)
-        return Trajectory(*steps.at(self.times), len(ends) - 1, False, steps.at)
+        ends = self.ends(model)
+        steps, answers = answered(self._operators(model), self.drive.within, ends, q, v, lacking)
+        found = [answer.at(self.times)[0] for answer in answers]
+        path = Trajectory(*steps.at(self.times), len(ends) - 1, False, steps.at)
+        if not all(np.all(np.isfinite(x)) for x in (path.q, *found)):
+            raise ComputationError("the solution of the reduced model is not finite")
+        return path, found
 
     def _operators(self, model: ReducedModel) -> Operators:
         return lambda t: model.operators(self.drive.factors(t))

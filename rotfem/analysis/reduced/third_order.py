@@ -26,7 +26,6 @@ from rotfem.equations.geometric import third_order_work
 from rotfem.equations.pieces import PRESTRESS
 from rotfem.mechanics.effects import INTERNAL, LOADS, Effect
 from rotfem.numerics import compat, forms
-from rotfem.numerics.linear import DirectSolver
 from rotfem.numerics.projection import summed, times
 
 Array = npt.NDArray[np.float64]
@@ -75,8 +74,8 @@ class ThirdOrder:
         if not len(self.triples):
             return out
         form = forms.form(third_order_work(system.model, functions, ufl.TestFunction(system.V)), once=True)
-        solver = DirectSolver(system.material, symmetric=True)
-        for column, triple in zip(out.T, self.triples, strict=True):
+        right = out[model.owned]
+        for column, triple in zip(right.T, self.triples, strict=True):
             orders = sorted(set(permutations(int(i) for i in triple)))
             first = {order[0]: (min(order[1:]), max(order[1:])) for order in orders}
             for function, i in zip(functions, triple, strict=False):
@@ -89,8 +88,8 @@ class ThirdOrder:
                 functions[0].x.array[:] = 0.0
             b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
             b.array[system.clamped] = 0.0
-            column[:] = -model.solve(solver, b.array[model.owned])
-        return out
+            column[:] = b.array[model.owned]
+        return -model.solve(system.material_solver, right)
 
     def _project(self) -> None:
         """Project the pieces of inertia and loads on V and Ξ."""
