@@ -36,7 +36,8 @@ MARGIN = 1.3
 #: its square, and frequencies say the rest, as in linear theories.
 LARGE = 0.3
 
-#: Tracks: in which part of their scatter frequencies are tried, and the relative error below which none is.
+#: Tracks: in which part of their scatter frequencies are tried, and the relative error below which none is; motions
+#: then count as large by the square of their size in lengths of the structure.
 FACTORS, SMALL = (0.0, -1.0, 1.0), 1e-3
 
 
@@ -64,13 +65,17 @@ def largest_errors(
     best, *others = Tracks(scheme, linear).errors(windows, stiffness)
     size, when = best["missing"]
     best["missing"] = (size * min(1.0, (scale / (LARGE * length)) ** 2), when)
+    fed = 1.0 + scale / length
     if not sure and best["time"][0] >= SMALL * scale:
         times = [best["time"], *(found["time"] for found in others)]
-        fed = 1.0 + scale / length
         (largest, when), least = max(times), min(size for size, _ in times)
         best["time"] = (MARGIN * max(largest, fed * least), when)
         best["space"] = (MARGIN * fed * best["space"][0], best["space"][1])
         best["missing"] = (fed * best["missing"][0], best["missing"][1])
+    elif not sure:
+        large = min(1.0, (scale / length) ** 2)
+        for name, most in (("time", MARGIN * fed), ("space", MARGIN * fed), ("missing", fed)):
+            best[name] = ((1.0 + large * (most - 1.0)) * best[name][0], best[name][1])
     return _both(windows, best)
 
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.error_bursts import ORDER, Burst, burst_in
+from rotfem.analysis.error_bursts import OF_MESH, ORDER, Burst, burst_in, growth_in
 from rotfem.analysis.error_tracks import largest_errors
 from rotfem.analysis.error_window import MeshErrors, Samples, Window
 from rotfem.analysis.schemes import State
@@ -134,19 +134,26 @@ class ErrorWatch:
             found = found if self._sound else nothing
         if not self._sound:
             return TipErrors(None, found["space"], found["model"], shape, size)
-        time, burst = found["time"], self._burst()
+        time, (space, later), (growth, burst) = found["time"], found["space"], self._growth(size)
         if burst is not None:
-            time = (time[0] * burst.growth, burst.t)
-        return TipErrors(time, found["space"], found["model"], shape, size, burst)
+            time = (time[0] * growth, burst.t)
+        return TipErrors(time, (space * min(growth, OF_MESH), later), found["model"], shape, size, burst)
 
-    def _burst(self) -> Burst | None:
-        """Return the burst that errors of the steps grow in; None if there is none, or they are told without it."""
+    def _growth(self, size: float) -> tuple[float, Burst | None]:
+        """Return by which factor errors grow beyond what tangents say, and the burst they do in; None without.
+
+        Args:
+            size: largest displacement of the tip, m.
+        """
         if not self._windows or self.scheme.order > ORDER:
-            return None
+            return 1.0, None
         lengths, rates = (np.concatenate([getattr(w, name) for w in self._windows]) for name in ("lengths", "rates"))
         ends = np.concatenate([w.t[w.ends[1]] for w in self._windows])
         slowest = np.median([np.sqrt(np.abs(w.shapes.squares).min()) for w in self._windows])
-        return burst_in(ends, lengths, rates, float(slowest))
+        burst = burst_in(ends, lengths, rates, float(slowest))
+        if burst is not None:
+            return burst.growth, burst
+        return growth_in(lengths, rates, size / self.system.held.structure.length), None
 
     def _shape(self, state: State, size: float) -> float:
         """Return the error of a state by the mesh, relative to the largest deflection (m).

@@ -1,4 +1,15 @@
-"""M, C and K of a motion in a few shapes, at any of its states; of a free hub with its angle as last coordinate."""
+"""M, C and K of a motion in a few shapes, at any of its states; of a free hub with its angle as last coordinate.
+
+Viscous stress ηD ε̇ of strain rates ε̇ = B(q) v has the tangents
+
+    C = η Bᵀ D B    and    T = η Bᵀ D Ḃ,  Ḃ = ∂(B v)/∂q, in K.
+
+Where a structure turns, neighbouring motions e keep B e small, not B_0 e of one state: ė is −B⁺Ḃ e beside what bends,
+and C ė + T e = η Bᵀ D (B e)˙ is far smaller than both. In shapes that stay as they are C ċ has nothing of the one, so
+that T must not be there either. With Ċ = T + Tᵀ, and what else v adds to K symmetric, it is
+
+    T = ½ Ċ + ½ (K(v) − K(v)ᵀ) − ½ (K(0) − K(0)ᵀ).
+"""
 
 from __future__ import annotations
 
@@ -9,8 +20,13 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.ritz_vectors import RitzVectors
+from rotfem.numerics.linear import transposed
 
 Array = npt.NDArray[np.float64]
+
+#: Product of viscosity and the largest rate of an unknown in units of its scale from which viscous stress turns with
+#: the structure, and how far it goes on to find Ċ, in those units.
+TURNS, FAR = 1e-5, 1e-5
 
 #: c_k, c_v, c_m of K, C and M, and what they are of the speed and its rate.
 SHIFTS = {"M": (0.0, 0.0, 1.0), "C": (0.0, 1.0, 0.0), "K": (1.0, 0.0, 0.0)}
@@ -49,9 +65,35 @@ class Tangents:
         self.speed = abs(float(system.motion.speed(state.t)))
         self.by_mode = inner.by_mode
         self.matrices = {name: self._matrix(name) for name in "MK"}
+        self._take_turning_stress(state)
 
     def _matrix(self, name: str) -> Any:
         return self.system.held.matrix(*SHIFTS[name], 1.0 if name == "K" else 0.0)
+
+    def _take_turning_stress(self, state: Any) -> None:
+        """Take T out of K."""
+        inner = self.system.held
+        eta = inner.structure.damping().stiffness
+        if inner.linear or eta is None:
+            return
+        n = len(inner.scale)
+        q, v = state.q[:n], state.v[:n]
+        rate = float(np.abs(v / inner.scale).max(initial=0.0))
+        rate = max(self.system.comm.allgather(rate))
+        if not float(eta.value) * rate > TURNS:
+            return
+        forward = FAR / rate
+        here = self._matrix("C")
+        inner.q.x.array[:] += forward * v
+        change = self._matrix("C")
+        change.axpy(-1.0, here)
+        change.scale(1.0 / forward)
+        inner.q.x.array[:], inner.v.x.array[:] = q, 0.0
+        still = self._matrix("K")
+        inner.v.x.array[:] = v
+        K = self.matrices["K"]
+        self.matrices["K"] = _sum((0.5, K), (0.5, transposed(K)), (0.5, still), (-0.5, transposed(still)))
+        self.matrices["K"] = _sum((1.0, self.matrices["K"]), (-0.25, change), (-0.25, transposed(change)))
 
     def shapes(self) -> RitzVectors:
         """Return the shapes that move the tip here."""
@@ -78,3 +120,13 @@ class Tangents:
         system, of_spin = self.system, OF_SPIN[name]
         row = system.row.row(SHIFTS[name]).array.copy()
         return Border(row, system.held.spin_derivative(*of_spin).array.copy(), system.row.diagonal(*of_spin))
+
+
+def _sum(*terms: tuple[float, Any]) -> Any:
+    """Return the sum of multiples of matrices, a new one."""
+    (factor, first), *others = terms
+    out = first.copy()
+    out.scale(factor)
+    for factor, A in others:
+        out.axpy(factor, A)
+    return out
