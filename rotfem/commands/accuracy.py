@@ -13,7 +13,7 @@ from rotfem.scene import Scene
 from rotfem.selection.accuracy import AIM, SHARES, Settings, part, shares
 
 #: Error that a reduced model may add to that of its theory, as a part of the accuracy.
-PROJECTED = 0.05
+PROJECTED = 0.15
 
 #: Rows of a history that does not say it.
 ROWS = 1000

@@ -13,10 +13,11 @@ import numpy as np
 from rotfem.analysis.reduced.effect_sizes import effect_sizes
 from rotfem.analysis.reduced.manifold import Manifold
 from rotfem.analysis.reduced.response import Response
+from rotfem.analysis.reduced.stretch import COARSE
 from rotfem.errors import ComputationError
 
-#: Steps of the reduced model, once for every effect, that may be spent on it.
-MOST = 3_000
+#: Steps of the reduced model, once for every effect, that may be spent on it: of an exact solution, and of collocation.
+MOST = {True: 3_000, False: 800}
 
 #: Error of a reduced model from which it does not say what effects are worth.
 POOR = 0.5
@@ -37,7 +38,7 @@ def effects_ahead(response: Response | None, off: float, allowed: float, manifol
     if response is None or not off < POOR:
         return None
     system = response.solution.drive.whole
-    if system.hub is not None or (1 + len(system.model.effects)) * response.trajectory.steps > MOST:
+    if system.hub is not None or (1 + len(system.model.effects)) * steps(response) > MOST[response.trajectory.exact]:
         return None
     try:
         sizes = effect_sizes(response, manifold=manifold)
@@ -50,3 +51,9 @@ def effects_ahead(response: Response | None, off: float, allowed: float, manifol
             break
         negligible.append(name)
     return {"sizes": sizes, "negligible": negligible}
+
+
+def steps(response: Response) -> int:
+    """Return the number of steps in which a response is compared with others."""
+    path, solution = response.trajectory, response.solution
+    return path.steps if path.exact else len(solution.ends(response.model, COARSE)) - 1

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.reduced.manifold import Manifold
 from rotfem.analysis.reduced.response import Response, largest
+from rotfem.analysis.reduced.stretch import COARSE
 from rotfem.errors import ComputationError
 
 Array = npt.NDArray[np.float64]
@@ -38,7 +39,7 @@ def effect_sizes(
     model, manifold = response.model, manifold or Manifold(response)
     system = response.solution.drive.whole
     wanted = system.model.effects if effects is None else effects
-    known = response.solution.hub is None
+    known = response.solution.hub is None and response.solution.parts == 1  # what is compared has the same steps
     whole = manifold.tip(response.q + manifold.own[1][-1]) if known else _tips(response, manifold)
     size = largest(model, whole)
     if largest(model, whole - response.tips) > MOST * largest(model, response.tips):
@@ -59,7 +60,7 @@ def effect_sizes(
 
 def _tips(response: Response, manifold: Manifold) -> Array:
     """Return the unknowns at the tip with the effects that are on, (rows, components)."""
-    model, solution = response.model, response.solution.again()
+    model, solution = response.model, response.solution.again(COARSE)
     path = None
     if solution.constant or solution.hub is not None:
         path = solution.solve(model, response.q[0], response.v[0])

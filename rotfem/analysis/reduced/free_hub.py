@@ -31,8 +31,8 @@ WINDOW, ITERATIONS, CLOSE = 64, 15, 1e-11
 #: Times and states (coordinates with the angle last, rates and accelerations, (n, m + 1)) ↦ forces (n, m + 1).
 Lacking = Callable[[Array, tuple[Array, ...]], Array]
 
-#: Change of an angle, of a speed and of a rate by which derivatives are taken; the last two are exact.
-BESIDE = np.array([1e-6, 1.0, 1.0])
+#: Change of angle, speed and rate for derivatives, the last two exact; and by how much longer steps of small things are.
+BESIDE, LONGER = np.array([1e-6, 1.0, 1.0]), 2
 
 
 class FreeDrive(Drive):
@@ -101,10 +101,10 @@ class FreeSolution(Solution):
         """This solution, which has a free hub."""
         return self
 
-    def again(self) -> FreeSolution:
-        """Return a solution by the same steps, for equations some of whose effects are switched off or on."""
+    def again(self, longer: int = 1) -> FreeSolution:
+        """Return a solution of equations with effects switched off or on, by steps so many times as long."""
         other = free_solution(self.drive.bordered, self.times)
-        other.parts, other._steps, other._known = self.parts, self._steps, self._known
+        other.parts, other._steps, other._known = -(-self.parts // longer), self._steps, self._known
         return other
 
     def solve(self, model: ReducedModel, q: Array, v: Array) -> Trajectory:
@@ -191,7 +191,6 @@ class FreeSolution(Solution):
         m, hub, moment = model.size, self.drive.hub, self.moment
         assert moment is not None
         x, turn = (q[:, :-1], v[:, :-1], a[:, :-1]), np.stack([q[:, -1], v[:, -1], a[:, -1]], axis=1)
-
         c, w = self._weighed(turn, t)
         slopes = moment.slopes(w, *x)
         out = []
@@ -228,12 +227,14 @@ class FreeSolution(Solution):
     def corrections(self, model: ReducedModel, lacking: Lacking, rounds: int) -> list[Array]:
         """Return what forces that the equations lack add to the coordinates, (rows, m), after each round of Newton's.
 
+        Its steps are longer; what the motion leaves between its own nodes is none of the forces.
+
         Args:
             model: the reduced model.
             lacking: of states, forces (n, m + 1), the moment on the hub last.
             rounds: how many.
         """
-        ends, path, nothing = self.ends(model), self.drive.steps, np.zeros(model.size + 1)
+        ends, path, nothing = self.ends(model, LONGER), self.drive.steps, np.zeros(model.size + 1)
         assert path is not None
         t = self.drive.within(ends[:-1], ends[1:], NODES)
 
@@ -245,9 +246,9 @@ class FreeSolution(Solution):
             f = []
             for at in np.array_split(t.ravel(), len(ends) // BATCH + 1):
                 x = path.state(at)
-                if added is not None:
-                    x = tuple(y + z for y, z in zip(x, added.state(at), strict=True))
-                f.append(lacking(at, x) + (0.0 if added is None else self._unbalanced(model, x, at)))
+                y = x if added is None else tuple(map(np.add, x, added.state(at)))
+                more = 0.0 if added is None else self._unbalanced(model, y, at) - self._unbalanced(model, x, at)
+                f.append(lacking(at, y) + more)
             steps = collocate(operators, self.drive.within, ends, nothing, nothing, np.vstack(f).reshape(*t.shape, -1))
             added = steps if added is None else added.plus(steps)
             out.append(added.at(self.times)[0][:, :-1])

@@ -26,6 +26,7 @@ from dolfinx.fem import petsc as fem_petsc
 
 from rotfem.analysis.reduced.response import Response, largest, tips_of
 from rotfem.analysis.reduced.solution import Solution, Trajectory
+from rotfem.analysis.reduced.stretch import ringing, stretched
 from rotfem.analysis.reduced.third_order import Motion, ThirdOrder, expands, inside
 from rotfem.analysis.theory_error import TheoryError, stiffened
 from rotfem.numerics import compat, forms
@@ -229,36 +230,8 @@ def recover(response: Response) -> Foreshortened:
     tips = manifold.tip(response.q + second)
     size = largest(response.model, tips)
     off = largest(response.model, manifold.tip(response.q + further) - tips) / size if size > 0.0 else 0.0
-    stretching, ringing = (more / size if size else 0.0 for more in (_stretched(response), _ringing(response, path)))
-    return Foreshortened(response, manifold, response.q + second, off + stretching + ringing, stretching)
-
-
-def _stretched(response: Response) -> float:
-    """Return how far the tip is with stiffnesses that are off by what the stretch does to them, m."""
-    model, solution = response.model, response.solution
-    stretch = float(np.abs(response.tips[:, 0]).max(initial=0.0)) / model.system.structure.length
-    model.system.scale_stiffness(*(1 + times_off * stretch for times_off in model.system.structure.stretched))
-    try:
-        other = solution.again().solve(model, response.q[0], response.v[0]).q
-    finally:
-        solution.drive.whole.leave_out(())
-    return largest(model, (other - response.q) @ tips_of(model).T)
-
-
-def _ringing(response: Response, slow: Trajectory) -> float:
-    """Return what the tip may be off, m, as the force along the structure rings where linear theories have it steady.
-
-    What is struck by the ringing itself, as the bending by its Coriolis forces, sees that force change as fast. The
-    part of a bending stiffness that is of it is at most the square of the speed over the frequency.
-    """
-    model, drive, times = response.model, response.solution.drive, response.times
-    if not response.trajectory.exact or model.size == 0:
-        return 0.0
-    rings = (response.q - slow.q) @ tips_of(model).T[:, 0]
-    M, _, K, _ = model.operators(response.factors()[:1])
-    squares = np.linalg.eigvals(np.linalg.solve(M[0], K[0])).real
-    lowest, speed = float(squares[squares > 0.0].min(initial=np.inf)), float(np.abs(drive.speed(times)).max())
-    return float(np.abs(rings).max()) * min(1.0, speed**2 / lowest)
+    by_stretch, by_ringing = (more / size if size else 0.0 for more in (stretched(response), ringing(response, path)))
+    return Foreshortened(response, manifold, response.q + second, off + by_stretch + by_ringing, by_stretch)
 
 
 @dataclass(frozen=True)

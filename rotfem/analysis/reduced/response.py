@@ -10,6 +10,7 @@ an estimate that sees what is not stiff, too.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil
 from time import perf_counter, process_time
 from typing import Any
 
@@ -35,8 +36,14 @@ INDEPENDENT, LOADS = 1e-9, 8
 #: Accuracy that is asked for if none is.
 ACCURACY = 1e-5
 
-#: Halvings of the steps of a collocation, by what one divides its error at least, and most steps.
-HALVINGS, ORDER, MOST_STEPS = 6, 8.0, 200_000
+#: Most parts into which a first step of a collocation is cut, most and least times as many as before, and most steps.
+PARTS, FINER, MOST_STEPS = 64, (1.25, 2.0), 200_000
+
+#: Order of their error that is taken for granted, and that which is believed at least and most: that of the nodes is 5.
+ORDER, SEEN = 3.0, (2.0, 4.0)
+
+#: Part of an accuracy that steps are cut for.
+AIM = 0.7
 
 
 @dataclass(frozen=True)
@@ -230,20 +237,27 @@ class Growth:
         return out
 
     def refine(self, path: Trajectory, accuracy: float) -> tuple[Trajectory, float]:
-        """Return the history with steps short enough, and the estimate of their error."""
+        """Return the history with steps short enough, and the estimate of their error.
+
+        With errors that fall as n^−p with the number of steps, n_2 of them are off by the difference from n_1 over
+        (n_2/n_1)^p − 1. Two differences show p.
+        """
+        solution, rows = self.solution, tips_of(self.model).T
         if path.exact:
-            return path, self.solution.off
-        rows, error = tips_of(self.model).T, np.inf
-        for _ in range(HALVINGS):
-            if 2 * path.steps > MOST_STEPS:
-                break
-            self.solution.parts *= 2
+            return path, solution.off
+        error, order, before, factor = np.inf, ORDER, 0.0, 2.0
+        while solution.parts < PARTS and factor * path.steps <= MOST_STEPS:
+            parts = min(PARTS, ceil(factor * solution.parts))
+            last, factor, solution.parts = factor, parts / solution.parts, parts
             finer = self.solve()
             size = largest(self.model, finer.q @ rows)
-            error = largest(self.model, (finer.q - path.q) @ rows) / (ORDER * size) if size > 0.0 else 0.0
-            path = finer
+            change = largest(self.model, (finer.q - path.q) @ rows) / size if size > 0.0 else 0.0
+            if before > 0.0 and change > 0.0:
+                order = float(np.clip(np.log(before / change) / np.log(last), *SEEN))
+            path, before, error = finer, change, change / (factor**order - 1)
             if error <= accuracy:
                 break
+            factor = float(np.clip((error / (AIM * accuracy)) ** (1 / order), *FINER))
         return path, error
 
 

@@ -125,10 +125,10 @@ class Solution:
         """The solution with its free hub (see `FreeSolution`); None where none is free."""
         return None
 
-    def again(self) -> Solution:
-        """Return a solution by the same steps, for equations some of whose effects are switched off or on."""
+    def again(self, longer: int = 1) -> Solution:
+        """Return a solution of equations with effects switched off or on, by steps so many times as long."""
         other = Solution(self.drive, self.times)
-        other.parts, other._steps = self.parts, self._steps
+        other.parts, other._steps = -(-self.parts // longer), self._steps
         return other
 
     def answered(self, model: ReducedModel, q: Array, v: Array, lacking: Lacking) -> tuple[Trajectory, list[Array]]:
@@ -154,11 +154,11 @@ class Solution:
     def _operators(self, model: ReducedModel) -> Operators:
         return lambda t: model.operators(self.drive.factors(t))
 
-    def ends(self, model: ReducedModel) -> Array:
-        """Return the ends of the steps of a collocation, s."""
+    def ends(self, model: ReducedModel, longer: int = 1) -> Array:
+        """Return the ends of the steps of a collocation, s, or of steps so many times as long."""
         if self._steps is None:
             self._steps = self._first_steps(model)
-        return cut(self._steps, np.full(len(self._steps) - 1, self.parts))
+        return cut(self._steps, np.full(len(self._steps) - 1, -(-self.parts // longer)))
 
     def _first_steps(self, model: ReducedModel) -> Array:
         """Return the ends of steps that land on all knots and resolve the lowest vibration."""
