@@ -27,6 +27,9 @@ Array = npt.NDArray[np.float64]
 #: Rows of a history whose steps are adaptive.
 ROWS = 1000
 
+#: Columns of energies.
+ENERGIES = ("kinetic", "strain", "jacobi")
+
 
 def by_reduced_model(run: Simulation, start: Array | None, progress: Progress) -> bool:
     """Record the history of a reduced model; return whether one serves, which is said where it does not.
@@ -39,12 +42,7 @@ def by_reduced_model(run: Simulation, start: Array | None, progress: Progress) -
     Raises:
         ComputationError: it failed.
     """
-    if run.problem.motion.pitch is not None:
-        why = "a reduced model does not hold under a pitch over time"
-        if run.settings is not None:
-            raise ComputationError(why)
-        run.warnings.append(f"{why}; the full system was used")
-    elif _recorded(run, start):
+    if _recorded(run, start):
         progress(1.0)
         return True
     run.critical = critical_speed(run.system)
@@ -111,7 +109,8 @@ class Rows:
         kept = set(range(0, len(times), stride(len(times)))) | {len(times) - 1}
         tips = response.tips if self.foreshortened is None else self.foreshortened.tips
         turn, a = self._turn(), response.accelerations()
-        root, energies = self._root(a, turn[1], turn[2]), self._energies(turn[1])
+        root, energies = self._root(a, turn[1], turn[2]), self._energies(turn[1], a)
+        tips, root = (self._in_hub_axes(values) for values in (tips, root))
         columns = np.column_stack([times, *turn[:2], tips, *energies[:3], root, *energies[3:]])
         for i, values in enumerate(columns):
             row = [float(value) for value in values]
@@ -144,12 +143,22 @@ class Rows:
         moment = torque - hub.damping * speed - hub.inertia * rate
         return np.asarray(out + (moment - out @ arms)[:, None] * turn)
 
-    def _energies(self, speed: Array) -> list[Array]:
-        """Return the columns of energies, and of a free hub those of its own."""
-        response, hub = self.response, self.system.hub
+    def _in_hub_axes(self, values: Array) -> Array:
+        """Return vectors of all rows (n, …) in the frame that turns with the hub."""
+        pitch = self.system.motion.pitch
+        if pitch is None:
+            return values
+        return np.array([pitch.in_hub_axes(row, float(t)) for row, t in zip(values, self.response.times, strict=True)])
+
+    def _energies(self, speed: Array, a: Array) -> list[Array]:
+        """Return the columns of energies and the pitch, and of a free hub those of its own."""
+        response, hub, pitch = self.response, self.system.hub, self.system.motion.pitch
+        if pitch is not None:  # the frame turns about any axis, and its origin moves: as the full system has them
+            columns = np.array([self._energies_of(i, a) for i in range(len(response.times))]).T
+            return [*columns, np.array([pitch.angle(float(t)) for t in response.times])]
         energies = ReducedEnergies(response.model)
         found = energies(response.factors(), speed, response.q, response.v)
-        out = [found[name] for name in ("kinetic", "strain", "jacobi")]
+        out = [found[name] for name in ENERGIES]
         if hub is None:
             return out
         coupled = float(self.system.row.coupled)
@@ -173,6 +182,14 @@ class Rows:
         if self.system.hub is not None:
             parts = [np.append(x, angle[i]) for x, angle in zip(parts, turn, strict=True)]
         return State(float(response.times[i]), *parts)
+
+    def _energies_of(self, i: int, a: Array) -> list[float]:
+        """Return the energies of a row as the full system has them."""
+        response, V, t = self.response, self.response.model.V, float(self.response.times[i])
+        self.system.set_time(t)
+        self.system.set_state(*(V @ x[i] for x in (response.q, response.v, a)))
+        energies = self.system.energies()
+        return [energies[name] for name in ENERGIES]
 
     def _outputs(self, state: State) -> list[float]:
         self.system.set_time(state.t)

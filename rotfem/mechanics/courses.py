@@ -196,10 +196,8 @@ def _watched_motion(motion: Motion, see: Callable[[Course], Callable[[float], An
 def _watched_pitch(pitch: Pitch, see: Callable[[Course], Callable[[float], Any]]) -> Pitch:
     """Return a pitch as it is seen; of a function the acceleration is looked at, where all that is fast shows most."""
     none, changes = np.empty(0), dict[str, Any]()
-    for name in ("angle", "rate", "acceleration"):
-        known = pitch.known or name == "rate"
-        key = "structure.root.pitch" if name == "angle" else f"pitch.{name}"
-        course = Course(key, getattr(pitch, name), _times(pitch.knots), none, known=known)
+    for name, (key, at) in zip(("angle", "rate", "acceleration"), pitch.courses.items(), strict=True):
+        course = Course(key, at, _times(pitch.knots), none, known=pitch.known or name == "rate")
         course.continuous = 2 if name == "angle" else 0
         changes[name] = see(course)
     return replace(pitch, **changes)

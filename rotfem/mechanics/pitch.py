@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -69,10 +70,16 @@ class Pitch:
     known: bool = True
     start: float = 0.0
 
-    @property
+    @cached_property
     def moves_origin(self) -> bool:
         """Whether the center of the hub is not on its axis."""
         return is_beside(self.root, self.axis)
+
+    @property
+    def courses(self) -> dict[str, Scalar]:
+        """The angle and its rates by the names of their courses (see `rotfem.mechanics.courses`)."""
+        names = ("structure.root.pitch", "pitch.rate", "pitch.acceleration")
+        return dict(zip(names, (self.angle, self.rate, self.acceleration), strict=True))
 
     def held(self) -> Pitch:
         """Return the pitch that stays as it is at t = 0."""
@@ -88,28 +95,44 @@ class Pitch:
         return turn_about(self.axis, self.turned(t))
 
     def frame(self, t: float, w: Array, dw: Array, a_o: Array) -> dict[str, Array]:
+        """Return the motion of the pitched frame at time t (s), see `moved`."""
+        return self.moved((self.turned(t), self.rate(t), self.acceleration(t)), w, dw, a_o)
+
+    def moved(self, turn: tuple[Any, Any, Any], w: Array, dw: Array, a_o: Array) -> dict[str, Array]:
         """Return the motion of the pitched frame: w, dw, a_o and v_o, the velocity of its origin, its components.
 
-        Beside it "pitch" (cos φ − 1, sin φ) and "pitch_rate", its rate (1/s).
+        Beside it "pitch" (cos φ − 1, sin φ) and "pitch_rate", its rate (1/s). Of many times at once all have one more
+        dimension, which comes first.
 
         Args:
-            t: time, s.
-            w: angular velocity of the hub, rad/s, components of its frame.
+            turn: φ and its two rates (rad, rad/s, rad/s²), each a number or (n,).
+            w: angular velocity of the hub, rad/s, components of its frame, (3,) or (n, 3).
             dw: its rate, rad/s².
             a_o: acceleration of the hub's center, m/s², likewise.
         """
-        back, rate, e, r = self.rotation(t).T, self.rate(t), self.axis, self.root
-        of_hub = back @ w
+        phi, rate, acceleration = (np.asarray(x)[..., None] for x in turn)
+        c, s, e, r = np.cos(phi), np.sin(phi), self.axis, self.root
+        of_hub = self.seen(phi, w)
         spin = of_hub + rate * e
-        change = back @ dw - rate * np.cross(e, of_hub) + self.acceleration(t) * e
-        acceleration, velocity = back @ a_o, np.zeros(3)
+        change = self.seen(phi, dw) - rate * (of_hub @ self._crossed.T) + acceleration * e
+        origin, velocity = self.seen(phi, a_o), np.zeros_like(spin)
         if self.moves_origin:
-            of_root = np.cross(dw, r) + np.cross(w, np.cross(w, r))
-            acceleration += back @ of_root - np.cross(change, r) - np.cross(spin, np.cross(spin, r))
-            velocity = back @ np.cross(w, r) - np.cross(spin, r)
-        c, s = np.cos(self.turned(t)), np.sin(self.turned(t))
-        turn = {"pitch": np.array([c - 1.0, s]), "pitch_rate": rate * np.array([-s, c])}
-        return {"w": spin, "dw": change, "a_o": acceleration, "v_o": velocity, **turn}
+            of_root: Any = np.cross(dw, r) + np.cross(w, np.cross(w, r))
+            origin = origin + self.seen(phi, of_root) - np.cross(change, r) - np.cross(spin, np.cross(spin, r))
+            velocity = self.seen(phi, np.asarray(np.cross(w, r))) - np.cross(spin, r)
+        turned = {"pitch": np.concatenate([c - 1.0, s], axis=-1)}
+        turned["pitch_rate"] = rate * np.concatenate([-s, c], axis=-1)
+        return {"w": spin, "dw": change, "a_o": origin, "v_o": velocity, **turned}
+
+    def seen(self, phi: Array, v: Array) -> Array:
+        """Return the components Rᵀ v of vectors (…, 3) of the hub's frame at turns φ (…, 1)."""
+        across = v @ self._crossed.T
+        return np.asarray(v - np.sin(phi) * across + (1 - np.cos(phi)) * (across @ self._crossed.T))
+
+    @cached_property
+    def _crossed(self) -> Array:
+        """The matrix of e×."""
+        return np.asarray(np.cross(self.axis, np.eye(3)).T)
 
     def in_hub_axes(self, values: Array, t: float) -> Array:
         """Return vectors (…, 3 n), n of them one after the other, with components in the hub's frame."""

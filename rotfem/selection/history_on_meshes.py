@@ -36,7 +36,7 @@ def error_of_history(trial: Trial, theory: str) -> float | None:
         None where a reduced linear model does not tell it, or not quickly.
     """
     linear, motion, mesh = linear_of(trial, theory), trial.case.problem.motion, trial.full.problem.mesh
-    if linear is None or trial.samples is None or motion.hub is not None or motion.pitch is not None:
+    if linear is None or trial.samples is None or motion.hub is not None:
         return None
     if from_file(trial.case.problem):
         return None

@@ -40,7 +40,7 @@ def reduced_effects(trial: Trial, theory: str, effects: Collection[str]) -> dict
     """
     linear = linear_of(trial, theory)
     motion = trial.case.problem.motion
-    if linear is None or trial.samples is None or motion.hub is not None or motion.pitch is not None:
+    if linear is None or trial.samples is None or motion.hub is not None:
         return {}
     candidate = trial.candidate(linear.name)
     times: Array = np.linspace(0.0, trial.samples.end, len(trial.samples.parts) + 1, dtype=np.float64)

@@ -9,14 +9,21 @@ import numpy.typing as npt
 
 from rotfem.analysis.looks import look_at
 from rotfem.mechanics.courses import SAME
+from rotfem.mechanics.pitch import Pitch
 
 Array = npt.NDArray[np.float64]
 
 #: Relative distance from a knot at which a course has the value that it has on that side of it.
 BESIDE = 4 * SAME
 
-#: Times in a leg at which it is looked whether anything changes.
-LOOKS = 5
+#: Times in a leg, and in all legs at least, at which it is looked whether anything changes.
+LOOKS, FEWEST = 5, 40
+
+#: Part of a leg from one of them to the next, counted on from its start: no multiple of it is a period of anything.
+GOLDEN = 0.5 * (np.sqrt(5.0) - 1)
+
+#: Arrays of times at which the pitch is known.
+KEPT = 256
 
 
 class Drive:
@@ -32,6 +39,7 @@ class Drive:
 
     def __init__(self, system: Any, times: Array):
         self.system, self.motion, self.frame = system, system.motion, system.model.frame
+        self._turns: dict[bytes, tuple[Array, Array, Array]] = {}
         self._courses = {course.name: course for course in system.courses}
         for course in system.courses:
             look_at(course, times)
@@ -71,22 +79,45 @@ class Drive:
         """
         turn = slice(2, 3) if self.frame.planar else slice(0, 3)
         plane = slice(0, 2) if self.frame.planar else slice(0, 3)
-        values: dict[str, Array] = {}
-        for name in self.frame.constants:
-            if name == "w":
-                values[name] = np.outer(speed, self.motion.axis[turn])
-            elif name == "dw":
-                values[name] = np.outer(rate, self.motion.axis[turn])
-            elif name == "a_o":
-                values[name] = self._course("motion.base_acceleration", self.motion.base_acceleration, t)[:, plane]
-            else:
-                values[name] = self._gravity(angle)[:, plane]
+        slices = {"w": turn, "dw": turn, "a_o": plane, "v_o": plane, "gravity": plane}
+        moved = self._moved(t, angle, speed, rate)
+        values = {name: moved[name][:, slices.get(name, slice(None))] for name in self.frame.constants}
         for name, (constant, at) in self.system.structure.load_constants.items():
             if constant.follows_nodes:
                 values[name] = np.array([at(float(s)) for s in t])
                 continue
             values[name] = self._course(f"loads.{name}", at, t)[:, : constant.value.size]
         return values
+
+    def _moved(self, t: Array, angle: Array, speed: Array, rate: Array) -> dict[str, Array]:
+        """Return what the frame's constants are at times, by name, as far as they are asked for, (n, components)."""
+        axis, names = self.motion.axis, self.frame.constants
+        values = {"w": np.outer(speed, axis), "dw": np.outer(rate, axis)}
+        if "a_o" in names or self.motion.pitch is not None:
+            values["a_o"] = self._course("motion.base_acceleration", self.motion.base_acceleration, t)
+        if "gravity" in names:
+            values["gravity"] = self._gravity(angle)
+        pitch = self.motion.pitch
+        if pitch is None:
+            return values
+        turn = self._turned(pitch, t)
+        if "gravity" in names:
+            values["gravity"] = pitch.seen(turn[0][:, None], values["gravity"])
+        values |= pitch.moved(turn, values["w"], values["dw"], values["a_o"])
+        return values
+
+    def _turned(self, pitch: Pitch, t: Array) -> tuple[Array, Array, Array]:
+        """Return what the pitch has turned the frame by at times (n,), rad, and the two rates of it.
+
+        They are functions of one time at a time, and the same times are asked for by all solutions by the same steps.
+        """
+        key = t.tobytes()
+        if key not in self._turns:
+            if len(self._turns) == KEPT:
+                self._turns.clear()
+            angle, rate, acceleration = (self._course(name, at, t)[:, 0] for name, at in pitch.courses.items())
+            self._turns[key] = angle - pitch.start, rate, acceleration
+        return self._turns[key]
 
     def angle(self, t: Array) -> Array:
         """Return the angle of the frame at times (n,), rad; 0 where nothing asks for it."""
@@ -108,7 +139,8 @@ class Drive:
 
     def looks(self) -> Array:
         """Return times in all legs at which what is prescribed is typical of them, s."""
-        shares = (np.arange(LOOKS) + 0.5) / LOOKS
+        number = max(LOOKS, -(-FEWEST // (len(self.knots) - 1)))
+        shares = np.sort(GOLDEN * (np.arange(number) + 1) % 1.0)
         return self.within(self.knots[:-1], self.knots[1:], shares).ravel()
 
     def _course(self, name: str, at: Any, t: Array) -> Array:

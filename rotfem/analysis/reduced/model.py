@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -107,6 +108,15 @@ class ReducedModel:
             function.array[self.owned] = x
             function.scatter_forward()
             column[:] = function.array
+        return out
+
+    def turned(self, turns: Array) -> ReducedModel:
+        """Return the model in fewer columns V T, from orthonormal columns T (m, k) of coordinates."""
+        out = copy(self)
+        out.V, out._strained = self.V @ turns, self._strained @ turns
+        out._products = {i: product @ turns for i, product in self._products.items()}
+        out.small = {kind: turns.T @ self.small[kind] @ turns for kind in "MCK"}
+        out.small["f"] = self.small["f"] @ turns
         return out
 
     def operators(self, c: Array) -> tuple[Array, Array, Array, Array]:

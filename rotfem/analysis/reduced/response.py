@@ -27,6 +27,9 @@ Array = npt.NDArray[np.float64]
 #: Rounds in which a basis may grow, shapes that one adds, and most columns.
 ROUNDS, ADDED, MOST = 12, 6, 60
 
+#: Columns from which a basis is wide, and the part of an accuracy by which a shape hardly moves.
+WIDE, NEGLIGIBLE = 24, 0.01
+
 #: Instants at which the full system's residual is looked at, and rows of which these are chosen.
 INSTANTS, CHOSEN_OF = 24, 600
 
@@ -125,7 +128,7 @@ def reduced_response(system: Any, times: Array, start: Array | None = None, accu
     began = process_time(), perf_counter()
     solution = Solution(Drive(system, times), times) if system.hub is None else free_solution(system, times)
     growth = Growth(ReducedModel(system.held, solution.active), solution, start)
-    path, projection = growth.grow(accuracy)
+    path, projection = growth.narrow(*growth.grow(accuracy), accuracy)
     path, error = growth.refine(path, accuracy)
     seconds = {"cpu": process_time() - began[0], "wall": perf_counter() - began[1]}
     met = projection <= accuracy and error <= accuracy
@@ -208,9 +211,34 @@ class Growth:
                     return path, error
             before = tips
             energy = float(np.max(np.einsum("ij,ij->i", path.q, path.q)))
-            least = (0.01 * accuracy) ** 2 * energy
+            least = (NEGLIGIBLE * accuracy) ** 2 * energy
             if model.size >= MOST or model.grow(answers.T, ADDED, least) == 0:
                 return path, lacking if not np.isfinite(error) else error
+
+    def narrow(self, path: Trajectory, error: float, accuracy: float) -> tuple[Trajectory, float]:
+        """Take what hardly moves out of a wide basis that is to be solved in by many steps.
+
+        Args:
+            path: the history in the basis that is there.
+            error: estimate of what that lacks.
+            accuracy: of the tip, relative.
+
+        Returns:
+            History and estimate.
+        """
+        wide = self.model
+        if path.exact or wide.size < WIDE or self.solution.hub is not None or error > accuracy:
+            return path, error
+        turns = np.linalg.svd(path.q, full_matrices=False)[2].T
+        most = np.abs(path.q @ turns).max(axis=0)
+        self.model = wide.turned(turns[:, most > NEGLIGIBLE * accuracy * most.max()])
+        narrow = self.solve()
+        change = narrow.q @ tips_of(self.model).T - path.q @ tips_of(wide).T
+        off = error + largest(wide, change) / largest(wide, path.q @ tips_of(wide).T)
+        if off <= accuracy:
+            return narrow, off
+        self.model = wide
+        return path, error
 
     def solve(self) -> Trajectory:
         """Return the history in the basis that is there."""
