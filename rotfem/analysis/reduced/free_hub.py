@@ -31,7 +31,7 @@ WINDOW, ITERATIONS, CLOSE = 64, 15, 1e-11
 #: Times and states (coordinates with the angle last, rates and accelerations, (n, m + 1)) ↦ forces (n, m + 1).
 Lacking = Callable[[Array, tuple[Array, ...]], Array]
 
-#: Change of angle, speed and rate for derivatives, the last two exact; and by how much longer steps of small things are.
+#: Change of angle, speed and rate for derivatives, the last two exact; how much longer steps of small things are.
 BESIDE, LONGER = np.array([1e-6, 1.0, 1.0]), 2
 
 
