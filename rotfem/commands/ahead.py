@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.reduced.manifold import Manifold
-from rotfem.analysis.reduced.response import Response, tips_of
+from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.reduced.struck import struck
+from rotfem.analysis.reduced.tips import tips_of
 from rotfem.analysis.schemes import Scheme
 from rotfem.numerics.newton import SMALLEST
 from rotfem.results.run import RunResult

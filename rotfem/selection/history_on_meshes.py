@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.reduced.response import Response, largest, reduced_response, tips_of
+from rotfem.analysis.reduced.response import Response, reduced_response
+from rotfem.analysis.reduced.tips import largest, tips_of
 from rotfem.analysis.refined_mesh import MOST
 from rotfem.errors import ComputationError, InputError
 from rotfem.selection.coarse_model import Trial, from_file

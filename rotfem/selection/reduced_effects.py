@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.reduced.effect_sizes import effect_sizes
-from rotfem.analysis.reduced.response import largest, reduced_response
+from rotfem.analysis.reduced.response import reduced_response
+from rotfem.analysis.reduced.tips import largest
 from rotfem.errors import ComputationError
 from rotfem.mechanics.theories import Theory
 from rotfem.selection.coarse_model import Trial

@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.reduced.manifold import Manifold
-from rotfem.analysis.reduced.response import Response, largest
+from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.reduced.stretch import COARSE
+from rotfem.analysis.reduced.tips import largest
 from rotfem.errors import ComputationError
 
 Array = npt.NDArray[np.float64]

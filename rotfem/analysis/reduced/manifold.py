@@ -24,10 +24,11 @@ import ufl
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 
-from rotfem.analysis.reduced.response import Response, largest, tips_of
+from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.reduced.solution import Solution, Trajectory
 from rotfem.analysis.reduced.stretch import ringing, stretched
 from rotfem.analysis.reduced.third_order import Motion, ThirdOrder, expands, inside
+from rotfem.analysis.reduced.tips import largest, tips_of
 from rotfem.analysis.theory_error import TheoryError, stiffened
 from rotfem.numerics import compat, forms
 from rotfem.numerics.projection import summed, times

@@ -20,7 +20,8 @@ import numpy.typing as npt
 from rotfem.analysis.reduced.drive import Drive
 from rotfem.analysis.reduced.free_hub import free_solution
 from rotfem.analysis.reduced.model import ReducedModel
-from rotfem.analysis.reduced.solution import Solution, Trajectory
+from rotfem.analysis.reduced.solution import Solution, Trajectory, nothing
+from rotfem.analysis.reduced.tips import largest, tips_of
 
 Array = npt.NDArray[np.float64]
 
@@ -287,25 +288,6 @@ class Growth:
                 break
             factor = float(np.clip((error / (AIM * accuracy)) ** (1 / order), *FINER))
         return path, error
-
-
-def nothing(rows: int) -> Trajectory:
-    """Return the history of a basis without columns."""
-    none = np.zeros((rows, 0))
-    return Trajectory(none, none, 0, True, lambda t: (np.zeros((len(t), 0)), np.zeros((len(t), 0))))
-
-
-def tips_of(model: ReducedModel, shapes: Array | None = None) -> Array:
-    """Return the unknowns at the tip of shapes, a local dof array a column, of the basis if None; (components, m)."""
-    shapes = model.V if shapes is None else shapes
-    columns = [model.system.structure.tip_values(column.copy()) for column in shapes.T]
-    return np.array(columns).reshape(shapes.shape[1], len(model.system.structure.components)).T
-
-
-def largest(model: ReducedModel, tips: Array) -> float:
-    """Return the largest length of displacement vectors of the tip (n, components), m."""
-    moves = [name.startswith("u") for name in model.system.structure.components]
-    return float(np.linalg.norm(tips[:, moves], axis=1).max(initial=0.0))
 
 
 def after(times: Array) -> Array:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotfem.analysis.reduced.response import Response, largest, tips_of
+from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.reduced.solution import Trajectory
+from rotfem.analysis.reduced.tips import largest, tips_of
 
 #: How many times as long the steps are by which two motions are only compared.
 COARSE = 4

@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.reduced.drive import BESIDE
-from rotfem.analysis.reduced.response import Response, tips_of
+from rotfem.analysis.reduced.response import Response
+from rotfem.analysis.reduced.tips import tips_of
 
 Array = npt.NDArray[np.float64]
 

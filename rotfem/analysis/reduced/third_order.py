@@ -21,7 +21,7 @@ from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 
 from rotfem.analysis.reduced.model import ReducedModel
-from rotfem.analysis.reduced.response import tips_of
+from rotfem.analysis.reduced.tips import tips_of
 from rotfem.equations.geometric import third_order_work
 from rotfem.equations.pieces import PRESTRESS
 from rotfem.mechanics.effects import INTERNAL, LOADS, Effect
