@@ -105,8 +105,8 @@ class Pieces:
 
     def _forms_at_rest(self) -> dict[str, Any]:
         """Return f, K, C and M at q = v = a = 0 as UFL forms; those that vanish are left out."""
-        *state, _ = self.structure.k.functions
-        at_rest = {kind: forms.without(f, self.q) for kind, f in forms.at_rest(self.model.residual, *state).items()}
+        q, v, a, _ = self.structure.k.functions
+        at_rest = forms.at_rest(self.model.residual, q, v, a, undeformed=True)
         return {kind: form for kind, form in at_rest.items() if not form.empty()}
 
     def _zero_constants(self) -> None:

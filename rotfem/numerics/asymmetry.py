@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 #: Random vectors by which norms of large matrices are estimated.
 PROBES = 4
 
+#: Relative asymmetry that is round-off of assembly.
+ROUND_OFF = 1e-14
+
 
 def asymmetries(pencil: Pencil) -> dict[str, float]:
     """Return relative ‖M − Mᵀ‖, ‖C + Cᵀ‖ and ‖K − Kᵀ‖ (Frobenius).
@@ -31,6 +34,12 @@ def asymmetries(pencil: Pencil) -> dict[str, float]:
             distance, size = _by_probes(A, sign, part) if part is not None else (_distance(A, sign), A.norm())
             out[name] = distance / size if size > 0 else 0.0
     return out
+
+
+def is_symmetric(A: Any) -> bool:
+    """Return whether a PETSc matrix is symmetric to round-off, by random probes."""
+    distance, size = _by_probes(A, -1.0, None)
+    return distance <= ROUND_OFF * size
 
 
 def _distance(A: Any, sign: float) -> float:

@@ -119,15 +119,25 @@ def containing(f: ufl.Form, function: Any) -> ufl.Form:
     return ufl.Form([part for part in f.integrals() if function in extract_coefficients(part.integrand())])
 
 
-def at_rest(f: Any, q: Any, v: Any, a: Any) -> dict[str, Any]:
+def at_rest(f: Any, q: Any, v: Any, a: Any, undeformed: bool = False) -> dict[str, Any]:
     """Return f and its derivatives K, C and M to q, v and a, at v = a = 0, as UFL forms; they may be empty.
 
     Expanded once: each derivative is that of what is left where the others vanish.
+
+    Args:
+        f: the form.
+        q: function in it.
+        v: its rate.
+        a: its acceleration.
+        undeformed: whether they are wanted at q = 0 too.
     """
     expanded, du = expand_derivatives(f), ufl.TrialFunction(q.function_space)
     rest = zeroed(expanded, v, a)
     C = ufl.derivative(zeroed(containing(expanded, v), a), v, du)
     M = ufl.derivative(zeroed(containing(expanded, a), v), a, du)
+    if undeformed:
+        out = {"K": without(ufl.derivative(rest, q, du), q), "C": without(C, q, v), "M": without(M, q)}
+        return {"f": zeroed(rest, q), **out}
     return {"f": rest, "K": ufl.derivative(rest, q, du), "C": without(C, v), "M": expand_derivatives(M)}
 
 

@@ -35,6 +35,17 @@ def test_what_is_left_has_the_value_at_zero(space: Any) -> None:
     np.testing.assert_allclose(found, exact, rtol=1e-14)
 
 
+def test_derivatives_at_no_displacement_are_those_at_rest_without_it(space: Any) -> None:
+    """Of a form with products of all three; that of ∂/∂v by (1 + q·a) v is ∫ w·δv, by q·v nothing is left."""
+    q, v, a = (fem.Function(space) for _ in range(3))
+    test = ufl.TestFunction(space)
+    F = ufl.inner((1 + ufl.dot(q, a)) * v + ufl.dot(q, v) * a + (2 + ufl.dot(q, q)) * (q + a), test) * ufl.dx
+    at_rest, whole = forms.at_rest(F, q, v, a), forms.at_rest(F, q, v, a, undeformed=True)
+    assert whole["f"].empty()
+    for kind in "KCM":
+        assert whole[kind].signature() == forms.without(at_rest[kind], q).signature()
+
+
 def test_branches_that_vanish_leave_no_conditional(space: Any) -> None:
     """The derivative of a rate like θ̇ f(θ), f of two branches, is a sum in which UFL misses the argument otherwise."""
     q, rate = fem.Function(space), fem.Function(space)

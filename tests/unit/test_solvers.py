@@ -10,6 +10,7 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics import linear
+from rotfem.numerics.asymmetry import is_symmetric
 from rotfem.numerics.left_vectors import mirror_error
 from rotfem.numerics.linear import DirectSolver, NearbySolver, SingularSolver, combine, is_regular
 from rotfem.numerics.low_rank import LowRank
@@ -194,6 +195,15 @@ def test_solutions_for_many_sides_at_once_are_those_one_by_one(
         np.testing.assert_allclose(whole @ X, right, atol=1e-9)
         np.testing.assert_allclose(solver.solve_all(right[:, :1]), X[:, :1], rtol=1e-9)
     np.testing.assert_allclose(times(A, right), A[:, :] @ right, rtol=1e-12, atol=1e-9)
+
+
+def test_a_small_skew_part_is_none_of_round_off() -> None:
+    """Symmetric to round-off is A; with 1e-9 of its largest entry in one corner only it is not."""
+    A = spread(np.random.default_rng(7), 40)
+    assert is_symmetric(A)
+    A.setValue(0, 39, A[0, 39] + 1e-9 * np.abs(A[:, :]).max())
+    A.assemble()
+    assert not is_symmetric(A)
 
 
 def test_a_singular_matrix_is_one_to_a_matrix_near_by_too() -> None:

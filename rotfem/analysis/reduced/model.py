@@ -9,7 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
 
-from rotfem.numerics.linear import DirectSolver, combine
+from rotfem.equations.pieces import PRESTRESS
+from rotfem.numerics.asymmetry import is_symmetric
+from rotfem.numerics.linear import MIDDLE, DirectSolver, combine
 from rotfem.numerics.projection import orthonormal, summed, times
 
 Array = npt.NDArray[np.float64]
@@ -158,9 +160,15 @@ class ReducedModel:
 
     def stiffness(self, c: Array) -> DirectSolver:
         """Return a solver with the stiffness of the full system, from the factors of all pieces (pieces,)."""
+        pieces = self.system.pieces
+        there = [i for i in self.kinds["K"] if c[i] != 0.0]
+        strains = [i for i, p in enumerate(pieces) if p.kind == "K" and "internal" in p.of and PRESTRESS not in p.of]
+        if there == strains and np.all(c[there] == 1.0) and not self.system.structure.hinges:
+            solver: DirectSolver = self.system.material_solver
+            return solver
         A = self.system.A.duplicate()
-        combine(A, [self.system.pieces[i].operator for i in self.kinds["K"]], c[self.kinds["K"]])
-        return DirectSolver(A)
+        combine(A, [pieces[i].operator for i in there], c[there])
+        return DirectSolver(A, symmetric=A.getSize()[0] > MIDDLE and is_symmetric(A))
 
     def solve(self, solver: DirectSolver, right: Array) -> Array:
         """Return the solutions (local dof arrays (n, k)) with right-hand sides of owned rows, (n, k)."""

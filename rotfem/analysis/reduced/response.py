@@ -150,11 +150,13 @@ class Growth:
         self.drive = drive = solution.drive
         self.rounds = 0
         looks = drive.looks()
+        self._factors = drive.factors(looks)
+        # a motion that begins at rest has the stiffness of the strains there, whose factor is known
+        looks = np.append(looks, drive.within(drive.knots[:1], drive.knots[1:2], np.zeros(1)))
         speeds = np.abs(drive.speed(looks))
         ends = [int(speeds.argmax()), int(speeds.argmin())][: 1 if solution.constant else 2]
-        self._factors = drive.factors(looks)
         self._speeds = speeds[ends]
-        self._solvers = [model.stiffness(self._factors[i]) for i in ends]
+        self._solvers = [model.stiffness(factors) for factors in drive.factors(looks[ends])]
         self._begin()
 
     def _begin(self) -> None:
