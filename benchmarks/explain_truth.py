@@ -1,6 +1,8 @@
 """How good every row of `rotfem explain` is on ten scenes, against runs on finer meshes with finer steps.
 
-    ./with-fenicsx python3 benchmarks/explain_truth.py [SCENE …]
+    ./with-fenicsx python3 benchmarks/explain_truth.py [further | SCENE …]
+
+of `explain_scenes.FRESH`, of the ten of `explain_further_scenes`, or of those named.
 
 The truth of an effect or a theory is the difference of two runs on twice the elements with a quarter of the steps in a
 scheme of fourth order; of the steps and the mesh that of the scene's own to the finer ones. Columns: kind, name and
@@ -13,6 +15,7 @@ import sys
 from typing import Any
 
 import numpy as np
+from explain_further_scenes import FURTHER
 from explain_scenes import FRESH, scene
 
 import rotfem
@@ -76,7 +79,7 @@ def with_truth(of: Scene, result: Any) -> list[dict[str, Any]]:
     for row in result.rows:
         name = row["name"]
         if row["kind"] == "effect":
-            kept = [effect for effect in effects if effect != name]
+            kept = sorted(set(effects) ^ {name})
             row["truth"] = apart(own, truth_of(finer(exact.replace({"model.effects": kept})), result))
         elif row["kind"] == "theory":
             row["truth"] = apart(own, truth_of(finer(exact.replace({"model.theory": name})), result))
@@ -90,7 +93,9 @@ def with_truth(of: Scene, result: Any) -> list[dict[str, Any]]:
 def main() -> None:
     """Print the table, and how many rows are within a factor 3, large ones for large ones counted with them."""
     inside, missed = [], []
-    for name in sys.argv[1:] or FRESH:
+    asked = sys.argv[1:] or list(FRESH)
+    FRESH.update(FURTHER)
+    for name in list(FURTHER) if asked == ["further"] else asked:
         result = rotfem.explain(scene(name))
         print(f"{name}: {', '.join(result.summary['effects'])}", flush=True)
         for row in with_truth(scene(name), result):

@@ -22,8 +22,9 @@ from rotfem.numerics import form_cache
 #: What dolfinx says on the other ranks when rank 0 could not compile a form.
 ELSEWHERE = "Compilation failed on root node"
 
-#: Flags of the C compiler for what is assembled often, and for what is assembled a few times or on a few cells.
-OFTEN, SELDOM = ["-O2", "-g0", "-w"], ["-O0", "-g0", "-w"]
+#: Flags of the C compiler for what is assembled often, and for what is assembled a few times or on a few cells: lines
+#: and surfaces. Code for surfaces is long, and what -O1 makes of it hardly slower than what -O2 does.
+OFTEN, SELDOM = ["-O2", "-g0", "-w"], {1: ["-O0", "-g0", "-w"], 2: ["-O1", "-g0", "-w"]}
 
 #: Compiles several forms, (communicator, forms, …) ↦ (forms, module, code): rank 0 first, as dolfinx does one.
 _library: Any = dolfinx_jit.mpi_jit_decorator(lambda *args, **more: ffcx_jit.compile_forms(*args, **more))
@@ -34,7 +35,7 @@ def form(f: Any, once: bool = False) -> Any:
 
     Args:
         f: the form.
-        once: whether it is assembled a few times only; on lines that is compiled in haste.
+        once: whether it is assembled a few times only, and compiled in haste.
 
     Raises:
         RuntimeError: the compiler failed.
@@ -67,7 +68,7 @@ def together(several: Sequence[Any], once: bool = False) -> list[Any]:
 
 
 def _flags(domain: Any, once: bool) -> list[str]:
-    return SELDOM if once and domain.topology.dim == 1 else OFTEN
+    return SELDOM.get(domain.topology.dim, OFTEN) if once else OFTEN
 
 
 def _taken(f: Any, i: int, library: tuple[Any, Any, Any]) -> Any:

@@ -27,7 +27,11 @@ HALVED, STRAYED = 0.01, 0.1
 
 
 class Halved(ComputationError):
-    """So many steps had to be halved, or Newton strayed in so many, that the others are too long to be trusted."""
+    """So many steps had to be halved that the others are too long to be trusted."""
+
+
+class Strayed(ComputationError):
+    """Newton strayed in so many steps that the others are too long to be trusted, and there may be shorter ones."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +76,7 @@ class Candidate:
         held.plain = True
         try:
             return compute()
-        except Beyond:
+        except (Beyond, Strayed):
             raise
         except ComputationError:
             if held.linear:
@@ -128,13 +132,15 @@ class Candidate:
         Raises:
             Beyond: it is farther from another one than was asked for.
             Halved: more steps were halved than is allowed.
+            Strayed: Newton strayed in more than is allowed.
             ComputationError: a step failed, or a linear theory has lost its meaning.
         """
         count = sum(steps.parts or ())
 
         def compute() -> None:
             few = HALVED * count if self.system.held.plain and count else watch.halved
-            self._history(steps, q, out, replace(watch, halved=min(few, watch.halved)))
+            here = replace(watch, halved=min(few, watch.halved), shorter=np.isfinite(watch.halved))
+            self._history(steps, q, out, here)
 
         self.plainly(compute)
 
@@ -158,7 +164,8 @@ class Candidate:
                     raise Halved(f"{march.stepper.substeps} steps were halved by t = {state.t:.4g} s")
                 strayed += newton.strayed
                 if strayed > most:  # where it ends may be no motion of this model, and no energy may tell
-                    raise Halved(f"Newton strayed in {strayed} steps by t = {state.t:.4g} s")
+                    why = f"Newton strayed in {strayed} steps by t = {state.t:.4g} s"
+                    raise Strayed(why) if watch.shorter else Halved(why)
         finally:
             out.tip = np.array(tips) if tips else out.tip
 
@@ -170,10 +177,12 @@ class Watch:
     Attributes:
         bound: what it may not go beyond; None if nothing.
         halved: so many steps may be halved.
+        shorter: whether it may be tried again in shorter steps, which take the place of another tangent.
     """
 
     bound: Bound | None = None
     halved: float = np.inf
+    shorter: bool = False
 
 
 def theories_of(problem: Problem) -> dict[str, Theory]:

@@ -24,7 +24,7 @@ from rotfem.selection.candidate import HALVED, Candidate, Watch, stand_in, theor
 from rotfem.selection.case import Case
 from rotfem.selection.distance import HISTORY, MODES, STEADY, Beyond, Bound, Outputs
 from rotfem.selection.resolution import given
-from rotfem.selection.sampling import FINER, LONGER, Sampling, serving
+from rotfem.selection.sampling import FINER, LONGER, SHORTER, Sampling, serving
 
 Array = npt.NDArray[Any]
 
@@ -152,12 +152,13 @@ class Trial:
         """Fit the steps of the histories to an error, relative, of one in the steps of the case (0: unknown).
 
         No two may differ by what steps make of the same motion, and up to `LONGER` they need not be shorter than that.
+        Where they are to be shorter by less than `SHORTER`, there are more samples, else several steps between two.
         """
         own, scheme = self.full.steps, self.full.scheme
         if self.samples is None or scheme is None or own is None or own.step is None or self._done or not error > 0.0:
             return
         wanted = serving(error, own.step, scheme.order)
-        if (longer := min(LONGER, wanted / self.samples.step)) > 1.0:
+        if (longer := min(LONGER, wanted / self.samples.step)) > SHORTER:
             self.samples = Sampling.of(own, self.at_rest, given(self.case.problem), longer)
         self.samples = self.samples.shortened(wanted)
 

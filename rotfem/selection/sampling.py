@@ -27,8 +27,14 @@ ROUGH = 0.1
 #: By how much longer steps may be than the frequencies ask for, where they are known to be off by less than that.
 LONGER = 2.0
 
+#: And by how much shorter while the samples are as close; else each has several steps to the next.
+SHORTER = 0.5
+
 #: Steps between two samples of a history, tried one after the other as far as the case has as many steps itself.
-FINER = (1, 4, 16)
+FINER = (1, 2, 4, 16)
+
+#: What steps may be too long by, relative, since their number is whole.
+ROUNDED = 1e-2
 
 #: Samples in 1/ω₁ where no frequency is known.
 SAMPLES_A_RADIAN = 5
@@ -58,12 +64,12 @@ class Sampling:
             steps: of the case itself.
             at_rest: frequencies of the resting structure, rad/s, as far as they are known.
             signals: what is prescribed.
-            longer: by how much the steps are to be longer than the frequencies ask for.
+            longer: by how much the steps are to be longer than the frequencies ask for, or shorter (below 1).
         """
         end = steps.end
         own = None if steps.step is None else int(np.ceil(end / steps.step - 1e-9))
         wanted = max((w * n for w, n in zip(at_rest, STEPS_A_PERIOD, strict=False)), default=np.inf) / (2 * np.pi)
-        number = ceil(np.clip(end * wanted, FEWEST_STEPS, MOST_STEPS) / longer)
+        number = ceil(min(np.clip(end * wanted, FEWEST_STEPS, MOST_STEPS) / longer, MOST_STEPS))
         step = end / min(number, own or MOST_STEPS)
         times = np.linspace(0.0, end, round(end / step) + 1)
         period = 1 / at_rest[0] if at_rest.size else SAMPLES_A_RADIAN * step
@@ -81,7 +87,7 @@ class Sampling:
     def shortened(self, wanted: float) -> Self:
         """Return the same samples with steps between them that are as short as wanted (s), if there may be so many."""
         most = max(1, MOST_STEPS // len(self.parts))
-        finer = min(ceil(self.step / wanted - 1e-9), most)
+        finer = min(ceil(self.step / wanted - ROUNDED), most)
         if finer <= 1:
             return self
         parts = np.maximum(self.parts, finer)

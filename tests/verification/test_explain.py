@@ -392,6 +392,8 @@ def test_steps_of_trials_are_as_long_as_their_error_allows() -> None:
     assert steps(0.1 * (0.01 / step / 1.5) ** 2)[1] == pytest.approx(1.5 * step, rel=2 / number)
     assert steps(1e-9)[1] == pytest.approx(2 * step, rel=2 / number)  # never longer
     assert steps(0.1 * (0.01 / step * 2) ** 2)[0] == 2 * number
+    for slightly in (1 / 1.013, 1.013, 1.4):  # not twice as many, whatever their number is rounded to
+        assert steps(0.1 * (0.01 / step * slightly) ** 2)[0] == pytest.approx(slightly * number, rel=2 / number)
 
 
 def test_an_estimate_does_not_depend_on_what_was_tried_before() -> None:
