@@ -9,7 +9,9 @@ from rotfem.analysis.error_estimate import ErrorEstimate, percent
 from rotfem.analysis.error_watch import ErrorWatch
 from rotfem.analysis.shape_error import ShapeError
 from rotfem.analysis.theory_error import TheoryError
+from rotfem.commands.ahead import sampled
 from rotfem.scene import Scene
+from rotfem.selection.mesh_ahead import MeshAhead
 from rotfem.selection.model_choice import Choice
 
 if TYPE_CHECKING:
@@ -38,7 +40,7 @@ def error_of_run(run: Simulation) -> ErrorEstimate | None:
         held = run.system.held
         shape = ShapeError(held).of_shape(farthest[: len(held.zeros())])
         time = run.reduced.time_error + run.reduced.projection_error
-        return ErrorEstimate({"time": time, "space": shape, "model": model})
+        return ErrorEstimate({"time": time, "space": max(shape, _of_mesh(run)), "model": model})
     assert run.last is not None
     watch = run.watch or ErrorWatch(run.system)
     tip = watch.errors(run.last, 0.0 if run.theory_error is None else run.theory_error.lacking)
@@ -55,6 +57,16 @@ def error_of_run(run: Simulation) -> ErrorEstimate | None:
     if tip.burst is not None:
         found["burst"] = {"at": tip.burst.t, "growth": tip.burst.growth}
     return ErrorEstimate(shares, found)
+
+
+def _of_mesh(run: Simulation) -> float:
+    """Return what the mesh has put off the vibrations of a reduced model by the end, as its spectrum tells it."""
+    assert run.reduced is not None
+    ahead = MeshAhead.of(run.reduced, run.scene.mesh.elements, run.scene.mesh.degree)
+    if ahead is None:
+        return 0.0
+    motion = sampled(run.reduced, ahead.structure)
+    return ahead.error(motion) if motion.tells else 0.0
 
 
 def _of_steps(scene: Scene, share: float) -> float:
