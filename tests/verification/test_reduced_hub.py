@@ -108,7 +108,8 @@ def test_loads_that_turn_leave_the_third_order_to_the_estimate() -> None:
 def test_what_a_coarse_mesh_puts_off_by_the_end_is_told() -> None:
     """Vibrations after a short pulse on two elements, against six: phases are lost that no shape of an instant shows.
 
-    Estimates by spectra are above the truth, as vibrations do not all come together: 5.5 times here. The shapes of instants tell a hundredth of the truth.
+    Estimates by spectra are above the truth, as vibrations do not all come together: 5.5 times here. The shapes of
+    instants tell a hundredth of the truth.
     """
     motion = {"type": "torque", "hub_inertia": 2.4e-3, "pulses": [[0.0, 0.004, 1.0], [0.02, 0.024, -1.0]]}
     scene = SCENE | {"loads": {}, "motion": motion, "model": SCENE["model"] | {"reduced": 1e-4}}
