@@ -191,11 +191,11 @@ class RitzPairs:
         self.values, x, y = values[order], x[:, order], y[:, order]
         MX, CX, KX = (P @ x for P in self._products)
         self.right, self.left = self.V @ x, self.V @ y
-        self._residual = self.values**2 * MX + self.values * CX + KX
-        self._left_residual = self._transposed(self.left)
         size = self.norms @ np.abs(np.array([self.values**2, self.values, np.ones_like(self.values)]))
+        self._residual = (self.values**2 * MX + self.values * CX + KX) / size
+        self._left_residual = self._transposed(self.left) / size
         both = [np.sqrt(self._sum(np.sum(np.abs(r) ** 2, axis=0))) for r in (self._residual, self._left_residual)]
-        self.errors = np.maximum(*both) / size
+        self.errors = np.maximum(*both)
 
     def _transposed(self, Y: Array) -> Array:
         """Return (λ² M + λ C + K)^H y for all pairs."""

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -42,18 +45,39 @@ step = 1e-3
 """
 
 
+COMMAND = ("run", "scene.toml", "--no-plots", "--no-advice")
+
+
+def end_of(text: str) -> float:
+    return float(text.split("end = ")[1].split("\n")[0])
+
+
+@pytest.fixture(scope="module")
+def begun(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Path]:
+    """Scene, number of processes ↦ a folder with the whole run of one process and six tenths of one by so many."""
+
+    @cache
+    def folder(text: str, first: int) -> Path:
+        out = tmp_path_factory.mktemp("begun")
+        (out / "scene.toml").write_text(text)
+        assert rotfem(out, 1, *COMMAND, "-o", "whole").returncode == 0
+        half = rotfem(out, first, *COMMAND, "-o", "cut", "--checkpoint", "3", "--set", f"time.end={0.6 * end_of(text)}")
+        assert half.returncode == 0, half.stderr
+        return out
+
+    return folder
+
+
 @pytest.mark.parametrize(
     ("text", "first", "second"), [(BEAM, 1, 2), (PLATE, 2, 1), (PLATE, 2, 3)], ids=["beam", "plate", "plate, more"]
 )
-def test_another_number_of_processes_goes_on(tmp_path: Path, text: str, first: int, second: int) -> None:
+def test_another_number_of_processes_goes_on(
+    tmp_path: Path, begun: Callable[[str, int], Path], text: str, first: int, second: int
+) -> None:
     """To 1e-9 of the largest value of a column: sums in another order, and Newton's last increments, are left."""
-    (tmp_path / "scene.toml").write_text(text)
-    end = float(text.split("end = ")[1].split("\n")[0])
-    command = ("run", "scene.toml", "--no-plots", "--no-advice")
-    assert rotfem(tmp_path, 1, *command, "-o", "whole").returncode == 0
-    half = rotfem(tmp_path, first, *command, "-o", "cut", "--checkpoint", "3", "--set", f"time.end={0.6 * end}")
-    assert half.returncode == 0, half.stderr
-    done = rotfem(tmp_path, second, *command, "-o", "cut", "--resume")
+    end = end_of(text)
+    shutil.copytree(begun(text, first), tmp_path, dirs_exist_ok=True)
+    done = rotfem(tmp_path, second, *COMMAND, "-o", "cut", "--resume")
     assert done.returncode == 0, done.stderr
     (note,) = json.loads((tmp_path / "cut" / "summary.json").read_text())["resumed"]
     assert note["ranks"] == second

@@ -181,14 +181,18 @@ def add() -> Iterator[Callable[[Any], None]]:
     [pytest.param(SPIN_UP, id="thin"), pytest.param(ALL | {"loads": {}}, id="thick", marks=pytest.mark.nightly)],
 )
 def test_estimates_are_within_a_factor_three(tables: dict[str, Any]) -> None:
-    """Every change above 1e-8 (below it, rounding of the two solutions), and none above 1 % is called negligible."""
+    """Every change above 1e-8 (below it, rounding of the two solutions), and none above 1 % is called negligible.
+
+    What meshes put off is told by linear models, and so only as far as it is above what is of second order in it: 1e-6.
+    """
     result = rotfem.explain(scene(tables), check=True)
     compared = 0
     for row in result.rows:
         assert set(row["truth"]) == {HISTORY, MODES}
         for name, truth in row["truth"].items():
             estimate = row["estimate"][name]
-            if max(truth, estimate) < 1e-8 or min(truth, estimate) == np.inf:
+            told = 1e-6 if row["name"] == "mesh.elements" else 1e-8
+            if max(truth, estimate) < told or min(truth, estimate) == np.inf:
                 continue
             assert truth / 3 < estimate < 3 * truth, (row["name"], name)
             compared += 1
