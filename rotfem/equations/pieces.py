@@ -27,6 +27,7 @@ from rotfem.equations.model import Model
 from rotfem.equations.prestress import geometric_pieces
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
+from rotfem.numerics.assembly import SAME, Assembler
 from rotfem.numerics.linear import DirectSolver, held, set_diagonal
 from rotfem.structures.root_reaction import RootReaction
 
@@ -93,9 +94,8 @@ class Pieces:
         self.axis: Array = model.motion.axis[2:] if self.structure.planar else model.motion.axis
         compiled = forms.together(list(self.at_rest.values()), once=True)
         self._forms = dict(zip(self.at_rest, compiled, strict=True))
-        self.pattern = fem_petsc.create_matrix(self._forms["K"])
-        fem_petsc.assemble_matrix(self.pattern, self._forms["K"], self.bcs)
-        self.pattern.assemble()
+        self._assembled = Assembler(self._forms["K"], self.bcs)
+        self.pattern = self._assembled.pattern
         self.all: list[Piece] = []
         for kind in self.at_rest:
             self._decompose(kind)
@@ -155,12 +155,13 @@ class Pieces:
         found: list[tuple[Key, Any, frozenset[str]]] = []
         for name, parts in self._parts(kind):
             bodiless: dict[Key, Any] = {}
+            same = () if kind == "f" else (SAME,)
             for part in parts:
                 for key in self._keys(name):
                     self._set_switches((name, part))
                     operator = self._polarised(kind, key, declared=self.model.acting[name].constants is not None)
                     if part and key in bodiless:
-                        operator.axpy(-1.0, bodiless[key])
+                        operator.axpy(-1.0, bodiless[key], *same)
                     elif not part:
                         bodiless[key] = operator
                     if operator.norm() > 0.0:
@@ -192,20 +193,21 @@ class Pieces:
         def at(*entries: tuple[tuple[str, int], float]) -> Any:
             return self._assemble_at(kind, dict(entries))
 
+        same = () if kind == "f" else (SAME,)
         if len(key) == 2 and key[0] != key[1]:
             operator = at((key[0], 1.0), (key[1], 1.0))
             for entry in key:
-                operator.axpy(-1.0, at((entry, 1.0)))
+                operator.axpy(-1.0, at((entry, 1.0)), *same)
             if not declared:
-                operator.axpy(1.0, at())
+                operator.axpy(1.0, at(), *same)
             return operator
         if declared or not key:
             return at(*((entry, 1.0) for entry in key))
         operator, mirrored = at((key[0], 1.0)), at((key[0], -1.0))
-        operator.axpy(-1.0 if len(key) == 1 else 1.0, mirrored)
+        operator.axpy(-1.0 if len(key) == 1 else 1.0, mirrored, *same)
         operator.scale(0.5)
         if len(key) == 2:
-            operator.axpy(-1.0, at())
+            operator.axpy(-1.0, at(), *same)
         return operator
 
     def _assemble_at(self, kind: str, values: dict[tuple[str, int], float]) -> Any:
@@ -225,10 +227,7 @@ class Pieces:
             fem_petsc.assemble_vector(b, form)
             b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
             return b
-        A = self.pattern.duplicate()
-        fem_petsc.assemble_matrix(A, form)
-        A.assemble()
-        return A
+        return self._assembled(form)
 
     @cached_property
     def material(self) -> Any:
@@ -247,7 +246,7 @@ class Pieces:
         if others or self.structure.hinges:
             K = K.copy()
         for other in others:
-            K.axpy(1.0, other)
+            K.axpy(1.0, other, SAME)
         if self.structure.hinges:
             held(K, self._hinged)
         return K

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from ufl.algorithms.analysis import extract_constants
 
+from rotfem.numerics.assembly import SAME
 from rotfem.numerics.linear import DirectSolver
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def geometric_pieces(pieces: Pieces) -> list[tuple[Piece, Any, frozenset[str]]]:
     found = [(load, K, frozenset[str]()) for load, K in zip(loads, plain, strict=True)]
     for name in adding:
         for load, K, bare in zip(loads, stiffness([other for other in adding if other != name]), plain, strict=True):
-            K.axpy(-1.0, bare)
+            K.axpy(-1.0, bare, SAME)
             found.append((load, K, frozenset((name,))))
     for name in adding:
         switches[name].value = 1.0

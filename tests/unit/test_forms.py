@@ -9,10 +9,12 @@ import pytest
 import ufl
 from basix.ufl import element
 from dolfinx import fem, mesh
+from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 
 from rotfem.equations.functionals import Functionals
 from rotfem.numerics import forms
+from rotfem.numerics.assembly import SAME, Assembler
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +72,24 @@ def test_forms_of_one_library_are_those_compiled_one_by_one(space: Any) -> None:
         lambda f: fem.assemble_matrix(f[2]).to_dense(),
     ):
         np.testing.assert_array_equal(assemble(together), assemble(apart))
+
+
+def test_matrices_of_one_pattern_are_those_that_petsc_adds_up(space: Any) -> None:
+    """To the last bit, whatever the form; where a form has fewer couplings than the pattern its zeros are stored."""
+    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+    c = forms.constant(space.mesh, np.float64(1.0))
+    whole = forms.form(c * ufl.dot(u, v) * ufl.dx + ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx)
+    part = forms.form(ufl.dot(u, v) * ufl.dx)
+    assembled = Assembler(whole, [])
+    for factor, form in ((1.0, whole), (3.0, whole), (3.0, part)):
+        c.value[...] = factor
+        exact = fem_petsc.assemble_matrix(form)
+        exact.assemble()
+        A = assembled(form)
+        np.testing.assert_array_equal(A[:, :], exact[:, :])
+        assert A.getInfo()["nz_used"] == assembled.pattern.getInfo()["nz_used"]
+        A.axpy(-1.0, assembled(form), SAME)
+        assert A.norm() == 0.0
 
 
 def test_functionals_are_those_assembled_one_by_one(space: Any) -> None:
