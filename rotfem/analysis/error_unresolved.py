@@ -7,8 +7,8 @@ A relative error ε of ω turns it by
     δθ = ε ωh / (1 + (ωh/2)²)
 
 more in each step, and after n steps it is off by min(2, n δθ) of its amplitude; of several, phases being what they may,
-the squares add up. Second differences of the samples have
-4 sin²(θ/2) of that, and next to nothing of what is slow.
+the squares add up. Second differences of the samples have 4 sin²(θ/2) of an amplitude, and next to nothing of what is
+slow.
 """
 
 from __future__ import annotations

@@ -21,7 +21,8 @@ from rotfem.mechanics.theories import Theory
 from rotfem.results import ExplainResult
 from rotfem.scene import Scene, as_scene
 from rotfem.selection.case import Case
-from rotfem.selection.coarse_model import INCREMENT, Trial
+from rotfem.selection.coarse_case import INCREMENT
+from rotfem.selection.coarse_model import Trial
 from rotfem.selection.dimensionless import MEANING, groups
 from rotfem.selection.distance import HISTORY, MODES, STEADY, Outputs, change, notes, outputs_of
 from rotfem.selection.estimate import Change, Estimates

@@ -5,8 +5,7 @@ The pieces are assembled once (see `rotfem.equations.pieces`); a new speed costs
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -14,14 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.equations.affine_energies import AffineEnergies
+from rotfem.equations.affine_stiffness import AffineStiffness
 from rotfem.equations.clamp_rows import ClampRows
 from rotfem.equations.modal_damping import EFFECT
 from rotfem.equations.model import Model
 from rotfem.equations.pieces import PRESTRESS, Piece, Pieces
 from rotfem.mechanics.motion import Motion
-from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
-from rotfem.numerics.linear import DirectSolver, Increment, combine, set_diagonal
+from rotfem.numerics.linear import Increment, combine, set_diagonal
 
 __all__ = ["PRESTRESS", "AffineSystem"]
 
@@ -30,7 +29,7 @@ Array = npt.NDArray[np.float64]
 ONE = np.ones(1)
 
 
-class AffineSystem(AffineEnergies):
+class AffineSystem(AffineStiffness, AffineEnergies):
     """System of a linear theory, about the undeformed state: sums of its pieces."""
 
     linear = True
@@ -85,62 +84,12 @@ class AffineSystem(AffineEnergies):
     def shift(self, shifts: tuple[float, ...]) -> None:
         """Take no shifts: the forms have none."""
 
-    @property
-    def prestressing(self) -> Any:
-        """The function that N⁰ of the form G is of: the displacement under the loads, by the material alone."""
-        return self._decomposed.prestressed
-
-    @contextmanager
-    def of_material(self) -> Iterator[None]:
-        """Let the form K be that of the strains alone."""
-        switches = self.model.switches
-        values = {name: float(switch.value) for name, switch in switches.items()}
-        for name, switch in switches.items():
-            switch.value = float(name == "internal")
-        try:
-            yield
-        finally:
-            for name, switch in switches.items():
-                switch.value = values[name]
-
     def leave_out(self, effects: Collection[str]) -> None:
         """Take the pieces of some effects, their bodies or the PRESTRESS out, and put all others back in."""
         super().leave_out(effects)
         left_out = set(effects)
         self._weights = np.array([0.0 if left_out & p.of else 1.0 for p in self.pieces])
         self._coefficients = None
-
-    def displaced(self) -> Array:
-        """Return the displacement (local dof array) of the structure at rest under the loads at the time set."""
-        if self._increment is None:
-            self._increment = Increment(self.V)
-        return -self._increment.solve(self.material_solver, self._load)
-
-    def scale_stiffness(self, strains: float, prestress: float) -> None:
-        """Multiply the stiffness of the strains and the geometric one by factors, until effects are switched."""
-        of = [strains if p.kind == "K" and "internal" in p.of else 1.0 for p in self.pieces]
-        self._weights *= [prestress if PRESTRESS in p.of else f for f, p in zip(of, self.pieces, strict=True)]
-        self._coefficients = None
-
-    @property
-    def material(self) -> Any:
-        """Stiffness of the strains alone, clamped rows 1."""
-        return self._decomposed.material
-
-    @property
-    def material_solver(self) -> DirectSolver:
-        """Solver of the `material`."""
-        return self._decomposed.material_solver
-
-    @property
-    def only_strains(self) -> bool:
-        """Whether the stiffness at rest is that of the strains alone, and regular."""
-        at_rest = [p for p in self.pieces if p.kind == "K" and not p.key and PRESTRESS not in p.of]
-        return not self.structure.hinges and all("internal" in p.of for p in at_rest)
-
-    def geometric(self, u: Any, w: Any, base: Any, theory: Theory | None = None) -> Any:
-        """Return ∫ N⁰ D²Γ₁[u, w], a UFL form (see `Pieces.geometric`)."""
-        return self._decomposed.geometric(u, w, base, theory)
 
     def _factor_indices(self) -> npt.NDArray[np.int64]:
         """Return for every piece the two places of its factors in (1, all constants one after the other)."""
@@ -240,16 +189,6 @@ class AffineSystem(AffineEnergies):
             return super().mass_damping_stiffness()
         return self._operators["M"], self._operators["C"], self._operators["K"]
 
-    def matrices_at_rest(self) -> tuple[Any, Any]:
-        """Return (M, K) of the undeformed structure at rest without spin and loads (see `System`)."""
-        out = []
-        for kind in "MK":
-            A = self.A.duplicate()
-            chosen = [p.operator for p in self.pieces if p.kind == kind and not p.key and PRESTRESS not in p.of]
-            combine(A, chosen, np.ones(len(chosen)))
-            out.append(A)
-        return out[0], out[1]
-
     @cached_property
     def _spun(self) -> Any:
         return compat.create_vector(self.V)
@@ -275,26 +214,3 @@ class AffineSystem(AffineEnergies):
                 out.axpy(slope, self._work)
         out.array[self.clamped] = 0.0
         return out
-
-    @property
-    def prestressed(self) -> bool:
-        """Whether there is geometric stiffness at the time set."""
-        weights = self._coefficients if self._coefficients is not None else np.zeros(len(self.pieces))
-        return any(PRESTRESS in p.of and value != 0.0 for p, value in zip(self.pieces, weights, strict=True))
-
-    def add_other_stiffness(self, A: Any) -> None:
-        """Add to a matrix the stiffness at the time set that is not that of the strains: of effects and prestress."""
-        assert self._coefficients is not None
-        for p, value in zip(self.pieces, self._coefficients, strict=True):
-            if p.kind == "K" and value != 0.0 and ("internal" not in p.of or PRESTRESS in p.of):
-                A.axpy(value, p.operator)
-
-    def stiffness_pieces(self) -> tuple[Any, Any]:
-        """Return (K_1, K_2) of K = K_1 + Omega² K_2 without base acceleration and loads; clamped rows 1 and 0."""
-        axis = self._decomposed.axis
-        parts = (self.A.duplicate(), self.A.duplicate())
-        for part, size in zip(parts, (0, 2), strict=True):
-            chosen = [p for p in self.pieces if p.kind == "K" and len(p.key) == size]
-            weights = [np.prod([axis[i] for _, i in p.key]) if p.key else 1.0 for p in chosen]
-            combine(part, [p.operator for p in chosen], np.array(weights))
-        return parts

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from rotfem.selection.coarse_model import Trial, from_file
+from rotfem.selection.coarse_case import from_file
+from rotfem.selection.coarse_model import Trial
 from rotfem.selection.discretisation import Discretisation, discretisation
 from rotfem.selection.distance import HISTORY, Outputs, change, notes
 from rotfem.selection.reduced_effects import reduced_effects

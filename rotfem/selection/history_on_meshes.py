@@ -16,7 +16,8 @@ from rotfem.analysis.reduced.response import Response, reduced_response
 from rotfem.analysis.reduced.tips import largest, tips_of
 from rotfem.analysis.refined_mesh import MOST
 from rotfem.errors import ComputationError, InputError
-from rotfem.selection.coarse_model import Trial, from_file
+from rotfem.selection.coarse_case import from_file
+from rotfem.selection.coarse_model import Trial
 from rotfem.selection.mesh_share import halved
 from rotfem.selection.reduced_effects import ACCURACY, linear_of
 

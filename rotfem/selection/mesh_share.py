@@ -24,7 +24,8 @@ from rotfem.errors import ComputationError
 from rotfem.numerics.eigenproblem import Pencil
 from rotfem.numerics.refinement import NotRefined
 from rotfem.selection.candidate import Candidate
-from rotfem.selection.coarse_model import Trial, from_file
+from rotfem.selection.coarse_case import from_file
+from rotfem.selection.coarse_model import Trial
 from rotfem.selection.distance import modes_change
 
 #: Shapes, the lowest first, by which two meshes are compared.

@@ -10,7 +10,7 @@ so what is fast but small need not be resolved, and T at most the time in which 
 
 Amplitudes are those of the Fourier transform under Hann's window, which makes a vibration half its amplitude in two
 neighbours of its line, and a jump from the end to the start nearly nothing. The sum is above the truth, as vibrations
-do not all come together; damping it does not know.
+do not all come together.
 
 A mesh that puts the frequency ω off by ε(ω) moves a motion likewise, by Σ_k A_k min(2, s ε(ω_k) ω_k T).
 """
