@@ -19,6 +19,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.error_samples import Samples
+
 Array = npt.NDArray[np.float64]
 
 #: Factor to the median rate, and to that of the slowest vibration with 1 rad of rotation, from which a rate is quick.
@@ -78,19 +80,16 @@ def growth_in(lengths: Array, rates: Array, size: float) -> float:
     return 1.0 + (min(MOST, quick) - 1.0) * min(1.0, size**2)
 
 
-def turning_rates(
-    system: Any, states: Sequence[Any], steps: Sequence[tuple[int, int]], components: Sequence[int]
-) -> Array:
+def turning_rates(system: Any, samples: Samples, components: Sequence[int]) -> Array:
     """Return the largest rate of rotation of a structure in every step, rad/s, (n,); 0 where it is counted anew.
 
     Args:
         system: equations of the structure, its hub held.
-        states: t (s), q, and what rotations are counted from as last entry (see `Samples`).
-        steps: numbers of the states that steps start and end with.
+        samples: states, and the steps between them.
         components: numbers of the unknowns of a node that are rotations.
     """
-    n, size = len(system.zeros()), len(system.structure.unknowns)
-    turned = np.array([state[1][:n] for state in states]).reshape(len(states), n // size, size)[:, :, list(components)]
+    n, size, states, steps = len(system.zeros()), len(system.structure.unknowns), samples.states, samples.steps
+    turned = samples.displacements[:, :n].reshape(len(states), n // size, size)[:, :, list(components)]
     begin, end = np.array(steps).T
     angles = np.sqrt(((turned[end] - turned[begin]) ** 2).sum(axis=2)).max(axis=1, initial=0.0)
     angles[[states[i][-1] is not states[j][-1] for i, j in steps]] = 0.0

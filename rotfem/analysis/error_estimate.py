@@ -27,7 +27,7 @@ class ErrorEstimate:
     @property
     def total(self) -> float | None:
         """Sum of the shares that are known; None if none is."""
-        known = [share for share in self.shares.values() if share is not None]
+        known = [float(share) for share in self.shares.values() if share is not None]
         return sum(known) if known else None
 
     def summary(self) -> dict[str, Any]:

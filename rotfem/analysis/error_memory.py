@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.error_samples import Samples
 from rotfem.analysis.error_watch import ErrorWatch
-from rotfem.analysis.error_window import Samples, Window
+from rotfem.analysis.error_window import Window
 from rotfem.analysis.ritz_vectors import RitzVectors
 from rotfem.analysis.schemes import State
 

@@ -19,8 +19,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.error_bursts import OF_MESH, ORDER, Burst, burst_in, growth_in
+from rotfem.analysis.error_samples import Samples
 from rotfem.analysis.error_tracks import largest_errors
-from rotfem.analysis.error_window import MeshErrors, Samples, Window
+from rotfem.analysis.error_window import MeshErrors, Window
 from rotfem.analysis.schemes import State
 from rotfem.analysis.turning_view import TurningView
 from rotfem.errors import ComputationError
@@ -29,7 +30,7 @@ Array = npt.NDArray[np.float64]
 
 #: Windows of a history, fewest steps in one by unknowns, and bytes of states up to which one goes on, and with which
 #: those before are looked at while the march is under way.
-WINDOWS, FEWEST, LARGE, MEMORY = 8, (40, 100), 2000, 64_000_000
+WINDOWS, FEWEST, LARGE, MEMORY = 8, (50, 100), 2000, 64_000_000
 
 
 @dataclass(frozen=True)
@@ -82,8 +83,8 @@ class ErrorWatch:
 
     def __call__(self, old: Any, new: Any) -> None:
         """Look at a step from an old to a new state."""
-        states, now = self._now.states, self._now
-        reached = self._reached
+        now, reached = self._now, self._reached
+        states = now.states
         if self._landed or not states or reached is None or reached.a is not old.a or reached.q is not old.q:
             self._landed = False
             now.pieces.append(len(states))
@@ -92,7 +93,7 @@ class ErrorWatch:
         self._reached = new
         now.steps.append((len(states) - 2, len(states) - 1))
         self._bytes += 3 * new.q.nbytes
-        due = new.t >= (self._closed + 1) * self.end / WINDOWS and len(now.steps) >= self._fewest
+        due = len(now.steps) >= self._fewest and new.t >= (self._closed + 1) * self.end / WINDOWS
         if due or self._bytes > MEMORY:
             self._close(new.t)
             if self._waiting > MEMORY:
@@ -120,7 +121,7 @@ class ErrorWatch:
         size, state = self._farthest
         if state is None:
             state = last if self._view is None else self._view.state(last)
-            size = float(self._tip_sizes([state.q])[0])
+            size = float(self._tip_sizes(state.q[None])[0])
         shape = self._shape(state, size)
         nothing = dict.fromkeys(("time", "space", "model"), (0.0, 0.0))
         found = nothing
@@ -183,7 +184,7 @@ class ErrorWatch:
 
     def _look_at(self, samples: Samples) -> None:
         """Look at a window."""
-        sizes = self._tip_sizes([state[1] for state in samples.states])
+        sizes = self._tip_sizes(samples.displacements)
         i = int(np.argmax(sizes))
         if sizes[i] > self._farthest[0]:
             self._farthest = (float(sizes[i]), samples.state(i))
@@ -196,14 +197,14 @@ class ErrorWatch:
         except (ComputationError, np.linalg.LinAlgError):
             self._sound = False
 
-    def _tip_sizes(self, shapes: list[Array]) -> Array:
-        """Return the displacement of the tip in shapes (local dof arrays), m."""
+    def _tip_sizes(self, shapes: Array) -> Array:
+        """Return the displacement of the tip in shapes (n, unknowns), m, (n,)."""
         inner = self.system.held
         values, names = inner.structure.tip_values, inner.structure.unknowns
         dofs = [values.dofs.start + i for i, name in enumerate(names) if name.startswith("u")]
         here: Array = np.zeros(len(shapes))
         if inner.comm.rank == values.owner:  # others may have no unknowns at all
-            here[:] = np.linalg.norm(np.array([q[dofs] for q in shapes]), axis=1)
+            here[:] = np.linalg.norm(shapes[:, dofs], axis=1)
         if inner.comm.size > 1:
             inner.comm.Bcast(here, root=values.owner)
         return here

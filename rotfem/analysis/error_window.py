@@ -11,11 +11,11 @@ import numpy.typing as npt
 
 from rotfem.analysis.error_bursts import turning_rates
 from rotfem.analysis.error_recursion import Index
+from rotfem.analysis.error_samples import Samples
 from rotfem.analysis.mesh_force import MeshForce
 from rotfem.analysis.reduced_tangents import Tangents
 from rotfem.analysis.refined_mesh import RefinedMesh
 from rotfem.analysis.ritz_vectors import RitzVectors
-from rotfem.analysis.schemes import State
 from rotfem.analysis.shape_error import ShapeError
 
 Array = npt.NDArray[np.float64]
@@ -35,42 +35,6 @@ MODERATE = 0.22
 
 #: Product of two shapes from which they are one, and a square of a frequency that is none, 1/s².
 SAME, TINY = 0.5, 1e-300
-
-
-@dataclass
-class Samples:
-    """States of a motion, and the steps between them.
-
-    Attributes:
-        states: t (s), q, v, a (local dof arrays), and what rotations are counted from.
-        steps: numbers of the states that a step starts and ends with.
-        pieces: numbers of the states with which what drives the motion starts afresh.
-    """
-
-    states: list[tuple[float, Array, Array, Array, Any]]
-    steps: list[tuple[int, int]]
-    pieces: list[int]
-
-    @property
-    def middle(self) -> tuple[int, float]:
-        """Number of the state in the middle, and the length of the step to it, s."""
-        t = [self.states[end][0] for _, end in self.steps]
-        begin, end = self.steps[int(np.searchsorted(t, 0.5 * (t[0] + t[-1])))]
-        return end, self.states[end][0] - self.states[begin][0]
-
-    def state(self, number: int) -> State:
-        """Return the state of a number."""
-        t, q, v, a, datum = self.states[number]
-        return State(t, q, v, a, datum=datum)
-
-    def around(self, number: int, most: int) -> Any:
-        """Return so many states on either side of one, and itself, if they are smooth with it; else None."""
-        own = int(np.searchsorted(self.pieces, number, side="right")) - 1
-        first, last = self.pieces[own], [*self.pieces, len(self.states)][own + 1] - 1
-        if number - most < first or number + most > last:
-            return None
-        found = self.states[number - most : number + most + 1]
-        return found if all(state[4] is found[0][4] for state in found) else None
 
 
 @dataclass
@@ -140,9 +104,10 @@ class Window:
         self.missing = self._missing(system, mesh)
         self.rates: Array = np.zeros(len(samples.steps))
         if not system.held.linear:
-            self.rates = turning_rates(system.held, samples.states, samples.steps, mesh.shape.turns)
-        self.motion = tuple(self._coordinates(x) for x in list(zip(*samples.states, strict=True))[1:4])
-        samples.states.clear()
+            self.rates = turning_rates(system.held, samples, mesh.shape.turns)
+        rates = (np.array([state[i] for state in samples.states]) for i in (2, 3))
+        self.motion = tuple(self._coordinates(x) for x in (samples.displacements, *rates))
+        samples.forget()
 
     def _alike(self, system: Any, before: Window) -> bool:
         """Return whether the matrices are those of the window before: a linear theory at the same constant speed."""
@@ -155,13 +120,12 @@ class Window:
         """Find shapes and matrices."""
         middle = self.samples.state(self.samples.middle[0]).q[: len(system.held.zeros())]
         along = mesh.shape.directions(middle)
-        self.shapes, tangents = self._tangents(system, mesh, along, before)
+        self.shapes, self.bends, tangents = self._tangents(system, mesh, along, before)
         self.speed = tangents.speed
         M, C, K = tangents.reduced(self.shapes)
         if self.free:
             K[-1, -1] += HELD * M[-1, -1] * (2 * np.pi / end) ** 2
         self.C, self.K = (np.asarray(np.linalg.solve(M, A), dtype=float) for A in (C, K))
-        self.bends = mesh.shape.bend(self.shapes, along)
         self.epsilon = self._errors_by_mesh(mesh, before)
         if before is not None:
             self.turn = self._turned(before.shapes)
@@ -182,7 +146,7 @@ class Window:
         if theory.exact or theory.linear:
             return None
         n = len(system.held.zeros())
-        turned = np.array([state[1][:n] for state in self.samples.states]).reshape(-1, size)[:, mesh.shape.turns]
+        turned = self.samples.displacements[:, :n].reshape(-1, size)[:, mesh.shape.turns]
         largest = float(np.abs(turned).max(initial=0.0))
         if system.comm.size > 1:
             largest = max(system.comm.allgather(largest))
@@ -203,7 +167,7 @@ class Window:
         if mesh.force is None or any(state[4] is not None for state in states):
             return None
         n = len(system.held.zeros())
-        return mesh.force(np.array([state[1][:n] for state in states]), self.shapes) * self.bends
+        return mesh.force(self.samples.displacements[:, :n], self.shapes) * self.bends
 
     @cached_property
     def ends(self) -> tuple[Index, Index]:
@@ -217,11 +181,10 @@ class Window:
         begin, end = self.ends
         return np.asarray(self.t[end] - self.t[begin])
 
-    def _coordinates(self, arrays: Any) -> Array:
-        """Return Vᵀ M x of local dof arrays, (n, r); of a free hub with its angle."""
-        n = len(self.shapes.V)
-        out = self.shapes.sum(np.array([x[:n] for x in arrays]) @ self.shapes.massed)
-        return np.column_stack([out, [x[-1] for x in arrays]]) if self.free else out
+    def _coordinates(self, arrays: Array) -> Array:
+        """Return Vᵀ M x of local dof arrays (n, unknowns), (n, r); of a free hub with its angle."""
+        out = self.shapes.sum(arrays[:, : len(self.shapes.V)] @ self.shapes.massed)
+        return np.column_stack([out, arrays[:, -1]]) if self.free else out
 
     def _turned(self, before: RitzVectors) -> Array:
         """Return Vᵀ M V_before; where shapes have turned, rates of what is quick are none of what is slow."""
@@ -236,22 +199,31 @@ class Window:
 
     def _tangents(
         self, system: Any, mesh: MeshErrors, along: Array, before: Window | None
-    ) -> tuple[RitzVectors, Tangents]:
-        """Return shapes and matrices in the middle of the window, where the structure has directions `along`."""
+    ) -> tuple[RitzVectors, npt.NDArray[np.bool_], Tangents]:
+        """Return shapes, which of them bend, and matrices in the middle of the window.
+
+        Args:
+            system: equations of motion.
+            mesh: errors of shapes.
+            along: directions of the structure in the middle.
+            before: the window before.
+        """
         number, h = self.samples.middle
         state = self.samples.state(number)
         tangents = Tangents(system, state)
         if system.held.linear:
-            return self._shapes_of_before(tangents, before) or tangents.shapes(), tangents
+            shapes = self._shapes_of_before(tangents, before) or tangents.shapes()
+            return shapes, mesh.shape.bend(shapes, along), tangents
         shapes = tangents.shapes()
         bends = mesh.shape.bend(shapes, along)
         quick = self._vibrating(shapes, bends, number, h)
         if not np.any(quick):
-            return shapes, tangents
+            return shapes, bends, tangents
         q, v, a = (_without(x, moved) for x, moved in zip((state.q, state.v, state.a), quick, strict=True))
-        tangents = Tangents(system, state.changed(q=q, v=v, a=a))
-        shapes.turn_to(tangents.matrices["M"], tangents.matrices["K"])
-        return shapes, tangents
+        # Vibrations change the stress, and hardly where masses are.
+        tangents = Tangents(system, state.changed(q=q, v=v, a=a), tangents.matrices["M"])
+        shapes.turn_to(tangents.matrices["K"])
+        return shapes, mesh.shape.bend(shapes, along), tangents
 
     @staticmethod
     def _shapes_of_before(tangents: Tangents, before: Window | None) -> RitzVectors | None:
@@ -269,16 +241,20 @@ class Window:
         each step another way, and on the average not. They are c̈ = −ω² c about what balances the forces, as far as c̈
         is not a parabola over some of their periods (Savitzky & Golay 1964).
         """
-        out, omega = np.zeros((3, shapes.V.shape[1])), np.sqrt(np.abs(shapes.squares))
-        for k in np.flatnonzero(~bends | (omega * h > np.pi)):
-            m = max(2, int(np.ceil(PERIODS * 2 * np.pi / (omega[k] * h))))
-            around = None if m * h > SLOW / omega[0] else self.samples.around(number, m)
-            if around is None:
-                continue
+        out: Array = np.zeros((3, shapes.V.shape[1]))
+        omega: Array = np.sqrt(np.abs(shapes.squares))
+        chosen = np.flatnonzero(~bends | (omega * h > np.pi))
+        reach = {int(k): max(2, int(np.ceil(PERIODS * 2 * np.pi / (omega[k] * h)))) for k in chosen}
+        reach = {k: m for k, m in reach.items() if m * h <= SLOW / omega[0] and self.samples.smooth(number, m)}
+        if not reach:
+            return np.asarray(out @ shapes.V.T)
+        columns, most = shapes.massed[:, list(reach)], max(reach.values())
+        around = self.samples.states[number - most : number + most + 1]
+        moved = np.array([[v[: len(columns)], a[: len(columns)]] for _, _, v, a, _ in around]).swapaxes(0, 1)
+        rates = shapes.sum(moved @ columns)
+        for j, (k, m) in enumerate(reach.items()):
             smooth = 3 * (3 * m * m + 3 * m - 1 - 5 * np.arange(-m, m + 1) ** 2) / ((4 * m * m - 1) * (2 * m + 3))
-            for i in (1, 2):
-                c = shapes.sum(np.array([state[i + 1][: len(shapes.V)] for state in around]) @ shapes.massed[:, k])
-                out[i, k] = c[m] - smooth @ c
+            out[1:, k] = rates[:, most, j] - rates[:, most - m : most + m + 1, j] @ smooth
         out[0] = -out[2] / shapes.squares
         return np.asarray(out @ shapes.V.T)
 

@@ -81,6 +81,7 @@ class MeshEstimate:
         self.volumes = (weights * np.abs(np.linalg.det(J))).sum(axis=1)
         polynomials = basix.tabulate_polynomials(basix.PolynomialType.legendre, cell, self.degree, points)
         self._expand = np.einsum("pq,q,dqn,cqd->cpnd", polynomials, weights, shape, per_length)
+        self._rows = np.ascontiguousarray(np.moveaxis(self._expand, 2, 3)).reshape(owned, -1, shape.shape[2])
         if cell == basix.CellType.quadrilateral:
             i, j = np.divmod(np.arange(n * n), n)
             self._levels = [i, j]
@@ -106,7 +107,11 @@ class MeshEstimate:
 
         Their squares times the volumes are energies; shape (states, cells, polynomials, components, directions).
         """
-        return np.asarray(np.einsum("cpnd,scnk->scpkd", self._expand, values[:, self.cells], optimize=True))
+        cells, nodes = self.cells.shape
+        states, size = len(values), values.shape[2]
+        found = self._rows @ np.moveaxis(values, 0, 1)[self.cells].reshape(cells, nodes, -1)
+        out = found.reshape(cells, -1, self._expand.shape[3], states, size)
+        return np.asarray(np.transpose(out, (3, 0, 1, 4, 2)))
 
     def energies(self, coefficients: Array) -> Array:
         """Return the energies over all cells, by polynomial and direction, shape (states, polynomials, directions)."""
@@ -136,7 +141,7 @@ class MeshEstimate:
             part: which degree and direction.
         """
         top = part.top
-        along = np.array([energy[:, part.level == n, part.direction].sum(axis=1) for n in range(self.degree + 1)])
+        along = (part.level == np.arange(self.degree + 1)[:, None]) @ energy[:, :, part.direction].T
         if top == 0:
             return along[0], np.ones(len(energy))
         ratio = along[top] / np.maximum(along[top - 1], TINY) * _sine(top + 1) * _sine(top - 1) / _sine(top) ** 2

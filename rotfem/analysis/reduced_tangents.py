@@ -48,12 +48,13 @@ class Tangents:
     Args:
         system: equations of motion; time and state are set in it.
         state: where.
+        mass: M, if it is known; None: found.
 
     Attributes:
         matrices: M and K, PETSc matrices.
     """
 
-    def __init__(self, system: Any, state: Any):
+    def __init__(self, system: Any, state: Any, mass: Any = None):
         self.system, self.t = system, state.t
         system.count_rotations_from(state.datum)
         system.set_time(state.t)
@@ -64,7 +65,7 @@ class Tangents:
                 x.x.scatter_forward()
         self.speed = abs(float(system.motion.speed(state.t)))
         self.by_mode = inner.by_mode
-        self.matrices = {name: self._matrix(name) for name in "MK"}
+        self.matrices = {"M": self._matrix("M") if mass is None else mass, "K": self._matrix("K")}
         self._take_turning_stress(state)
 
     def _matrix(self, name: str) -> Any:

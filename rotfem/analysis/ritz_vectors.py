@@ -52,23 +52,29 @@ class RitzVectors:
         self._x, self._y = M.createVecs()
         A = K.copy()
         A.axpy(shift, M, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        self.V: Array = self._spanned(system, M, DirectSolver(A))
-        self.tip: Array = self._at_tip(system)
+        self.V: Array
         self.massed: Array
+        self.V, self.massed = self._spanned(system, M, DirectSolver(A))
+        self.tip: Array = self._at_tip(system)
         self.stiffness: Array
         self.squares: Array
-        self._turn_by(K, self._all_times(M))
+        self.turn_to(K)
         self.made = self.squares
 
-    def turn_to(self, M: Any, K: Any) -> None:
-        """Combine the columns so that those of another M and K near by are diagonal."""
-        self._turn_by(K, self._all_times(M))
+    def turn_to(self, K: Any) -> None:
+        """Combine the columns so that another K near by is diagonal, with the mass that they have."""
+        stiffness = self.product(K)
+        self.squares, turn = np.linalg.eigh(_symmetric(stiffness))
+        self._combine(stiffness, turn, self.massed)
 
     def turned_to(self, M: Any, K: Any, shift: float) -> RitzVectors:
         """Return combinations of the columns with which another M and K near by are diagonal."""
         out = copy(self)
         out.shift, (out._x, out._y) = shift, M.createVecs()
-        out.turn_to(M, K)
+        massed = out._all_times(M)
+        stiffness, mass = out.sum(np.array([out.V.T @ out._all_times(K), out.V.T @ massed]))
+        out.squares, turn = scipy.linalg.eigh(_symmetric(stiffness), _symmetric(mass))
+        out._combine(stiffness, turn, massed)
         return out
 
     def sum(self, local: Array) -> Array:
@@ -94,35 +100,32 @@ class RitzVectors:
             out[:, i] = y
         return out
 
-    def _turn_by(self, K: Any, massed: Array) -> None:
-        """Combine the columns, of which M V is given, so that M and K are diagonal."""
-        stiffness, mass = self.sum(np.array([self.V.T @ self._all_times(K), self.V.T @ massed]))
-        self.squares, turn = scipy.linalg.eigh(_symmetric(stiffness), _symmetric(mass))
+    def _combine(self, stiffness: Array, turn: Array, massed: Array) -> None:
+        """Combine the columns, of which Vᵀ K V and M V are given."""
         self.stiffness = turn.T @ stiffness @ turn
         self.V, self.massed, self.tip = self.V @ turn, massed @ turn, self.tip @ turn
 
-    def _spanned(self, system: Any, M: Any, solver: DirectSolver) -> Array:
-        """Return the columns before they are combined."""
+    def _spanned(self, system: Any, M: Any, solver: DirectSolver) -> tuple[Array, Array]:
+        """Return the columns before they are combined, orthonormal with M, and M times them."""
         moves = [i for i, name in enumerate(system.structure.unknowns) if name.startswith("u")]
         V, massed = np.empty((2, ALONG + ACROSS * len(moves), self._x.getLocalSize()))
-        r = 0
-        for i in moves:
-            b = self._force(system, i)
-            for _ in range(ALONG if i == 0 else ACROSS):
-                x = self._solved(solver, b, system.clamped)
-                Mx = self.times(M, x)
-                size = float(self.sum(np.array(x @ Mx)))
-                if not size > 0.0:
-                    break
+        forces, r = {i: self._force(system, i) for i in moves}, 0
+        for step in range(ACROSS):
+            block = [i for i in forces if i > 0 or step < ALONG]
+            X = np.array([self._solved(solver, forces[i], system.clamped) for i in block])
+            MX = np.array([self.times(M, x) for x in X])
+            sizes = self.sum(np.einsum("ij,ij->i", X, MX))
+            forces = {}
+            for i, x, Mx, size in zip(block, X, MX, sizes, strict=True):
                 for _ in range(2):
-                    x -= self.sum(massed[:r] @ x) @ V[:r]
-                Mx = self.times(M, x)
+                    other = self.sum(massed[:r] @ x)
+                    x, Mx = x - other @ V[:r], Mx - other @ massed[:r]
                 left = float(self.sum(np.array(x @ Mx)))
                 if not left > DEPENDENT**2 * size:  # nothing is left of it without the others
-                    break
+                    continue
                 V[r], massed[r] = x / np.sqrt(left), Mx / np.sqrt(left)
-                b, r = massed[r], r + 1
-        return np.ascontiguousarray(V[:r].T)
+                forces[i], r = massed[r], r + 1
+        return np.ascontiguousarray(V[:r].T), np.ascontiguousarray(massed[:r].T)
 
     def _at_tip(self, system: Any) -> Array:
         """Return the displacement of the tip of every column, (d, r)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -77,19 +78,25 @@ class ShapeError:
         Args:
             q: local dof array of a state, which says where the structure lies; None: undeformed.
         """
-        V, structure = self.system.V, self.system.structure
-        x = V.tabulate_dof_coordinates()
-        place = np.zeros((len(x), sum(name.startswith("u") for name in structure.components)))
-        place[:, : V.mesh.geometry.dim] = x[:, : V.mesh.geometry.dim]
+        place = self._places
         if q is not None:
-            place += self._oriented(q.reshape(-1, self._size, 1))[:, : place.shape[1], 0]
+            place = place + self._oriented(q.reshape(-1, self._size, 1))[:, : place.shape[1], 0]
         gradients = self.estimate.coefficients(place[None])[0, :, 0]
-        nodes: Array = np.zeros((len(x), *gradients.shape[1:]))
+        nodes: Array = np.zeros((len(place), *gradients.shape[1:]))
         np.add.at(nodes, self.estimate.cells, gradients[:, None])
-        owned = nodes[: V.dofmap.index_map.size_local]
+        owned = nodes[: self.system.V.dofmap.index_map.size_local]
         if owned.shape[2] == 1:
             return np.asarray(owned / np.linalg.norm(owned, axis=1, keepdims=True))
         return np.asarray(np.linalg.qr(owned)[0])
+
+    @cached_property
+    def _places(self) -> Array:
+        """Where the nodes are, m, in as many components as displacements have, shape (n, components)."""
+        V, names = self.system.V, self.system.structure.components
+        x, dim = V.tabulate_dof_coordinates(), V.mesh.geometry.dim
+        out: Array = np.zeros((len(x), sum(name.startswith("u") for name in names)))
+        out[:, :dim] = x[:, :dim]
+        return out
 
     def _oriented(self, values: Array) -> Array:
         """Return all components along the undeformed structure of nodal values (n, unknowns of a node, r)."""

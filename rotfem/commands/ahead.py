@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.error_estimate import WORDS
 from rotfem.analysis.reduced.manifold import Manifold
 from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.reduced.struck import struck
@@ -226,8 +227,8 @@ def put(error: dict[str, Any], name: str, found: float) -> None:
     """Write another estimate of a part of an error into it, and into the sum; one that is unknown stays so if zero."""
     if error[name] is None and found == 0.0:
         return
-    error["total"] = (error["total"] or 0.0) + found - part(error, name)
     error[name] = found
+    error["total"] = sum(part(error, share) for share in WORDS)
 
 
 def compare(

@@ -1,0 +1,60 @@
+"""States that a motion has passed, kept until they are looked at together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.analysis.schemes import State
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass
+class Samples:
+    """States of a motion, and the steps between them.
+
+    Attributes:
+        states: t (s), q, v, a (local dof arrays), and what rotations are counted from.
+        steps: numbers of the states that a step starts and ends with.
+        pieces: numbers of the states with which what drives the motion starts afresh.
+    """
+
+    states: list[tuple[float, Array, Array, Array, Any]]
+    steps: list[tuple[int, int]]
+    pieces: list[int]
+
+    @cached_property
+    def displacements(self) -> Array:
+        """Displacements of the states, local dof arrays (n, unknowns)."""
+        return np.array([state[1] for state in self.states])
+
+    def forget(self) -> None:
+        """Let go of the states; steps and pieces stay."""
+        self.states.clear()
+        vars(self).pop("displacements", None)
+
+    @property
+    def middle(self) -> tuple[int, float]:
+        """Number of the state in the middle, and the length of the step to it, s."""
+        t = [self.states[end][0] for _, end in self.steps]
+        begin, end = self.steps[int(np.searchsorted(t, 0.5 * (t[0] + t[-1])))]
+        return end, self.states[end][0] - self.states[begin][0]
+
+    def state(self, number: int) -> State:
+        """Return the state of a number."""
+        t, q, v, a, datum = self.states[number]
+        return State(t, q, v, a, datum=datum)
+
+    def smooth(self, number: int, most: int) -> bool:
+        """Return whether so many states on either side of one are there and smooth with it."""
+        own = int(np.searchsorted(self.pieces, number, side="right")) - 1
+        first, last = self.pieces[own], [*self.pieces, len(self.states)][own + 1] - 1
+        if number - most < first or number + most > last:
+            return False
+        found = self.states[number - most : number + most + 1]
+        return all(state[4] is found[0][4] for state in found)
