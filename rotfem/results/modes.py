@@ -34,7 +34,7 @@ class ModesResult(Result):
         rows: one dictionary a mode: `mode`, `label`, `frequency` (rad/s), `frequency_hz`, `damping` (ratio), `growth`
             (1/s), `stability`, `share_…` (of the kinetic energy), `residual` (backward error),
             `error_bound` (how far round-off can have moved the eigenvalue, relative to its size),
-            `mesh_error` (how far the mesh can have put the frequency off, relative, as its shape tells).
+            `mesh_error` (how far the mesh is estimated to have put the frequency off, relative).
         shapes: title ↦ columns along the structure: `x` (m), of a plate `y`, each component and its imaginary part,
             largest entry 1.
         sensitivities: one dictionary a mode and parameter: `mode`, `parameter`, `value`, `dfrequency` (rad/s per unit),

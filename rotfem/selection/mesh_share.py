@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.mesh_estimate import SAFE
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.refined_mesh import MOST, RefinedMesh
 from rotfem.analysis.ritz_vectors import RitzVectors
-from rotfem.analysis.shape_error import LIKELY, ShapeError
+from rotfem.analysis.shape_error import ShapeError
 from rotfem.equations.finer import FinerEquations
 from rotfem.errors import ComputationError
 from rotfem.numerics.eigenproblem import Pencil
@@ -85,7 +84,7 @@ def error_of_modes(trial: Trial, own: Candidate) -> float:
             return max(modes_change(here, there) for here, there in found)
     analysis = ModalAnalysis(system.model.problem, trial.case.about, trial.case.newton(), trial.comm, system)
     told = [analysis.mesh_errors(analysis.at(speed, count))[:count] for speed in trial.speeds]
-    return LIKELY / SAFE * max(map(max, told))
+    return max(map(max, told))
 
 
 def halved(mesh: Any) -> Any:
