@@ -130,12 +130,12 @@ def missed(scene: Scene, done: Result, why: str = "", advice: str | None = None)
         why: what ends the message, on attempts that would have been better.
         advice: what to try; None for what the largest part of the error calls for.
     """
-    error, chosen = done.summary["error"], done.summary["accuracy"]["chosen"]
+    error = done.summary["error"]
     worst = max(WORDS, key=lambda name: part(error, name))
     by_worst = {
         "time": "a looser accuracy, or fixed steps without one",
         "space": "a looser accuracy" + (", or a finer mesh file" if scene.structure.mesh_file is not None else ""),
-        "model": f"a looser accuracy, or a richer model.theory than {chosen['theory']}",
+        "model": f"a looser accuracy, or a richer model.theory than {scene.model.theory}",
         "round_off": "a looser accuracy, or a section of less different stiffnesses",
     }[worst]
     if error["total"] is None:

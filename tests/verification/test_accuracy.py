@@ -99,7 +99,7 @@ def test_two_runs_say_what_their_steps_do() -> None:
 def test_a_mesh_too_coarse_for_a_blow_is_seen() -> None:
     """Eight milliseconds strike modes up to the eighth: what their frequencies are off by moves the tip in the end.
 
-    On six elements a reduced answer is told to be as far off as they put it, by the run and among answers to an accuracy.
+    On six elements a reduced answer is told to be as far off as they put it, by the run and as it answers an accuracy.
     """
     steel = {"E": 2.1e11, "nu": 0.3, "rho": 7800.0, "shape": "rectangle", "width": 0.04, "height": 0.012}
     struck = {
