@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+from petsc4py import PETSc
 
 from rotfem.equations.modal_damping import EFFECT as DAMPING
 from rotfem.equations.model import Model
@@ -34,20 +35,21 @@ class AtClamp:
         self._work = compat.create_vector(self._V)
         fixed = np.zeros((len(root.weights), 1), dtype=bool)
         fixed[clamped] = True
-        self._motions = self._vectors(np.where(fixed, root.weights, 0.0))
-        self._turns = self._vectors(np.where(fixed, 0.0, root.weights))  # of its hinges
+        self._motions = self._moved(np.where(fixed, root.weights, 0.0))
+        self._turns = self._moved(np.where(fixed, 0.0, root.weights))  # of its hinges
         by_mass = model.mechanics.damping.mass is not None
-        self._others = self._vectors(np.where(fixed, 0.0, root.carried())) if by_mass else []
+        self._others = self._moved(np.where(fixed, 0.0, root.carried())) if by_mass else None
 
-    def _vectors(self, columns: Array) -> list[Any]:
-        out = [compat.create_vector(self._V) for _ in columns.T]
-        for vector, column in zip(out, columns.T, strict=True):
-            vector.array[:] = column
-        return out
+    def _moved(self, columns: Array) -> tuple[Any, Array]:
+        """Return the rows that motions (owned rows, a column each) move, global numbers, and what these are there."""
+        rows = np.flatnonzero(np.any(columns != 0.0, axis=1))
+        first = self._work.getOwnershipRange()[0]
+        return PETSc.IS().createGeneral((first + rows).astype(PETSc.IntType), comm=self._work.comm), columns[rows]
 
     def of_vector(self, b: Any) -> Array:
         """Return one number for each motion."""
-        return np.array([b.array @ motion.array for motion in self._motions])
+        rows, motions = self._motions
+        return np.asarray(b.array[rows.getIndices() - b.getOwnershipRange()[0]] @ motions)
 
     def of_matrix(self, A: Any, of: Collection[str]) -> Array:
         """Return a row for each owned unknown.
@@ -58,15 +60,19 @@ class AtClamp:
         """
         if any(self._model.acting[n].at_root for n in of if n in self._model.acting):
             return -self._times(A, self._turns)
-        if DAMPING in of and self._others:  # the hub takes up what strains do not (see `hub_damping`)
+        if DAMPING in of and self._others is not None:  # the hub takes up what strains do not (see `hub_damping`)
             return -self._times(A, self._others)
         return self._times(A, self._motions)
 
-    def _times(self, A: Any, motions: list[Any]) -> Array:
-        """Return Aᵀ times motions, owned rows."""
-        out = np.zeros((len(self._work.array), len(motions)))
-        for column, motion in zip(out.T, motions, strict=True):
-            A.multTranspose(motion, self._work)
+    def _times(self, A: Any, moved: tuple[Any, Array]) -> Array:
+        """Return Aᵀ times motions, owned rows; only the rows of A that they move are multiplied."""
+        rows, motions = moved
+        there = A.createSubMatrix(rows)
+        motion = there.createVecs()[1]
+        out = np.zeros((len(self._work.array), motions.shape[1]))
+        for column, values in zip(out.T, motions.T, strict=True):
+            motion.array[:] = values
+            there.multTranspose(motion, self._work)
             column[:] = self._work.array
         return out
 
