@@ -115,7 +115,7 @@ def told(scene: Scene, settings: Settings, error: dict[str, Any], tried: list[di
         "of": scene.accuracy_of or ("tip" if "time" in error else "frequencies"),
         "met": is_met(scene, error),
         "estimated": error["total"],
-        "allowed": shares(error, accuracy),
+        "allowed": shares(error, accuracy, settings.plate),
         "chosen": settings.summary(),
         "attempts": tried,
     }

@@ -147,7 +147,7 @@ class Ahead:
         error["space"] = max(part(error, "space"), off)
         # what is known by a poor model only may be less demanding than the motion is
         trusted = self.own is not None or self.off < POOR
-        allowed = shares(error, self.accuracy)["time"]
+        allowed = shares(error, self.accuracy, settings.plate)["time"]
         return self.stepped(settings, allowed if trusted or self._dear(allowed) else DOUBTED * allowed)
 
     def _dear(self, allowed: float) -> bool:
@@ -163,7 +163,7 @@ class Ahead:
             settings: to follow.
             error: of the result before them.
         """
-        is_coarse = part(error, "space") > shares(error, self.accuracy)["space"]
+        is_coarse = part(error, "space") > shares(error, self.accuracy, settings.plate)["space"]
         return self._grown(settings, error)[0] if is_coarse and settings.models[0].get("reduced") else settings
 
     def effects(self, error: Mapping[str, Any]) -> Any:
@@ -175,7 +175,7 @@ class Ahead:
         """Return settings with elements as the motion needs them, and the relative error that these leave."""
         if self.mesh is None or settings.elements is None:
             return settings, 0.0
-        allowed = AIM * shares({**error, "space": 1.0}, self.accuracy)["space"]
+        allowed = AIM * shares({**error, "space": 1.0}, self.accuracy, settings.plate)["space"]
         growth, off = self.mesh.growth(self.motions, allowed)
         growth = max(growth, (part(error, "space") / allowed) ** (0.5 / self.mesh.degree)) if growth < 1.0 else growth
         grown: Elements = finer(self.mesh.elements, growth)
@@ -185,7 +185,7 @@ class Ahead:
 
     def looser(self, settings: Settings, factor: float) -> Settings:
         """Return settings with the steps of an accuracy that is so many times looser, if the motion is known."""
-        return self.stepped(settings, factor * shares({"time": 1.0}, self.accuracy)["time"])
+        return self.stepped(settings, factor * shares({"time": 1.0}, self.accuracy, settings.plate)["time"])
 
     def stepped(self, settings: Settings, allowed: float) -> Settings:
         """Return settings with the steps of an error that is allowed."""

@@ -23,8 +23,9 @@ from rotfem.analysis.schemes import Scheme
 #: Part of an accuracy that estimates may use up: they are estimates.
 SAFETY = 0.8
 
-#: Parts of that for steps, mesh and model, where all three have an error.
+#: Parts of that for steps, mesh and model, where all three have an error; of plates, whose meshes cost most.
 SHARES = {"time": 0.5, "space": 0.2, "model": 0.3}
+OF_PLATES = {"time": 0.25, "space": 0.45, "model": 0.3}
 
 #: Least and most that a number of elements grows by at once, and to what a tolerance and a step shrink at most.
 FINER, TIGHTER, SHORTER = (1.25, 4.0), 1e-3, 1 / 16
@@ -59,6 +60,11 @@ class Settings:
     step: float | None = None
     tolerance: float | None = None
     increment: float | None = None
+
+    @property
+    def plate(self) -> bool:
+        """Whether they are those of a plate with elements along two edges."""
+        return isinstance(self.elements, tuple)
 
     @property
     def moving(self) -> bool:
@@ -107,7 +113,7 @@ class Settings:
         Returns:
             None where nothing that can be chosen makes the error smaller.
         """
-        allowed = shares(error, accuracy)
+        allowed = shares(error, accuracy, self.plate)
         new = self
         spared = SPARED * SAFETY * accuracy if self.models[0].get("reduced") else 0.0
         if part(error, "model") > max(allowed["model"], spared):
@@ -116,7 +122,7 @@ class Settings:
                 return None
             new = richer or self
             error = error if richer is None else {**error, "model": 0.0}
-            allowed = shares(error, accuracy)
+            allowed = shares(error, accuracy, self.plate)
         if part(error, "time") > allowed["time"]:
             factor = AIM * allowed["time"] / part(error, "time")
             if self.step is not None and self.scheme is not None:
@@ -138,16 +144,18 @@ def part(error: Mapping[str, Any], name: str) -> float:
     return 0.0 if value is None else float(value)
 
 
-def shares(error: Mapping[str, Any], accuracy: float) -> dict[str, float]:
+def shares(error: Mapping[str, Any], accuracy: float, plate: bool = False) -> dict[str, float]:
     """Return what each part of an error may be: what a part does not need is the others'.
 
     Args:
         error: relative errors by part; those a result does not have are missing or None.
         accuracy: what all may be together.
+        plate: whether the structure is one.
     """
-    left, wanting = SAFETY * accuracy, dict(SHARES)
+    fair_shares = OF_PLATES if plate else SHARES
+    left, wanting = SAFETY * accuracy, dict(fair_shares)
     out = {}
-    for name in sorted(SHARES, key=lambda name: part(error, name) / SHARES[name]):
+    for name in sorted(fair_shares, key=lambda name: part(error, name) / fair_shares[name]):
         fair = left * wanting[name] / sum(wanting.values())
         out[name] = fair if part(error, name) > AIM * fair or len(wanting) == 1 else part(error, name)
         left -= out[name]
