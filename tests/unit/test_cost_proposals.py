@@ -16,7 +16,7 @@ from rotfem.commands.cost.record import Measurement
 from rotfem.commands.cost.reference import Samples
 from rotfem.commands.cost.refinement import Plan
 from rotfem.commands.cost.settings import Setting
-from rotfem.commands.cost.summary import closest
+from rotfem.commands.cost.summary import closest, missing
 from rotfem.errors import SceneError
 
 END = 10.0
@@ -94,6 +94,17 @@ def test_nothing_is_proposed_where_what_is_uncertain_has_no_bound() -> None:
     """After one level of a reference, for want of time, no error is known."""
     assert knowledge(STEPS, uncertainty=np.inf).best(np.inf) is None
     assert closest([row_of(s) | {"total_error": 1e-3} for s in STEPS], 1e-4, np.inf) is None
+
+
+def test_the_closest_is_one_that_may_be_recommended() -> None:
+    """A level of a reference by a theory that is not asked for is more exact, and none of the answers."""
+    rows = [row_of(s) | {"total_error": 1e-3} for s in STEPS]
+    rows.append(row_of(STEPS[0]) | {"total_error": 1e-9, "candidate": False})
+    found = closest(rows, 1e-4, 1e-8)
+    assert found is not None
+    assert found["within"] == pytest.approx(1e-3, rel=0.11)
+    assert found["row"]["candidate"]
+    assert "the best error is 1.0e-03" in missing(rows, 1e-4, 1e-8, [])
 
 
 def test_listed_meshes_and_steps_are_not_departed_from() -> None:

@@ -95,7 +95,7 @@ def closest(rows: list[Row], accuracy: float, uncertainty: float) -> dict[str, A
 
     None where nothing could be judged.
     """
-    errors = [error for error in map(judged, rows) if error is not None]
+    errors = _errors(rows)
     if not errors or not isfinite(uncertainty):
         return None
     within = float(f"{NEAR * max(min(errors) + uncertainty, accuracy):.1e}")
@@ -104,7 +104,7 @@ def closest(rows: list[Row], accuracy: float, uncertainty: float) -> dict[str, A
 
 def missing(rows: list[Row], accuracy: float, uncertainty: float, refused: list[dict[str, Any]]) -> str:
     """Return what it takes to recommend a setting where there is none."""
-    errors = [error for error in map(judged, rows) if error is not None]
+    errors = _errors(rows)
     known = errors and isfinite(uncertainty)
     said = f"the best error is {min(errors):.1e}, known to {uncertainty:.0e}" if known else "nothing could be judged"
     wanted = [entry for entry in refused if entry["time"] is not None]
@@ -114,6 +114,11 @@ def missing(rows: list[Row], accuracy: float, uncertainty: float, refused: list[
     elif refused:
         said += f"; {describe(refused[0]['setting'])} {refused[0]['why']}"
     return said
+
+
+def _errors(rows: list[Row]) -> list[float]:
+    """Return the errors of all settings that may be recommended, as far as they are known."""
+    return [error for error in (judged(row) for row in rows if row["candidate"]) if error is not None]
 
 
 def _warnings(study: Study, rows: list[Row], accuracy: float, uncertainty: float) -> list[str]:
