@@ -5,7 +5,7 @@ And what the stiff strains have of third order in displacements, which the force
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import ufl
@@ -50,18 +50,40 @@ def third_order_work(model: Model, displacements: Sequence[Any], test: Any) -> A
         displacements: a, b, c, d and e, functions of the unknowns.
         test: δq.
     """
+    first, second = displacements[:3], displacements[3:]
+    return _work_of(model, test, lambda strain, at: _along(strain, at, *first) + _along(strain, at, *second))
+
+
+def fourth_order_work(model: Model, displacements: Sequence[Any], test: Any) -> Any:
+    """Return ∫ N(δq)·Γ₄, a UFL form: what is of fourth order in x of the exact strains Γ[x + y + z] at rest.
+
+    Args:
+        model: of a linear theory, whose forces N are.
+        displacements: x, and y and z that are of second and third order in it, functions of the unknowns.
+        test: δq.
+    """
+    x, y, z = displacements
+
+    def fourth(strain: Any, at: Any) -> Any:
+        mixed = _along(strain, at, x, x, y) / 2 + _along(strain, at, y, y) / 2 + _along(strain, at, x, z)
+        return _along(strain, at, x, x, x, x) / 24 + mixed
+
+    return _work_of(model, test, fourth)
+
+
+def _along(strain: Any, q: Any, *directions: Any) -> Any:
+    for direction in directions:
+        strain = ufl.derivative(strain, q, direction)
+    return strain
+
+
+def _work_of(model: Model, test: Any, change: Callable[[Any, Any], Any]) -> Any:
+    """Return the work of N(δq) of membrane and shear in a change at rest of their exact strains, (Γ, q) ↦ change."""
     s, out = model.structure, 0
     q, exact = s.k.functions[0], {strain.name: strain.value for strain in model.strains(richest().measures(s.type))}
-    first, second = displacements[:3], displacements[3:]
     for strain in model.mechanics.strains:
         if strain.name not in {*s.stiff, *s.prestressing}:
             continue
-        change = 0
-        for directions in (first, second):
-            part = exact[strain.name]
-            for direction in directions:
-                part = ufl.derivative(part, q, direction)
-            change += part
         force = strain.force(ufl.replace(strain.value, {q: test}))
-        out += ufl.inner(force, forms.without(change, q)) * strain.measure
+        out += ufl.inner(force, forms.without(change(exact[strain.name], q), q)) * strain.measure
     return out

@@ -178,7 +178,10 @@ def test_the_basis_is_checked(spin_up: MakeScene, monkeypatch: pytest.MonkeyPatc
 
 
 def test_foreshortening_brings_the_spin_up_near_reissner(spin_up: MakeScene) -> None:
-    """From 3.3e-2 to 1.1e-3 of the largest displacement, and the estimate of what is left is not less than that."""
+    """From 3.3e-2 to 3.1e-5 of the largest displacement, and the estimate of what is left is not less than that.
+
+    In the second order alone it is 1.1e-3. The steps of the exact theory leave 6e-5.
+    """
     time = {"end": 20.0, "step": 0.01, "output_every": 10}
     changes: dict[str, Any] = {"model.theory": "consistent_linear", "model.reduced": True, "model.foreshortening": True}
     exact, scene = run(spin_up(time=time)), spin_up(changes, time=time)
@@ -189,11 +192,28 @@ def test_foreshortening_brings_the_spin_up_near_reissner(spin_up: MakeScene) -> 
         return float(np.linalg.norm(u[0] - u[1], axis=0).max() / np.linalg.norm(u[1], axis=0).max())
 
     assert off(linear) == pytest.approx(3.3e-2, rel=0.02)
-    assert off(given) < 1.2e-3
-    assert off(given) < given.summary["theory_error"]["estimate"] < 3.5 * off(given)
+    assert off(given) < 1.2e-4
+    assert off(given) < given.summary["theory_error"]["estimate"] < 10 * off(given)
     assert given.shape["u1"][-1] == pytest.approx(given.history["tip_u1"][-1], rel=1e-12)  # summed in another order
     with pytest.raises(SceneError, match="model.foreshortening = true: needs reduced = true"):
         scene.replace({"model.reduced": None})
+
+
+def test_a_blow_at_speed_is_followed_to_the_third_order(spin_up: MakeScene) -> None:
+    """A tip that moves by 14 % of the length, at 4 rad/s: what is left is 5e-4, of fifth order, and told as 4e-3.
+
+    In the second order alone it is 6e-3; without what the centrifugal force does in displacements of fourth order 2e-2.
+    """
+    table = [[0.0, 0.0, 0.0], [0.5, 0.0, 30.0], [1.0, 0.0, -30.0], [1.5, 0.0, 0.0], [4.0, 0.0, 0.0]]
+    loads, time = {"tip_force": {"kind": "dead", "table": table}}, {"end": 4.0, "step": 0.01}
+    changes: dict[str, Any] = {"motion": {"type": "constant", "speed": 4.0}, "loads": loads, "mesh.elements": 8}
+    model = {"model.theory": "consistent_linear", "model.reduced": 1e-4, "model.foreshortening": True}
+    exact = run(spin_up(changes, time={**time, "step": 0.0025, "output_every": 4, "scheme": "esdirk4"}))
+    given = run(spin_up(changes | model, time=time))
+    u = [np.stack([x.history["tip_u1"], x.history["tip_u2"]]) for x in (given, exact)]
+    off = float(np.linalg.norm(u[0] - u[1], axis=0).max() / np.linalg.norm(u[1], axis=0).max())
+    assert off < 1.5e-3
+    assert off / 2 < given.summary["theory_error"]["estimate"] < 15 * off
 
 
 def test_effects_are_as_large_as_the_full_models_say(spin_up: MakeScene) -> None:

@@ -103,7 +103,7 @@ def collocate(
         forces: f at the nodes of all steps, (n, nodes, m), in the place of that of the operators.
     """
     out = _Course(ends, q, v)
-    for part, t, h in _batches(nodes, ends):
+    for part, t, h in batches(nodes, ends):
         M, C, K, f = operators(t.ravel())
         left, right = _equations((M, C, K, f if forces is None else forces[part]), h, len(q))
         answers: Array = _solved(left, right).reshape(len(h), len(NODES), len(q), -1)
@@ -126,7 +126,7 @@ def answered(
         lacking: of the solution, forces in the place of f.
     """
     solution, answers, rest, m = _Course(ends, q, v), list[_Course](), np.zeros(len(q)), len(q)
-    for part, t, h in _batches(nodes, ends):
+    for part, t, h in batches(nodes, ends):
         left, right = _equations(operators(t.ravel()), h, m)
         own: Array = _solved(left, right).reshape(len(h), len(NODES), m, -1)
         by_start = own[..., :-1]
@@ -167,7 +167,7 @@ class _Course:
         self.steps.a[part] = np.einsum("nsij,nj->nsi", by_start, x[part]) + alone
 
 
-def _batches(nodes: Callable[..., Array], ends: Array) -> Iterator[tuple[slice, Array, Array]]:
+def batches(nodes: Callable[..., Array], ends: Array) -> Iterator[tuple[slice, Array, Array]]:
     """Give the steps of each batch, the times of their nodes (n, nodes) and their lengths (n,), s."""
     for first in range(0, len(ends) - 1, BATCH):
         part = slice(first, min(first + BATCH, len(ends) - 1))

@@ -41,7 +41,8 @@ def effect_sizes(
     system = response.solution.drive.whole
     wanted = system.model.effects if effects is None else effects
     known = response.solution.hub is None and response.solution.parts == 1  # what is compared has the same steps
-    whole = manifold.tip(response.q + manifold.own[1][-1]) if known else _tips(response, manifold)
+    # own answers are of forces without and with third order, and maybe of a further round, which is not compared
+    whole = manifold.tip(response.q + manifold.own[1][1]) if known else _tips(response, manifold)
     size = largest(model, whole)
     if largest(model, whole - response.tips) > MOST * largest(model, response.tips):
         raise ComputationError("the answer to second-order forces is as large as the motion")

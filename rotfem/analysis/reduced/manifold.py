@@ -24,6 +24,8 @@ import ufl
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 
+from rotfem.analysis.reduced.collocation import Lacking
+from rotfem.analysis.reduced.fourth_order import FourthOrder
 from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.reduced.solution import Solution, Trajectory
 from rotfem.analysis.reduced.stretch import ringing, stretched
@@ -38,6 +40,9 @@ Array = npt.NDArray[np.float64]
 #: Amplitude of a shape, relative to the largest, from which its foreshortening matters, and most shapes.
 MATTERS, MOST = 2e-3, 6
 
+#: Rounds in which forces of third order are balanced where all of them are known.
+ROUNDS = 2
+
 
 class Manifold:
     """The second-order displacements of a response, and the forces of their inertia.
@@ -51,6 +56,7 @@ class Manifold:
         pairs: numbers (i, j) of these, i ≤ j.
         Theta: answers to the pairs, local dof arrays (n, p).
         third: displacements of third order, or None.
+        fourth: the work of loads in those of fourth order, or None.
     """
 
     def __init__(self, response: Response, third: bool = False):
@@ -65,9 +71,12 @@ class Manifold:
         self.tips = tips_of(self.model, self.Theta)
         self._project()
         self.third: ThirdOrder | None = None
+        self.fourth: FourthOrder | None = None
         if third and expands(self.model):
             seconds = {p: f * x for p, f, x in zip(self.pairs, self._factor, self.Theta.T, strict=True)}
             self.third = ThirdOrder(self.model, self.shapes, seconds)
+            if response.solution.hub is None:
+                self.fourth = FourthOrder(self.model, self.shapes, self._displaced)
 
     def _answers(self) -> Array:
         """Return Θ of all pairs, one solution each."""
@@ -103,6 +112,12 @@ class Manifold:
             m, p = model.size, len(self.pairs)
             self._pieces[kind] = (numbers, second.reshape(-1, m + p, p), first.reshape(-1, p, m))
 
+    def _displaced(self, y: Array) -> tuple[Array, Array, Array]:
+        """Return displacements of first, second and third order (local dof arrays) of coordinates of shapes (r,)."""
+        assert self.third is not None
+        q = (self.shapes @ y)[None, :]
+        return self.model.V @ q[0], self.Theta @ self.second(q).s[0], self.third.Xi @ self.third.products(q)[0]
+
     # --- motion on the manifold --------------------------------------------------------------------------------------
 
     def second(self, q: Array, v: Array | None = None, a: Array | None = None) -> Motion:
@@ -115,10 +130,10 @@ class Manifold:
             c * x[:, i] * x[:, j], rate, c * (ddx[:, i] * x[:, j] + 2 * dx[:, i] * dx[:, j] + x[:, i] * ddx[:, j])
         )
 
-    def tip(self, q: Array) -> Array:
+    def tip(self, q: Array, third: bool = True) -> Array:
         """Return the unknowns at the tip of coordinates (n, m), foreshortening with them, (n, components)."""
         out = q @ tips_of(self.model).T + self.second(q).s @ self.tips.T
-        return out if self.third is None else out + self.third.products(q) @ self.third.tips.T
+        return out if self.third is None or not third else out + self.third.products(q) @ self.third.tips.T
 
     def shape(self, q: Array) -> Array:
         """Return the displacement (local dof array) of coordinates (m,)."""
@@ -168,20 +183,29 @@ class Manifold:
             orders: `third` of `forces`, of each answer.
         """
         start = self.response.q[0], self.response.v[0]
+        return solution.answered(self.model, *start, self._lacking(solution, orders))
 
+    def _lacking(self, solution: Solution, orders: Sequence[bool]) -> Lacking:
         def lacking(t: Array, q: Array, v: Array, a: Array) -> list[Array]:
             c = solution.drive.factors(t)
-            return [self.forces(c, q, v, a, third) for third in orders]
+            return [self._all_forces(c, q, v, a, third) for third in orders]
 
-        return solution.answered(self.model, *start, lacking)
+        return lacking
+
+    def _all_forces(self, c: Array, q: Array, v: Array, a: Array, third: bool) -> Array:
+        """Return the `forces`, with all of third order where these are known, (n, m)."""
+        found = self.forces(c, q, v, a, third)
+        if third and self.third is not None and self.fourth is not None:
+            found += self.third.forces(c, q, v, a) + self.fourth.forces(c, q)
+        return found
 
     @cached_property
     def own(self) -> tuple[Trajectory, list[Array]]:
-        """The `corrections` of the response itself, without and with forces of third order.
-
-        With a free hub whose structure has displacements of third order, those of two rounds of Newton's method.
-        """
-        hub, path = self.response.solution.hub, self.response.trajectory
+        """The `corrections` of the response without and with forces of third order; a round more if all are known."""
+        response, hub, path = self.response, self.response.solution.hub, self.response.trajectory
+        if self.fourth is not None:
+            lacking = self._lacking(response.solution, (False, True))
+            return response.solution.rounds(self.model, (response.q[0], response.v[0]), lacking, ROUNDS)
         if hub is None:
             return self.corrections(self.response.solution, (False, True))
         if self.third is not None:
@@ -221,18 +245,23 @@ class Manifold:
 def recover(response: Response) -> Foreshortened:
     """Return a response with its foreshortening and the answer to the forces of second order.
 
-    The forces of third order, which cubic terms of the strains oppose, move it by what is taken as the error left; with
-    these terms it is what a further round of Newton's method moves it by. To it comes what the stretch may do that
-    linear theories take for none.
+    The forces of third order, which cubic terms of the strains oppose, move it by what is taken as the error left. With
+    these terms they belong to the answer; the error is what a further round moves it by, and what orders beyond do that
+    fall as those that are known. To it comes what the stretch may do that linear theories take for none.
     """
-    solution = response.solution
-    manifold = Manifold(response, third=solution.hub is not None)
-    path, (second, further) = manifold.own
-    tips = manifold.tip(response.q + second)
-    size = largest(response.model, tips)
-    off = largest(response.model, manifold.tip(response.q + further) - tips) / size if size > 0.0 else 0.0
-    by_stretch, by_ringing = (more / size if size else 0.0 for more in (stretched(response), ringing(response, path)))
-    return Foreshortened(response, manifold, response.q + second, off + by_stretch + by_ringing, by_stretch)
+    # a start that is displaced is one of a linear theory, which third order would displace further
+    manifold = Manifold(response, third=response.solution.hub is not None or not np.any(response.q[0]))
+    path, answers = manifold.own
+    kept = answers[0] if manifold.fourth is None else answers[-1]
+    *_, before, last = (manifold.tip(response.q + answer) for answer in answers)
+    size = largest(response.model, before)
+    parts = [largest(response.model, last - before), stretched(response), ringing(response, path)]
+    if manifold.fourth is not None:
+        second = manifold.tip(response.q + answers[0], third=False)
+        orders = [largest(response.model, x) for x in (second - response.tips, last - second)]
+        parts.append(orders[1] * min(1.0, orders[1] / max(orders[0], 1e-300)))
+    off, by_stretch = (x / size if size > 0.0 else 0.0 for x in (sum(parts), parts[1]))
+    return Foreshortened(response, manifold, response.q + kept, off, by_stretch)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.reduced.collocation import Lacking, Operators, answered, collocate
+from rotfem.analysis.reduced.collocation import NODES, Lacking, Operators, answered, batches, collocate
 from rotfem.analysis.reduced.drive import Drive
 from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.analysis.reduced.propagator import Propagator, cubics
@@ -150,6 +150,30 @@ class Solution:
         if not all(np.all(np.isfinite(x)) for x in (path.q, *found)):
             raise ComputationError("the solution of the reduced model is not finite")
         return path, found
+
+    def rounds(
+        self, model: ReducedModel, start: tuple[Array, Array], lacking: Lacking, number: int
+    ) -> tuple[Trajectory, list[Array]]:
+        """Return the history by collocation, and in its rows (n, m) the answers to forces, of more rounds of the last.
+
+        Forces are those of the history in the first round, and with the last answer so far in all others.
+
+        Args:
+            model: the reduced model.
+            start: coordinates and rates at the start, (m,).
+            lacking: see `answered`.
+            number: how many rounds.
+        """
+        ends, operators, rest = self.ends(model), self._operators(model), np.zeros(model.size)
+        steps, answers = answered(operators, self.drive.within, ends, *start, lacking)
+        for _ in range(number - 1):
+            moved, f = steps.plus(answers[-1]), []
+            for part, t, h in batches(self.drive.within, ends):
+                state = (x.reshape(-1, model.size) for x in moved.nodes(part))
+                f.append(lacking(t.ravel(), *state)[-1].reshape(len(h), len(NODES), -1))
+            answers.append(collocate(operators, self.drive.within, ends, rest, rest, np.concatenate(f)))
+        found = [answer.at(self.times)[0] for answer in answers]
+        return Trajectory(*steps.at(self.times), len(ends) - 1, False, steps.at), found
 
     def _operators(self, model: ReducedModel) -> Operators:
         return lambda t: model.operators(self.drive.factors(t))
