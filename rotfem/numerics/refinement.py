@@ -165,7 +165,7 @@ class Refinement:
     def _weights(self, space: Any) -> list[Array]:
         """Return for every part the values of the basis at its nodes, shape (nodes, basis)."""
         e = space.ufl_element()
-        base = e.sub_elements[0] if e.block_size > 1 else e
+        base = e.sub_elements[0] if e.sub_elements else e  # one unknown of a node makes a block, too
         try:
             return [base.tabulate(0, self._of(i, base))[0] for i in range(len(self.origins))]
         except (AttributeError, NotImplementedError) as error:
