@@ -25,7 +25,7 @@ from rotfem.selection.coarse_case import INCREMENT
 from rotfem.selection.coarse_model import Trial
 from rotfem.selection.dimensionless import MEANING, groups
 from rotfem.selection.distance import HISTORY, MODES, STEADY, Outputs, change, notes, outputs_of
-from rotfem.selection.estimate import Change, Estimates
+from rotfem.selection.estimate import RESOLVED, Change, Estimates
 from rotfem.selection.model_choice import choose
 
 #: What follows from the size of a change: for an effect or a richer theory, and for a poorer theory.
@@ -88,6 +88,7 @@ def _explained(scene: Scene, case: Case, check: bool, comm: MPI.Comm, progress: 
         "groups": numbers,
         "meaning": {name: MEANING[name] for name in numbers},
         "outputs": list(trial.wanted),
+        "resolution": RESOLVED,
         "absent_outputs": trial.absent,
         "absent_effects": {
             effect.name: effect.reasons[1] for effect in Effect.registry if effect.name not in trial.effects

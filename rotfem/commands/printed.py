@@ -165,6 +165,11 @@ def choice_report(summary: dict[str, Any]) -> list[str]:
     return [f"chosen in {choice['seconds']:.2f} s: {choice['theory']}; left out: {dropped}; {error}"]
 
 
+def size_of_change(estimate: float, resolution: float) -> str:
+    """Return an estimate as text; one that is smaller than can be told, as smaller than that."""
+    return f"<{resolution:.0e}".replace("e-0", "e-") if 0.0 < estimate < resolution else f"{estimate:.1e}"
+
+
 def explain_report(summary: dict[str, Any], folder: Path) -> list[str]:
     """Return the lines `explain` prints: dimensionless groups, then a row an effect and a theory."""
     outputs, rows = summary["outputs"], summary["rows"]
@@ -178,8 +183,10 @@ def explain_report(summary: dict[str, Any], folder: Path) -> list[str]:
     for row in rows:
         what = {True: "without ", False: "with "}[row["included"]] if row["kind"] == "effect" else ""
         what = "theory " if row["kind"] == "theory" else what
-        kinds = ("estimate", "truth") if checked else ("estimate",)
-        cells = "".join(f"{row.get(kind, {}).get(name, nan):>10.1e}" for name in outputs for kind in kinds)
+        cells = ""
+        for name in outputs:
+            cells += f"{size_of_change(row['estimate'][name], summary['resolution']):>10}"
+            cells += f"{row.get('truth', {}).get(name, nan):>10.1e}" if checked else ""
         lines.append(f"{what + row['name']:<26}{cells}  {row['verdict']}: {row['why']}")
     lines += choice_report(summary)
     lines += [f"no {name}: {text}" for name, text in summary["absent_effects"].items()]

@@ -28,7 +28,8 @@ class ExplainResult(Result):
     Attributes:
         summary: scene, dimensionless groups, changes, warnings, timings; JSON-able.
         rows: one dictionary an effect and a theory: `kind`, `name`, `included`, `why`, `estimate` (output ↦ relative
-            change), `worst`, `verdict`; with a check `truth` (output ↦ relative change of the full models).
+            change; below `summary["resolution"]` it says no more than that it is), `worst`, `verdict`; with a check
+            `truth` (output ↦ relative change of the full models).
     """
 
     rows: list[Row]
@@ -55,7 +56,7 @@ class ExplainResult(Result):
 
     def files(self) -> dict[str, str]:
         """Return explain.json and summary.json."""
-        explained = {"groups": self.summary["groups"], "outputs": self.summary["outputs"], "rows": self.rows}
+        explained = {name: self.summary[name] for name in ("groups", "outputs", "resolution")} | {"rows": self.rows}
         return {"explain.json": json_text(explained), "summary.json": json_text(self.summary)}
 
     def drawings(self) -> dict[str, Callable[[], Figure]]:

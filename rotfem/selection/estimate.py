@@ -22,6 +22,9 @@ SAFETY = 3.0
 #: A relative change that nobody would call negligible, and one that changes the answer.
 NOTICEABLE, LARGE = 1e-2, 1e-1
 
+#: What is smaller is told as smaller: by how much, coarse meshes and few steps do not say within the safety factor.
+RESOLVED = 1e-4
+
 
 @dataclass
 class Change:

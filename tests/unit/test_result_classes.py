@@ -93,7 +93,7 @@ def explained() -> ExplainResult:
         {"kind": "theory", "name": "linear", "included": False, "why": "not good enough", "verdict": "large"}
         | {"estimate": {"steady": np.inf, "modes": 0.5}, "worst": np.inf},
     ]
-    return ExplainResult(summary(command="explain", outputs=["steady", "modes"], groups={}), rows)
+    return ExplainResult(summary(command="explain", outputs=["steady", "modes"], groups={}, resolution=1e-4), rows)
 
 
 def cost_row(step: float, time: float, error: float | None, pareto: bool) -> dict[str, Any]:
