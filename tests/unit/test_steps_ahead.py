@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotfem.analysis.esdirk import ESDIRK4
-from rotfem.commands.ahead import FREE, Ahead
+from rotfem.commands.ahead import FREE, Ahead, put
 from rotfem.selection.accuracy import Settings
 from rotfem.selection.mesh_ahead import MeshAhead
 from rotfem.selection.spectrum import LOST, SAFE, Vibrating
@@ -135,3 +135,10 @@ def test_what_a_jump_has_struck_counts_unseen() -> None:
     short, long = (motion.error(ESDIRK4, h) - Motion(t, motion.tips).error(ESDIRK4, h) for h in (1e-4, 0.1))
     assert long == pytest.approx(LOST * 0.01, rel=1e-2)
     assert short == pytest.approx(0.01 * SAFE * of_one(500.0, 1e-4, 100.05), rel=1e-2)
+
+
+def test_the_sum_of_an_error_is_that_of_its_parts() -> None:
+    """However large the part was that another one stands for now: what it was leaves no round-off."""
+    error = {"time": 1e9, "space": 1e-7, "model": None, "total": 1e9 + 1e-7}
+    put(error, "time", 3e-8)
+    assert error == {"time": 3e-8, "space": 1e-7, "model": None, "total": 3e-8 + 1e-7}
