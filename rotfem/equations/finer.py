@@ -16,6 +16,7 @@ from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
 from rotfem.numerics import compat
+from rotfem.numerics.extended_cells import ExtendedCells
 from rotfem.numerics.linear import DirectSolver, Increment, NearbySolver, held
 from rotfem.numerics.low_rank import LowRank
 from rotfem.numerics.projection import times
@@ -48,7 +49,7 @@ class FinerEquations:
         self.V = self._refined.V
         self.q, self.v, self.a = (fem.Function(self.V) for _ in range(3))
         self._functions: dict[Any, fem.Function] = {system.q: self.q, system.v: self.v, system.a: self.a}
-        self._forms: dict[str, Any] = {}
+        self._forms: dict[str, tuple[Any, ExtendedCells | None]] = {}
         #: Of a linear theory: matrices at the time that was taken.
         self._matrices: dict[str, Any] = {}
         #: A matrix with the pattern of all.
@@ -73,7 +74,7 @@ class FinerEquations:
         s = self.system
         base = self._functions.setdefault(s.prestressing, fem.Function(self.V))
         load = compat.create_vector(self.V)
-        fem_petsc.assemble_vector(load, self._form("F"))
+        self._assemble(load, "F")
         load.array[self.clamped] = 0.0
         base.x.array[:] = -Increment(self.V).solve(self.material[1], load)
 
@@ -112,11 +113,15 @@ class FinerEquations:
         return self.material[0] if self.system.only_strains else self._assembled(("K",), 1.0)
 
     def _assembled(self, names: tuple[str, ...], diagonal: float) -> Any:
-        A = fem_petsc.create_matrix(self._form(names[0])) if self._pattern is None else self._pattern.duplicate()
-        for name in names:
-            fem_petsc.assemble_matrix(A, self._form(name), self._bcs, 0.0)
-            A.assemble()
+        A = fem_petsc.create_matrix(self._form(names[0])[0]) if self._pattern is None else self._pattern.duplicate()
         A.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)  # of a damper at the root
+        for name in names:
+            form, points = self._form(name)
+            fem_petsc.assemble_matrix(A, form, self._bcs, 0.0)
+            A.assemble()
+            if points is not None:
+                points.add_to_matrix(A, self.clamped)
+                A.assemble()
         d = A.getDiagonal()
         d.array[self.clamped] = diagonal
         A.setDiagonal(d)
@@ -136,7 +141,7 @@ class FinerEquations:
         b = compat.create_vector(self.V)
         if not self.system.linear or self.system.tangent_forms("f")[0]:  # nothing may drive a linear theory
             for name in self.system.residual_forms:
-                fem_petsc.assemble_vector(b, self._form(name))
+                self._assemble(b, name)
         if self.system.linear:
             for kind, x in (("M", self.a), ("C", self.v), ("K", self.q)):
                 self._add(b, kind, x)
@@ -168,8 +173,15 @@ class FinerEquations:
         if self.system.tangent_forms(kind)[0]:  # what is clamped is zero, whatever is on the diagonal there
             self.matrix(kind).multAdd(compat.wrap(x.x), b, b)
 
-    def _form(self, name: str) -> Any:
-        """Return a form of the system on the refined mesh."""
+    def _assemble(self, b: Any, name: str) -> None:
+        """Add a form of the system on the refined mesh to a vector."""
+        form, points = self._form(name)
+        fem_petsc.assemble_vector(b, form)
+        if points is not None:
+            points.add_to_vector(b)
+
+    def _form(self, name: str) -> tuple[Any, ExtendedCells | None]:
+        """Return a form of the system on the refined mesh, and its integrals at points inside of cells there."""
         if name not in self._forms:
             f, compiled = self.system.known_form(name)
             self._forms[name] = self._refined.form(compiled, f, self._functions)

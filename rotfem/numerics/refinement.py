@@ -19,6 +19,7 @@ from dolfinx.fem.forms import get_integration_domains
 from mpi4py import MPI
 
 from rotfem.numerics import compat
+from rotfem.numerics.extended_cells import ExtendedCells, InnerPoint
 
 Array = npt.NDArray[np.float64]
 
@@ -63,6 +64,7 @@ class Refinement:
 
     Attributes:
         mesh, V: the refined ones.
+        corners: where the nodes of the cells lie that are refined, of all processes, m, shape (cells, nodes, 3).
     """
 
     def __init__(self, V: fem.FunctionSpace):
@@ -87,7 +89,7 @@ class Refinement:
         geometry = old.geometry
         dofmap = geometry.dofmap[: self._owned]
         known = np.concatenate(self._comm.allgather(np.asarray(geometry.input_global_indices)[dofmap]))
-        at = np.concatenate(self._comm.allgather(geometry.x[dofmap]))
+        self.corners = at = np.concatenate(self._comm.allgather(geometry.x[dofmap]))
         shape = element("Lagrange", self._cell, geometry.cmap.degree)
         weights = np.stack([shape.tabulate(0, self._of(i, shape))[0] for i in range(len(self.origins))])
         keys = np.rint(weights / STEP).astype(np.int64)
@@ -164,17 +166,33 @@ class Refinement:
 
     def _weights(self, space: Any) -> list[Array]:
         """Return for every part the values of the basis at its nodes, shape (nodes, basis)."""
-        e = space.ufl_element()
-        base = e.sub_elements[0] if e.sub_elements else e  # one unknown of a node makes a block, too
+        base = _base(space)
         try:
             return [base.tabulate(0, self._of(i, base))[0] for i in range(len(self.origins))]
         except (AttributeError, NotImplementedError) as error:
-            raise NotRefined(str(e)) from error
+            raise NotRefined(str(base)) from error
+
+    def number(self, cell: int, part: int) -> int:
+        """Return the number of a part of a cell (over all processes) on the refined mesh."""
+        return int(self._number[cell * len(self.origins) + part])
+
+    def extension(self, space: Any, part: int) -> Array:
+        """Return the values at the nodes of a cell of what is known at those of its part, continued as a polynomial.
+
+        Raises:
+            NotRefined: the functions of the space have no nodes.
+        """
+        base = _base(space)
+        if not hasattr(base, "basix_element"):
+            raise NotRefined(str(base))
+        points = base.basix_element.points
+        inside = np.linalg.solve(self.axes[part], (points - self.origins[part]).T).T
+        return np.asarray(base.tabulate(0, inside)[0])
 
     # --- forms -------------------------------------------------------------------------------------------------------
 
-    def form(self, compiled: Any, f: Any, functions: dict[Any, fem.Function]) -> Any:
-        """Return a compiled form on the refined mesh.
+    def form(self, compiled: Any, f: Any, functions: dict[Any, fem.Function]) -> tuple[Any, ExtendedCells | None]:
+        """Return a compiled form on the refined mesh, and its integrals at points inside of parts of cells.
 
         Args:
             compiled: what dolfinx has made of f.
@@ -190,15 +208,22 @@ class Refinement:
             c = coefficients[compiled.ufcx_form.original_coefficient_positions[number]]
             if c not in functions:
                 functions[c] = self.function(c)
-        subdomains = {name: self._subdomains(f, name, data[0]) for name, data in domains.items()}
-        return compat.form_elsewhere(compiled, f, self.V, functions, subdomains)
+        inner: list[InnerPoint] = []
+        subdomains = {name: self._subdomains(f, name, data[0], inner) for name, data in domains.items()}
+        made = compat.form_elsewhere(compiled, f, self.V, functions, subdomains)
+        return made, ExtendedCells(self, inner, (compiled, f), functions) if inner else None
 
-    def _subdomains(self, f: Any, name: str, data: Any) -> list[tuple[int, npt.NDArray[np.int32]]]:
-        """Return the parts of the entities that integrals of one type go over, by their numbers."""
+    def _subdomains(
+        self, f: Any, name: str, data: Any, inner: list[InnerPoint]
+    ) -> list[tuple[int, npt.NDArray[np.int32]]]:
+        """Return the parts of the entities that integrals of one type go over, by their numbers.
+
+        Points inside of parts are added to `inner`.
+        """
         if data is None:
             return []
         if name == "cell":
-            return self._points(f, dict(data))
+            return self._points(f, dict(data), inner)
         if name != "exterior_facet":
             raise NotRefined(name)
         ids = sorted({i for part in f.integrals() if part.integral_type() == name for i in _numbers(part)})
@@ -212,22 +237,32 @@ class Refinement:
             out.append((number, np.array(cut, dtype=np.int32).reshape(shape)))
         return out
 
-    def _points(self, f: Any, cells: dict[int, Any]) -> list[tuple[int, npt.NDArray[np.int32]]]:
+    def _points(
+        self, f: Any, cells: dict[int, Any], inner: list[InnerPoint]
+    ) -> list[tuple[int, npt.NDArray[np.int32]]]:
         """Return the parts that hold the points that integrals of one point go over, where these are corners.
 
-        Such a point has the same reference coordinates in the cell and in its part.
+        Such a point has the same reference coordinates in the cell and in its part. All others are added to `inner`.
         """
         out: dict[int, npt.NDArray[np.int32]] = {}
-        for part in f.integrals():
-            for number in _numbers(part) if part.integral_type() == "cell" else ():
-                points = np.asarray(part.metadata()["quadrature_points"])
-                same = [i for i in range(len(self.origins)) if np.allclose(self._at(i, points), points, atol=NONE)]
-                if not same:
-                    raise NotRefined("a point inside a cell")
-                mine = np.asarray(cells[number], dtype=np.int64) + self._first
-                every = np.concatenate(self._comm.allgather(mine))
-                out[number] = self._number[every * len(self.origins) + same[0]].astype(np.int32)
+        integrals = [part for part in f.integrals() if part.integral_type() == "cell"]
+        for number, integral in {number: part for part in integrals for number in _numbers(part)}.items():
+            points = np.asarray(integral.metadata()["quadrature_points"])
+            same = [i for i in range(len(self.origins)) if np.allclose(self._at(i, points), points, atol=NONE)]
+            mine = np.asarray(cells[number], dtype=np.int64) + self._first
+            every = np.concatenate(self._comm.allgather(mine))
+            chosen = self._number[every * len(self.origins) + same[0]] if same else []
+            out[number] = np.asarray(chosen, dtype=np.int32)
+            if not same:
+                inner += [InnerPoint(number, int(cell), self._part_about(points)) for cell in every]
         return sorted(out.items())
+
+    def _part_about(self, points: Array) -> int:
+        """Return the part of a cell that holds a point (1, d) of it, in reference coordinates."""
+        inside = [np.linalg.solve(axes, (points - o).T).T for o, axes in zip(self.origins, self.axes, strict=True)]
+        # How far it is outside: of a triangle its coordinates have a sum of at most 1, else each has.
+        most = [x.sum() if self._cell == "triangle" else x.max() for x in inside]
+        return int(np.argmin([max(-x.min(), top - 1.0) for x, top in zip(inside, most, strict=True)]))
 
     def _on(self, side: int) -> list[tuple[int, int]]:
         """Return the (part, its facet) that lie on a facet of the whole cell."""
@@ -245,3 +280,9 @@ def _numbers(integral: Any) -> list[int]:
     """Return the numbers of the subdomains that an integral goes over."""
     number = integral.subdomain_id()
     return [i for i in (number if isinstance(number, tuple) else (number,)) if isinstance(i, int)]
+
+
+def _base(space: Any) -> Any:
+    """Return the element of one component of a space."""
+    e = space.ufl_element()
+    return e.sub_elements[0] if e.sub_elements else e  # one unknown of a node makes a block, too

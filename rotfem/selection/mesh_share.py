@@ -79,7 +79,7 @@ def error_of_modes(trial: Trial, own: Candidate) -> float:
         return modes_change(own.eigenvalues(trial.speeds), twice.eigenvalues(trial.speeds))
     fine = RefinedMesh(system).equations if system.held.linear else None
     if fine is not None:
-        with suppress(NotRefined):  # a point mass that is inside a finer cell
+        with suppress(NotRefined):
             found = [_eigenvalues(system.held, fine, speed, count) for speed in trial.speeds]
             return max(modes_change(here, there) for here, there in found)
     analysis = ModalAnalysis(system.model.problem, trial.case.about, trial.case.newton(), trial.comm, system)

@@ -81,6 +81,29 @@ def test_every_mode_is_judged(more: dict[str, Any], motion: dict[str, Any]) -> N
         assert error < 1e-4 or 0.5 * error < row["mesh_error"] < 2.5 * error
 
 
+def test_point_mass_inside_a_cell() -> None:
+    """A mass where no corner of a triangle or of its parts is: above 1e-3 within ½ … 2 of the true error."""
+    heavy = {**plate(2.0), "point_masses": [[1.7, 0.23, 20.0]]}
+    exact, told = (modes(scene).rows for scene in (triangles(heavy, [16, 8]), triangles(heavy, [4, 2])))
+    seen = [
+        (row["frequency"] / true["frequency"] - 1.0, row["mesh_error"]) for row, true in zip(told, exact, strict=True)
+    ]
+    assert max(seen)[0] > 1e-2
+    for error, estimate in seen:
+        assert error < 1e-3 or 0.5 * error < estimate < 2.0 * error
+
+
+def triangles(structure: dict[str, Any], elements: list[int]) -> dict[str, Any]:
+    """Return a scene of four modes at rest."""
+    return {
+        "structure": structure,
+        "motion": {"type": "constant", "speed": 0.0},
+        "model": {"theory": "consistent_linear"},
+        "mesh": {"elements": elements, "cell": "triangle"},
+        "modes": {"count": 4},
+    }
+
+
 def test_what_is_said() -> None:
     """A mesh that is too coarse for the modes wanted is said to be; the mesh that is taken without one is not."""
     few = result(BEAM, 2, 4)

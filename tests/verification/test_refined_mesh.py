@@ -15,6 +15,7 @@ from rotfem.analysis.reduced_tangents import Tangents
 from rotfem.analysis.refined_mesh import RefinedMesh
 from rotfem.analysis.schemes import State
 from rotfem.equations.finer import FinerEquations
+from rotfem.mechanics.loads import PointLoads
 from rotfem.numerics.refinement import Refinement
 
 SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
@@ -76,6 +77,34 @@ def test_equations_are_those_of_twice_the_elements() -> None:
         np.testing.assert_allclose(A[np.ix_(mine, mine)], B[np.ix_(theirs, theirs)], atol=1e-12 * np.abs(B).max())
     F, G = fine.imbalance().array, other.residual().array
     np.testing.assert_allclose(F[mine], G[theirs], atol=1e-12 * np.abs(G).max())
+
+
+@pytest.mark.parametrize("cell", ["triangle", "quadrilateral"])
+def test_points_inside_of_parts_of_cells(cell: str) -> None:
+    """Masses and a load where no corner is: of shapes of the coarse mesh, M and −F have the same products (round-off)."""
+    bare = {"structure": rotfem.Plate(**PLATE), "mesh": rotfem.PlateMesh(elements=(2, 1), cell=cell)}
+    heavy = rotfem.Plate(**PLATE, point_masses=[(0.9, 0.1, 3.0), (0.3, -0.07, 2.0)])
+    load = rotfem.Loads(at=(PointLoads((0.83, 0.06), force=rotfem.ConstantLoad((0.0, 0.0, 5.0))),))
+    common = {"motion": rotfem.Motion.constant_speed(3.0), "theory": "consistent_linear"}
+    masses = []
+    for problem in (
+        rotfem.Problem(**{**bare, **common}),
+        rotfem.Problem(**{**bare, "structure": heavy, "loads": load, **common}),
+    ):
+        system = problem.system()
+        system.set_time(0.0)
+        system.set_state(system.zeros())
+        fine = FinerEquations(system)
+        fine.take()
+        X = np.random.default_rng(1).standard_normal((len(system.zeros()), 3))
+        X[system.clamped] = 0.0
+        Y = fine.carried(X)
+        here, there = (x.T @ A[:, :] @ x for x, A in ((X, system.matrix(0.0, 0.0, 1.0, 0.0)), (Y, fine.matrix("M"))))
+        np.testing.assert_allclose(there, here, atol=1e-12 * np.abs(here).max())
+        f, g = X.T @ system.residual().array, Y.T @ fine.imbalance().array
+        np.testing.assert_allclose(g, f, atol=1e-12 * np.abs(f).max())
+        masses.append(here)
+    assert np.linalg.norm(masses[1]) > 1.1 * np.linalg.norm(masses[0])  # the points are felt
 
 
 @pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
