@@ -81,7 +81,7 @@ def test_equations_are_those_of_twice_the_elements() -> None:
 
 @pytest.mark.parametrize("cell", ["triangle", "quadrilateral"])
 def test_points_inside_of_parts_of_cells(cell: str) -> None:
-    """Masses and a load where no corner is: of shapes of the coarse mesh, M and −F have the same products (round-off)."""
+    """Masses and a load where no corner is: of coarse shapes M and −F have the same products (round-off)."""
     bare = {"structure": rotfem.Plate(**PLATE), "mesh": rotfem.PlateMesh(elements=(2, 1), cell=cell)}
     heavy = rotfem.Plate(**PLATE, point_masses=[(0.9, 0.1, 3.0), (0.3, -0.07, 2.0)])
     load = rotfem.Loads(at=(PointLoads((0.83, 0.06), force=rotfem.ConstantLoad((0.0, 0.0, 5.0))),))
