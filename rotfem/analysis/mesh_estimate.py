@@ -81,7 +81,8 @@ class MeshEstimate:
         self.volumes = (weights * np.abs(np.linalg.det(J))).sum(axis=1)
         polynomials = basix.tabulate_polynomials(basix.PolynomialType.legendre, cell, self.degree, points)
         self._expand = np.einsum("pq,q,dqn,cqd->cpnd", polynomials, weights, shape, per_length)
-        self._rows = np.ascontiguousarray(np.moveaxis(self._expand, 2, 3)).reshape(owned, -1, shape.shape[2])
+        rows = self._expand.shape[1] * tdim
+        self._rows = np.ascontiguousarray(np.moveaxis(self._expand, 2, 3)).reshape(owned, rows, shape.shape[2])
         if cell == basix.CellType.quadrilateral:
             i, j = np.divmod(np.arange(n * n), n)
             self._levels = [i, j]
@@ -109,8 +110,8 @@ class MeshEstimate:
         """
         cells, nodes = self.cells.shape
         states, size = len(values), values.shape[2]
-        found = self._rows @ np.moveaxis(values, 0, 1)[self.cells].reshape(cells, nodes, -1)
-        out = found.reshape(cells, -1, self._expand.shape[3], states, size)
+        found = self._rows @ np.moveaxis(values, 0, 1)[self.cells].reshape(cells, nodes, states * size)
+        out = found.reshape(cells, self._expand.shape[1], self._expand.shape[3], states, size)
         return np.asarray(np.transpose(out, (3, 0, 1, 4, 2)))
 
     def energies(self, coefficients: Array) -> Array:
