@@ -28,8 +28,8 @@ from rotfem.errors import ComputationError
 
 Array = npt.NDArray[np.float64]
 
-#: Windows of a history, fewest steps in one by unknowns, and bytes of states up to which one goes on, and with which
-#: those before are looked at while the march is under way.
+#: Windows of a history, fewest steps in one by unknowns (the last one takes those that would be fewer), and bytes of
+#: states up to which one goes on, and with which those before are looked at while the march is under way.
 WINDOWS, FEWEST, LARGE, MEMORY = 8, (50, 100), 2000, 64_000_000
 
 
@@ -94,10 +94,15 @@ class ErrorWatch:
         now.steps.append((len(states) - 2, len(states) - 1))
         self._bytes += 3 * new.q.nbytes
         due = len(now.steps) >= self._fewest and new.t >= (self._closed + 1) * self.end / WINDOWS
-        if due or self._bytes > MEMORY:
+        if (due and self._lasts(new.t)) or self._bytes > MEMORY:
             self._close(new.t)
             if self._waiting > MEMORY:
                 self.catch_up(new)
+
+    def _lasts(self, t: float) -> bool:
+        """Return whether a window from a time (s) to the end would have enough steps, at the pace of this one."""
+        steps, since = len(self._now.steps), self._now.states[0][0]
+        return (self.end - t) / (t - since) * steps > self._fewest - 0.5
 
     def _seen(self, state: State) -> tuple[float, Array, Array, Array, Any]:
         """Return t, q, v, a of a state in the frame that turns, and what rotations are counted from."""

@@ -112,9 +112,9 @@ class Window:
     def _alike(self, system: Any, before: Window) -> bool:
         """Return whether the matrices are those of the window before: a linear theory at the same constant speed."""
         motion, t = system.motion, 0.5 * (self.t[0] + self.t[-1])
-        same = system.hub is None and motion.rate(t) == 0.0 and abs(motion.speed(t)) == before.speed
-        same = same and motion.pitch is None
-        return bool(system.held.linear and same)
+        if not system.held.linear or system.hub is not None or motion.pitch is not None:
+            return False
+        return bool(motion.rate(t) == 0.0 and abs(motion.speed(t)) == before.speed)
 
     def _reduce(self, system: Any, mesh: MeshErrors, end: float, before: Window | None) -> None:
         """Find shapes and matrices."""

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from petsc4py import PETSc
 
 from rotfem.analysis.ritz_vectors import RitzVectors
 from rotfem.numerics.linear import transposed
@@ -48,7 +49,7 @@ class Tangents:
     Args:
         system: equations of motion; time and state are set in it.
         state: where.
-        mass: M, if it is known; None: found.
+        mass: M, if it is known, and the time of the state is set already; None: found.
 
     Attributes:
         matrices: M and K, PETSc matrices.
@@ -56,8 +57,9 @@ class Tangents:
 
     def __init__(self, system: Any, state: Any, mass: Any = None):
         self.system, self.t = system, state.t
-        system.count_rotations_from(state.datum)
-        system.set_time(state.t)
+        if mass is None:
+            system.count_rotations_from(state.datum)
+            system.set_time(state.t)
         system.set_state(state.q, state.v, state.a)
         inner = system.held
         if system.comm.size > 1:
@@ -65,6 +67,8 @@ class Tangents:
                 x.x.scatter_forward()
         self.speed = abs(float(system.motion.speed(state.t)))
         self.by_mode = inner.by_mode
+        #: C, if it has been found.
+        self._damping: Any = None
         self.matrices = {"M": self._matrix("M") if mass is None else mass, "K": self._matrix("K")}
         self._take_turning_stress(state)
 
@@ -84,17 +88,20 @@ class Tangents:
         if not float(eta.value) * rate > TURNS:
             return
         forward = FAR / rate
-        here = self._matrix("C")
+        self._damping = self._matrix("C")
         inner.q.x.array[:] += forward * v
         change = self._matrix("C")
-        change.axpy(-1.0, here)
-        change.scale(1.0 / forward)
+        change.axpy(-1.0, self._damping, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         inner.q.x.array[:], inner.v.x.array[:] = q, 0.0
         still = self._matrix("K")
         inner.v.x.array[:] = v
-        K = self.matrices["K"]
-        self.matrices["K"] = _sum((0.5, K), (0.5, transposed(K)), (0.5, still), (-0.5, transposed(still)))
-        self.matrices["K"] = _sum((1.0, self.matrices["K"]), (-0.25, change), (-0.25, transposed(change)))
+        # K + still of the one, and K − still of what is transposed, each less Ċ / 2
+        one, other = self.matrices["K"], self.matrices["K"].copy()
+        for A, sign in ((one, 1.0), (other, -1.0)):
+            A.axpy(-0.5 / forward, change, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            A.axpy(sign, still, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        one.axpy(1.0, transposed(other))
+        one.scale(0.5)
 
     def shapes(self) -> RitzVectors:
         """Return the shapes that move the tip here."""
@@ -105,7 +112,7 @@ class Tangents:
 
         The state must still be the one that is set in the system.
         """
-        C = self._matrix("C")
+        C = self._matrix("C") if self._damping is None else self._damping
         parts = {"M": np.eye(len(shapes.squares)), "C": shapes.product(C), "K": shapes.stiffness}
         if self.by_mode is not None:
             along = self.by_mode.along(shapes.V)
@@ -121,13 +128,3 @@ class Tangents:
         system, of_spin = self.system, OF_SPIN[name]
         row = system.row.row(SHIFTS[name]).array.copy()
         return Border(row, system.held.spin_derivative(*of_spin).array.copy(), system.row.diagonal(*of_spin))
-
-
-def _sum(*terms: tuple[float, Any]) -> Any:
-    """Return the sum of multiples of matrices, a new one."""
-    (factor, first), *others = terms
-    out = first.copy()
-    out.scale(factor)
-    for factor, A in others:
-        out.axpy(factor, A)
-    return out
