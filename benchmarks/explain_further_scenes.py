@@ -19,8 +19,8 @@ FURTHER: dict[str, dict[str, Any]] = {
         },
         "motion": {"type": "constant", "speed": 20.0},
         "loads": {"distributed": [0.0, 5.0, 30.0]},
-        "mesh": {"elements": 3},
-        "time": {"end": 0.8, "step": 0.004},
+        "mesh": {"elements": 2},
+        "time": {"end": 0.5, "step": 0.005},
     },
     "hub, mass beside the axis": {
         "structure": {
@@ -31,8 +31,8 @@ FURTHER: dict[str, dict[str, Any]] = {
             **{"type": "torque", "hub_inertia": 4.0, "speed": 6.0},
             "table": [[0, 0], [0.1, 40.0], [0.5, 40.0], [0.55, -30.0], [0.8, 0.0]],
         },
-        "mesh": {"elements": 3},
-        "time": {"end": 1.0, "step": 0.005},
+        "mesh": {"elements": 2},
+        "time": {"end": 0.8, "step": 0.01},
     },
     "plate, load near a corner": {
         "structure": {**PLATE, "thickness": 0.01, "hub_radius": 0.15, "damping": {"kelvin_voigt": 2e-4}},
@@ -40,8 +40,8 @@ FURTHER: dict[str, dict[str, Any]] = {
         "loads": {
             "at": [{"x": [0.9, 0.2], "force": [[0, 0, 0, 0], [0.01, 0, 0, 60.0], [0.06, 0, 0, 60.0], [0.065, 0, 0, 0]]}]
         },
-        "mesh": {"elements": [5, 2]},
-        "time": {"end": 0.12, "step": 0.001},
+        "mesh": {"elements": [3, 2]},
+        "time": {"end": 0.08, "step": 0.001},
     },
     "follower, spin-up": {
         "structure": {"type": "planar_beam", "length": 3.0, "section": THIN | {"EI": 600.0}, "hub_radius": 0.3},
@@ -58,15 +58,15 @@ FURTHER: dict[str, dict[str, Any]] = {
         "motion": {"type": "constant", "speed": 14.0},
         "loads": {"distributed": {"value": [0, 3.0, 15.0], "harmonic": {"amplitude": [0, 1.0, 12.0], "per_rev": 1}}},
         "mesh": {"elements": 4},
-        "time": {"end": 1.2, "step": 0.006},
+        "time": {"end": 0.8, "step": 0.008},
     },
     "lamina spins down": {
         "structure": {**LAMINA, "type": "plate", "length": 0.8, "width": 0.3, "thickness": 0.006, "hub_radius": 0.1},
         "motion": {"type": "table", "table": [[0, 90.0], [0.02, 90.0], [0.12, 30.0], [0.2, 30.0]], "axis": [0, 1, 0]},
         "initial": {"state": "steady"},
         "loads": {"pressure": {"value": 300.0, "kind": "follower"}},
-        "mesh": {"elements": [5, 2]},
-        "time": {"end": 0.2, "step": 0.001},
+        "mesh": {"elements": [3, 2]},
+        "time": {"end": 0.15, "step": 0.0015},
     },
     "shaken, second order": {
         "structure": {

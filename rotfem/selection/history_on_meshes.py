@@ -49,7 +49,7 @@ def error_of_history(trial: Trial, theory: str) -> float | None:
         size = largest(own.model, own.tips)
         if unknowns > MOST or not 0.0 < size <= LARGE * own.model.system.structure.length:
             return None
-        fine = _response(trial, halved(mesh), linear.name, times)
+        fine = _response(trial, halved(mesh, own.model.system.structure), linear.name, times)
     except (ComputationError, InputError, np.linalg.LinAlgError):
         return None
     if max(own.projection_error, fine.projection_error) > ACCURACY:

@@ -75,7 +75,7 @@ def error_of_modes(trial: Trial, own: Candidate) -> float:
     system, count, hub = own.switched(), trial.case.mode_count, trial.case.problem.motion.hub
     small = 2**system.structure.mesh.topology.dim * len(system.held.zeros()) <= MOST
     if hub is not None and small and not from_file(trial.case.problem):
-        twice = trial.poorest_on(halved(trial.full.problem.mesh))
+        twice = trial.poorest_on(halved(trial.full.problem.mesh, system.structure))
         return modes_change(own.eigenvalues(trial.speeds), twice.eigenvalues(trial.speeds))
     fine = RefinedMesh(system).equations if system.held.linear else None
     if fine is not None:
@@ -87,10 +87,13 @@ def error_of_modes(trial: Trial, own: Candidate) -> float:
     return max(map(max, told))
 
 
-def halved(mesh: Any) -> Any:
-    """Return a mesh of no file with cells of half the size."""
-    elements = mesh.elements
-    twice = 2 * elements if isinstance(elements, int) else tuple(2 * n for n in elements)
+def halved(mesh: Any, structure: Any) -> Any:
+    """Return a mesh of no file with cells of half the size of those that a structure has on it.
+
+    A beam has a node wherever its line or its section has one, and so maybe more elements than were asked for.
+    """
+    elements, cells = mesh.elements, structure.mesh.topology.index_map(structure.mesh.topology.dim).size_global
+    twice = 2 * cells if isinstance(elements, int) else tuple(2 * n for n in elements)
     return mesh.model_copy(update={"elements": twice})
 
 

@@ -2,7 +2,9 @@
 
 A basis of few shapes is solved again without each effect (see `rotfem.analysis.reduced.effect_sizes`), which takes a
 small part of the time that marches of a trial take. It serves where the hub's motion is prescribed, nothing is left out
-yet, and bending stays moderate: what second-order forces do beyond that only a trial knows.
+yet, and bending stays moderate: what second-order forces do beyond that only a trial knows. Where steps were cut short
+for a fast motion that even they do not resolve, its accelerations grow as steps become shorter, and with them what an
+effect seems to do; so sizes count that steps of twice the length show, too.
 """
 
 from __future__ import annotations
@@ -13,7 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.reduced.effect_sizes import effect_sizes
-from rotfem.analysis.reduced.response import reduced_response
+from rotfem.analysis.reduced.manifold import Manifold
+from rotfem.analysis.reduced.response import Response, reduced_response
+from rotfem.analysis.reduced.stretch import COARSE
 from rotfem.analysis.reduced.tips import largest
 from rotfem.errors import ComputationError
 from rotfem.mechanics.theories import Theory
@@ -29,6 +33,9 @@ LARGEST = 3.0
 
 #: Accuracy of the basis: changes of a history are found in one basis, and are much better than it.
 ACCURACY = 1e-4
+
+#: Sizes in steps of twice the length that are farther apart than by this factor, and not both as small, are not told.
+AGREED, SMALL = 1.5, 1e-8
 
 
 def reduced_effects(trial: Trial, theory: str, effects: Collection[str]) -> dict[str, float]:
@@ -49,10 +56,24 @@ def reduced_effects(trial: Trial, theory: str, effects: Collection[str]) -> dict
         response = reduced_response(candidate.switched(), times, trial.start(candidate, linear.name), ACCURACY)
         if not response.met or largest(response.model, response.tips) > MODERATE * candidate.system.structure.length:
             return {}
-        found = effect_sizes(response, effects)
+        found = _agreed(response, effects)
     except (ComputationError, np.linalg.LinAlgError):
         return {}
     return {name: size for name, size in found.items() if size < LARGEST}
+
+
+def _agreed(response: Response, effects: Collection[str]) -> dict[str, float]:
+    """Return effect ↦ relative change without it, as far as longer steps show the same.
+
+    Raises:
+        ComputationError: the answer to second-order forces is no small part of the motion.
+    """
+    manifold = Manifold(response)
+    found = effect_sizes(response, effects, manifold)
+    if response.solution.parts <= COARSE:  # there are no longer steps
+        return found
+    other = effect_sizes(response, effects, manifold, 2 * COARSE)
+    return {n: x for n, x in found.items() if max(x, other[n]) <= max(SMALL, AGREED * min(x, other[n]))}
 
 
 def linear_of(trial: Trial, theory: str) -> Theory | None:

@@ -25,7 +25,10 @@ MOST = 0.5
 
 
 def effect_sizes(
-    response: Response, effects: Collection[str] | None = None, manifold: Manifold | None = None
+    response: Response,
+    effects: Collection[str] | None = None,
+    manifold: Manifold | None = None,
+    longer: int = COARSE,
 ) -> dict[str, float]:
     """Return effect ↦ relative change of the displacement of the tip without it; infinite where nothing holds then.
 
@@ -33,6 +36,7 @@ def effect_sizes(
         response: history of a linear theory with all effects.
         effects: those that are asked for; all of the model if None.
         manifold: of the response, if it is known.
+        longer: how many times as long as those of the response the steps are in which the effects are compared.
 
     Raises:
         ComputationError: the answer to second-order forces is no small part of the motion, so that it is none.
@@ -42,7 +46,7 @@ def effect_sizes(
     wanted = system.model.effects if effects is None else effects
     known = response.solution.hub is None and response.solution.parts == 1  # what is compared has the same steps
     # own answers are of forces without and with third order, and maybe of a further round, which is not compared
-    whole = manifold.tip(response.q + manifold.own[1][1]) if known else _tips(response, manifold)
+    whole = manifold.tip(response.q + manifold.own[1][1]) if known else _tips(response, manifold, longer)
     size = largest(model, whole)
     if largest(model, whole - response.tips) > MOST * largest(model, response.tips):
         raise ComputationError("the answer to second-order forces is as large as the motion")
@@ -51,7 +55,7 @@ def effect_sizes(
         for name in wanted:
             system.leave_out((name,))
             try:
-                change = largest(model, _tips(response, manifold) - whole)
+                change = largest(model, _tips(response, manifold, longer) - whole)
             except (ComputationError, np.linalg.LinAlgError):
                 change = np.inf
             out[name] = change / size if size > 0.0 else float(change > 0.0)
@@ -60,9 +64,9 @@ def effect_sizes(
     return out
 
 
-def _tips(response: Response, manifold: Manifold) -> Array:
+def _tips(response: Response, manifold: Manifold, longer: int) -> Array:
     """Return the unknowns at the tip with the effects that are on, (rows, components)."""
-    model, solution = response.model, response.solution.again(COARSE)
+    model, solution = response.model, response.solution.again(longer)
     path = None
     if solution.constant or solution.hub is not None:
         path = solution.solve(model, response.q[0], response.v[0])
