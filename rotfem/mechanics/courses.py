@@ -175,7 +175,7 @@ def _watched_motion(motion: Motion, see: Callable[[Course], Callable[[float], An
     if motion.is_accelerated and not motion.constant:
         base, at = motion.base_knots, motion.base_acceleration
         changes["base_acceleration"] = see(
-            Course("motion.base_acceleration", at, _times(base), none, known=base is not None)
+            Course("motion.base_acceleration", at, _times(base), none, _between(at, base), known=base is not None)
         )
     if motion.hub is not None:
         if len(motion.hub.torque.knots):
@@ -219,3 +219,11 @@ def _times(knots: Iterable[float] | None) -> Array:
 
 def _columns(f: Callable[[Any], Any]) -> Callable[[Array], Array]:
     return lambda t: np.asarray(f(t))[:, None]
+
+
+def _between(at: Callable[[float], Array], knots: tuple[float, ...] | None) -> Callable[[Array], Array] | None:
+    """Return a course of an array of times that is linear between knots; None where it is not, or jumps there."""
+    if not knots or np.any(np.diff(knots) <= 0.0):
+        return None
+    columns = np.array([at(t) for t in knots], dtype=float).T
+    return lambda t: np.stack([np.interp(t, knots, column) for column in columns], axis=1)

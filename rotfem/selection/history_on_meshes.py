@@ -49,7 +49,7 @@ def error_of_history(trial: Trial, theory: str) -> float | None:
         size = largest(own.model, own.tips)
         if unknowns > MOST or not 0.0 < size <= LARGE * own.model.system.structure.length:
             return None
-        fine = _response(trial, halved(mesh, own.model.system.structure), linear.name, times)
+        fine = _response(trial, halved(mesh, own.model.system.structure), linear.name, times, own.solution.parts)
     except (ComputationError, InputError, np.linalg.LinAlgError):
         return None
     if max(own.projection_error, fine.projection_error) > ACCURACY:
@@ -58,7 +58,7 @@ def error_of_history(trial: Trial, theory: str) -> float | None:
     return change / size
 
 
-def _response(trial: Trial, mesh: Any, theory: str, times: Array) -> Response:
-    """Return the history of a linear theory on a mesh."""
+def _response(trial: Trial, mesh: Any, theory: str, times: Array, parts: int | None = None) -> Response:
+    """Return the history of a linear theory on a mesh, by steps cut into so many parts or as many as it asks for."""
     candidate = trial.on_mesh(mesh, theory)
-    return reduced_response(candidate.switched(), times, trial.start(candidate, theory), ACCURACY)
+    return reduced_response(candidate.switched(), times, trial.start(candidate, theory), ACCURACY, parts)

@@ -56,13 +56,13 @@ def reduced_effects(trial: Trial, theory: str, effects: Collection[str]) -> dict
         response = reduced_response(candidate.switched(), times, trial.start(candidate, linear.name), ACCURACY)
         if not response.met or largest(response.model, response.tips) > MODERATE * candidate.system.structure.length:
             return {}
-        found = _agreed(response, effects)
+        found = agreed(response, effects)
     except (ComputationError, np.linalg.LinAlgError):
         return {}
     return {name: size for name, size in found.items() if size < LARGEST}
 
 
-def _agreed(response: Response, effects: Collection[str]) -> dict[str, float]:
+def agreed(response: Response, effects: Collection[str]) -> dict[str, float]:
     """Return effect ↦ relative change without it, as far as longer steps show the same.
 
     Raises:

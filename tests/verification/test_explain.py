@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 import ufl
 
 import rotfem
+from rotfem.analysis.reduced.stretch import COARSE
 from rotfem.analysis.time_loop import March
 from rotfem.commands.problem import Problem, case_of
 from rotfem.equations.compiled import compile_system
@@ -19,9 +21,11 @@ from rotfem.mechanics.effects import Effect
 from rotfem.mechanics.theories import Theory
 from rotfem.registry import register
 from rotfem.scene import Scene
+from rotfem.selection import reduced_effects
 from rotfem.selection.coarse_model import Trial
 from rotfem.selection.distance import HISTORY, MODES, STEADY, tip_change
 from rotfem.selection.estimate import NOTICEABLE, Estimates
+from rotfem.selection.history_on_meshes import error_of_history
 from rotfem.selection.mesh_share import error_of_modes
 from rotfem.selection.model_choice import Choice, choose
 from tests.beams import STRUCTURE
@@ -347,6 +351,28 @@ def test_effects_of_a_reduced_model_are_those_of_trials() -> None:
         assert 1 / 3 < size / tried < 3
     bent = Scene.from_dict({"structure": STRUCTURE, **COARSE_STEPS, "loads": {"tip_force": [0.0, 200.0]}})
     assert Estimates(Trial(case_of(bent)), "reissner", Trial(case_of(bent)).effects).reduced == {}
+
+
+def test_sizes_that_depend_on_the_steps_of_a_reduced_model_are_left_to_trials(monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes = {COARSE: {"same": 0.02, "growing": 0.04, "none": 1e-12}, 2 * COARSE: {"same": 0.019, "growing": 1e-3}}
+    sizes[2 * COARSE]["none"] = 1e-14
+    monkeypatch.setattr(reduced_effects, "Manifold", lambda response: None)
+    monkeypatch.setattr(reduced_effects, "effect_sizes", lambda r, e, manifold, longer=COARSE: sizes[longer])
+    response: Any = SimpleNamespace(solution=SimpleNamespace(parts=2 * COARSE))
+    assert set(reduced_effects.agreed(response, ())) == {"same", "none"}
+    response.solution.parts = 1  # no steps are longer
+    assert reduced_effects.agreed(response, ()) == sizes[COARSE]
+
+
+def test_cells_of_half_the_size_are_of_the_mesh_a_beam_has() -> None:
+    """Point masses are nodes, so that one element is four, whose error is not zero and the same however it is said."""
+    masses = [{"x": x * STRUCTURE["length"], "mass": 0.1} for x in (0.25, 0.5, 0.75)]
+    tables = {**COARSE_STEPS, "structure": {**STRUCTURE, "masses": masses}}
+    trials = [Trial(case_of(scene(tables, {"mesh.elements": n}))) for n in (1, 4)]
+    one, four = (error_of_history(trial, "reissner") for trial in trials)
+    assert one is not None
+    assert one == pytest.approx(four, rel=1e-6)
+    assert one > 0.0
 
 
 def test_a_spin_down_starts_from_the_steady_state_of_its_speed() -> None:

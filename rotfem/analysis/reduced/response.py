@@ -20,7 +20,7 @@ import numpy.typing as npt
 from rotfem.analysis.reduced.drive import Drive
 from rotfem.analysis.reduced.free_hub import free_solution
 from rotfem.analysis.reduced.model import ReducedModel
-from rotfem.analysis.reduced.solution import Solution, Trajectory, nothing
+from rotfem.analysis.reduced.solution import Solution, Trajectory, after, nothing
 from rotfem.analysis.reduced.tips import largest, tips_of
 
 Array = npt.NDArray[np.float64]
@@ -114,7 +114,9 @@ class Response:
         }
 
 
-def reduced_response(system: Any, times: Array, start: Array | None = None, accuracy: float = ACCURACY) -> Response:
+def reduced_response(
+    system: Any, times: Array, start: Array | None = None, accuracy: float = ACCURACY, parts: int | None = None
+) -> Response:
     """Return the history of a linear theory by a reduced model.
 
     Args:
@@ -122,6 +124,7 @@ def reduced_response(system: Any, times: Array, start: Array | None = None, accu
         times: times of the rows, the first 0, s.
         start: shape at t = 0, at rest in the turning frame, local dof array; undeformed if None.
         accuracy: error of basis and time, relative to the largest displacement of the tip, each.
+        parts: of each first step of a collocation, whose error is then infinite; as the accuracy asks for if None.
 
     Raises:
         ComputationError: the stiffness is singular, or the history not finite.
@@ -130,7 +133,7 @@ def reduced_response(system: Any, times: Array, start: Array | None = None, accu
     solution = Solution(Drive(system, times), times) if system.hub is None else free_solution(system, times)
     growth = Growth(ReducedModel(system.held, solution.active), solution, start)
     path, projection = growth.narrow(*growth.grow(accuracy), accuracy)
-    path, error = growth.refine(path, accuracy)
+    path, error = growth.refine(path, accuracy, parts)
     seconds = {"cpu": process_time() - began[0], "wall": perf_counter() - began[1]}
     met = projection <= accuracy and error <= accuracy
     return Response(growth.model, solution, path, projection, error, met, growth.rounds, seconds)
@@ -267,8 +270,8 @@ class Growth:
             out[nearest == number] = -model.solve(solver, residuals[:, nearest == number]).T
         return out
 
-    def refine(self, path: Trajectory, accuracy: float) -> tuple[Trajectory, float]:
-        """Return the history with steps short enough, and the estimate of their error.
+    def refine(self, path: Trajectory, accuracy: float, parts: int | None = None) -> tuple[Trajectory, float]:
+        """Return the history with steps short enough, or cut into parts, and the estimate of their error.
 
         With errors that fall as n^−p with the number of steps, n_2 of them are off by the difference from n_1 over
         (n_2/n_1)^p − 1. Two differences show p.
@@ -276,6 +279,9 @@ class Growth:
         solution, rows = self.solution, tips_of(self.model).T
         if path.exact:
             return path, solution.off
+        if parts is not None:
+            solution.parts = parts
+            return self.solve(), np.inf
         error, order, before, factor = np.inf, ORDER, 0.0, 2.0
         while solution.parts < PARTS and factor * path.steps <= MOST_STEPS:
             parts = min(PARTS, ceil(factor * solution.parts))
@@ -290,8 +296,3 @@ class Growth:
                 break
             factor = float(np.clip((error / (AIM * accuracy)) ** (1 / order), *FINER))
         return path, error
-
-
-def after(times: Array) -> Array:
-    """Return times just after those given, where they have what follows a jump."""
-    return np.asarray(times * (1 + 1e-12))
