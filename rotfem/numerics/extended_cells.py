@@ -2,8 +2,8 @@
 
 What is compiled for a point mass, a load or a spring at x holds x as a place in its cell, and the part of the cell that
 x lies in has it elsewhere. So the shape in that part is continued to the whole cell as the polynomial that it is, E u
-of the unknowns u of the part, with the same value and gradient at x. What f and A of the whole cell are there is Eᵀf and
-EᵀAE of the part.
+of the unknowns u of the part, with the same value and gradient at x. What f and A of the whole cell are there is Eᵀf
+and EᵀAE of the part.
 
 What other integrals there are of the same form come along, and are subtracted: of a cell or two that costs nothing.
 """
