@@ -112,6 +112,8 @@ class RitzVectors:
         forces, r = {i: self._force(system, i) for i in moves}, 0
         for step in range(ACROSS):
             block = [i for i in forces if i > 0 or step < ALONG]
+            if not block:  # all directions are spanned
+                break
             X = np.array([self._solved(solver, forces[i], system.clamped) for i in block])
             MX = np.array([self.times(M, x) for x in X])
             sizes = self.sum(np.einsum("ij,ij->i", X, MX))
