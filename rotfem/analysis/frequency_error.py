@@ -38,7 +38,7 @@ CORRECTIONS, SMALL = 6, 1e-6
 SYMMETRIC = 1e-12
 
 #: Most unknowns of the finer mesh, whose factor is most of the work.
-MOST = 12_000
+MOST = 40_000
 
 #: Part of its stiffness, in units of its mass and the highest frequency, that a structure has for mass.
 LITTLE = 1e-6

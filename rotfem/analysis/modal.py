@@ -77,6 +77,7 @@ class ModalAnalysis:
         free: whether the hub is free, so that its angle is one more unknown.
         past_limits: whether the path to an equilibrium is followed past maxima of the load.
         notes: what there is to be said of these paths.
+        mesh_by_shape: whether the shapes alone told the last mesh errors.
     """
 
     def __init__(
@@ -96,7 +97,7 @@ class ModalAnalysis:
         self.newton = newton or Newton()
         self._unit: float | None = None
         self._kept = KeptDigits(self.system)
-        self.past_limits, self.notes = False, list[str]()
+        self.past_limits, self.notes, self.mesh_by_shape = False, list[str](), False
         assembled = self.system.assembled
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
         self.seconds |= {"equilibrium": 0.0, "factor": 0.0, "eigen": 0.0}
@@ -222,6 +223,7 @@ class ModalAnalysis:
         """
         motion = self.system.motion.at_speed(spinning.speed)
         found = self._frequency_errors(spinning, motion, self.about != "undeformed")
+        self.mesh_by_shape = found is None and bool(len(spinning.pairs.values))
         if found is not None:
             return found
         shares, names = self.shares(spinning), self.structure.components

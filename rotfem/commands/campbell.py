@@ -20,7 +20,7 @@ from rotfem.commands.accuracy import changes_of, refuse, settings_of
 from rotfem.commands.finite import check_rows
 from rotfem.commands.known_error import error_of_modes
 from rotfem.commands.loads import held
-from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
+from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows, rough
 from rotfem.commands.modes import analysis_of, hints_of, theory_error
 from rotfem.commands.pace import Pace
 from rotfem.commands.problem import Problem, case_of
@@ -168,7 +168,7 @@ class Diagram:
             crossing["label"] = labels[crossing["branch"] - 1]
         ends = mode_rows(analysis, sweep.nodes[-1].spinning)[:count]
         warnings = [] if self.choice is not None else advice(analysis, fastest)
-        warnings += [*held(self.analysis.problem), *told(sweep, labels, onsets, ends)]
+        warnings += [*held(self.analysis.problem), *told(sweep, labels, onsets, ends), *rough(self.analysis)]
         off = theory_error(analysis, sweep.nodes[-1].spinning)
         warnings += [off.warning()] if off.warning() else []
         summary = {

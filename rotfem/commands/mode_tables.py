@@ -55,7 +55,7 @@ def mode_tables(analysis: ModalAnalysis, speed: float, count: int, *, keep: bool
     rigid = int(spinning.rigid)
     spinning.pairs = spinning.pairs.select(np.arange(min(count - rigid, len(spinning.pairs.values))))
     rows = mode_rows(analysis, spinning)
-    warnings = [*advice(analysis, speed), *instabilities(rows), *doubtful(rows)]
+    warnings = [*advice(analysis, speed), *instabilities(rows), *doubtful(rows), *rough(analysis)]
     rows = [{**row, "mode": row["mode"] + rigid} for row in rows]
     shapes = {f"mode {row['mode']}: {row['label']}": scaled_shape(analysis, spinning, i) for i, row in enumerate(rows)}
     return ModeTables(spinning, [rigid_row(rows), *rows] if rigid else rows, shapes, warnings)
@@ -113,6 +113,13 @@ def coarse(rows: list[dict[str, Any]]) -> list[str]:
         return []
     listed = ", ".join(f"{label} by about {100 * error:.2g} %" for label, error in found.items())
     return [f"coarse: the mesh may have put off {listed} (mesh_error); more mesh.elements, or a higher mesh.degree"]
+
+
+def rough(analysis: ModalAnalysis) -> list[str]:
+    """Return a warning if no finer mesh has told what the mesh puts off the modes that were judged last."""
+    if not analysis.mesh_by_shape:
+        return []
+    return ["rough: mesh_error is told by the shapes of the modes alone and may be far too small; compare another mesh"]
 
 
 def unreliable(rows: list[dict[str, Any]]) -> list[str]:
