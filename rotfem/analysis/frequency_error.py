@@ -23,6 +23,7 @@ from petsc4py import PETSc
 
 from rotfem.analysis.refined_mesh import RefinedMesh
 from rotfem.errors import ComputationError
+from rotfem.numerics.bounds import RoundOff
 from rotfem.numerics.linear import DirectSolver, Increment
 from rotfem.numerics.refinement import NotRefined
 
@@ -39,6 +40,10 @@ SYMMETRIC = 1e-12
 
 #: Most unknowns of the finer mesh, whose factor is most of the work.
 MOST = 40_000
+
+#: Round-off of the stiffness, relative, from which compliances of finer cells, which have more of it, say nothing.
+#: It is a tenth of what they would tell at most. Modes slower than STILL of the highest have no stiffness.
+ROUND_OFF, STILL = 1e-5, 1e-6
 
 #: Part of its stiffness, in units of its mass and the highest frequency, that a structure has for mass.
 LITTLE = 1e-6
@@ -63,8 +68,11 @@ class FrequencyErrors:
             balanced: whether the equilibrium is that of loads and spin, not the undeformed structure.
         """
         inner = self.system.held
-        large = self.system.A.getSize()[0] * 2**inner.structure.mesh.topology.dim > MOST
+        size = self.system.A.getSize()[0]
+        large = size * 2**inner.structure.mesh.topology.dim > MOST
         if large or inner.datum is not None or spinning.datum is not None or not len(spinning.pairs.values):
+            return None
+        if spinning.clamped.M.getSize() != inner.A.getSize():  # modes are in coordinates of a basis
             return None
         if (fine := self._refined.equations) is None:
             return None
@@ -73,6 +81,8 @@ class FrequencyErrors:
         lam = spinning.pairs.values
         sizes = np.abs(lam)
         shift = float(sizes.min() * sizes.max())
+        if _rounded(spinning, shift) > ROUND_OFF:
+            return None
         try:
             fine.take()
             if balanced and not inner.linear and not _balance(fine):
@@ -95,6 +105,17 @@ class FrequencyErrors:
         M = fine.matrix("M")
         there = fine.carried(densities)[: M.getLocalSize()[0]]
         return _compliances(M, _shifted(fine.matrix("K"), shift, M), there, fine.clamped) / here - 1.0
+
+
+def _rounded(spinning: Any, shift: float) -> float:
+    """Return what round-off of K can make of the shifted stiffness that modes feel, relative, at most."""
+    clamped, squares = spinning.clamped, np.abs(spinning.pairs.values) ** 2 + shift
+    q = spinning.pairs.right[: clamped.M.getLocalSize()[0]]
+    local = np.real(np.sum(q.conj() * clamped.apply(clamped.M, q), axis=0))
+    inertia = squares * (clamped.comm.allreduce(local) if clamped.comm.size > 1 else local)
+    lost = RoundOff(clamped, clamped.sizes).stiffness(q, q)
+    moving = squares > shift + STILL**2 * squares.max()
+    return float(np.max(lost[moving] / inertia[moving], initial=0.0))
 
 
 def _weights(spinning: Any, shift: float) -> Array:

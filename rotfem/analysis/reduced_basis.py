@@ -66,7 +66,7 @@ class ReducedAnalysis(ModalAnalysis):
         self.full = full
         self.problem, self.about, self.comm, self.newton = full.problem, full.about, full.comm, full.newton
         self.system, self.model, self.structure, self.free = full.system, full.model, full.structure, full.free
-        self.seconds, self._unit = full.seconds, full._unit
+        self.seconds, self._unit, self.mesh_by_shape = full.seconds, full._unit, False
         self.checks: list[dict[str, float]] = []
         self._columns: list[Array] = []
 

@@ -168,7 +168,7 @@ class Diagram:
             crossing["label"] = labels[crossing["branch"] - 1]
         ends = mode_rows(analysis, sweep.nodes[-1].spinning)[:count]
         warnings = [] if self.choice is not None else advice(analysis, fastest)
-        warnings += [*held(self.analysis.problem), *told(sweep, labels, onsets, ends), *rough(self.analysis)]
+        warnings += [*held(self.analysis.problem), *told(sweep, labels, onsets, ends), *rough(analysis)]
         off = theory_error(analysis, sweep.nodes[-1].spinning)
         warnings += [off.warning()] if off.warning() else []
         summary = {
