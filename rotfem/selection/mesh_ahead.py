@@ -121,4 +121,5 @@ def vibrating(response: Response) -> Vibrating:
     # of those that do not vibrate the one that fades least comes last
     ordered = [v[np.lexsort((v.real, np.abs(v.imag)))] for v in values]
     known = tuple((np.abs(v.imag), np.maximum(0.0, -v.real)) for v in ordered)
-    return Vibrating(float(np.sqrt(max(0.0, squares.real.min()))), max(0.0, -float(values.real.max())), known)
+    lowest, fading = float(np.sqrt(max(0.0, squares.real.min()))), max(0.0, -float(values.real.max()))
+    return Vibrating(lowest, fading, known, float(response.model.system.structure.length))

@@ -46,11 +46,14 @@ class Vibrating:
         lowest: frequency, rad/s; what is far below it follows its loads and has no phase to lose. 0 where unknown.
         fading: rate at which vibrations fade at least, 1/s: a phase that is lost is forgotten after 1/fading.
         rates: frequencies of modes (increasing, rad/s) and at what rates these fade (1/s), at some instants each.
+        length: of the structure, m; infinite where unknown. Of motions of that size frequencies follow amplitudes, so
+            that an error of these puts phases off, too.
     """
 
     lowest: float = 0.0
     fading: float = 0.0
     rates: tuple[tuple[Array, Array], ...] = ()
+    length: float = np.inf
 
     def fades(self, omega: Array) -> Array:
         """Return the rate (1/s) at which vibrations of frequencies (n,), rad/s, fade: of the modes beside them."""

@@ -122,7 +122,12 @@ class Motion:
         start = LOST * self.start(max(DAMPED / h, above)) / self.scale
         lost = max(start, struck.lost(h), *(part.lost(h) for part in parts)) - whole.lost(h)
         moving = whole.error(scheme, h, turned) + struck.error(scheme, h, turned)
-        return moving - struck.lost(h) + max(0.0, lost)
+        return self.fed * (moving - struck.lost(h) + max(0.0, lost))
+
+    @property
+    def fed(self) -> float:
+        """By what an error grows as it changes the frequencies of a motion that is large beside the structure."""
+        return 1.0 + self.scale / self.structure.length
 
     def start(self, omega: float) -> float:
         """Return the largest displacement (m) at the start of what is quicker than a frequency (rad/s).
@@ -146,7 +151,9 @@ class Motion:
     def plan(self, scheme: Any, allowed: float) -> Plan:
         """Return the steps of a scheme."""
         step = longest(partial(self.error, scheme), self.whole.duration, allowed)
-        own = [longest(partial(part.error, scheme), part.duration, allowed / WINDOWS) for part in self.parts]
+        own = [
+            longest(partial(part.error, scheme), part.duration, allowed / (WINDOWS * self.fed)) for part in self.parts
+        ]
         worst = self.whole.duration / min(min(own), step)
         adapted = sum(part.duration / h for part, h in zip(self.parts, own, strict=True))
         work = (scheme.stages + BESIDE) * self.whole.duration / step

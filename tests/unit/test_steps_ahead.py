@@ -46,6 +46,17 @@ def test_a_phase_that_fades_or_follows_its_loads_does_not_add_up() -> None:
     assert following == pytest.approx(free * (8 / 3) / 100, rel=0.1)
 
 
+def test_an_error_of_a_motion_as_large_as_the_structure_feeds_itself() -> None:
+    """Where the tip moves by half the length, frequencies change with the error: half as much again is told."""
+    t = np.linspace(0.0, 100.0, 8001)
+    free, large = (
+        error_ahead([Motion(t, np.cos(t)[:, None], structure=structure)], ESDIRK4, 0.5)
+        for structure in (Vibrating(), Vibrating(length=2.0))
+    )
+    assert free is not None
+    assert large == pytest.approx(1.5 * free)
+
+
 def test_phases_fade_as_those_of_the_modes_beside_them() -> None:
     """At each frequency the less damped neighbour counts, of all instants that one which fades least."""
     first, then = ((np.array([2.0, 9.0, 30.0]), np.array(rates)) for rates in ([0.1, 1.0, 8.0], [0.1, 3.0, 6.0]))
