@@ -207,7 +207,7 @@ def draw(results: dict[str, dict[str, np.ndarray]], path: Path) -> None:
     for axis in axes[-1]:
         axis.set_xlabel("largest error of the tip, relative")
     for axis in axes[:, 0]:
-        axis.set_ylabel("CPU time of the march, s")
+        axis.set_ylabel("CPU time of the march (s)")
     axes[0, 0].legend(fontsize=7)
     figure.tight_layout()
     figure.savefig(path, dpi=110)
