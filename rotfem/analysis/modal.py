@@ -77,7 +77,7 @@ class ModalAnalysis:
         free: whether the hub is free, so that its angle is one more unknown.
         past_limits: whether the path to an equilibrium is followed past maxima of the load.
         notes: what there is to be said of these paths.
-        mesh_by_shape: whether shapes alone told the last mesh errors, of cells in which they may tell far too little.
+        mesh_by_shape: whether shapes alone told the last mesh errors, of plates, which may be far too small.
     """
 
     def __init__(
@@ -221,10 +221,9 @@ class ModalAnalysis:
 
         A finer mesh says it (see `frequency_error`); without one the shape does (see `mesh_estimate`).
         """
-        motion = self.system.motion.at_speed(spinning.speed)
-        found = self._frequency_errors(spinning, motion, self.about != "undeformed")
-        flat = self.structure.mesh.topology.dim > 1  # shapes of beams have nothing across that they could miss
-        self.mesh_by_shape = found is None and flat and bool(len(spinning.pairs.values))
+        motion, steady = self.system.motion.at_speed(spinning.speed), self.about != "undeformed"
+        found = self._frequency_errors(spinning, motion, steady)
+        self.mesh_by_shape = found is None and self.structure.mesh.topology.dim > 1 and len(spinning.pairs.values) > 0
         if found is not None:
             return found
         shares, names = self.shares(spinning), self.structure.components
