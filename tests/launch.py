@@ -6,15 +6,22 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 MPIRUN = shutil.which("mpirun")
+SCRATCH = tempfile.TemporaryDirectory(prefix="rotfem-tests.", ignore_cleanup_errors=True)
 
 
 def environment() -> dict[str, str]:
-    """Return the environment of a started process."""
+    """Return the environment of a started process.
+
+    Each has a TMPDIR of its own: mpirun names its session directory after its process number, and one that was killed
+    leaves it behind, where a later mpirun of the same number fails with PMIX_ERR_EXISTS.
+    """
     return os.environ | {
+        "TMPDIR": tempfile.mkdtemp(dir=SCRATCH.name),
         "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
         "OMPI_ALLOW_RUN_AS_ROOT": "1",
         "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
