@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from rotfem.analysis.error_estimate import WORDS
@@ -18,8 +19,9 @@ PROJECTED = 0.15
 #: Rows of a history that does not say it.
 ROWS = 1000
 
-#: Nodes along a structure to start from, and for every mode that is wanted.
-NODES, NODES_A_MODE = 30, 4
+#: Nodes along a structure to start from, and for every mode that is wanted; along the longer edge of a plate, whose
+#: cells along the other are no fewer than FEWEST if the scene has as many.
+NODES, NODES_A_MODE, NODES_OF_PLATES, FEWEST = 30, 4, 24, 3
 
 
 class Missed(ComputationError):
@@ -36,7 +38,10 @@ def settings_of(scene: Scene, modes: int = 0) -> Settings:
     mesh, nodes, time = scene.mesh, max(NODES, NODES_A_MODE * modes), None if modes else scene.time
     elements: Any = None
     if scene.structure.mesh_file is None:
-        elements = mesh.elements if isinstance(mesh.elements, tuple) else -(-nodes // mesh.degree)
+        if isinstance(mesh.elements, tuple):
+            elements = mesh.elements if time is None else coarsened(mesh.elements, mesh.degree)
+        else:
+            elements = -(-nodes // mesh.degree)
     return Settings(
         models=models_of(scene, moving=time is not None),
         elements=elements,
@@ -44,6 +49,13 @@ def settings_of(scene: Scene, modes: int = 0) -> Settings:
         scheme=None if time is None else ADAPTIVE,
         tolerance=None if time is None else AIM * SHARES["time"] * (scene.accuracy or 0.0),
     )
+
+
+def coarsened(elements: tuple[int, int], degree: int) -> tuple[int, int]:
+    """Return cells of a plate as those of a scene, but no more than its motion needs to be known at first."""
+    growth = min(1.0, NODES_OF_PLATES / degree / max(elements))
+    x, y = (max(math.ceil(n * growth), min(n, FEWEST)) for n in elements)
+    return x, y
 
 
 def models_of(scene: Scene, moving: bool) -> tuple[dict[str, Any], ...]:

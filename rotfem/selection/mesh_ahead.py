@@ -21,12 +21,12 @@ from rotfem.selection.steps_ahead import Motion
 
 Array = npt.NDArray[np.float64]
 
-#: Elements along an edge that a mesh of a plate keeps at least, where it becomes coarser, and what one of a beam may
-#: become, which costs little as it is.
+#: Elements along the longer edge that a mesh of a plate keeps at least, where it becomes coarser, and what one of a
+#: beam may become, which costs little as it is.
 FEWEST, COARSER = 4, 0.6
 
 #: Modes whose errors are told, smallest error of one, and growths of the number of elements that are tried.
-MODES, LEAST, GROWTHS = 12, 1e-14, np.append([0.3, 0.4, 0.5, 0.6, 0.8], np.geomspace(1.0, 8.0, 25))
+MODES, LEAST, GROWTHS = 12, 1e-14, np.append(np.arange(0.15, 0.96, 0.05), np.geomspace(1.0, 8.0, 25))
 
 #: Instants at which the lowest frequency and the least damping are looked for.
 LOOKS = 17
@@ -92,8 +92,8 @@ class MeshAhead:
             motions: of the tip, whose most demanding one counts.
             allowed: relative error.
         """
-        left, fewest = np.inf, int(np.min(self.elements))
-        coarsest = min(1.0, FEWEST / fewest) if isinstance(self.elements, tuple) else COARSER
+        left = np.inf
+        coarsest = min(1.0, FEWEST / max(self.elements)) if isinstance(self.elements, tuple) else COARSER
         for growth in (g for g in GROWTHS if g >= coarsest):
             left = max((self.error(motion, growth) for motion in motions), default=0.0)
             if left <= allowed:

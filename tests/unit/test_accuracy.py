@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from rotfem.commands.accuracy import coarsened
 from rotfem.errors import SceneError
 from rotfem.scene import Scene
 from rotfem.selection.accuracy import AIM, SAFETY, SHARES, Settings, finer, shares
@@ -89,3 +90,11 @@ def test_scenes_ask_for_an_accuracy() -> None:
             scene.replace({key: value})
     with pytest.raises(SceneError, match="cannot be combined with accuracy"):
         scene.replace({"model.tolerance": 1e-3})
+
+
+def test_a_plate_begins_with_few_cells_of_its_proportions() -> None:
+    """24 nodes along the longer edge, no fewer than three cells along the other, and never more than the scene has."""
+    assert coarsened((24, 12), 2) == (12, 6)
+    assert coarsened((8, 40), 2) == (3, 12)
+    assert coarsened((60, 1), 3) == (8, 1)
+    assert coarsened((10, 2), 2) == (10, 2)

@@ -139,6 +139,16 @@ def test_elements_grow_by_the_order_of_a_frequency() -> None:
     assert growth == pytest.approx(60 ** (1 / 6), rel=0.1)
 
 
+def test_cells_of_a_plate_become_as_few_as_its_motion_allows() -> None:
+    """Of 40 × 8 quadratic cells, whose errors fall with n⁴, four stay along the longer edge at least."""
+    mesh = MeshAhead(np.array([1.0, 50.0]), np.array([1e-8, 2e-8]), np.array([False, False]), (40, 8), 2)
+    off = mesh.error(vibration(1.0))
+    growth, left = mesh.growth([vibration(1.0)], 100 * off)
+    assert 0.3 <= growth <= 0.4
+    assert left <= 100 * off
+    assert mesh.growth([vibration(1.0)], 1.0)[0] * 40 >= 4
+
+
 def test_what_a_jump_has_struck_counts_unseen() -> None:
     """A vibration that the motion itself does not show: resolved by short steps, lost by long ones."""
     t = np.linspace(0.0, 100.0, 2001)
