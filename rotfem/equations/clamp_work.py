@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import ufl
+from ufl.algorithms import expand_derivatives
 
 from rotfem.equations.hub_damping import HubDamping
 from rotfem.mechanics.sums import added
@@ -42,14 +43,15 @@ class ClampWork:
 
     @cached_property
     def _springs(self) -> list[Any]:
-        """The work of springs and dampers of the root, compiled; empty where it has none."""
+        """The work of springs and dampers of the root, compiled; empty where it has none that unknowns move."""
         terms = self._terms
         return [forms.form(added(terms), once=True)] if terms else []
 
     @property
     def _terms(self) -> list[Any]:
         model = self._system.model
-        return [term for name, term in model.terms.items() if model.acting[name].at_root]
+        terms = [term for name, term in model.terms.items() if model.acting[name].at_root]
+        return [term for term in terms if not expand_derivatives(term).empty()]  # of turns that are left out
 
     def tangents(self) -> tuple[Array, Array, Array]:
         """Return the derivatives of these forces to q, v and a about an equilibrium, (unknowns, motions) each."""

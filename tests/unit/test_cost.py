@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import itertools
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from rotfem.commands.cost.chain import Chain
 from rotfem.commands.cost.front import Row, pareto, recommend
 from rotfem.commands.cost.plot import ERRORS
 from rotfem.commands.cost.record import Measurement, Record, fingerprint
@@ -143,6 +145,38 @@ def test_meshes_are_refined_again_in_steps_that_resolve_what_they_move() -> None
     assert distance(found.samples, exact, each=False) <= found.uncertainty < 1e-4
 
 
+def test_steps_of_a_large_mesh_that_would_take_too_long_are_refined_on_a_coarser_one() -> None:
+    """The budget takes 200 cells at most: the mesh of 800 is never asked for but with a part of the share."""
+    own = Setting("reissner", (40, 20), 2, "newmark", 0.02)
+    plan = Plan(own, each=False, first_step=0.08, interval=0.02)
+    shares: dict[Any, list[float]] = {}
+
+    def get(setting: Setting, share: float) -> Measurement | None:
+        shares.setdefault(setting.elements, []).append(share)
+        assert isinstance(setting.elements, tuple)
+        there = measured(replace(setting, elements=setting.elements[0]))
+        return there if setting.elements[0] <= 20 else None
+
+    found = Refinement(plan, get).reference("reissner", 1e-4, 0.4)
+    assert found is not None
+    exact = Samples(np.sin(TIMES)[:, None], TIMES)
+    assert distance(found.samples, exact, each=False) <= found.uncertainty < 1e-3
+    assert next(iter(shares)) == (10, 5)  # by which the time of others is known
+    assert shares[40, 20][0] < 0.4 == shares[10, 5][0]
+
+
+def test_what_a_chain_would_take_goes_with_its_order() -> None:
+    """Errors of order 2 that take twice as long when halved: two levels to a tenth of what is uncertain."""
+    levels = (Setting("reissner", 8, 3, "newmark", 0.08 / 2**i) for i in range(9))
+    chain = Chain(levels, each=False)
+    assert chain.to_take(1e-3) == np.inf
+    for _ in range(4):
+        chain.extend(lambda setting, share: measured(setting), 1.0)
+    uncertain, last = chain.limit().uncertainty, chain.costs[-1]
+    assert chain.to_take(uncertain) == 0.0
+    assert chain.to_take(uncertain / 10) == pytest.approx(last * (2 + 4), rel=1e-6)
+
+
 def test_reference_says_what_the_budget_leaves_uncertain() -> None:
     plan = Plan(Setting("reissner", 8, 3, "newmark", 0.02), each=False, first_step=0.08, interval=0.02)
     found = Refinement(plan, lambda s, share: measured(s) if s.elements in (2, 4, 8) else None)
@@ -155,9 +189,17 @@ def test_reference_says_what_the_budget_leaves_uncertain() -> None:
 
 
 @pytest.mark.parametrize(
-    ("elements", "there"), [(8, [2, 4, 8, 16]), (10, [5, 10, 20, 40]), ((6, 1), [(6, 1), (12, 2), (24, 4), (48, 8)])]
+    ("elements", "there"),
+    [
+        (8, [2, 4, 8, 16]),
+        (10, [5, 10, 20, 40]),
+        ((6, 1), [(6, 1), (12, 2), (24, 4), (48, 8)]),
+        ((8, 3), [(4, 2), (8, 3), (16, 6), (32, 12)]),
+        ((10, 8), [(3, 2), (5, 4), (10, 8), (20, 16)]),
+    ],
 )
-def test_meshes_of_a_chain_are_halved_exactly(elements: Any, there: list[Any]) -> None:
+def test_meshes_of_a_chain_are_halved(elements: Any, there: list[Any]) -> None:
+    """Exactly where it is cheap to refine on; of plates to the next larger numbers, so that there are coarser ones."""
     assert [s.elements for s in finer_meshes(Setting("reissner", elements, 2))][:4] == there
 
 

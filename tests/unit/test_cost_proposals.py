@@ -105,6 +105,9 @@ def test_the_closest_is_one_that_may_be_recommended() -> None:
     assert found["within"] == pytest.approx(1e-3, rel=0.11)
     assert found["row"]["candidate"]
     assert "the best error is 1.0e-03" in missing(rows, 1e-4, 1e-8, [])
+    ahead = {"setting": STEPS[0].key(), "cost": 4.2, "budget": 120.0}
+    said = missing(rows, 1e-4, 1e-8, [], ahead)
+    assert "should be within 0.0001 in about 4.2 s of CPU time, which a --budget of about 120s" in said
 
 
 def test_listed_meshes_and_steps_are_not_departed_from() -> None:

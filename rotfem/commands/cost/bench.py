@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from time import perf_counter, process_time
 from typing import Any
 
@@ -19,7 +19,8 @@ from rotfem.commands.cost.settings import Setting, sweep_speeds
 from rotfem.commands.modes import analysis_of
 from rotfem.commands.problem import Problem
 from rotfem.commands.simulation import Simulation
-from rotfem.errors import ComputationError, SceneError, input_of
+from rotfem.equations.model import Model
+from rotfem.errors import ComputationError, InputError, SceneError, input_of
 from rotfem.listeners import Progress
 from rotfem.scene import Scene
 
@@ -173,3 +174,16 @@ class Bench:
             return samples, (result.summary["dofs"], result.summary["speeds_solved"], 0)
 
         return go
+
+
+def check_degrees(scene: Scene, degrees: Sequence[int], comm: MPI.Comm = MPI.COMM_WORLD) -> None:
+    """Check that elements of these degrees may be used; of a mesh file only the file says of what shape they are.
+
+    Raises:
+        SceneError: they may not.
+    """
+    for degree in degrees if getattr(scene.structure, "mesh", None) is not None else ():
+        try:
+            Model(Problem.of(scene.replace({"mesh.degree": degree})).replace(effects=()), comm)
+        except InputError as error:
+            raise SceneError(scene.file, "cost --degrees", degree, error.allowed) from None

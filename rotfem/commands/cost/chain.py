@@ -93,3 +93,18 @@ class Chain:
             1 if uncertain <= goal or p == float("inf") else max(1, ceil(log2(uncertain / goal) / min(p, self.highest)))
         )
         return self.costs[-1] * 2.0 ** (further + 1)
+
+    def to_take(self, goal: float) -> float:
+        """Return about how long (s) it would take until the limit is known to a goal, were there no bound of time.
+
+        Each level takes as many times as long as the last one did, at least twice; where no order shows, what is
+        uncertain is taken to halve with each. Infinite where there are too few levels to say.
+        """
+        if len(self.samples) < 2:
+            return float("inf")
+        found = self.limit()
+        if found.uncertainty <= goal:
+            return 0.0
+        further = ceil(log2(found.uncertainty / goal) / min(found.order or 1.0, self.highest))
+        growth = max(2.0, self.costs[-1] / max(self.costs[-2], 1e-9))
+        return self.costs[-1] * sum(growth**i for i in range(1, further + 1))

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from rotfem import registry
+from rotfem.commands.cost.bench import check_degrees
 from rotfem.commands.cost.budget import Budget
 from rotfem.commands.cost.front import Row, describe, model_errors, recommend, rows_of, setting_of, truth_of
 from rotfem.commands.cost.laboratory import Laboratory
@@ -35,9 +36,7 @@ from rotfem.commands.cost.settings import (
     unique,
 )
 from rotfem.commands.cost.summary import study_summary
-from rotfem.commands.problem import Problem
-from rotfem.equations.model import Model
-from rotfem.errors import ComputationError, InputError, SceneError
+from rotfem.errors import ComputationError, SceneError
 from rotfem.listeners import Progress
 from rotfem.mechanics.theories import richest
 from rotfem.scene import Scene
@@ -51,15 +50,19 @@ STILL: dict[str, Any] = {"scheme": None, "step": None, "tolerance": None, "every
 #: Part of the accuracy that a reference of the richest theory may be off by; of another theory, of the theory's error.
 CERTAIN, CERTAIN_OF_MODEL = 1 / 5, 1 / 10
 
+#: The same where the time does not suffice for that: half of the accuracy is left to settings.
+ENOUGH = 1 / 2
+
 #: Uncertainty with which the richest theory's reference begins in a quick study.
 ROUGH = 0.02
 
 #: Uncertainty below which no reference is refined: what Newton leaves is not far below.
 LEAST_GOAL = 1e-8
 
-#: Parts of the time left that one computation may take: of the richest theory's reference, of others', of the scene's
-#: own setting, of the rest of the grid, of a proposal, of a repetition.
-SHARES = {"truth": 0.4, "reference": 0.1, "own": 0.5, "grid": 0.1, "proposal": 0.5, "repeat": 0.3}
+#: Parts of the time left that one computation may take: of the richest theory's reference, of the same where nothing
+#: could be recommended without it, of others', of the scene's own setting, of the rest of the grid, of a proposal, of a
+#: repetition.
+SHARES = {"truth": 0.4, "last": 0.8, "reference": 0.1, "own": 0.5, "grid": 0.1, "proposal": 0.5, "repeat": 0.3}
 
 #: Part of the budget that the grid leaves to proposals.
 RESERVE = 0.4
@@ -105,10 +108,10 @@ class Study:
         self.chosen = chosen
         base = self.base_step()
         settings = grid(self.scene, self.output, quick, base, chosen)
-        self.check_degrees(chosen.get("degrees") or ())
+        check_degrees(self.scene, chosen.get("degrees") or (), self.laboratory.comm)
         self.plan = self._plan(settings, base, quick, chosen)
         self.refinement = Refinement(self.plan, lambda s, share: self.laboratory.get(s, share, "reference"))
-        self._refer(unique([richest().name, *(s.theory for s in settings)]), max(CERTAIN * accuracy, LEAST_GOAL), quick)
+        self._refer(unique([richest().name, *(s.theory for s in settings)]), accuracy, quick)
         progress(0.4)
         self._try(settings, RESERVE, progress)
         rows = [row for row in self.rows() if row["candidate"]]
@@ -162,13 +165,15 @@ class Study:
             plan.own, plan.schemes = replace(own, scheme=others[0]), list(others[1:])
         return plan
 
-    def _refer(self, theories: Sequence[str], goal: float, quick: bool) -> None:
+    def _refer(self, theories: Sequence[str], accuracy: float, quick: bool) -> None:
         """Make the references, that of the richest theory first; in a quick study others are told from it."""
-        truth = theories[0]
+        truth, goal = theories[0], max(CERTAIN * accuracy, LEAST_GOAL)
         self._refine(truth, max(goal, ROUGH) if quick else goal, SHARES["truth"], self.plan.schemes)
         beside = {theory: self._beside(theory, truth) for theory in theories[1:]}
         if quick:  # the others are known now, however much time the rest takes
             self._refine(truth, goal, SHARES["truth"], self.plan.schemes)
+        if self.uncertainty > max(accuracy / TOLD_APART, goal):  # nothing could be recommended
+            self._refine(truth, self.enough(accuracy), SHARES["last"], self.plan.schemes)
         for theory, there in beside.items():
             if quick and there is not None and truth in self.references:
                 self.references[theory] = neighbour(self.references[truth], *there, self.refinement.errors[truth])
@@ -178,9 +183,10 @@ class Study:
 
     def _refine(self, theory: str, goal: float, share: float, schemes: Sequence[str]) -> None:
         found = self.refinement.reference(theory, goal, share, schemes)
-        if found is None:
+        known = self.references.get(theory)
+        if found is None and known is None:
             self.failures[theory] = self.refinement.reasons.get(theory, "")
-        else:
+        elif found is not None and (known is None or found.uncertainty <= known.uncertainty):
             self.references[theory] = found
 
     def _beside(self, theory: str, other: str) -> tuple[Samples, Samples] | None:
@@ -210,11 +216,10 @@ class Study:
 
     def _propose(self, accuracy: float) -> None:
         """Compute what should be the cheapest good setting until nothing cheaper than what is known is in sight."""
-        truth, chosen = truth_of(self.references), self.chosen
+        truth = truth_of(self.references)
         if truth is None:
             return
-        allowed = chosen.get("theories") or list(self.references)
-        errors = {t: e for t, e in model_errors(self.references, self.each).items() if t in allowed}
+        errors = {t: e for t, e in model_errors(self.references, self.each).items() if t in self.allowed}
         self._seed(truth, accuracy)
         goal = aim = self.attainable(accuracy)
         for _ in range(MOST_ROUNDS):
@@ -223,7 +228,7 @@ class Study:
             knowledge = Knowledge(
                 self.plan, rows, self.refinement.meshes, errors, self.uncertainty, self.laboratory.prediction
             )
-            proposal = knowledge.best(aim, {name for name in ("elements", "steps") if chosen.get(name)})
+            proposal = knowledge.best(aim, self.fixed)
             if proposal is None or (best is not None and proposal.cost > WORTH * best["cost"]):
                 return
             found = self.laboratory.get(proposal.setting, SHARES["proposal"], "proposal")
@@ -240,6 +245,20 @@ class Study:
             adaptive = replace(self.plan.own, theory=truth, scheme=scheme, step=None, tolerance=accuracy, every=1)
             self.laboratory.get(adaptive, SHARES["grid"], "proposal")
 
+    @property
+    def allowed(self) -> Sequence[str]:
+        """Theories that may be recommended."""
+        return self.chosen.get("theories") or list(self.references)
+
+    @property
+    def fixed(self) -> frozenset[str]:
+        """Which of "elements" and "steps" were chosen, so that no others are proposed."""
+        return frozenset(name for name in ("elements", "steps") if self.chosen.get(name))
+
+    def enough(self, accuracy: float) -> float:
+        """Return the uncertainty of a reference that leaves settings enough of the accuracy to be recommended."""
+        return max(ENOUGH * accuracy, LEAST_GOAL)
+
     def attainable(self, accuracy: float) -> float:
         """Return the accuracy, or the nearest one that can be told from what errors are measured against."""
         return max(accuracy, TOLD_APART * self.uncertainty)
@@ -255,19 +274,6 @@ class Study:
             self.laboratory.get(setting_of(row), SHARES["repeat"], row["purpose"], self.repeat)
 
     # --- the scene ---------------------------------------------------------------------------------------------------
-
-    def check_degrees(self, degrees: Sequence[int]) -> None:
-        """Check that elements of these degrees may be used; of a mesh file only the file says of what shape they are.
-
-        Raises:
-            SceneError: they may not.
-        """
-        for degree in degrees if getattr(self.scene.structure, "mesh", None) is not None else ():
-            try:
-                scene = self.scene.replace({"mesh.degree": degree})
-                Model(Problem.of(scene).replace(effects=()), self.laboratory.comm)
-            except InputError as error:
-                raise SceneError(self.scene.file, "cost --degrees", degree, error.allowed) from None
 
     def base_step(self) -> float | None:
         """Return the fixed step (s) around which steps are tried: the scene's own, or the mean of its adaptive ones.

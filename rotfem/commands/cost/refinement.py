@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from math import ceil
 
 from rotfem import registry
 from rotfem.commands.cost.chain import MOST_FAILURES, MOST_LEVELS, Chain, Get
@@ -27,6 +28,10 @@ MIXED_SHARE = 0.25
 #: Parts of the share that a mesh may take in the long steps with which meshes are first looked at, and in those that
 #: have turned out to be needed: without them nothing is known.
 LOOK, NEEDED = 0.5, 2.0
+
+#: Cells from which a mesh is large: what its steps take is told from the coarsest one before any of them is made, and
+#: none may take more than a part of the share, as more of them are to follow.
+LARGE, FIRST_LOOK = 128, 0.25
 
 
 @dataclass
@@ -73,6 +78,12 @@ class Refinement:
         self.base: dict[str, Setting] = {}
         self.errors: dict[str, float] = {}
         self.reasons: dict[str, str] = {}
+        self._chains: dict[str, list[Chain]] = {}
+
+    def to_take(self, theory: str, goal: float) -> float:
+        """Return about how long (s) the chains of a theory's reference would take to be known to a goal, together."""
+        chains = self._chains.get(theory, [])
+        return sum(chain.to_take(goal / len(chains)) for chain in chains)
 
     def reference(self, theory: str, goal: float, share: float, schemes: Sequence[str] = ()) -> Reference | None:
         """Return the reference of a theory; None where no level could be computed, with the reason in `reasons`.
@@ -88,7 +99,7 @@ class Refinement:
             if not chain.samples:
                 self.reasons[theory] = chain.reason
                 return None
-            found = chain.limit()
+            found, self._chains[theory] = chain.limit(), [chain]
             base = self.base[theory] = min(chain.settings[-2:], key=lambda s: cells(s.elements) + s.degree)
             self.errors[theory] = dict(self.meshes[theory])[base]
             return Reference(found.samples, found.uncertainty, found.order, {"mesh": found.uncertainty})
@@ -96,9 +107,7 @@ class Refinement:
 
     def _history(self, theory: str, goal: float, share: float, schemes: Sequence[str]) -> Reference | None:
         own = replace(self.plan.own, theory=theory)
-        scout = self._steps(own)
-        while not scout.ended and (len(scout.samples) < 2 or scout.limit().error > FINE_ENOUGH):
-            scout.extend(self.get, share)
+        scout = self._scout(own, share)
         if not scout.samples:
             self.reasons[theory] = scout.reason
             return None
@@ -111,6 +120,7 @@ class Refinement:
         space = meshes.limit()
         chain = self._cheaper(scout, meshes, space, goal, error)
         best = self._refined(chain, schemes, goal / 2, share)
+        self._chains[theory] = [best, meshes]
         near = self._close(best, MIXED_SHARE * goal)
         mixed = self._unlike(near, best, meshes, share)
         if mixed > MIXED_SHARE * goal or space.uncertainty > goal / 2:
@@ -121,6 +131,24 @@ class Refinement:
         if there is None or there.samples is None:
             return None
         return combined(best.limit(), there.samples, space, error, self.plan.each, mixed)
+
+    def _scout(self, own: Setting, share: float) -> Chain:
+        """Return the chain of steps to an error that meshes can be refined at, on the own mesh or a coarser one.
+
+        A coarser one serves where the steps of a large mesh would take too much of the time.
+        """
+        meshes = [own, *reversed([s for s in finer_meshes(own) if cells(s.elements) < cells(own.elements)])]
+        if cells(own.elements) >= LARGE and len(meshes) > 1:
+            self._steps(meshes[-1]).extend(self.get, share)
+        else:
+            del meshes[1:]
+        for mesh in meshes:
+            chain, most = self._steps(mesh), share if mesh is meshes[-1] else FIRST_LOOK * share
+            while not chain.ended and (len(chain.samples) < 2 or chain.limit().error > FINE_ENOUGH):
+                chain.extend(self.get, most)
+            if len(chain.samples) > 1:
+                break
+        return chain
 
     def _close(self, chain: Chain, goal: float) -> Setting:
         """Return the longest of a chain's steps whose error is within a goal, the shortest if none is."""
@@ -212,7 +240,7 @@ class Refinement:
         if self.plan.least_step is not None or scout.to_go(goal) < 1.0:
             return scout
         for setting, samples in zip(meshes.settings, meshes.samples, strict=True):
-            if setting.elements == self.plan.own.elements:
+            if setting.elements == scout.settings[0].elements:
                 return scout
             if distance(samples, space.samples, self.plan.each) * error <= MIXED_SHARE * goal:
                 chain = self._steps(replace(setting, step=None))
@@ -251,14 +279,16 @@ class Refinement:
 def finer_meshes(base: Setting) -> list[Setting]:
     """Return settings on finer and finer meshes, from one that the own one is refined from, where it is.
 
-    A mesh from a file cannot be refined: its degree is raised instead.
+    Odd numbers of a plate's elements are halved to the next larger ones. A mesh from a file cannot be refined: its
+    degree is raised instead.
     """
     if base.elements is None:
         return [replace(base, degree=degree) for degree in range(base.degree, HIGHEST_DEGREE + 1)]
-    down = 0
-    counts = base.elements if isinstance(base.elements, tuple) else (base.elements,)
+    down, counts = 0, base.elements if isinstance(base.elements, tuple) else (base.elements,)
     # One element cannot be shared among processes.
-    while down < 2 and all(n % 2 ** (down + 1) == 0 and n > 2 ** (down + 1) for n in counts):
+    while down < 2 and all(n > 2 ** (down + 1) and (len(counts) > 1 or n % 2 ** (down + 1) == 0) for n in counts):
         down += 1
-    start = scaled(base.elements, 0.5**down)
-    return [replace(base, elements=scaled(start, 2.0**i)) for i in range(MOST_LEVELS)]
+    coarser = [[ceil(n / 2**i) for n in counts] for i in range(down, 0, -1)]
+    meshes: list[Elements] = [(n[0], n[1]) if len(n) > 1 else n[0] for n in coarser]
+    meshes += [scaled(base.elements, 2.0**i) for i in range(MOST_LEVELS - down)]
+    return [replace(base, elements=elements) for elements in meshes]

@@ -38,7 +38,7 @@ def cost_report(summary: dict[str, Any], rows: list[dict[str, Any]], folder: Pat
     largest = summary["reference_largest"]
     if largest["dofs"]:
         lines.append(
-            f"largest reference: {largest['dofs']} unknowns; longest {largest['time']:.2g} s; most memory "
+            f"largest reference: {largest['dofs']} unknowns; longest {largest['cost']:.2g} s of CPU time; most memory "
             f"{largest['memory'] / 1e6:.0f} MB"
         )
     if summary["budget"]["refused"]:

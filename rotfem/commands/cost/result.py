@@ -111,9 +111,9 @@ class CostResult(Result):
         wanted = self.summary["accuracy"] if accuracy is None else accuracy
         row = self.recommend(wanted)
         if row is None:
-            raise ComputationError(
-                f"no setting tried is within {wanted:g}", advice="a larger --accuracy, or smaller --steps"
-            )
+            ahead = self.summary.get("outlook") if wanted == self.summary["accuracy"] else None
+            more = "smaller --steps" if ahead is None else f"a --budget of about {ahead['budget']:.0f}s"
+            raise ComputationError(f"no setting tried is within {wanted:g}", advice=f"a larger --accuracy, or {more}")
         error = row["error"] if row["total_error"] is None else row["total_error"]
         remark = (
             f"{self.scene.name}, tuned to a relative accuracy of {wanted:g} of {self.summary['output']}: "

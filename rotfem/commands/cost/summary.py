@@ -6,6 +6,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from rotfem.commands.cost.front import Row, describe, judged, model_errors, recommend, truth_of
+from rotfem.commands.cost.outlook import outlook
 from rotfem.mechanics.theories import richest
 from rotfem.version import versions
 
@@ -36,6 +37,7 @@ def study_summary(study: Study, rows: list[Row], accuracy: float, quick: bool) -
     uncertainty = 0.0 if truth is None else references[truth].uncertainty
     best = {a: recommend(rows, a, uncertainty) for a in sorted({*DECADES, accuracy}, reverse=True)}
     nearest = closest(rows, accuracy, uncertainty) if best[accuracy] is None else None
+    ahead = outlook(study, rows, accuracy) if best[accuracy] is None else None
     used, compiling = study.budget.summary(), laboratory.bench.compiling
     return {
         "command": "cost",
@@ -55,7 +57,8 @@ def study_summary(study: Study, rows: list[Row], accuracy: float, quick: bool) -
         "recommended": best[accuracy],
         "promise": promise(best[accuracy], uncertainty),
         "closest": nearest,
-        "missing": missing(rows, accuracy, uncertainty, used["refused"]) if best[accuracy] is None else "",
+        "missing": missing(rows, accuracy, uncertainty, used["refused"], ahead) if best[accuracy] is None else "",
+        "outlook": ahead,
         "recommendations": [{"accuracy": a, "setting": r and describe(r), "row": r} for a, r in best.items()],
         "scaling": laboratory.prediction.scaling(),
         "settings": len(rows),
@@ -81,11 +84,12 @@ def promise(row: Row | None, uncertainty: float) -> dict[str, float] | None:
 
 
 def largest(rows: list[Row]) -> dict[str, float]:
-    """Return the most unknowns, time (s, with set-up) and memory (bytes) of a setting computed for references."""
+    """Return the most unknowns, time and CPU time (s, with set-up), memory (bytes) of what references are made of."""
     made = [row for row in rows if row["purpose"] == "reference" and row["status"] == "done"]
     return {
         "dofs": max((row["dofs"] or 0 for row in made), default=0),
         "time": max((row["setup"] + row["time"] for row in made), default=0.0),
+        "cost": max((row["cost"] for row in made), default=0.0),
         "memory": max((row["memory"] or 0.0 for row in made), default=0.0),
     }
 
@@ -102,13 +106,24 @@ def closest(rows: list[Row], accuracy: float, uncertainty: float) -> dict[str, A
     return {"within": within, "row": recommend(rows, within, uncertainty)}
 
 
-def missing(rows: list[Row], accuracy: float, uncertainty: float, refused: list[dict[str, Any]]) -> str:
-    """Return what it takes to recommend a setting where there is none."""
+def missing(
+    rows: list[Row],
+    accuracy: float,
+    uncertainty: float,
+    refused: list[dict[str, Any]],
+    ahead: dict[str, Any] | None = None,
+) -> str:
+    """Return what was reached, and what it takes to recommend a setting where there is none (see `outlook`)."""
     errors = _errors(rows)
     known = errors and isfinite(uncertainty)
     said = f"the best error is {min(errors):.1e}, known to {uncertainty:.0e}" if known else "nothing could be judged"
     wanted = [entry for entry in refused if entry["time"] is not None]
-    if wanted:
+    if ahead is not None:
+        said += (
+            f"; the budget left out {len(refused)} settings; {describe(ahead['setting'])} should be within {accuracy:g} in about {ahead['cost']:.2g} s of CPU time, "
+            f"which a --budget of about {ahead['budget']:.0f}s should suffice to find"
+        )
+    elif wanted:
         least = min(wanted, key=lambda entry: entry["time"])
         said += f"; the budget left out {len(refused)} settings, as {describe(least['setting'])}: {least['why']}"
     elif refused:
