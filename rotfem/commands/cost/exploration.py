@@ -59,9 +59,9 @@ ROUGH = 0.02
 #: Uncertainty below which no reference is refined: what Newton leaves is not far below.
 LEAST_GOAL = 1e-8
 
-#: Parts of the time left that one computation may take: of the richest theory's reference, of the same where nothing
-#: could be recommended without it, of others', of the scene's own setting, of the rest of the grid, of a proposal, of a
-#: repetition.
+#: Parts of the time left that one computation may take: of the richest theory's reference, of this and of a proposal
+#: where nothing could be recommended without it, of others', of the scene's own setting, of the rest of the grid, of a
+#: proposal, of a repetition.
 SHARES = {"truth": 0.4, "last": 0.8, "reference": 0.1, "own": 0.5, "grid": 0.1, "proposal": 0.5, "repeat": 0.3}
 
 #: Part of the budget that the grid leaves to proposals.
@@ -231,7 +231,8 @@ class Study:
             proposal = knowledge.best(aim, self.fixed)
             if proposal is None or (best is not None and proposal.cost > WORTH * best["cost"]):
                 return
-            found = self.laboratory.get(proposal.setting, SHARES["proposal"], "proposal")
+            share = SHARES["last" if best is None else "proposal"]
+            found = self.laboratory.get(proposal.setting, share, "proposal")
             if found is None:
                 return
             row = next(r for r in self.rows() if setting_of(r) == proposal.setting)
