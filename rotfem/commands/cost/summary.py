@@ -120,9 +120,9 @@ def missing(
     wanted = [entry for entry in refused if entry["time"] is not None]
     if ahead is not None:
         said += (
-            f"; the budget left out {len(refused)} settings; {describe(ahead['setting'])} should be within {accuracy:g} "
-            f"in about {ahead['cost']:.2g} s of CPU time, which a --budget of about {ahead['budget']:.0f}s should "
-            "suffice to find"
+            f"; the budget left out {len(refused)} settings; {describe(ahead['setting'])} should be within "
+            f"{accuracy:g} in about {ahead['cost']:.2g} s of CPU time, which a --budget of about "
+            f"{ahead['budget']:.0f}s should suffice to find"
         )
     elif wanted:
         least = min(wanted, key=lambda entry: entry["time"])
