@@ -16,7 +16,7 @@ def outlook(study: Study, rows: list[Row], accuracy: float) -> dict[str, Any] | 
     """Return the `setting` that should be good enough, its CPU time `cost` (s), and the `budget` (s) to know it.
 
     It is one that was computed where that is within the accuracy, but for what is uncertain of the reference. None
-    where time was not what is missing, or nothing can be said.
+    where time was not what is missing, or nothing can be said, as errors do not fall with an order yet.
 
     Args:
         study: what was done.
@@ -29,6 +29,8 @@ def outlook(study: Study, rows: list[Row], accuracy: float) -> dict[str, Any] | 
     found = recommend(rows, accuracy)
     if found is not None:
         setting, cost = setting_of(found), found["cost"]
+    elif not study.refinement.settled(truth, study.enough(accuracy)):
+        return None
     else:
         errors = {t: e for t, e in model_errors(study.references, study.each).items() if t in study.allowed}
         known = Knowledge(study.plan, rows, study.refinement.meshes, errors, 0.0, study.laboratory.prediction)

@@ -85,6 +85,11 @@ class Refinement:
         chains = self._chains.get(theory, [])
         return sum(chain.to_take(goal / len(chains)) for chain in chains)
 
+    def settled(self, theory: str, goal: float) -> bool:
+        """Return whether each chain of a theory's reference is known to a goal, or its levels show an order."""
+        limits = [chain.limit() for chain in self._chains.get(theory, [])]
+        return all(found.order is not None or found.uncertainty <= goal for found in limits)
+
     def reference(self, theory: str, goal: float, share: float, schemes: Sequence[str] = ()) -> Reference | None:
         """Return the reference of a theory; None where no level could be computed, with the reason in `reasons`.
 

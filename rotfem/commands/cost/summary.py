@@ -125,8 +125,8 @@ def missing(
             f"{ahead['budget']:.0f}s should suffice to find"
         )
     elif wanted:
-        least = min(wanted, key=lambda entry: entry["time"])
-        said += f"; the budget left out {len(refused)} settings, as {describe(least['setting'])}: {least['why']}"
+        together = sum(entry["time"] for entry in wanted)
+        said += f"; the budget left out {len(refused)} settings, which would take about {together:.2g} s"
     elif refused:
         said += f"; {describe(refused[0]['setting'])} {refused[0]['why']}"
     return said
