@@ -1,8 +1,8 @@
 """How good every row of `rotfem explain` is on ten scenes, against runs on finer meshes with finer steps.
 
-    ./with-fenicsx python3 benchmarks/explain_truth.py [further | SCENE …]
+    ./with-fenicsx python3 benchmarks/explain_truth.py [further | odd | SCENE …]
 
-of `explain_scenes.FRESH`, of the ten of `explain_further_scenes`, or of those named.
+of `explain_scenes.FRESH`, of the ten of `explain_further_scenes` or `explain_odd_scenes`, or of those named.
 
 The truth of an effect or a theory is the difference of two runs on twice the elements with a quarter of the steps in a
 scheme of fourth order; of the steps and the mesh that of the scene's own to the finer ones. Columns: kind, name and
@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from explain_further_scenes import FURTHER
+from explain_odd_scenes import ODD
 from explain_scenes import FRESH, scene
 
 import rotfem
@@ -94,8 +95,9 @@ def main() -> None:
     """Print the table, and how many rows are within a factor 3, large ones for large ones counted with them."""
     inside, missed = [], []
     asked = sys.argv[1:] or list(FRESH)
-    FRESH.update(FURTHER)
-    for name in list(FURTHER) if asked == ["further"] else asked:
+    FRESH.update(FURTHER | ODD)
+    sets = {"further": FURTHER, "odd": ODD}
+    for name in [name for one in asked for name in sets.get(one, [one])]:
         result = rotfem.explain(scene(name))
         print(f"{name}: {', '.join(result.summary['effects'])}", flush=True)
         for row in with_truth(scene(name), result):

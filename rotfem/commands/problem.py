@@ -9,6 +9,7 @@ from typing import Any, Self, cast
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady, steady_state
+from rotfem.analysis.first_motion import FirstMotion
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import Array, Scheme, State
 from rotfem.analysis.time_loop import March, Steps
@@ -197,6 +198,7 @@ def case_of(scene: Scene) -> Case:
         scheme=None if time is None else scheme_of(time),
         tip_displacement=scene.initial.tip_displacement,
         from_steady=scene.initial.state == "steady",
+        first=first_motion(scene),
         mode_count=scene.modes.count,
         about=scene.modes.about,
         increment_tolerance=scene.solver.increment_tolerance,
@@ -204,6 +206,14 @@ def case_of(scene: Scene) -> Case:
         tolerance=scene.model.tolerance,
         unsteady=unsteady,
     )
+
+
+def first_motion(scene: Scene) -> FirstMotion | None:
+    """Return what the history of a scene starts with beside its first state; None where it starts at rest."""
+    said = scene.initial
+    if not said.moves:
+        return None
+    return FirstMotion(mode=said.mode, amplitude=said.amplitude or 0.0, phase=said.phase, velocity=said.velocity)
 
 
 def scheme_of(time: Time) -> Scheme:

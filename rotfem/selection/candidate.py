@@ -10,6 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.equilibrium import steady_state
+from rotfem.analysis.first_motion import FirstMotion
+from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
 from rotfem.equations.affine import PRESTRESS
 from rotfem.errors import ComputationError
@@ -21,6 +23,9 @@ from rotfem.selection.distance import Beyond, Bound, Outputs
 
 Array = npt.NDArray[Any]
 T = TypeVar("T")
+
+#: What a history starts from, (q, q̇): local dof arrays.
+Start = tuple[Array | None, Array | None]
 
 #: Share of halved steps, and of steps in which Newton strayed, from which on steps are too long to be trusted.
 HALVED, STRAYED = 0.01, 0.1
@@ -69,6 +74,20 @@ class Candidate:
         """
         system, speed = self.switched(), self.case.problem.motion.speed(0.0)
         return self.plainly(lambda: steady_state(system, speed, self.case.newton()))
+
+    def in_motion(self, q: Array | None, first: FirstMotion) -> tuple[Array | None, Array]:
+        """Return (q, q̇) at t = 0, local dof arrays, of a history that starts with a mode or velocities.
+
+        Args:
+            q: equilibrium that it starts from; None where it is undeformed.
+            first: mode or velocities.
+
+        Raises:
+            ComputationError: no equilibrium, or eigenpairs not to be trusted.
+        """
+        system, state = self.switched(), "steady" if self.case.from_steady else "undeformed"
+        modal = ModalAnalysis(system.model.problem, state, self.case.newton(), system.comm, system)
+        return self.plainly(lambda: first.beside(q, modal))
 
     def plainly(self, compute: Callable[[], T]) -> T:
         """Return what is computed with plain tangents, or where that fails with those that take longer to compile."""
@@ -120,12 +139,12 @@ class Candidate:
         flexible: Array = np.abs(values) > ZERO * np.median(np.abs(values))
         return values[flexible][: count - int(not flexible.all())]
 
-    def history(self, steps: Steps, q: Array | None, out: Outputs, watch: Watch) -> None:
+    def history(self, steps: Steps, start: Start, out: Outputs, watch: Watch) -> None:
         """Write a history into the outputs, as far as it goes.
 
         Args:
             steps: its steps.
-            q: shape at t = 0, undeformed if None.
+            start: (q, q̇) at t = 0; None where it is undeformed, or at rest.
             out: where its samples go.
             watch: what ends it early.
 
@@ -140,15 +159,15 @@ class Candidate:
         def compute() -> None:
             few = HALVED * count if self.system.held.plain and count else watch.halved
             here = replace(watch, halved=min(few, watch.halved), shorter=np.isfinite(watch.halved))
-            self._history(steps, q, out, here)
+            self._history(steps, start, out, here)
 
         self.plainly(compute)
 
-    def _history(self, steps: Steps, q: Array | None, out: Outputs, watch: Watch) -> None:
+    def _history(self, steps: Steps, start: Start, out: Outputs, watch: Watch) -> None:
         system, scheme = self.switched(), self.case.scheme
         assert scheme is not None
         newton, strayed = self.case.newton(foreseeing=True), 0
-        march = March(system, scheme, steps, newton, q)
+        march = March(system, scheme, steps, newton, *start)
         most = STRAYED * len(steps.parts or ()) if np.isfinite(watch.halved) else np.inf
         tips: list[Array] = []
         out.sizes = np.zeros(len(system.structure.components))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
+from rotfem.analysis.first_motion import FirstMotion
 from rotfem.analysis.schemes import Scheme
 from rotfem.analysis.time_loop import Steps
 from rotfem.mechanics.problem import Problem
@@ -21,9 +22,11 @@ class Case:
         scheme: time-stepping scheme of the history.
         tip_displacement: u_2 (m) of the tip of the static shape it starts from, or None.
         from_steady: whether it starts from the equilibrium at its speed.
+        first: the mode or the velocities it starts with beside that; None where it starts at rest.
         mode_count: number of modes that are wanted.
         about: the state that modes are about: "steady" or "undeformed".
         increment_tolerance: at which Newton's method stops.
+        history_tolerance: at which it does in a history; None where that is the same.
         max_iterations: of Newton's method.
         tolerance: relative error up to which a poorer model is good enough; None if none is to be chosen.
         unsteady: why there is neither history nor steady state; "" if there is one.
@@ -34,9 +37,11 @@ class Case:
     scheme: Scheme | None = None
     tip_displacement: float | None = None
     from_steady: bool = False
+    first: FirstMotion | None = None
     mode_count: int = 6
     about: str = "steady"
     increment_tolerance: float = 1e-9
+    history_tolerance: float | None = None
     max_iterations: int = 25
     tolerance: float | None = None
     unsteady: str = ""
@@ -47,4 +52,6 @@ class Case:
 
     def newton(self, foreseeing: bool = False) -> Newton:
         """Return the iteration control, for histories one that need not see the last increment (see `Newton`)."""
-        return Newton(self.increment_tolerance, self.max_iterations, foreseeing=foreseeing)
+        own = self.increment_tolerance
+        tolerance = own if not foreseeing or self.history_tolerance is None else self.history_tolerance
+        return Newton(tolerance, self.max_iterations, foreseeing=foreseeing)

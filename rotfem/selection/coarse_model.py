@@ -32,6 +32,9 @@ Array = npt.NDArray[Any]
 #: Share of the case's own steps from which on shorter steps of a trial cost more than they can save.
 DEAR = 0.5
 
+#: Increment of Newton's method, relative to the motion, that is not felt in the smallest change that is told.
+FELT = 1e-6
+
 #: Times at which the speed of a free hub is looked at.
 HUB_LOOKS = 2001
 
@@ -64,6 +67,7 @@ class Trial:
         unknown: why it did.
         samples: of the histories; None where none is wanted.
         finer: the fewest steps between two samples, from where Newton needs them.
+        moves: largest displacement of the tip over the length, where a march has shown it, else 0.
     """
 
     def __init__(
@@ -99,22 +103,30 @@ class Trial:
         self.samples: Sampling | None = None
         if HISTORY in self.wanted and case.steps is not None:
             self.samples = Sampling.of(case.steps, self.at_rest, given(problem))
-        self.finer = FINER[0]
+        self.finer, self.moves = FINER[0], 0.0
 
     def _refuse(self) -> None:
         """Say why there is none of the outputs."""
         check_steady(self.full.problem.replace(effects=None))
         raise InputError("", None, self.full.unsteady or "there is nothing to compare models by")
 
-    def fit(self, error: float) -> None:
-        """Fit the steps of the histories to an error, relative, of one in the steps of the case (0: unknown).
+    def fit(self, error: float, size: float = 0.0) -> None:
+        """Fit steps and iterations of the histories to a march in the steps of the case.
 
-        No two may differ by what steps make of the same motion, and up to `LONGER` they need not be shorter than that.
-        Where they are to be shorter by less than `SHORTER`, there are more samples, else several steps between two.
+        Args:
+            error: of its steps, relative (0: unknown).
+            size: its largest displacement of the tip over the length (0: unknown).
+
+        Newton's method stops where increments are no matter of what changes are told. No two histories may differ by
+        what steps make of the same motion, and up to `LONGER` they need not be shorter than that. Where they are to be
+        shorter by less than `SHORTER`, there are more samples, else several steps between two.
         """
         own, scheme = self.full.steps, self.full.scheme
         if self.samples is None or scheme is None or own is None or own.step is None or self._done or not error > 0.0:
             return
+        self.moves = size
+        increment = max(self.case.increment_tolerance, FELT * min(1.0, size))
+        self.case = self.case.replace(history_tolerance=increment)
         wanted = serving(error, own.step, scheme.order)
         if (longer := min(LONGER, wanted / self.samples.step)) > SHORTER:
             self.samples = Sampling.of(own, self.at_rest, given(self.case.problem), longer)
@@ -177,7 +189,7 @@ class Trial:
         return compile_system(problem.replace(theory=own), self.comm, HISTORY in self.wanted, parted=True)
 
     def on_mesh(self, mesh: Any, theory: str, without: Collection[str] = ()) -> Candidate:
-        """Return a model on another mesh; a new one every time, where that is not the coarse one.
+        """Return a model on another mesh; the compiled system is one for all that ask for a theory on it.
 
         Raises:
             InputError: a mesh that cannot be computed with.
@@ -185,8 +197,11 @@ class Trial:
         if mesh == self.case.problem.mesh:
             return self.candidate(theory, without)
         case = self.case.replace(problem=self.case.problem.replace(mesh=mesh))
-        _, left_out = self._stand_in(theory)
-        return Candidate(case, self.compiled(case.problem, theory), left_out.union(without))
+        own, left_out = self._stand_in(theory)
+        key = f"{own.name} on {mesh!r}"
+        if key not in self._systems:
+            self._systems[key] = self.compiled(case.problem, theory)
+        return Candidate(case, self._systems[key], left_out.union(without))
 
     def poorest_on(self, mesh: Any) -> Candidate:
         """Return the poorest theory with its geometric stiffness on another mesh, nothing left out.
@@ -247,13 +262,14 @@ class Trial:
             self.finer = finer
             self._done.clear()
 
-    def start(self, candidate: Candidate, theory: str) -> Array | None:
-        """Return the shape at t = 0 of a model; None if it is undeformed."""
+    def start(self, candidate: Candidate, theory: str) -> tuple[Array | None, Array | None]:
+        """Return (q, q̇) of a model at t = 0; None where it is undeformed, or at rest."""
         case = self.case
         if case.tip_displacement is not None:
             problem = candidate.case.problem.replace(theory=self.theories[theory])
             key = theory, repr(problem.mesh)
             if key not in self._released:
                 self._released[key] = static_tip_shape(problem, case.tip_displacement, case.newton(), self.comm)
-            return self._released[key].copy()
-        return candidate.equilibrium() if case.from_steady else None
+            return self._released[key].copy(), None
+        q = candidate.equilibrium() if case.from_steady else None
+        return (q, None) if case.first is None else candidate.in_motion(q, case.first)

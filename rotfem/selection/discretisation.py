@@ -43,10 +43,12 @@ class Discretisation:
     Attributes:
         steps: output ↦ what the steps put it off.
         mesh: output ↦ what the mesh puts it off.
+        sizes: output ↦ largest displacement of the tip over the length.
     """
 
     steps: dict[str, float] = field(default_factory=dict)
     mesh: dict[str, float] = field(default_factory=dict)
+    sizes: dict[str, float] = field(default_factory=dict)
 
 
 def discretisation(trial: Trial, theory: str, without: Collection[str] = ()) -> Discretisation:
@@ -74,6 +76,7 @@ def discretisation(trial: Trial, theory: str, without: Collection[str] = ()) -> 
         errors = _resting(candidate) if name == STEADY else _marched(trial, candidate, theory)
         if errors is None or not errors.scale > 0.0:
             continue
+        out.sizes[name] = errors.scale / candidate.system.structure.length
         if name == HISTORY and errors.time is not None:
             out.steps[name] = errors.time[0] / errors.scale
             known = None if without else error_of_history(trial, theory)
@@ -124,7 +127,7 @@ def _marched(trial: Trial, candidate: Candidate, theory: str, finer: int = 1) ->
     system = candidate.switched()
 
     def march() -> TipErrors | None:
-        states = March(system, scheme, longer, trial.case.newton(foreseeing=True), trial.start(candidate, theory))
+        states = March(system, scheme, longer, trial.case.newton(foreseeing=True), *trial.start(candidate, theory))
         watch = states.stepper.watch = ErrorWatch(system, longer.end, scheme)
         last = None
         for last in states:

@@ -123,7 +123,7 @@ class Estimates:
 
     def all(self) -> list[Change]:
         """Return every effect there are data for, then every other theory, the steps of a history, and the mesh."""
-        self.trial.fit(self.off.steps.get(HISTORY, 0.0))
+        self.trial.fit(self.off.steps.get(HISTORY, 0.0), self.off.sizes.get(HISTORY, 0.0))
         effects = [self.effect(name) for name in self.trial.effects]
         others = [self.replaced(name) for name in self.trial.theories if name != self.theory]
         return [*effects, *others, *self.discretisations()]

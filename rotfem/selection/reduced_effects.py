@@ -1,10 +1,11 @@
 """How much effects change a history, by a reduced linear model where the motion is one that it holds for.
 
 A basis of few shapes is solved again without each effect (see `rotfem.analysis.reduced.effect_sizes`), which takes a
-small part of the time that marches of a trial take. It serves where the hub's motion is prescribed, nothing is left out
-yet, and bending stays moderate: what second-order forces do beyond that only a trial knows. Where steps were cut short
-for a fast motion that even they do not resolve, its accelerations grow as steps become shorter, and with them what an
-effect seems to do; so sizes count that steps of twice the length show, too.
+small part of the time that marches of a trial take. It serves where nothing is left out yet, and bending stays
+moderate: what second-order forces do beyond that only a trial knows. With a free hub each solution is a Newton
+iteration, so it is asked for less accuracy in time there, and compared in steps that are less coarse. Where steps
+were cut short for a fast motion that even they do not resolve, its accelerations grow as steps become shorter, and with
+them what an effect seems to do; so sizes count that steps of twice the length show, too.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from rotfem.analysis.reduced.stretch import COARSE
 from rotfem.analysis.reduced.tips import largest
 from rotfem.errors import ComputationError
 from rotfem.mechanics.theories import Theory
+from rotfem.selection.candidate import Candidate
 from rotfem.selection.coarse_model import Trial
 
 Array = npt.NDArray[np.float64]
@@ -28,11 +30,18 @@ Array = npt.NDArray[np.float64]
 #: Displacement of the tip over the length from which a trial is asked.
 MODERATE = 0.1
 
+#: How many times as large a displacement of another model may be for this one to be asked how large its own is.
+SURELY = 2.0
+
 #: Relative change of a history from which a trial is asked.
 LARGEST = 3.0
 
-#: Accuracy of the basis: changes of a history are found in one basis, and are much better than it.
-ACCURACY = 1e-4
+#: Accuracy of basis and steps, with a free hub the latter of that one: changes of a history are found in one basis by
+#: the same steps, and are much better than it.
+ACCURACY, WITH_HUB = 1e-4, 1e-3
+
+#: How many times as long steps are in which effects on a free hub are compared.
+LONGER = 2
 
 #: Sizes in steps of twice the length that are farther apart than by this factor, and not both as small, are not told.
 AGREED, SMALL = 1.5, 1e-8
@@ -47,13 +56,11 @@ def reduced_effects(trial: Trial, theory: str, effects: Collection[str]) -> dict
         effects: those that are asked for.
     """
     linear = linear_of(trial, theory)
-    motion = trial.case.problem.motion
-    if linear is None or trial.samples is None or motion.hub is not None:
+    if linear is None or trial.samples is None or trial.moves > SURELY * MODERATE:
         return {}
     candidate = trial.candidate(linear.name)
-    times: Array = np.linspace(0.0, trial.samples.end, len(trial.samples.parts) + 1, dtype=np.float64)
     try:
-        response = reduced_response(candidate.switched(), times, trial.start(candidate, linear.name), ACCURACY)
+        response = history_of(trial, candidate, linear.name)
         if not response.met or largest(response.model, response.tips) > MODERATE * candidate.system.structure.length:
             return {}
         found = agreed(response, effects)
@@ -62,22 +69,47 @@ def reduced_effects(trial: Trial, theory: str, effects: Collection[str]) -> dict
     return {name: size for name, size in found.items() if size < LARGEST}
 
 
+def history_of(trial: Trial, candidate: Candidate, theory: str, parts: int | None = None) -> Response:
+    """Return the history of a linear theory at the samples of a trial by a reduced model.
+
+    Args:
+        trial: the case that is tried out, with a history.
+        candidate: the model, on any mesh.
+        theory: its name.
+        parts: into which the first steps are cut; as many as the accuracy asks for if None.
+
+    Raises:
+        ComputationError: the stiffness is singular, or the history not finite.
+    """
+    samples = trial.samples
+    assert samples is not None
+    times: Array = np.linspace(0.0, samples.end, len(samples.parts) + 1, dtype=np.float64)
+    accuracy = ACCURACY if trial.case.problem.motion.hub is None else WITH_HUB
+    shape, _ = trial.start(candidate, theory)
+    return reduced_response(candidate.switched(), times, shape, accuracy, parts)
+
+
 def agreed(response: Response, effects: Collection[str]) -> dict[str, float]:
     """Return effect ↦ relative change without it, as far as longer steps show the same.
 
     Raises:
         ComputationError: the answer to second-order forces is no small part of the motion.
     """
-    manifold = Manifold(response)
-    found = effect_sizes(response, effects, manifold)
-    if response.solution.parts <= COARSE:  # there are no longer steps
+    manifold, longer = Manifold(response), COARSE if response.solution.hub is None else LONGER
+    found = effect_sizes(response, effects, manifold, longer)
+    if response.solution.parts <= longer:  # there are no longer steps
         return found
-    other = effect_sizes(response, effects, manifold, 2 * COARSE)
+    other = effect_sizes(response, effects, manifold, 2 * longer)
     return {n: x for n, x in found.items() if max(x, other[n]) <= max(SMALL, AGREED * min(x, other[n]))}
 
 
 def linear_of(trial: Trial, theory: str) -> Theory | None:
-    """Return the linear theory with prestress that is the model's, or that its theory has for small motions."""
+    """Return the linear theory with prestress that is the model's, or that its theory has for small motions.
+
+    None of a history that does not start at rest, as those of reduced models do.
+    """
+    if trial.case.first is not None:
+        return None
     own = trial.theories[theory]
     names = [own.name, *reversed(own.poorer)]
     able = (trial.theories[name] for name in names if name in trial.theories)

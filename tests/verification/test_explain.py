@@ -341,14 +341,22 @@ def test_error_of_a_mesh_far_finer_than_that_of_trials_is_scaled(file: bool, mon
     assert scaled[MODES] == pytest.approx(own[MODES], rel=1e-6)
 
 
-def test_effects_of_a_reduced_model_are_those_of_trials() -> None:
-    scene = Scene.from_dict({"structure": STRUCTURE, **COARSE_STEPS})
-    trial = Trial(case_of(scene))
+#: A hub that is turned up to 0.5 rad/s, in a second and a half; its beam bends by a twentieth of its length.
+TURNED = {"type": "torque", "hub_inertia": 200.0, "pulses": [[0.0, 1.5, 200.0]]}
+
+
+@pytest.mark.parametrize("motion", [COARSE_STEPS["motion"], TURNED], ids=["prescribed", "free hub"])
+def test_effects_of_a_reduced_model_are_those_of_trials(motion: Any) -> None:
+    scene = Scene.from_dict({"structure": STRUCTURE, **COARSE_STEPS, "motion": motion})
+    trial = Trial(case_of(scene), (HISTORY,))
     estimates = Estimates(trial, "reissner", trial.effects)
     assert set(estimates.reduced) == set(trial.effects)
     for name, size in estimates.reduced.items():
         tried = tip_change(estimates.own.tip, trial.outputs("reissner", {name}).tip)
         assert 1 / 3 < size / tried < 3
+
+
+def test_no_reduced_model_tells_effects_on_large_motions() -> None:
     bent = Scene.from_dict({"structure": STRUCTURE, **COARSE_STEPS, "loads": {"tip_force": [0.0, 200.0]}})
     assert Estimates(Trial(case_of(bent)), "reissner", Trial(case_of(bent)).effects).reduced == {}
 
@@ -358,7 +366,7 @@ def test_sizes_that_depend_on_the_steps_of_a_reduced_model_are_left_to_trials(mo
     sizes[2 * COARSE]["none"] = 1e-14
     monkeypatch.setattr(reduced_effects, "Manifold", lambda response: None)
     monkeypatch.setattr(reduced_effects, "effect_sizes", lambda r, e, manifold, longer=COARSE: sizes[longer])
-    response: Any = SimpleNamespace(solution=SimpleNamespace(parts=2 * COARSE))
+    response: Any = SimpleNamespace(solution=SimpleNamespace(parts=2 * COARSE, hub=None))
     assert set(reduced_effects.agreed(response, ())) == {"same", "none"}
     response.solution.parts = 1  # no steps are longer
     assert reduced_effects.agreed(response, ()) == sizes[COARSE]
@@ -384,6 +392,20 @@ def test_a_spin_down_starts_from_the_steady_state_of_its_speed() -> None:
     k = 6.0 * np.sqrt(1.2 / 2.8e7)
     np.testing.assert_allclose(history["tip_u1"], np.tan(10 * k) / k - 10, rtol=1e-6)
     assert np.abs(history["tip_u2"]).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    "initial", [{"velocity": [[0, 0, 0], [10.0, 0, 1.0]]}, {"state": "steady", "mode": 1, "amplitude": 0.1}]
+)
+def test_a_trial_starts_in_motion_where_its_scene_does(initial: dict[str, Any]) -> None:
+    """All that moves does since the start: without the spin nothing else of it would be there to be compared."""
+    tables = {"structure": STRUCTURE, "motion": {"type": "constant", "speed": 3.0}, "mesh": {"elements": 4}}
+    own = Scene.from_dict({**tables, "initial": initial, "time": {"end": 1.5, "step": 0.01}})
+    trial = Trial(case_of(own), (HISTORY,))
+    estimates = Estimates(trial, "reissner", trial.effects)
+    true = tip_change(*(tip(rotfem.run(own.replace(left))) for left in ({}, {"model.effects": ["coriolis"]})))
+    assert estimates.reduced == {}
+    assert estimates.effect("centrifugal").estimate[HISTORY] == pytest.approx(true, rel=0.2)
 
 
 def test_modes_of_a_free_hub_are_at_the_speed_it_reaches() -> None:
