@@ -22,7 +22,7 @@ def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bo
         comm: communicator the structure is distributed over.
         moving: whether it will be stepped in time; a steady state and its modes do without what only that needs.
         parted: whether it is for a trial of some hundred steps: forms are shared with other nonlinear theories of the
-            problem (see `NonlinearSystem`), and compiled in haste where steps hardly feel it.
+            problem (see `NonlinearSystem`), and those of planar beams, whose steps hardly feel it, compiled in haste.
 
     Raises:
         InputError: a mesh or a section that cannot be computed with.
@@ -33,4 +33,4 @@ def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bo
     linear = problem.theory.linear
     system = AffineSystem(model, moving) if linear else NonlinearSystem(model, moving, parted)
     system.view, system.courses = view, tuple(courses)
-    return system if model.hub is None else BorderedSystem(system, once=parted and model.structure.hasty)
+    return system if model.hub is None else BorderedSystem(system, once=parted and model.structure.planar)

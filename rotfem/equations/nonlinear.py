@@ -47,7 +47,7 @@ class NonlinearSystem(System):
             libraries = [list(part) for part in zip(self._residuals, self._tangents, strict=True)]
             if self.model.hub is not None and self._by_spin.ufl is not None:
                 libraries[-1].append(self._by_spin.ufl)
-            compiled = [forms.together(library, once=self._parted and self.structure.hasty) for library in libraries]
+            compiled = [forms.together(library, once=self._parted and self.structure.planar) for library in libraries]
             self._F, self._J = [part[0] for part in compiled], [part[1] for part in compiled]
             self._spin = compiled[-1][2] if len(compiled[-1]) > 2 else None
             self._pattern = self._J[0]

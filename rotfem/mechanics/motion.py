@@ -189,15 +189,21 @@ def smooth_spin_up(speed: float, duration: float) -> tuple[Scalar, Scalar, Scala
     """
     T, k = duration, 2 * pi / duration
 
+    def rising(t: Any, sine: Callable[[Any], Any]) -> Any:
+        return speed * (t / T - sine(k * t) / (2 * pi))
+
+    def gaining(t: Any, cosine: Callable[[Any], Any]) -> Any:
+        return speed / T * (1 - cosine(k * t))
+
     def omega(t: Any) -> Any:
         if isinstance(t, np.ndarray):
-            return np.where(t < T, speed * (t / T - np.sin(k * t) / (2 * pi)), speed)
-        return float(speed * (t / T - sin(k * t) / (2 * pi))) if t < T else speed
+            return np.where(t < T, rising(t, np.sin), speed)
+        return float(rising(t, sin)) if t < T else speed  # of one number math's sine is ten times quicker
 
     def rate(t: Any) -> Any:
         if isinstance(t, np.ndarray):
-            return np.where(t < T, speed / T * (1 - np.cos(k * t)), 0.0)
-        return float(speed / T * (1 - cos(k * t))) if t < T else 0.0
+            return np.where(t < T, gaining(t, np.cos), 0.0)
+        return float(gaining(t, cos)) if t < T else 0.0
 
     def angle(t: float) -> float:
         s = min(t, T)

@@ -25,8 +25,8 @@ from rotfem.numerics.projection import times
 Array = npt.NDArray[Any]
 Matrices: TypeAlias = tuple[Any, Any, Any, LowRank | None]
 
-#: A size that is none.
-TINY = 1e-300
+#: A size that is none, and that of an eigenvalue whose square, times anything, may be no number any more.
+TINY, BEYOND = 1e-300, 1e140
 
 #: Part −Re λ/|λ| from which damping is heavy.
 HEAVY = 0.3
@@ -179,13 +179,19 @@ class RitzPairs:
         return int(W.shape[1])
 
     def solve(self, count: int) -> None:
-        """Set the pairs to those of the smoothest shapes, slowest without damping first, one of each conjugate pair."""
+        """Set the pairs to those of the smoothest shapes, slowest without damping first, one of each conjugate pair.
+
+        Raises:
+            ComputationError: no eigenvalue is one that can be computed with.
+        """
         m, c, k = (self._sum(self.V.T @ P) for P in self._products)
         values, x, y = quadratic(m, c, k, self.target)
         turn_equal(values, (x, y), (m, c, k))
-        upper = (values.imag >= 0.0) & (np.abs(np.sum(x.conj() * (m @ x), axis=0)) > 0.0)
+        upper = (values.imag >= 0.0) & (np.abs(np.sum(x.conj() * (m @ x), axis=0)) > 0.0) & (np.abs(values) < BEYOND)
         if not self.fast:
             upper &= ~are_fast(values, shape_frequencies(x, m @ x, k @ x))
+        if not np.any(upper):
+            raise ComputationError("damping is so far out of proportion that no mode is left")
         values, x, y = values[upper], x[:, upper], y[:, upper]
         order = np.lexsort((np.abs(values), place(values, x, m @ x, k @ x)))[:count]
         self.values, x, y = values[order], x[:, order], y[:, order]
@@ -217,8 +223,9 @@ class RitzPairs:
                 self._b.array[:] = r
                 self._solver.solve(self._b, self._x)
                 columns.append(self._x.array.copy())
-        sizes = np.sqrt(self._sum(np.array([c @ c for c in columns])))
-        new = [c / size for c, size in zip(columns, sizes, strict=True) if size > 0.0]
+        # by largest entries, whose squares may be no numbers any more; lengths are made one by `add`
+        sizes = self._sum(np.array([np.abs(c).max(initial=0.0) for c in columns]))
+        new = [c / size for c, size in zip(columns, sizes, strict=True) if 0.0 < size < np.inf]
         return self.add(np.array(new).T) if new else 0
 
 

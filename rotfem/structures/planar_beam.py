@@ -26,7 +26,7 @@ class PlanarBeam(Beam):
     """
 
     type = "planar_beam"
-    planar = hasty = True
+    planar = True
     turns_of: ClassVar = {3: 2}
     components = ("u1", "u2", "alpha")
     dimension = 2

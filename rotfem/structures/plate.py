@@ -57,7 +57,6 @@ class Plate(Structure):
     """
 
     type = "plate"
-    hasty = True
     components = ("u1", "u2", "u3", "alpha1", "alpha2")
     planes: ClassVar = {2: (0, 1)}
     across: ClassVar = {2: (2, 3, 4)}

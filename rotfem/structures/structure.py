@@ -44,8 +44,6 @@ class Structure(LoadsOfStructure):
 
     type: ClassVar[str]
     planar: ClassVar[bool] = False
-    #: Whether a few hundred steps hardly feel that forms are compiled in haste.
-    hasty: ClassVar[bool] = False
     #: Names of the unknowns.
     components: ClassVar[tuple[str, ...]]
     #: Direction that is normal to a plane of symmetry ↦ the components of motions in that plane.

@@ -94,8 +94,8 @@ def test_energy_stays_for_thousands_of_steps(theory: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("theory", NONLINEAR)
 def test_energy_stays_for_ever(theory: str) -> None:
-    """No growth with the number of steps: 10⁵ of them, each with its round-off."""
-    result = run(released(theory, 100_000, **{"time.output_every": 10}))
+    """No growth with the number of steps: thirty thousand of them, each with its round-off."""
+    result = run(released(theory, 30_000, **{"time.output_every": 10}))
     assert drift(result) < 1e-6
     energy = result.history["jacobi"]
     assert abs(np.median(energy[-100:]) - energy[0]) < 1e-11 * np.max(result.history["strain"])

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from rotfem import SceneError, modes, run
+from rotfem import SceneError, explain, modes, run
 from rotfem.analysis.reduced.collocation import collocate
 from rotfem.analysis.reduced.propagator import Propagator, cubics, functions
 from rotfem.scene import Scene
@@ -266,3 +266,24 @@ def test_stretch_makes_frequencies_lower_by_what_it_is_said_to() -> None:
     off = (squares[0] - squares[1])[:3] / squares[0][:3] / stretch
     law, _ = PlanarBeam.stretched
     assert np.all((0.85 * law < off) & (off < law))
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [
+        {"type": "spin_up", "speed": 0.0, "duration": 1.0},
+        {"type": "torque", "hub_inertia": 5.0, "pulses": [[0.0, 0.1, 0.0]]},
+    ],
+    ids=["prescribed", "free hub"],
+)
+def test_what_nothing_moves_stays_where_it_is(spin_up: MakeScene, motion: dict[str, Any]) -> None:
+    """A basis without columns; of a free hub, which that says nothing of, the full system has the history."""
+    scene = spin_up({"accuracy": 1e-3}, motion=motion, time={"end": 0.5, "step": 0.05})
+    result = run(scene)
+    assert result.summary["accuracy"]["met"]
+    assert not np.any(result.history["tip_u2"])
+    given = {"theory": "consistent_linear", "reduced": True, "foreshortening": True}
+    other = run(scene.replace({"accuracy": None, "model": given}))
+    assert not np.any(other.history["tip_u1"])
+    assert ("reduced" in other.summary) == (motion["type"] == "spin_up")
+    assert all(row["estimate"].get("history", 0.0) == 0.0 for row in explain(scene.replace({"accuracy": None})).rows)

@@ -48,7 +48,8 @@ class FourthOrder:
         self.products = np.array(list(combinations_with_replacement(range(number), 4)), dtype=int).reshape(-1, 4)
         # a polynomial of products is known from its values where coordinates are how often they are in each
         points = np.array([np.bincount(product, minlength=number) for product in self.products], dtype=float)
-        values = self._work(points.reshape(-1, number), displacements)
+        points = points.reshape(len(self.products), number)  # where nothing moves there is no shape
+        values = self._work(points, displacements)
         #: Factor of each product in the work of each load, (loads, p).
         self.factors: Array = np.linalg.solve(points[:, self.products].prod(axis=2), values).T if number else values.T
 

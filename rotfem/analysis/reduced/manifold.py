@@ -109,8 +109,8 @@ class Manifold:
             whole = np.hstack([V, Theta])
             second = np.array([summed(model.comm, whole.T @ P) for P in on_pairs])
             first = np.array([summed(model.comm, Theta.T @ P) for P in on_basis])
-            m, p = model.size, len(self.pairs)
-            self._pieces[kind] = (numbers, second.reshape(-1, m + p, p), first.reshape(-1, p, m))
+            n, m, p = len(numbers), model.size, len(self.pairs)  # where nothing moves there is no m, and no p
+            self._pieces[kind] = (numbers, second.reshape(n, m + p, p), first.reshape(n, p, m))
 
     def _displaced(self, y: Array) -> tuple[Array, Array, Array]:
         """Return displacements of first, second and third order (local dof arrays) of coordinates of shapes (r,)."""
@@ -183,6 +183,8 @@ class Manifold:
             orders: `third` of `forces`, of each answer.
         """
         start = self.response.q[0], self.response.v[0]
+        if self.model.size == 0:  # nothing moves
+            return self.response.trajectory, [self.response.q for _ in orders]
         return solution.answered(self.model, *start, self._lacking(solution, orders))
 
     def _lacking(self, solution: Solution, orders: Sequence[bool]) -> Lacking:
@@ -203,7 +205,7 @@ class Manifold:
     def own(self) -> tuple[Trajectory, list[Array]]:
         """The `corrections` of the response without and with forces of third order; a round more if all are known."""
         response, hub, path = self.response, self.response.solution.hub, self.response.trajectory
-        if self.fourth is not None:
+        if self.fourth is not None and self.model.size:
             lacking = self._lacking(response.solution, (False, True))
             return response.solution.rounds(self.model, (response.q[0], response.v[0]), lacking, ROUNDS)
         if hub is None:

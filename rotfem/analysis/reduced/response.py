@@ -187,7 +187,7 @@ class Growth:
         parts = parts[sizes > INDEPENDENT * max(sizes[0], 1e-300)][:LOADS]
         c = np.zeros((len(parts), self._factors.shape[1]))
         c[:, numbers] = parts / norms
-        return np.array([model.load(row) for row in c])
+        return np.array([model.load(row) for row in c]).reshape(len(c), model.owned.stop)
 
     # --- rounds ------------------------------------------------------------------------------------------------------
 
@@ -200,7 +200,8 @@ class Growth:
         model, lacking, error = self.model, np.inf, np.inf
         before: Array | None = None
         if model.size == 0:
-            return nothing(len(self.solution.times)), 0.0
+            # where nothing moves a structure its free hub may turn yet, of which there is no history
+            return nothing(len(self.solution.times)), 0.0 if self.solution.hub is None else np.inf
         while True:
             self.rounds += 1
             path = self.solve()
@@ -232,15 +233,15 @@ class Growth:
         Returns:
             History and estimate.
         """
-        wide = self.model
-        if path.exact or wide.size < WIDE or self.solution.hub is not None or error > accuracy:
+        wide, moved = self.model, path.q @ tips_of(self.model).T
+        size = largest(wide, moved)
+        if path.exact or wide.size < WIDE or self.solution.hub is not None or error > accuracy or not size > 0.0:
             return path, error
         turns = np.linalg.svd(path.q, full_matrices=False)[2].T
         most = np.abs(path.q @ turns).max(axis=0)
         self.model = wide.turned(turns[:, most > NEGLIGIBLE * accuracy * most.max()])
         narrow = self.solve()
-        change = narrow.q @ tips_of(self.model).T - path.q @ tips_of(wide).T
-        off = error + largest(wide, change) / largest(wide, path.q @ tips_of(wide).T)
+        off = error + largest(wide, narrow.q @ tips_of(self.model).T - moved) / size
         if off <= accuracy:
             return narrow, off
         self.model = wide

@@ -77,6 +77,8 @@ class Solution:
         Raises:
             ComputationError: it is not finite.
         """
+        if model.size == 0:
+            return nothing(len(self.times))
         path = self._exact(model, q, v) if self.constant else None
         path = path or self._collocated(model, q, v)
         if not np.all(np.isfinite(path.q)):
@@ -190,7 +192,8 @@ class Solution:
         M, _, K, _ = model.operators(middle)
         squares = np.abs(np.linalg.eigvals(np.linalg.solve(M[0], K[0])))
         knots = self.drive.knots
-        longest = min(LONG / np.sqrt(squares.min()), (knots[-1] - knots[0]) / FEWEST)
+        slowest = LONG / np.sqrt(squares.min()) if squares.size else np.inf  # nothing may move
+        longest = min(slowest, (knots[-1] - knots[0]) / FEWEST)
         return cut(knots, np.ceil(np.diff(knots) / longest * (1 - 1e-9)).astype(int))
 
 

@@ -96,14 +96,15 @@ class ThirdOrder:
         model, system = self.model, self.model.system
         Xi, V = self.Xi[model.owned], model.V[model.owned]
         self._pieces: dict[str, tuple[list[int], Array, Array]] = {}
-        m, p = model.size, len(self.triples)
+        m, p = model.size, len(self.triples)  # both 0 where nothing moves
         for kind in "MCK":
             numbers = [i for i in model.kinds[kind] if not inside(system.pieces[i].of)]
             third = [summed(model.comm, V.T @ times(system.pieces[i].operator, Xi)) for i in numbers]
             first = [summed(model.comm, Xi.T @ model.product(i)) for i in numbers]
-            self._pieces[kind] = numbers, np.array(third).reshape(-1, m, p), np.array(first).reshape(-1, p, m)
+            n = len(numbers)
+            self._pieces[kind] = numbers, np.array(third).reshape(n, m, p), np.array(first).reshape(n, p, m)
         loads = [summed(model.comm, Xi.T @ system.pieces[i].operator.array[model.owned]) for i in model.kinds["f"]]
-        self._loads = np.array(loads).reshape(-1, p)
+        self._loads = np.array(loads).reshape(len(loads), p)
 
     def products(self, q: Array) -> Array:
         """Return the coordinates of the triples of coordinates (n, m)."""
