@@ -94,7 +94,7 @@ def smoothed(windows: Sequence[Window]) -> tuple[tuple[list[Array], list[Array]]
     speeds = np.array([w.speed**2 for w in windows])
     number = np.arange(len(windows))
     fitted, spread = squares, np.zeros_like(squares)
-    if len(windows) > 2:
+    if len(windows) > 1:
         weights = np.exp(-0.5 * (np.subtract.outer(number, number) / WIDTH) ** 2)
         scaled = np.subtract.outer(speeds, speeds).T / (speeds.max() or 1.0)
         base = np.stack([np.ones_like(scaled), scaled], axis=2)  # of every window, at all windows

@@ -32,6 +32,10 @@ Array = npt.NDArray[np.float64]
 #: states up to which one goes on, and with which those before are looked at while the march is under way.
 WINDOWS, FEWEST, LARGE, MEMORY = 8, (50, 100), 2000, 64_000_000
 
+#: Steps of a window where the speed is constant, so that only the deflection changes a tangent, and more than two such
+#: windows are to come: of two halves one tells how far the other is off.
+STEADY = 80
+
 
 @dataclass(frozen=True)
 class TipErrors:
@@ -94,15 +98,25 @@ class ErrorWatch:
         now.steps.append((len(states) - 2, len(states) - 1))
         self._bytes += 3 * new.q.nbytes
         due = len(now.steps) >= self._fewest and new.t >= (self._closed + 1) * self.end / WINDOWS
-        if (due and self._lasts(new.t)) or self._bytes > MEMORY:
+        if (due and self._is_enough(new.t)) or self._bytes > MEMORY:
             self._close(new.t)
             if self._waiting > MEMORY:
                 self.catch_up(new)
 
-    def _lasts(self, t: float) -> bool:
-        """Return whether a window from a time (s) to the end would have enough steps, at the pace of this one."""
+    def _is_enough(self, t: float) -> bool:
+        """Return whether this window may end at a time (s) and those to come have enough steps, at the pace of it."""
         steps, since = len(self._now.steps), self._now.states[0][0]
-        return (self.end - t) / (t - since) * steps > self._fewest - 0.5
+        left = (self.end - t) / (t - since) * steps
+        if left <= self._fewest - 0.5:
+            return False
+        return steps >= min(STEADY, (steps + left) / 2) or not self._steady(since, t)
+
+    def _steady(self, since: float, t: float) -> bool:
+        """Return whether the hub turns at a constant speed from one time to another, s, as far as these say it."""
+        motion = self.system.motion
+        if self.system.hub is not None or motion.pitch is not None:
+            return False
+        return all(motion.rate(s) == 0.0 and motion.speed(s) == motion.speed(t) for s in (since, 0.5 * (since + t), t))
 
     def _seen(self, state: State) -> tuple[float, Array, Array, Array, Any]:
         """Return t, q, v, a of a state in the frame that turns, and what rotations are counted from."""

@@ -96,7 +96,8 @@ class RefinedMesh:
             if not np.isfinite(size):
                 return None
             done = done + 1 if last <= SMALL * size else 0
-            if self.system.held.linear or done == ENOUGH:
+            # The next one is about the square of the last.
+            if self.system.held.linear or done == ENOUGH or last <= SMALL**ENOUGH * size:
                 return size
         return None
 

@@ -20,7 +20,7 @@ from rotfem.numerics.extended_cells import ExtendedCells
 from rotfem.numerics.linear import DirectSolver, Increment, NearbySolver, held
 from rotfem.numerics.low_rank import LowRank
 from rotfem.numerics.projection import times
-from rotfem.numerics.refinement import Refinement
+from rotfem.numerics.refined_before import refinement
 from rotfem.structures.tip_values import TipValues
 
 Array = npt.NDArray[np.float64]
@@ -45,7 +45,7 @@ class FinerEquations:
 
     def __init__(self, system: Any):
         self.system, self.compilations = system, system.compilations
-        self._refined = Refinement(system.V)
+        self._refined = refinement(system.V)
         self.V = self._refined.V
         self.q, self.v, self.a = (fem.Function(self.V) for _ in range(3))
         self._functions: dict[Any, fem.Function] = {system.q: self.q, system.v: self.v, system.a: self.a}

@@ -7,7 +7,8 @@ Every process holds the whole refined mesh.
 
 from __future__ import annotations
 
-from functools import cached_property, lru_cache
+from copy import copy
+from functools import lru_cache
 from itertools import product
 from typing import Any
 
@@ -56,6 +57,20 @@ def parts(cell: str) -> tuple[Array, Array]:
     return origins, np.tile(np.eye(dim) / 2, (len(origins), 1, 1))
 
 
+@lru_cache(maxsize=16)
+def weights_in_parts(base: Any) -> list[Array]:
+    """Return for every part of a cell the values of the basis of an element at its nodes there, (nodes, basis).
+
+    Raises:
+        NotRefined: it has no nodes, or no basis to be told at points.
+    """
+    try:
+        points, (origins, axes) = base.basix_element.points, parts(base.cell_type.name)
+        return [base.tabulate(0, origin + points @ A.T)[0] for origin, A in zip(origins, axes, strict=True)]
+    except (AttributeError, NotImplementedError) as error:
+        raise NotRefined(str(base)) from error
+
+
 class Refinement:
     """A refined mesh, with the space of the unknowns on it.
 
@@ -83,6 +98,13 @@ class Refinement:
         self._number = np.empty_like(made)
         self._number[made] = np.arange(len(made))
         self.V = fem.functionspace(self.mesh, V.ufl_element())
+        self._carriers = self._carriers_to(V, self.V)
+
+    def of(self, V: fem.FunctionSpace) -> Refinement:
+        """Return this of another space whose cells and nodes are the same ones, in the same order."""
+        out = copy(self)
+        out._coarse = V
+        return out
 
     def _nodes(self, old: Any) -> tuple[npt.NDArray[np.int64], Array]:
         """Return the nodes of all parts, and where each node lies (m); what cells share is one node."""
@@ -90,8 +112,7 @@ class Refinement:
         dofmap = geometry.dofmap[: self._owned]
         known = np.concatenate(self._comm.allgather(np.asarray(geometry.input_global_indices)[dofmap]))
         self.corners = at = np.concatenate(self._comm.allgather(geometry.x[dofmap]))
-        shape = element("Lagrange", self._cell, geometry.cmap.degree)
-        weights = np.stack([shape.tabulate(0, self._of(i, shape))[0] for i in range(len(self.origins))])
+        weights = np.stack(weights_in_parts(element("Lagrange", self._cell, geometry.cmap.degree)))
         keys = np.rint(weights / STEP).astype(np.int64)
         numbers: dict[tuple[Any, ...], int] = {}
         cells = np.empty((len(known), *weights.shape[:2]), dtype=np.int64)
@@ -104,10 +125,6 @@ class Refinement:
         x = np.empty((len(numbers), 3))
         x[cells.ravel()] = np.einsum("ijn,cnd->cijd", weights, at).reshape(-1, 3)
         return cells.reshape(-1, cells.shape[2]), x
-
-    def _of(self, part: int, e: Any) -> Array:
-        """Return where the points of an element on a part lie in the whole reference cell."""
-        return self._at(part, e.basix_element.points)
 
     def _at(self, part: int, points: Array) -> Array:
         """Return where points of a part lie in the whole reference cell."""
@@ -130,10 +147,6 @@ class Refinement:
         out: Array = (weights[:, None] @ cells[parent])[:, 0]
         return out.reshape(-1, *values.shape[1:])
 
-    @cached_property
-    def _carriers(self) -> tuple[npt.NDArray[np.int64], Array]:
-        return self._carriers_to(self._coarse, self.V)
-
     def _carriers_to(self, space: Any, to: Any) -> tuple[npt.NDArray[np.int64], Array]:
         """Return for every node of a space on the new mesh a cell that it lies in, and the basis of a space there."""
         parent = np.empty(to.dofmap.index_map.size_local, dtype=np.int64)
@@ -142,7 +155,7 @@ class Refinement:
         number = np.empty_like(parent)
         number[to.dofmap.list] = np.arange(to.dofmap.list.shape[1])
         part[to.dofmap.list] = self._part[:, None]
-        return parent, np.stack(self._weights(space))[part, number]
+        return parent, np.stack(weights_in_parts(_base(space)))[part, number]
 
     def function(self, f: fem.Function) -> fem.Function:
         """Return a function on the refined mesh with the values of one on the coarse mesh."""
@@ -159,18 +172,10 @@ class Refinement:
         free[nodes] = False
         cells = np.concatenate(self._comm.allgather(free[space.dofmap.list[: self._owned]]))
         out = np.zeros(self.V.dofmap.index_map.size_local, dtype=bool)
-        for i, weights in enumerate(self._weights(space)):
+        for i, weights in enumerate(weights_in_parts(_base(space))):
             mine = self._part == i
             out[self.V.dofmap.list[mine]] = cells[self._parent[mine]] @ (np.abs(weights.T) > NONE)
         return np.flatnonzero(~out).astype(np.int32)
-
-    def _weights(self, space: Any) -> list[Array]:
-        """Return for every part the values of the basis at its nodes, shape (nodes, basis)."""
-        base = _base(space)
-        try:
-            return [base.tabulate(0, self._of(i, base))[0] for i in range(len(self.origins))]
-        except (AttributeError, NotImplementedError) as error:
-            raise NotRefined(str(base)) from error
 
     def number(self, cell: int, part: int) -> int:
         """Return the number of a part of a cell (over all processes) on the refined mesh."""
