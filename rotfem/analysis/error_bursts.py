@@ -92,7 +92,8 @@ def turning_rates(system: Any, samples: Samples, components: Sequence[int]) -> A
     turned = samples.displacements[:, :n].reshape(len(states), n // size, size)[:, :, list(components)]
     begin, end = np.array(steps).T
     angles = np.sqrt(((turned[end] - turned[begin]) ** 2).sum(axis=2)).max(axis=1, initial=0.0)
-    angles[[states[i][-1] is not states[j][-1] for i, j in steps]] = 0.0
+    if any(state[-1] is not states[0][-1] for state in states):
+        angles[[states[i][-1] is not states[j][-1] for i, j in steps]] = 0.0
     if system.comm.size > 1:
         angles = np.max(system.comm.allgather(angles), axis=0)
     t = np.array([state[0] for state in states])

@@ -17,6 +17,8 @@ from math import isqrt
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.error_samples import middle
+
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 Index = npt.NDArray[np.int64]
@@ -130,7 +132,7 @@ def _alike(h: Array, of: Index) -> Index:
 
 def _medians(h: Array, of: Index, windows: int) -> Array:
     """Return the median of the lengths of the steps in every window, s."""
-    return np.array([np.median(part) for part in np.split(h, np.searchsorted(of, np.arange(1, windows)))])
+    return np.array([middle(part) for part in np.split(h, np.searchsorted(of, np.arange(1, windows)))])
 
 
 def moments(z: Complex, count: int) -> Complex:

@@ -22,11 +22,13 @@ class Samples:
         states: t (s), q, v, a (local dof arrays), and what rotations are counted from.
         steps: numbers of the states that a step starts and ends with.
         pieces: numbers of the states with which what drives the motion starts afresh.
+        size: largest displacement of the tip, m, once it is known.
     """
 
     states: list[tuple[float, Array, Array, Array, Any]]
     steps: list[tuple[int, int]]
     pieces: list[int]
+    size: float = np.inf
 
     @cached_property
     def displacements(self) -> Array:
@@ -50,11 +52,17 @@ class Samples:
         t, q, v, a, datum = self.states[number]
         return State(t, q, v, a, datum=datum)
 
-    def smooth(self, number: int, most: int) -> bool:
-        """Return whether so many states on either side of one are there and smooth with it."""
+    def smooth(self, number: int) -> int:
+        """Return how many states on either side of one are there and smooth with it."""
         own = int(np.searchsorted(self.pieces, number, side="right")) - 1
         first, last = self.pieces[own], [*self.pieces, len(self.states)][own + 1] - 1
-        if number - most < first or number + most > last:
-            return False
-        found = self.states[number - most : number + most + 1]
-        return all(state[4] is found[0][4] for state in found)
+        most, datum = min(number - first, last - number), self.states[number][4]
+        around = range(1, most + 1)
+        other = (i for i in around if not self.states[number - i][4] is self.states[number + i][4] is datum)
+        return next(other, most + 1) - 1
+
+
+def middle(lengths: Array) -> float:
+    """Return the median of lengths; of an even number the upper one of the two in the middle."""
+    half = len(lengths) // 2
+    return float(np.partition(lengths, half)[half])

@@ -35,7 +35,7 @@ def largest_unresolved(windows: Sequence[Window]) -> tuple[float, float]:
     for window in windows:
         passed += len(window.lengths)
         omega = np.sqrt(np.abs(window.shapes.squares))
-        half = 0.5 * omega * float(np.median(window.lengths))
+        half = 0.5 * omega * window.step
         lost = 2.0 * passed * (half - np.arctan(half))
         # Shapes that were not compared are off by what the ones below are, or more.
         known = np.maximum.accumulate(np.abs(window.epsilon))

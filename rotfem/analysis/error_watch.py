@@ -94,10 +94,10 @@ class ErrorWatch:
             now.pieces.append(len(states))
             states.append(self._seen(old))
         states.append(self._seen(new))
-        self._reached = new
-        now.steps.append((len(states) - 2, len(states) - 1))
+        self._reached, number = new, len(states)
+        now.steps.append((number - 2, number - 1))
         self._bytes += 3 * new.q.nbytes
-        due = len(now.steps) >= self._fewest and new.t >= (self._closed + 1) * self.end / WINDOWS
+        due = number > self._fewest and new.t >= (self._closed + 1) * self.end / WINDOWS
         if (due and self._is_enough(new.t)) or self._bytes > MEMORY:
             self._close(new.t)
             if self._waiting > MEMORY:
@@ -107,7 +107,7 @@ class ErrorWatch:
         """Return whether this window may end at a time (s) and those to come have enough steps, at the pace of it."""
         steps, since = len(self._now.steps), self._now.states[0][0]
         left = (self.end - t) / (t - since) * steps
-        if left <= self._fewest - 0.5:
+        if steps < self._fewest or left <= self._fewest - 0.5:
             return False
         return steps >= min(STEADY, (steps + left) / 2) or not self._steady(since, t)
 
@@ -205,6 +205,7 @@ class ErrorWatch:
         """Look at a window."""
         sizes = self._tip_sizes(samples.displacements)
         i = int(np.argmax(sizes))
+        samples.size = float(sizes[i])
         if sizes[i] > self._farthest[0]:
             self._farthest = (float(sizes[i]), samples.state(i))
         if not self._sound:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.error_bursts import turning_rates
 from rotfem.analysis.error_recursion import Index
-from rotfem.analysis.error_samples import Samples
+from rotfem.analysis.error_samples import Samples, middle
 from rotfem.analysis.mesh_force import MeshForce
 from rotfem.analysis.reduced_tangents import Tangents
 from rotfem.analysis.refined_mesh import RefinedMesh
@@ -32,6 +32,9 @@ LIKE, LOWEST = 9.0, 3
 #: Relative error of frequencies in theories of moderate rotations, in squares of the largest rotation: 0.13 to 0.32 in
 #: free vibrations of beams and plates, less where it is the spin that stiffens.
 MODERATE = 0.22
+
+#: Part of the length up to which a motion is small: what it lacks beside errors of frequencies goes with its square.
+SMALL = 0.06
 
 #: Product of two shapes from which they are one, and a square of a frequency that is none, 1/s².
 SAME, TINY = 0.5, 1e-300
@@ -134,7 +137,7 @@ class Window:
         """Return the relative errors of the frequencies, those at rest, once and for all."""
         if before is not None and len(before.epsilon) == len(self.shapes.squares):
             return before.epsilon
-        found = mesh.refined.of_frequencies(self.shapes, np.pi / float(np.median(self.lengths)))
+        found = mesh.refined.of_frequencies(self.shapes, np.pi / self.step)
         return mesh.shape.of_modes(self.shapes) if found is None else found
 
     def _errors_by_theory(self, system: Any, mesh: MeshErrors) -> Array | None:
@@ -162,9 +165,14 @@ class Window:
         self.theory = 0.5 * stiffness * self.bends * omega[:LOWEST].min() / np.maximum(omega, TINY)
 
     def _missing(self, system: Any, mesh: MeshErrors) -> Array | None:
-        """Return the forces on shapes that bend which the mesh leaves out, where rotations are those of the motion."""
+        """Return the forces on shapes that bend which the mesh leaves out in a large motion; None where not known.
+
+        Rotations have to be those of the motion, not counted from a state on the way.
+        """
         states = self.samples.states
-        if mesh.force is None or any(state[4] is not None for state in states):
+        if mesh.force is None or self.samples.size < SMALL * system.held.structure.length:
+            return None
+        if any(state[4] is not None for state in states):
             return None
         n = len(system.held.zeros())
         return mesh.force(self.samples.displacements[:, :n], self.shapes) * self.bends
@@ -175,11 +183,16 @@ class Window:
         begin, end = np.array(self.samples.steps).T
         return begin, end
 
-    @property
+    @cached_property
     def lengths(self) -> Array:
         """Of the steps, s."""
         begin, end = self.ends
         return np.asarray(self.t[end] - self.t[begin])
+
+    @cached_property
+    def step(self) -> float:
+        """Median of the lengths, s."""
+        return middle(self.lengths)
 
     def _coordinates(self, arrays: Array) -> Array:
         """Return Vᵀ M x of local dof arrays (n, unknowns), (n, r); of a free hub with its angle."""
@@ -245,7 +258,8 @@ class Window:
         omega: Array = np.sqrt(np.abs(shapes.squares))
         chosen = np.flatnonzero(~bends | (omega * h > np.pi))
         reach = {int(k): max(2, int(np.ceil(PERIODS * 2 * np.pi / (omega[k] * h)))) for k in chosen}
-        reach = {k: m for k, m in reach.items() if m * h <= SLOW / omega[0] and self.samples.smooth(number, m)}
+        smooth = self.samples.smooth(number)
+        reach = {k: m for k, m in reach.items() if m * h <= SLOW / omega[0] and m <= smooth}
         if not reach:
             return np.asarray(out @ shapes.V.T)
         columns, most = shapes.massed[:, list(reach)], max(reach.values())
@@ -253,8 +267,8 @@ class Window:
         moved = np.array([[v[: len(columns)], a[: len(columns)]] for _, _, v, a, _ in around]).swapaxes(0, 1)
         rates = shapes.sum(moved @ columns)
         for j, (k, m) in enumerate(reach.items()):
-            smooth = 3 * (3 * m * m + 3 * m - 1 - 5 * np.arange(-m, m + 1) ** 2) / ((4 * m * m - 1) * (2 * m + 3))
-            out[1:, k] = rates[:, most, j] - rates[:, most - m : most + m + 1, j] @ smooth
+            weights = 3 * (3 * m * m + 3 * m - 1 - 5 * np.arange(-m, m + 1) ** 2) / ((4 * m * m - 1) * (2 * m + 3))
+            out[1:, k] = rates[:, most, j] - rates[:, most - m : most + m + 1, j] @ weights
         out[0] = -out[2] / shapes.squares
         return np.asarray(out @ shapes.V.T)
 

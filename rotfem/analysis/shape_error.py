@@ -104,6 +104,8 @@ class ShapeError:
 
     def _whole(self, values: Array) -> Array:
         """Return all components of nodal values (n, unknowns of a node, r), zeros for those left out."""
+        if values.shape[1] == len(self.system.structure.components):
+            return values
         return np.swapaxes(self.system.structure.whole_values(np.swapaxes(values, 1, 2)), 1, 2)
 
     def of_shape(self, q: Array, datum: Any = None) -> float:

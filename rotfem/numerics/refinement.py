@@ -71,6 +71,18 @@ def weights_in_parts(base: Any) -> list[Array]:
         raise NotRefined(str(base)) from error
 
 
+@lru_cache(maxsize=16)
+def parts_on(cell: str, side: int) -> list[tuple[int, int]]:
+    """Return the (part, its facet) that lie on a facet of a whole cell."""
+    base = element("Lagrange", cell, 1).basix_element
+    corners, out = base.entity_closure_dofs[-2], []
+    for i, (origin, A) in enumerate(zip(*parts(cell), strict=True)):
+        weights = base.tabulate(0, origin + base.points @ A.T)[0, :, :, 0]
+        beside = np.delete(weights, corners[side], axis=1)
+        out += [(i, m) for m, ends in enumerate(corners) if np.all(np.abs(beside[ends]) < NONE)]
+    return out
+
+
 class Refinement:
     """A refined mesh, with the space of the unknowns on it.
 
@@ -237,7 +249,7 @@ class Refinement:
         for number, entities in found:
             pairs = np.asarray(entities).reshape(-1, 2) + np.array([self._first, 0])
             everywhere = np.concatenate(self._comm.allgather(pairs))
-            cut = [(self._number[c * len(self.origins) + i], m) for c, side in everywhere for i, m in self._on(side)]
+            cut = [(self.number(c, i), m) for c, side in everywhere for i, m in parts_on(self._cell, int(side))]
             shape = (-1, 2) if np.ndim(entities) == 2 else -1  # flat in dolfinx 0.9
             out.append((number, np.array(cut, dtype=np.int32).reshape(shape)))
         return out
@@ -268,17 +280,6 @@ class Refinement:
         # How far it is outside: of a triangle its coordinates have a sum of at most 1, else each has.
         most = [x.sum() if self._cell == "triangle" else x.max() for x in inside]
         return int(np.argmin([max(-x.min(), top - 1.0) for x, top in zip(inside, most, strict=True)]))
-
-    def _on(self, side: int) -> list[tuple[int, int]]:
-        """Return the (part, its facet) that lie on a facet of the whole cell."""
-        base = element("Lagrange", self._cell, 1).basix_element
-        corners = [base.entity_closure_dofs[-2][k] for k in range(len(base.entity_closure_dofs[-2]))]
-        out = []
-        for i in range(len(self.origins)):
-            weights = base.tabulate(0, self.origins[i] + base.points @ self.axes[i].T)[0, :, :, 0]
-            beside = np.delete(weights, corners[side], axis=1)
-            out += [(i, m) for m, ends in enumerate(corners) if np.all(np.abs(beside[ends]) < NONE)]
-        return out
 
 
 def _numbers(integral: Any) -> list[int]:
