@@ -109,7 +109,7 @@ class ErrorWatch:
         left = (self.end - t) / (t - since) * steps
         if steps < self._fewest or left <= self._fewest - 0.5:
             return False
-        return steps >= min(STEADY, (steps + left) / 2) or not self._steady(since, t)
+        return steps >= min(STEADY, (steps + left) / 2 - 0.5) or not self._steady(since, t)
 
     def _steady(self, since: float, t: float) -> bool:
         """Return whether the hub turns at a constant speed from one time to another, s, as far as these say it."""

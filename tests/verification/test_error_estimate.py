@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,7 +12,11 @@ import pytest
 import rotfem
 from rotfem.analysis.error_bursts import MOST, burst_in
 from rotfem.analysis.error_recursion import Propagator, Spans, accumulated, interpolated, moments, settled
+from rotfem.analysis.error_samples import Samples, middle
 from rotfem.analysis.error_unresolved import largest_unresolved
+from rotfem.analysis.error_watch import ErrorWatch
+from rotfem.analysis.error_window import MeshErrors
+from rotfem.analysis.schemes import State
 
 BEAM = {
     "type": "planar_beam",
@@ -87,6 +92,38 @@ def test_phase_of_the_trapezoidal_rule() -> None:
     np.testing.assert_allclose(found, (c[:, 0] - np.cos(omega * t))[1:], atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("motion", "steps", "expected"),
+    [
+        (rotfem.Motion.spin_up(5.0, 1.0), 200, [50, 50, 50, 50]),
+        (rotfem.Motion.constant_speed(5.0), 200, [80, 60, 60]),
+        (rotfem.Motion.constant_speed(5.0), 110, [55, 55]),
+        (rotfem.Motion.constant_speed(5.0), 99, [99]),
+    ],
+)
+def test_windows_are_longer_at_a_constant_speed(
+    monkeypatch: pytest.MonkeyPatch, motion: rotfem.Motion, steps: int, expected: list[int]
+) -> None:
+    """Windows of a varying speed have 50 steps; of a constant one up to 80, and two at least from 100 steps on."""
+    monkeypatch.setattr(MeshErrors, "of", lambda system: None)
+    system = SimpleNamespace(clamp=None, hub=None, motion=motion, A=SimpleNamespace(getSize=lambda: (60, 60)))
+    watch, q = ErrorWatch(system, 1.0), np.zeros(60)
+    states = [State(i / steps, q, q, q) for i in range(steps + 1)]
+    for old, new in pairwise(states):
+        watch(old, new)
+    found = [*watch._ended, watch._now]
+    assert [len(samples.steps) for samples in found if samples.steps] == expected
+
+
+def test_samples_are_smooth_up_to_where_something_starts_afresh() -> None:
+    """Of 20 states in two pieces, rotations counted anew from the fifteenth on: as far as the next of these."""
+    q, one, other = np.zeros(1), object(), object()
+    samples = Samples([(float(i), q, q, q, one if i < 15 else other) for i in range(20)], [], [0, 8])
+    assert [samples.smooth(i) for i in (0, 3, 7, 8, 11, 13, 17, 19)] == [0, 3, 0, 0, 3, 1, 2, 0]
+    assert middle(np.array([3.0, 1.0, 2.0])) == 2.0
+    assert middle(np.array([4.0, 3.0, 1.0, 2.0])) == 3.0
+
+
 @pytest.mark.parametrize("epsilon", [1e-4, 0.1])
 def test_mesh_in_vibrations_that_steps_do_not_resolve(epsilon: float) -> None:
     """Two vibrations of the trapezoidal rule, ωh = 3 and ω off by ε, differ by a phase, or by twice the amplitude."""
@@ -95,7 +132,7 @@ def test_mesh_in_vibrations_that_steps_do_not_resolve(epsilon: float) -> None:
     c, other = (np.cos(2 / h * np.arctan(0.5 * w * h) * t) for w in (omega, (1 + epsilon) * omega))
     shapes = SimpleNamespace(squares=np.array([omega**2]), tip=np.array([[0.0], [2.0]]))
     ends, motion = (np.arange(n), np.arange(1, n + 1)), (3.0 * c[:, None],)
-    window: Any = SimpleNamespace(t=t, lengths=np.full(n, h), ends=ends, motion=motion, shapes=shapes)
+    window: Any = SimpleNamespace(t=t, lengths=np.full(n, h), step=h, ends=ends, motion=motion, shapes=shapes)
     window.epsilon = np.array([epsilon])
     size, when = largest_unresolved([window])
     assert size == pytest.approx(6.0 * np.abs(c - other).max(), rel=0.02)  # samples pass the peaks by

@@ -16,6 +16,7 @@ from rotfem.analysis.refined_mesh import RefinedMesh
 from rotfem.analysis.schemes import State
 from rotfem.equations.finer import FinerEquations
 from rotfem.mechanics.loads import PointLoads
+from rotfem.numerics.refined_before import refinement
 from rotfem.numerics.refinement import Refinement
 
 SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
@@ -52,6 +53,23 @@ def test_polynomials_are_carried_exactly(cell: Any, degree: int) -> None:
     np.testing.assert_allclose(out, values(refined.V.tabulate_dof_coordinates().T).T, atol=1e-13)
     cells = refined.mesh.topology.index_map(refined.mesh.topology.dim).size_global
     assert cells == (2 if line else 4) * V.mesh.topology.index_map(V.mesh.topology.dim).size_global
+
+
+def test_a_refined_mesh_serves_another_space_on_the_same_cells() -> None:
+    """A second mesh of the same cells takes the refined one of the first and carries the same; longer cells do not."""
+    spaces = []
+    for length in (1.0, 1.0, 1.5):
+        line = mesh.create_interval(MPI.COMM_SELF, 3, [0.0, length])
+        spaces.append(fem.functionspace(line, element("Lagrange", line.basix_cell(), 2, shape=(2,))))
+    first, second, longer = (refinement(V) for V in spaces)
+    assert second.V is first.V
+    assert longer.V is not first.V
+    f = fem.Function(spaces[1])
+    f.interpolate(lambda x: np.array([x[0] ** 2, 1.0 - x[0]]))
+    for refined in (second, Refinement(spaces[1])):
+        out, x = refined.function(f).x.array.reshape(-1, 2), refined.V.tabulate_dof_coordinates()[:, 0]
+        np.testing.assert_allclose(out, np.column_stack([x**2, 1.0 - x]), atol=1e-14)
+    assert refinement(spaces[1]).function(f).function_space.mesh is first.mesh
 
 
 def test_equations_are_those_of_twice_the_elements() -> None:
