@@ -70,7 +70,7 @@ class AdaptiveSteps:
         self.shortest = steps.min_step or SHORTEST * self.end
         self.measure = ErrorMeasure(stepper.system, stepper.scheme, self.end)
         cells = np.append(np.arange(round(1 / CELL)) * (CELL * self.end), self.end)
-        self.cells = Itinerary(stepper.system.courses, cells, CELL * self.end)
+        self.cells = Itinerary(stepper.system.courses, cells, CELL * self.end, fixed=False)
         self.landings, self.dense = self.cells.landings()
         self.least = NOISE * stepper.newton.tolerance
         self.wanted, self.allowed = min(self.longest, FIRST * self.end), np.inf

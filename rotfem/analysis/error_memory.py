@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.error_samples import Samples
+from rotfem.analysis.error_samples import Inner, Samples
 from rotfem.analysis.error_watch import ErrorWatch
 from rotfem.analysis.error_window import Window
 from rotfem.analysis.ritz_vectors import RitzVectors
@@ -23,7 +23,7 @@ Tree = dict[str, Any]
 
 #: Attributes of a watch, of a window and of its shapes that are plain or the same on every process.
 OF_WATCH = ("_bytes", "_closed", "_landed", "_sound", "_farthest")
-OF_WINDOW = ("t", "C", "K", "bends", "epsilon", "theory", "missing", "turn", "rates")
+OF_WINDOW = ("t", "M", "C", "K", "bends", "epsilon", "theory", "missing", "turn", "rates")
 OF_SHAPES = ("squares", "tip", "made")
 
 
@@ -69,8 +69,9 @@ def _samples(samples: Samples, nodes: int) -> Tree:
             data.append(state[4])
     out: Tree = {"steps": samples.steps, "pieces": samples.pieces, "t": [state[0] for state in samples.states]}
     out |= {"data": data, "datum": [_place(data, state[4]) for state in samples.states]}
+    out |= {"within": [instant[:2] for instant in samples.inner]}
     for i, name in enumerate("qva", 1):
-        whole = np.array([state[i] for state in samples.states]).T
+        whole = np.array([*(state[i] for state in samples.states), *(x[i + 1] for x in samples.inner)]).T
         size = len(whole) // nodes * nodes if len(whole) else 0
         out[name], out[f"hub_{name}"] = whole[:size].reshape(nodes, -1), whole[size:][None]
     return out
@@ -81,7 +82,8 @@ def _place(data: Sequence[Any], datum: Any) -> int:
 
 
 def _samples_of(tree: Tree) -> Samples:
-    number = len(tree["t"])
+    own_number, inner = len(tree["t"]), [tuple(place) for place in tree["within"]]
+    number = own_number + len(inner)
     arrays = []
     for name in "qva":
         over = tree[name]
@@ -89,7 +91,11 @@ def _samples_of(tree: Tree) -> Samples:
         arrays.append(np.concatenate([own, tree[f"hub_{name}"][0].reshape(-1, number)]).T if number else own)
     data = [tree["data"][i] for i in tree["datum"]]
     states = [(t, *(np.ascontiguousarray(x[i]) for x in arrays), data[i]) for i, t in enumerate(tree["t"])]
-    return Samples(states, [tuple(step) for step in tree["steps"]], list(tree["pieces"]))
+    within: list[Any] = [
+        (int(step), float(t), *(np.ascontiguousarray(x[own_number + k]) for x in arrays))
+        for k, (step, t) in enumerate(inner)
+    ]
+    return Samples(states, [tuple(step) for step in tree["steps"]], list(tree["pieces"]), inner=within)
 
 
 def _window(window: Window, nodes: int) -> Tree:
@@ -98,6 +104,8 @@ def _window(window: Window, nodes: int) -> Tree:
     out |= {name: _same(getattr(window.shapes, name)) for name in OF_SHAPES}
     out |= {"speed": window.speed, "motion": _same(np.array(window.motion)), "shift": window.shapes.shift}
     out |= {"steps": _same(np.array(window.samples.steps)), "pieces": window.samples.pieces}
+    if (inner := window.inner) is not None:
+        out["inner"] = {"steps": _same(inner.steps), "t": _same(inner.t), "motion": _same(np.array(inner.motion))}
     if nodes:
         out |= {name: _over_nodes(getattr(window.shapes, name), window, nodes) for name in ("V", "massed")}
     return out
@@ -122,6 +130,9 @@ def _window_of(watch: ErrorWatch, tree: Tree) -> Window:
         for name in names:
             setattr(thing, name, None if tree[name] is None else tree[name][0])
     window.speed, window.motion, window.free = tree["speed"], tuple(tree["motion"][0]), watch.system.hub is not None
+    window.inner = None
+    if (within := tree.get("inner")) is not None:
+        window.inner = Inner(within["steps"][0], within["t"][0], tuple(within["motion"][0]))
     window.samples = Samples([], [(int(a), int(b)) for a, b in tree["steps"][0]], list(tree["pieces"]))
     space, r = watch.system.V.dofmap, len(shapes.squares)
     shapes.comm, shapes.shift, shapes.block = watch.system.comm, tree["shift"], space.index_map_bs

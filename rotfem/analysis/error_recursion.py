@@ -177,6 +177,7 @@ class Spans:
         starts, lengths: of the steps, s, shape (n,).
         near: number of the sample at the start of each step, or of the one in its middle.
         first, last: numbers of the first and last sample of the smooth piece each step is in.
+        end: numbers of the samples at the ends of the steps, where there are samples between, else None.
     """
 
     starts: Array
@@ -184,11 +185,27 @@ class Spans:
     near: Index
     first: Index
     last: Index
+    end: Index | None = None
 
     def select(self, index: Index) -> Spans:
         """Return the steps of an index array."""
         s = self
-        return Spans(s.starts[index], s.lengths[index], s.near[index], s.first[index], s.last[index])
+        own = None if s.end is None else s.end[index]
+        return Spans(s.starts[index], s.lengths[index], s.near[index], s.first[index], s.last[index], own)
+
+    def around(self, m: int) -> Index:
+        """Return the numbers of m samples around every step, (n, m)."""
+        lowest = self.near - (m - 1) // 2
+        if self.end is not None:
+            lowest = (self.near + self.end - m + 1) // 2
+        return np.asarray(np.clip(lowest, self.first, self.last - m + 1)[:, None] + np.arange(m))
+
+    @property
+    def within(self) -> Index:
+        """The samples that join a step most simply: its ends, and one in its middle if there is any, (n, 2 or 3)."""
+        if self.end is None:
+            return self.around(2)
+        return np.stack([self.near, (self.near + self.end + 1) // 2, self.end], axis=1)
 
 
 def settled(times: Array, values: Array, first: Index) -> Array:
@@ -221,8 +238,8 @@ def settled(times: Array, values: Array, first: Index) -> Array:
 def interpolated(times: Array, values: Array, spans: Spans, order: int) -> Array:
     """Return polynomials through samples around every step, coefficients in powers of s/h, shape (n, order, r).
 
-    Samples that change as fast as the steps go are joined by straight lines: no polynomial is right between them, and
-    the straight one does not overshoot.
+    Samples that change as fast as the steps go are joined by straight lines, or a parabola where there are some within
+    the step: no polynomial is right between them, and these do not overshoot.
 
     Args:
         times: of the samples, s, (N,).
@@ -235,14 +252,22 @@ def interpolated(times: Array, values: Array, spans: Spans, order: int) -> Array
     for m in np.unique(available):
         chosen = np.flatnonzero(available == m)
         part = spans.select(chosen)
-        out[chosen, :m], sampled = _through(times, values, part, int(m))
+        out[chosen, :m], theta, sampled = _through(times, values, part, part.around(int(m)))
         if m > 2:
-            straight, _ = _through(times, values, part, 2)
-            low = _around(np.abs(np.diff(sampled, n=2 if m > 3 else 1, axis=1)).max(axis=1))
-            rough = np.abs(np.diff(sampled, n=int(m) - 1, axis=1)[:, 0]) >= low
+            simple, _, _ = _through(times, values, part, part.within)
+            low = _around(np.abs(differences(theta, sampled, 2 if m > 3 else 1)).max(axis=1))
+            rough = np.abs(differences(theta, sampled, int(m) - 1)[:, 0]) >= low
             padded = np.zeros((len(chosen), m, values.shape[1]))
-            padded[:, :2] = straight
+            padded[:, : simple.shape[1]] = simple
             out[chosen, :m] = np.where(rough[:, None, :], padded, out[chosen, :m])
+    return out
+
+
+def differences(theta: Array, sampled: Array, order: int) -> Array:
+    """Return differences of samples (n, m, r) at places (n, m), (n, m − order, r), as if evenly spaced."""
+    out, spacing = sampled, (theta[:, -1] - theta[:, 0]) / (theta.shape[1] - 1)
+    for k in range(1, order + 1):
+        out = k * np.diff(out, axis=1) * (spacing[:, None] / (theta[:, k:] - theta[:, :-k]))[..., None]
     return out
 
 
@@ -255,12 +280,11 @@ def _around(values: Array) -> Array:
     return out
 
 
-def _through(times: Array, values: Array, spans: Spans, m: int) -> tuple[Array, Array]:
-    """Return polynomials through m samples around every step, and these samples, shape (n, m, r) both."""
-    lowest = np.clip(spans.near - (m - 1) // 2, spans.first, spans.last - m + 1)
-    index = lowest[:, None] + np.arange(m)
+def _through(times: Array, values: Array, spans: Spans, index: Index) -> tuple[Array, Array, Array]:
+    """Return polynomials through samples (n, m) of every step, their places, (n, m), and they, (n, m, r)."""
+    m = index.shape[1]
     theta = (times[index] - spans.starts[:, None]) / spans.lengths[:, None]
     _, one, of = np.unique(np.rint(theta / ALIKE), axis=0, return_index=True, return_inverse=True)
     inverse = np.linalg.inv(theta[one][:, :, None] ** np.arange(m))
     sampled = values[index]
-    return np.asarray(inverse[of.ravel()] @ sampled), sampled
+    return np.asarray(inverse[of.ravel()] @ sampled), theta, sampled

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +16,21 @@ Array = npt.NDArray[np.float64]
 
 
 @dataclass
+class Inner:
+    """A motion at instants within steps at which the equations hold.
+
+    Attributes:
+        steps: numbers of the steps, increasing, (k,).
+        t: times, s, increasing, (k,).
+        motion: displacements, rates and accelerations, (k, r) each.
+    """
+
+    steps: npt.NDArray[np.int64]
+    t: Array
+    motion: tuple[Array, ...]
+
+
+@dataclass
 class Samples:
     """States of a motion, and the steps between them.
 
@@ -23,21 +39,31 @@ class Samples:
         steps: numbers of the states that a step starts and ends with.
         pieces: numbers of the states with which what drives the motion starts afresh.
         size: largest displacement of the tip, m, once it is known.
+        inner: number of the step, and t (s), q, v, a at instants within it at which the equations hold.
     """
 
     states: list[tuple[float, Array, Array, Array, Any]]
     steps: list[tuple[int, int]]
     pieces: list[int]
     size: float = np.inf
+    inner: list[tuple[int, float, Array, Array, Array]] = field(default_factory=list)
 
     @cached_property
     def displacements(self) -> Array:
         """Displacements of the states, local dof arrays (n, unknowns)."""
         return np.array([state[1] for state in self.states])
 
+    def within(self, coordinates: Callable[[Array], Array]) -> Inner | None:
+        """Return the motion within steps in coordinates of local dof arrays (n, unknowns); None if none is known."""
+        if not self.inner:
+            return None
+        steps, t, *motion = zip(*self.inner, strict=True)
+        return Inner(np.array(steps), np.array(t), tuple(coordinates(np.array(x)) for x in motion))
+
     def forget(self) -> None:
         """Let go of the states; steps and pieces stay."""
         self.states.clear()
+        self.inner.clear()
         vars(self).pop("displacements", None)
 
     @property

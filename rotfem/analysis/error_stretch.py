@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.error_recursion import Index, Spans, settled
+from rotfem.analysis.error_samples import Inner
 from rotfem.analysis.error_window import Window
 
 Array = npt.NDArray[np.float64]
@@ -19,14 +20,14 @@ Array = npt.NDArray[np.float64]
 MANY = 4000
 
 
-def stretches(windows: Sequence[Window]) -> Iterator[tuple[Stretch, slice]]:
-    """Yield the windows put together as far as they are short, and which of them they are."""
+def stretches(windows: Sequence[Window], within: bool = False) -> Iterator[tuple[Stretch, slice]]:
+    """Yield the windows put together as far as they are short, `within` steps too, and which of them they are."""
     size, first = max(len(window.K) for window in windows), 0
     while first < len(windows):
         last, steps = first + 1, len(windows[first].lengths)
         while last < len(windows) and (steps := steps + len(windows[last].lengths)) <= MANY:
             last += 1
-        yield Stretch(windows[first:last], size), slice(first, last)
+        yield Stretch(windows[first:last], size, within), slice(first, last)
         first = last
 
 
@@ -36,6 +37,7 @@ class Stretch:
     Args:
         windows: one after the other.
         size: number of coordinates, r.
+        within: whether instants within steps are wanted.
 
     Attributes:
         t: times of the samples, s, (N,).
@@ -44,9 +46,11 @@ class Stretch:
         of: numbers of the windows that steps are in, (n,).
         samples, steps: those of every window.
         pieces: numbers of the samples with which what drives the motion starts afresh.
+        inner: the motion at instants within steps, (k, r) each; None where it is not known in all steps.
+        inner_rows: those of every window.
     """
 
-    def __init__(self, windows: Sequence[Window], size: int):
+    def __init__(self, windows: Sequence[Window], size: int, within: bool = False):
         self.windows, self.size = windows, size
         self.t = np.concatenate([window.t for window in windows])
         self.motion = tuple(self._rows([window.motion[i] for window in windows]) for i in range(3))
@@ -61,6 +65,19 @@ class Stretch:
         self.steps = _slices([len(e[0]) for e in ends])
         pieces = [np.array(window.samples.pieces) + at for window, at in zip(windows, offsets, strict=False)]
         self.pieces: Index = np.concatenate(pieces)
+        self.inner, self.inner_rows = self._within() if within else (None, [])
+
+    def _within(self) -> tuple[Inner | None, list[slice]]:
+        """Return the motion within the steps of all windows, and the rows of every window."""
+        found = [window.inner for window in self.windows if window.inner is not None]
+        if len(found) < len(self.windows):
+            return None, []
+        steps = np.concatenate([part.start + inner.steps for part, inner in zip(self.steps, found, strict=True)])
+        if len(np.unique(steps)) < len(self.begin):
+            return None, []
+        motion = tuple(self._rows([inner.motion[i] for inner in found]) for i in range(3))
+        t = np.concatenate([inner.t for inner in found])
+        return Inner(steps, t, motion), _slices([len(inner.t) for inner in found])
 
     @property
     def C(self) -> Array:
@@ -100,6 +117,22 @@ class Stretch:
         piece = np.searchsorted(self.pieces, self.begin, side="right") - 1
         first, last = self.pieces[piece], np.append(self.pieces[1:], len(self.t))[piece] - 1
         return Spans(self.t[self.begin], self.lengths, self.begin, first, last)
+
+    @cached_property
+    def among(self) -> tuple[Index, Index]:
+        """Numbers of the samples, and of the instants within steps, where both are put in one row; with instants."""
+        assert self.inner is not None
+        before = self.begin[self.inner.steps]
+        samples = np.arange(len(self.t))
+        return samples + np.searchsorted(before, samples), before + 1 + np.arange(len(before))
+
+    @property
+    def in_all(self) -> Spans:
+        """The steps, the samples and the instants within steps around them, and those that a step has itself."""
+        ends, (samples, _) = self.at_ends, self.among
+        return Spans(
+            ends.starts, ends.lengths, samples[ends.near], samples[ends.first], samples[ends.last], samples[self.end]
+        )
 
     @property
     def in_middles(self) -> Spans:

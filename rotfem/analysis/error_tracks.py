@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.error_recursion import Complex, Propagator, accumulated, interpolated, settled
+from rotfem.analysis.error_recursion import Complex, Index, Propagator, accumulated, interpolated, settled
 from rotfem.analysis.error_stretch import Stretch, in_windows, stretches
 from rotfem.analysis.error_unresolved import largest_unresolved
 from rotfem.analysis.error_window import Window
@@ -40,6 +40,9 @@ LARGE = 0.3
 #: then count as large by the square of their size in lengths of the structure.
 FACTORS, SMALL = (0.0, -1.0, 1.0), 1e-3
 
+#: Factor to what instants within steps say of an error: a scheme and polynomials through them fail alike.
+DOUBT = 2.0
+
 
 def largest_errors(
     windows: Sequence[Window], scheme: Any, linear: bool, scale: float, length: float
@@ -54,15 +57,15 @@ def largest_errors(
         length: of the structure, m.
     """
     if linear:
-        return _both(windows, Tracks(scheme, linear).errors(windows, [[window.K] for window in windows])[0])
+        return _both(windows, _followed(windows, scheme, linear, [[window.K] for window in windows])[0])
     (changes, spreads), phase = smoothed(windows)
     sure = phase < UNSURE
     factors = FACTORS[:1] if sure else FACTORS
     stiffness = [
-        [window.K + np.diag(x + factor * y) for factor in factors]
+        [window.K + np.linalg.solve(window.M, np.diag(x + factor * y)) for factor in factors]
         for window, x, y in zip(windows, changes, spreads, strict=True)
     ]
-    best, *others = Tracks(scheme, linear).errors(windows, stiffness)
+    best, *others = _followed(windows, scheme, linear, stiffness)
     size, when = best["missing"]
     best["missing"] = (size * min(1.0, (scale / (LARGE * length)) ** 2), when)
     fed = 1.0 + scale / length
@@ -77,6 +80,23 @@ def largest_errors(
         for name, most in (("time", MARGIN * fed), ("space", MARGIN * fed), ("missing", fed)):
             best[name] = ((1.0 + large * (most - 1.0)) * best[name][0], best[name][1])
     return _both(windows, best)
+
+
+def _followed(
+    windows: Sequence[Window], scheme: Any, linear: bool, stiffness: Sequence[Sequence[Array]]
+) -> list[dict[str, tuple[float, float]]]:
+    """Return the largest errors on every track (see `Tracks.errors`); of steps by all that is known of them.
+
+    The ends of steps know too little of what drives a motion that goes up and down in each. What is known within the
+    steps is what the scheme itself has seen of it.
+    """
+    found = Tracks(scheme, linear).errors(windows, stiffness)
+    if any(window.inner is None for window in windows):
+        return found
+    for track, within in zip(found, Tracks(scheme, linear, within=True).errors(windows, stiffness), strict=True):
+        size, when = within["time"]
+        track["time"] = min(track["time"], (DOUBT * size, when))
+    return found
 
 
 def _both(windows: Sequence[Window], found: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
@@ -100,7 +120,7 @@ def smoothed(windows: Sequence[Window]) -> tuple[tuple[list[Array], list[Array]]
         base = np.stack([np.ones_like(scaled), scaled], axis=2)  # of every window, at all windows
         weighed = np.swapaxes(weights[:, :, None] * base, 1, 2)
         fit = np.linalg.solve(weighed @ base + np.diag([0.0, 1e-3]), weighed @ squares)
-        fitted = fit[:, 0]
+        fitted = np.clip(fit[:, 0], squares.min(axis=0), squares.max(axis=0))  # a fit may overshoot, to below 0
         spread = np.sqrt((weights[:, None] @ (squares - base @ fit) ** 2)[:, 0] / weights.sum(axis=1)[:, None])
     spread = np.minimum(spread, MOST * np.abs(fitted))
     lengths = np.array([w.t[-1] - w.t[0] for w in windows])
@@ -133,13 +153,54 @@ def drives(stretch: Stretch, C: Array, K: Array, scheme: Any) -> Array:
         t, c, v = (0.5 * (x[begin] + x[end]) for x in (t, c, v))
         later, rows = a[end], stretch.steps
     tracks, r = K.shape[1:3]
-    values = in_windows(c, K.reshape(len(K), -1, r), rows)
-    values += np.tile(later + in_windows(v, C, rows), tracks)
-    if scheme.balanced_at_end:
-        values = settled(t, values, stretch.pieces)
+    apart, together = decoupled(K) if stretch.windows[0].free else (None, None)
+    values = _forces((c, v, later), C, K, rows, apart)
     spans = stretch.at_ends if scheme.balanced_at_end else stretch.in_middles
+    if stretch.inner is not None and scheme.balanced_at_end:
+        (samples, within), spans, inner = stretch.among, stretch.in_all, stretch.inner
+        own = _forces(inner.motion, C, K, stretch.inner_rows, apart)
+        t, values = _merged(samples, within, (t, inner.t)), _merged(samples, within, (values, own))
+    elif scheme.balanced_at_end:
+        values = settled(t, values, stretch.pieces)
     found = interpolated(t, values, spans, scheme.order + BEYOND)
-    return np.moveaxis(found.reshape(*found.shape[:2], tracks, r), 1, 0)
+    found = np.moveaxis(found.reshape(*found.shape[:2], tracks, r), 1, 0)
+    if together is not None:
+        found = np.concatenate(
+            [np.einsum("kij,qnkj->qnki", A, found[:, part]) for part, A in zip(stretch.steps, together, strict=True)],
+            axis=1,
+        )
+    return found
+
+
+def decoupled(K: Array) -> tuple[Array, Array]:
+    """Return matrices that take forces apart into those on the eigenvectors of K (…, r, r), and put them together.
+
+    What a free hub couples cancels in them. By itself each force of two that cancel is as quick as the quicker one, and
+    what is taken for its course between samples is not that of the other.
+    """
+    values, vectors = np.linalg.eig(K)
+    real = np.all(np.imag(values) == 0.0, axis=-1)[..., None, None]
+    together = np.where(real, np.real(vectors), np.eye(K.shape[-1]))
+    return np.linalg.inv(together), together
+
+
+def _forces(motion: Sequence[Array], C: Array, K: Array, rows: Sequence[slice], apart: Array | None) -> Array:
+    """Return c̈ + C ċ + K c of samples (n, r), in windows, on all tracks, (n, tracks r), taken apart by matrices."""
+    c, v, a = motion
+    tracks, r = K.shape[1:3]
+    out = in_windows(c, K.reshape(len(K), -1, r), rows)
+    out += np.tile(a + in_windows(v, C, rows), tracks)
+    if apart is not None:
+        parts = (np.einsum("kij,nkj->nki", A, out[p].reshape(-1, tracks, r)) for p, A in zip(rows, apart, strict=True))
+        out = np.concatenate([part.reshape(-1, tracks * r) for part in parts])
+    return np.asarray(out)
+
+
+def _merged(samples: Index, within: Index, values: tuple[Array, Array]) -> Array:
+    """Return values at samples and within steps in one row."""
+    out = np.empty((len(samples) + len(within), *values[0].shape[1:]))
+    out[samples], out[within] = values
+    return out
 
 
 class Tracks:
@@ -148,10 +209,11 @@ class Tracks:
     Args:
         scheme: that made the motion.
         linear: whether what the tangents say may grow.
+        within: whether instants within steps are samples, too.
     """
 
-    def __init__(self, scheme: Any, linear: bool):
-        self.scheme, self.bounded = scheme, not linear
+    def __init__(self, scheme: Any, linear: bool, within: bool = False):
+        self.scheme, self.bounded, self.within = scheme, not linear, within
         #: Errors c and ċ at the end of the last window, (lanes, 2 r); a lane is an error on a track.
         self.carried: Array = np.zeros((0, 0))
         #: Names of the errors beside that of time.
@@ -171,7 +233,7 @@ class Tracks:
         self.beside = ["space", *["missing"] * self.bounded, *["model"] * by_theory]
         self.lanes = np.array([*range(tracks), *[0] * len(self.beside)])
         best = [(0.0, 0.0)] * len(self.lanes)
-        for stretch, which in stretches(windows):
+        for stretch, which in stretches(windows, self.within):
             matrices = [stretch.stiffness(track) for track in zip(*stiffness[which], strict=True)]
             for found in self._through(stretch, np.stack(matrices, axis=1)):
                 best = [max(pair) for pair in zip(best, found, strict=True)]

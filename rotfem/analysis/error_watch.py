@@ -22,7 +22,7 @@ from rotfem.analysis.error_bursts import OF_MESH, ORDER, Burst, burst_in, growth
 from rotfem.analysis.error_samples import Samples
 from rotfem.analysis.error_tracks import largest_errors
 from rotfem.analysis.error_window import MeshErrors, Window
-from rotfem.analysis.schemes import State
+from rotfem.analysis.schemes import Instant, State
 from rotfem.analysis.turning_view import TurningView
 from rotfem.errors import ComputationError
 
@@ -95,8 +95,9 @@ class ErrorWatch:
             states.append(self._seen(old))
         states.append(self._seen(new))
         self._reached, number = new, len(states)
+        now.inner += [(len(now.steps), *self._within(new, instant)) for instant in new.inner]
         now.steps.append((number - 2, number - 1))
-        self._bytes += 3 * new.q.nbytes
+        self._bytes += 3 * new.q.nbytes * (1 + len(new.inner))
         due = number > self._fewest and new.t >= (self._closed + 1) * self.end / WINDOWS
         if (due and self._is_enough(new.t)) or self._bytes > MEMORY:
             self._close(new.t)
@@ -122,6 +123,14 @@ class ErrorWatch:
         """Return t, q, v, a of a state in the frame that turns, and what rotations are counted from."""
         s = state if self._view is None else self._view.state(state)
         return s.t, s.q, s.v, s.a, s.datum
+
+    def _within(self, new: State, instant: Instant) -> Instant:
+        """Return an instant within the step to a state in the frame that turns."""
+        if self._view is None:
+            return instant
+        t, q, v, a = instant
+        s = self._view.state(new.changed(t=t, q=q, v=v, a=a))
+        return s.t, s.q, s.v, s.a
 
     def landed(self) -> None:
         """Take note that what drives the motion is not smooth where the last step has ended."""

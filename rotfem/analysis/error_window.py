@@ -76,6 +76,8 @@ class Window:
         shapes: the shapes.
         t: times of the samples, s, (N,).
         motion: c, ċ, c̈ of the samples, (N, r) each.
+        inner: c, ċ, c̈ at instants within steps; None without any.
+        M: of the shapes, and of the angle of a free hub, (r, r).
         C, K: for c̈ + C ċ + K c, (r, r).
         speed: of the frame in the middle, rad/s.
         bends: which shapes bend, (r of the structure,).
@@ -93,12 +95,13 @@ class Window:
         self.t = np.array([state[0] for state in samples.states])
         self.shapes: RitzVectors
         self.speed: float
+        self.M: Array
         self.C: Array
         self.K: Array
         self.bends: npt.NDArray[np.bool_]
         self.epsilon: Array
         if before is not None and self._alike(system, before):
-            for name in ("shapes", "speed", "C", "K", "bends", "epsilon"):
+            for name in ("shapes", "speed", "M", "C", "K", "bends", "epsilon"):
                 setattr(self, name, getattr(before, name))
             self.turn = np.eye(len(self.K))
         else:
@@ -110,6 +113,7 @@ class Window:
             self.rates = turning_rates(system.held, samples, mesh.shape.turns)
         rates = (np.array([state[i] for state in samples.states]) for i in (2, 3))
         self.motion = tuple(self._coordinates(x) for x in (samples.displacements, *rates))
+        self.inner = samples.within(self._coordinates)
         samples.forget()
 
     def _alike(self, system: Any, before: Window) -> bool:
@@ -128,6 +132,7 @@ class Window:
         M, C, K = tangents.reduced(self.shapes)
         if self.free:
             K[-1, -1] += HELD * M[-1, -1] * (2 * np.pi / end) ** 2
+        self.M = np.asarray(M, dtype=float)
         self.C, self.K = (np.asarray(np.linalg.solve(M, A), dtype=float) for A in (C, K))
         self.epsilon = self._errors_by_mesh(mesh, before)
         if before is not None:

@@ -17,7 +17,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rotfem.analysis.schemes import Array, Scheme, Stage, State, divided_difference
+from rotfem.analysis.schemes import Array, Scheme, Stage, State, divided_difference, inner
 from rotfem.registry import register
 
 GAMMA = 0.25
@@ -73,7 +73,7 @@ class ESDIRK4(Scheme):
         end = done[-1]
         points, values = [0.0, *(C[i] * h for i in TAKEN)], [state.a, *(done[i - 1].a for i in TAKEN)]
         error = 6 * ERROR * h**5 * divided_difference(points, values)
-        return State(end.t, end.q, end.v, end.a, error)
+        return State(end.t, end.q, end.v, end.a, error, inner=inner(done))
 
     def local_error(self, new: State, old: State) -> Array:
         """Return the error of q in the step, of fifth order."""

@@ -91,6 +91,8 @@ def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State
             old, state = state, stepper.advance(state, leg.length, leg.end)
         if stepper.watch is not None:
             stepper.watch(old, state)
+            if leg.averaged:  # hats make up the impulse of straight lines between the ends of legs, of no other ones
+                stepper.watch.landed()
     if after is None:
         return state
     if old is not None and not after.drifts and after.length != leg.length:

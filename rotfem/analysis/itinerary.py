@@ -32,6 +32,10 @@ MOST, OUTSTANDING = 4, 10.0
 #: on where there are many, and from which marks are by a scheme of second order; by one of order p a power p/2 of that.
 KINKED, CURVED = 1e-3, 5e-2
 
+#: Deviation over a step from which what is smooth between marks is averaged there, a parabola in up to three steps; and
+#: order of the schemes that averages by hats serve: those of higher order sum up what is smooth in a step as it is.
+SMOOTH, AVERAGING = 0.1, 2
+
 
 @dataclass(frozen=True)
 class Leg:
@@ -68,10 +72,11 @@ class Itinerary:
         times: ends of the steps, the first the start of the march, s.
         step: nominal length of a step, s.
         order: of the scheme that goes there.
+        fixed: whether these are the steps that are gone, and not cells of some that adapt themselves to what is quick.
     """
 
-    def __init__(self, courses: Sequence[Course], times: Array, step: float, order: int = 2):
-        self.times, self.step, self.close = times, step, CLOSE * step
+    def __init__(self, courses: Sequence[Course], times: Array, step: float, order: int = 2, fixed: bool = True):
+        self.times, self.step, self.close, self.order, self.fixed = times, step, CLOSE * step, order, fixed
         self.curved = CURVED ** (order / 2)
         for course in courses:
             look_at(course, times)
@@ -122,6 +127,19 @@ class Itinerary:
         inside: Array = np.unique(points[(points > self.close) & (points < self.times[-1] + self.close)])
         return inside
 
+    def _quick(self) -> Array:
+        """Return rows (begin, end) of the stretches (s) between marks that are smooth, but not within a step."""
+        rows = [np.empty((0, 2))]
+        for course, _ in self._courses if self.fixed and self.order <= AVERAGING else ():
+            if len(looks := course.looks):
+                begin, end = course.marks[:-1], course.marks[1:]
+                first, last = np.maximum(begin, looks - 0.5 * self.step), np.minimum(end, looks + 0.5 * self.step)
+                start, middle, stop = (course.values(t) for t in (first * (1 + SAME), looks, last * (1 - SAME)))
+                off = np.linalg.norm(middle - 0.5 * (start + stop), axis=1)
+                size = float(np.linalg.norm([start, middle, stop], axis=2).max())
+                rows.append(np.column_stack([begin, end])[off > SMOOTH * size])
+        return np.concatenate(rows)
+
     def _step_of(self, points: Array) -> npt.NDArray[np.int64]:
         """Return the number, from 1, of the step that each point is in or ends."""
         index = np.searchsorted(self.times + self.close, points, side="left")
@@ -141,7 +159,8 @@ class Itinerary:
         chosen = sharp if len(sharp) <= n else sharp[off[self._step_of(sharp)] > KINKED]
         chosen = np.union1d(chosen, soft[off[self._step_of(soft)] > self.curved])
         landings, edges = self._spaced(self._foremost(chosen, weight[np.searchsorted(points, chosen)]))
-        self._lay(landings, edges, points, np.isin(points, sharp), off)
+        counts = np.isin(points, sharp if self.order > AVERAGING else np.union1d(sharp, soft))
+        self._lay(landings, edges, (points[counts], np.isin(points[counts], sharp)), off)
 
     def _foremost(self, points: Array, weight: Array) -> Array:
         """Return points without those that do not stand out where a step has more than MOST."""
@@ -170,11 +189,13 @@ class Itinerary:
             edges += [max(first, edges[-1] if edges else 0.0), min(last, float(self.times[-1]))]
         return np.array(single), np.array(edges)
 
-    def _lay(self, landings: Array, edges: Array, points: Array, sharp: Array, off: Array) -> None:
-        """Write the legs of all steps that have points or edges of legs in them."""
+    def _lay(self, landings: Array, edges: Array, knots: tuple[Array, Array], off: Array) -> None:
+        """Write the legs of all steps that have points or edges of legs in them; `knots` are points, and which jump."""
+        (points, sharp), quick = knots, self._quick()
         inner = np.union1d(landings, edges)
         of_point, of_inner = self._step_of(points), self._step_of(inner)
-        for i in np.union1d(of_point, of_inner):
+        of_quick = [np.arange(a, b + 1) for a, b in zip(*self._step_of(quick.T), strict=True)]
+        for i in np.unique(np.concatenate([of_point, of_inner, *of_quick])):
             begin, end = float(self.times[i - 1]), float(self.times[i])
             inside = points[slice(*np.searchsorted(of_point, [i, i + 1]))]
             kinks = sharp[slice(*np.searchsorted(of_point, [i, i + 1]))]
@@ -187,6 +208,7 @@ class Itinerary:
                 passes = (inside > begin + self.close) & (inside < stop - self.close)
                 allowed = KINKED if np.any(passes & kinks) else CURVED
                 averaged = np.any(passes) and (off[i] if len(stops) == 1 else self.bent(begin, stop)) > allowed
+                averaged |= np.any((quick[:, 0] < stop - self.close) & (quick[:, 1] > begin + self.close))
                 stretch = np.searchsorted(edges, 0.5 * (begin + stop)) % 2 == 1
                 legs.append((stop, stop in landed, bool(averaged or stretch)))
                 begin = stop

@@ -20,7 +20,7 @@ import numpy as np
 
 from rotfem.analysis.alpha_family import GeneralisedAlpha
 from rotfem.analysis.esdirk import ESDIRK4
-from rotfem.analysis.schemes import Array, Equations, Scheme, Stage, State, divided_difference
+from rotfem.analysis.schemes import Array, Equations, Scheme, Stage, State, divided_difference, inner
 from rotfem.errors import ComputationError
 from rotfem.registry import register
 
@@ -153,7 +153,8 @@ class RadauIIA(Scheme):
     def finish(self, state: State, h: float, done: Sequence[Stage]) -> State:
         """Return the last stage, with the accelerations of all and the local error."""
         accelerations, end = tuple(s.a for s in done), done[-1]
-        return State(end.t, end.q, end.v, end.a, Before(h, accelerations, local_error(state, h, accelerations)))
+        memory = Before(h, accelerations, local_error(state, h, accelerations))
+        return State(end.t, end.q, end.v, end.a, memory, inner=inner(done))
 
     def local_error(self, new: State, old: State) -> Array | None:
         """Return the leading term of the error, by the fourth divided difference of accelerations."""

@@ -26,6 +26,10 @@ Array = npt.NDArray[np.float64]
 Shifts = tuple[float, float, float]
 
 
+#: A time (s), and q, v, a at it.
+Instant = tuple[float, Array, Array, Array]
+
+
 @dataclass
 class State:
     """The motion at one instant.
@@ -38,6 +42,7 @@ class State:
             moment (N·m) of the forces from outside now; None where the hub is not free.
         datum: what the rotations in q are counted from; None for the undeformed structure.
         balanced: whether the equations hold with q, v and a; otherwise a is that of another instant.
+        inner: instants (s) within the step that led here at which the equations hold, too, and q, v, a there.
     """
 
     t: float
@@ -48,6 +53,7 @@ class State:
     given: Array | None = None
     datum: Any = None
     balanced: bool = True
+    inner: tuple[Instant, ...] = ()
 
     @classmethod
     def at_rest(cls, system: Any, q: Array, v: Array | None = None) -> State:
@@ -63,6 +69,17 @@ class State:
     def changed(self, **changes: Any) -> State:
         """Return a copy with other values."""
         return replace(self, **changes)
+
+    def after(self, before: State) -> State:
+        """Return the state as the end of one step with the part that led to another state, `before`.
+
+        What is between is known as well as in other steps, by an instant in the middle of each part.
+        """
+        if not self.inner:
+            return self
+        parts = [part.inner[len(part.inner) // 2] for part in (before, self) if part.inner]
+        middle = (before.t, before.q, before.v, before.a)
+        return self.changed(inner=tuple(sorted([*parts, middle], key=lambda instant: instant[0])))
 
 
 @dataclass(frozen=True)
@@ -104,6 +121,11 @@ class Stage:
         self.q += dq
         self.v += self.c_v * dq
         self.a += self.c_a * dq
+
+
+def inner(stages: Sequence[Stage]) -> tuple[Instant, ...]:
+    """Return the instants of stages before the last one, in their order in time."""
+    return tuple(sorted(((s.t, s.q, s.v, s.a) for s in stages[:-1]), key=lambda instant: instant[0]))
 
 
 class Equations(Protocol):

@@ -163,7 +163,7 @@ class Stepper(StageSolver):
             raise _cut_down(failure, h) if halvings == 0 else failure
         self.substeps += 1
         middle = self.advance(state, h / 2, None, halvings - 1)
-        return self.advance(middle, h / 2, state.t + h if end is None else end, halvings - 1)
+        return self.advance(middle, h / 2, state.t + h if end is None else end, halvings - 1).after(middle)
 
     def _stood_in(self, others: Sequence[Scheme], state: State, h: float, end: float | None) -> State | None:
         """Return the state at the end of a step that one of other schemes takes, in parts; None if none can."""
@@ -172,7 +172,8 @@ class Stepper(StageSolver):
             now, last = scheme.start(state), state.t + h if end is None else end
             try:
                 for part in range(1, PARTS + 1):
-                    now = other.advance(now, h / PARTS, last if part == PARTS else None)
+                    new = other.advance(now, h / PARTS, last if part == PARTS else None)
+                    now = new.after(now) if part > 1 else new
             except ComputationError:
                 continue
             self.stood_in[scheme.name] = self.stood_in.get(scheme.name, 0) + 1

@@ -116,7 +116,7 @@ class Memory:
             "positions": self.numbering.positions,
             "t": state.t,
             "given": state.given,
-            "state": self._packed({k: v for k, v in vars(state).items() if k != "given"}),
+            "state": self._packed({k: v for k, v in vars(state).items() if k not in ("given", "inner")}),
             "factored": self._packed(run.system.held.factored),
             "stepper": plain(run.stepper),
             "learnt": {name: plain(part) for name, part in learning(run.stepper).items()},

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rotfem import SceneError, run
+from rotfem.analysis.itinerary import Itinerary
 from rotfem.analysis.looks import look_at
 from rotfem.mechanics.courses import Course
 from tests.beams import STRUCTURE
@@ -35,6 +36,32 @@ def test_what_is_smooth_has_no_knots_and_what_is_slow_no_marks() -> None:
     assert len(bump.knots) == 0
     assert np.all((bump.marks > 0.48) & (bump.marks < 0.53))
     assert len(bump.marks) >= 64
+
+
+@pytest.mark.parametrize("step", [0.03, 0.02, 0.0137, 0.01, 0.007])
+@pytest.mark.parametrize(("order", "averages"), [(2, True), (4, False)])
+def test_what_is_smooth_in_up_to_three_steps_is_averaged_wherever_they_end(
+    step: float, order: int, averages: bool
+) -> None:
+    """A parabola of 20 ms: every leg in it is averaged or none, so that hats add up to all of it, 2/3 · 20 ms."""
+    course = Course(
+        "motion.rate",
+        lambda t: max(0.0, 1.0 - ((t - 0.51) / 0.01) ** 2),
+        np.empty(0),
+        np.array([0.0, 0.5, 0.52, 1.0]),
+        looks=np.array([0.25, 0.51, 0.76]),
+    )
+    legs = [leg for _, leg in Itinerary([course], np.append(np.arange(0.0, 1.0, step), 1.0), step, order)]
+    inside = [leg for leg in legs if leg.end > 0.5 + 1e-9 and leg.end - leg.length < 0.52 - 1e-9]
+    assert {leg.averaged for leg in inside} == {averages}
+    if averages:
+        ends = [inside[0].end - inside[0].length, *(leg.end for leg in inside)]
+        lengths = [0.0, *np.diff(ends), 0.0]
+        impulse = sum(
+            0.5 * (before + after) * course.mean(t, before, after)
+            for t, before, after in zip(ends, lengths, lengths[1:], strict=False)
+        )
+        assert impulse == pytest.approx(2 / 3 * 0.02, rel=1e-9)
 
 
 def beam(**tables: Any) -> Any:

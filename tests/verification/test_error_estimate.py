@@ -206,6 +206,25 @@ def test_estimate_changes_nothing_and_can_be_left_out() -> None:
         np.testing.assert_array_equal(column, unknown.history[name])
 
 
+@pytest.mark.parametrize(("step", "scheme"), [(0.05, "generalised_alpha"), (0.1, "esdirk4")])
+def test_a_stop_within_few_steps_is_met_and_judged(step: float, scheme: str) -> None:
+    """The impulse of a stop in 0.1 s is in one step or two, whose ends see none of it, or three quarters."""
+    stop = {"type": "table", "table": [[0.0, 0.3], [1.0, 0.3], [1.1, 0.0], [4.0, 0.0]]}
+    run = rotfem.run(scene(step, motion=stop, time={"scheme": scheme}))
+    fine = rotfem.run(scene(0.0125, motion=stop, time={"scheme": "radau5"}, output={"error": False}))
+    tip, finer = (np.column_stack([r.tip[name] for name in ("u1", "u2")]) for r in (run, fine))
+    true = np.linalg.norm(tip - finer[:: round(step / 0.0125)], axis=1).max() / np.linalg.norm(tip, axis=1).max()
+    assert true < 0.08
+    assert 0.6 < run.summary["error"]["time"] / true < 6.0
+
+
+def test_steps_of_a_free_hub_are_judged_by_what_is_within_them() -> None:
+    """Forces at the ends of steps in which an arm goes up and down say three times its error, elsewhere 1500 times."""
+    hub = {"type": "torque", "hub_inertia": 60.0, "pulses": [[0.0, 0.3, 300.0], [1.2, 1.6, -300.0]]}
+    true, summary = true_error(scene(0.1, motion=hub, time={"scheme": "esdirk4"}), parts=4)
+    assert 0.6 < summary["error"]["time"] / true < 2.5
+
+
 def test_unresolved_motion_is_said() -> None:
     """A pulse that is as short as the steps: more than 1 % off, and said so with a step that would do."""
     run = rotfem.run(scene(0.05, loads=PULSE))
