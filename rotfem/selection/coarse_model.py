@@ -102,7 +102,7 @@ class Trial:
         self.speeds = tuple(speeds) if speeds is not None else (self._reached(),)
         self.samples: Sampling | None = None
         if HISTORY in self.wanted and case.steps is not None:
-            self.samples = Sampling.of(case.steps, self.at_rest, given(problem))
+            self.samples = self._sampled()
         self.finer, self.moves = FINER[0], 0.0
 
     def _refuse(self) -> None:
@@ -118,8 +118,9 @@ class Trial:
             size: its largest displacement of the tip over the length (0: unknown).
 
         Newton's method stops where increments are no matter of what changes are told. No two histories may differ by
-        what steps make of the same motion, and up to `LONGER` they need not be shorter than that. Where they are to be
-        shorter by less than `SHORTER`, there are more samples, else several steps between two.
+        what steps make of the same motion, and up to `LONGER` they need not be shorter than that, if the motion begins
+        at rest. Where they are to be shorter by less than `SHORTER`, there are more samples, else several steps
+        between two.
         """
         own, scheme = self.full.steps, self.full.scheme
         if self.samples is None or scheme is None or own is None or own.step is None or self._done or not error > 0.0:
@@ -128,9 +129,17 @@ class Trial:
         increment = max(self.case.increment_tolerance, FELT * min(1.0, size))
         self.case = self.case.replace(history_tolerance=increment)
         wanted = serving(error, own.step, scheme.order)
-        if (longer := min(LONGER, wanted / self.samples.step)) > SHORTER:
-            self.samples = Sampling.of(own, self.at_rest, given(self.case.problem), longer)
+        longest = LONGER if self.case.first is None else 1.0
+        if (longer := min(longest, wanted / self.samples.step)) > SHORTER:
+            self.samples = self._sampled(longer)
         self.samples = self.samples.shortened(wanted)
+
+    def _sampled(self, longer: float = 1.0) -> Sampling:
+        """Return the samples of the histories, with steps that are by so much longer than frequencies ask for."""
+        steps = self.full.steps
+        assert steps is not None
+        found = Sampling.of(steps, self.at_rest, given(self.case.problem), longer)
+        return found if self.case.first is None else found.struck()
 
     def outputs(
         self,

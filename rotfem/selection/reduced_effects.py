@@ -56,6 +56,8 @@ def reduced_effects(trial: Trial, theory: str, effects: Collection[str]) -> dict
         effects: those that are asked for.
     """
     linear = linear_of(trial, theory)
+    if trial.case.first is not None:  # motions of reduced models begin at rest
+        return {}
     if linear is None or trial.samples is None or trial.moves > SURELY * MODERATE:
         return {}
     candidate = trial.candidate(linear.name)
@@ -104,12 +106,7 @@ def agreed(response: Response, effects: Collection[str]) -> dict[str, float]:
 
 
 def linear_of(trial: Trial, theory: str) -> Theory | None:
-    """Return the linear theory with prestress that is the model's, or that its theory has for small motions.
-
-    None of a history that does not start at rest, as those of reduced models do.
-    """
-    if trial.case.first is not None:
-        return None
+    """Return the linear theory with prestress that is the model's, or that its theory has for small motions."""
     own = trial.theories[theory]
     names = [own.name, *reversed(own.poorer)]
     able = (trial.theories[name] for name in names if name in trial.theories)

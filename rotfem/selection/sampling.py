@@ -33,6 +33,9 @@ SHORTER = 0.5
 #: Steps between two samples of a history, tried one after the other as far as the case has as many steps itself.
 FINER = (1, 2, 4, 16)
 
+#: Samples at the start of a motion that does not begin at rest, and the steps that each of them has to the next.
+FIRST, STRUCK = 6, 16
+
 #: What steps may be too long by, relative, since their number is whole.
 ROUNDED = 1e-2
 
@@ -91,6 +94,12 @@ class Sampling:
         if finer <= 1:
             return self
         parts = np.maximum(self.parts, finer)
+        return replace(self, parts=parts, own=None if self.own is None else max(self.own, int(parts.sum())))
+
+    def struck(self) -> Self:
+        """Return the same samples with short steps at the start, where what begins in motion rings along its axis."""
+        parts = self.parts.copy()
+        parts[:FIRST] = np.maximum(parts[:FIRST], STRUCK)
         return replace(self, parts=parts, own=None if self.own is None else max(self.own, int(parts.sum())))
 
     def count(self, finer: int) -> int:

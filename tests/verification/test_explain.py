@@ -406,6 +406,9 @@ def test_a_trial_starts_in_motion_where_its_scene_does(initial: dict[str, Any]) 
     true = tip_change(*(tip(rotfem.run(own.replace(left))) for left in ({}, {"model.effects": ["coriolis"]})))
     assert estimates.reduced == {}
     assert estimates.effect("centrifugal").estimate[HISTORY] == pytest.approx(true, rel=0.2)
+    linear = own.replace({"model.theory": "consistent_linear", "mesh.elements": 1})
+    meshes = tip_change(*(tip(rotfem.run(linear.replace({"mesh.elements": n}))) for n in (1, 2)))
+    assert error_of_history(Trial(case_of(linear), (HISTORY,)), "consistent_linear") == pytest.approx(meshes, rel=0.3)
 
 
 def test_modes_of_a_free_hub_are_at_the_speed_it_reaches() -> None:
