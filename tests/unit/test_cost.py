@@ -175,6 +175,10 @@ def test_what_a_chain_would_take_goes_with_its_order() -> None:
     uncertain, last = chain.limit().uncertainty, chain.costs[-1]
     assert chain.to_take(uncertain) == 0.0
     assert chain.to_take(uncertain / 10) == pytest.approx(last * (2 + 4), rel=1e-6)
+    chain.costs[-1], chain.doubt = 1e200 * last, np.inf  # whatever that is, it is no time
+    assert chain.to_take(1e-3) == np.inf
+    chain.doubt = 0.0
+    assert chain.to_take(uncertain / 1e3) == np.inf
 
 
 def test_reference_says_what_the_budget_leaves_uncertain() -> None:

@@ -20,6 +20,9 @@ ROUND_OFF = 1e-6
 #: Failures in a row after which a chain is given up, and levels that it has at most.
 MOST_FAILURES, MOST_LEVELS = 3, 14
 
+#: Doublings of a time after which it is no number any more.
+ENDLESS = 1000.0
+
 
 @dataclass
 class Chain:
@@ -98,13 +101,15 @@ class Chain:
         """Return about how long (s) it would take until the limit is known to a goal, were there no bound of time.
 
         Each level takes as many times as long as the last one did, at least twice; where no order shows, what is
-        uncertain is taken to halve with each. Infinite where there are too few levels to say.
+        uncertain is taken to halve with each. Infinite where there are too few levels to say, and beyond all numbers.
         """
         if len(self.samples) < 2:
             return float("inf")
         found = self.limit()
         if found.uncertainty <= goal:
             return 0.0
-        further = ceil(log2(found.uncertainty / goal) / min(found.order or 1.0, self.highest))
+        further = log2(found.uncertainty / goal) / min(found.order or 1.0, self.highest)
         growth = max(2.0, self.costs[-1] / max(self.costs[-2], 1e-9))
-        return self.costs[-1] * sum(growth**i for i in range(1, further + 1))
+        if further * log2(growth) > ENDLESS:
+            return float("inf")
+        return self.costs[-1] * sum(growth**i for i in range(1, ceil(further) + 1))
