@@ -11,8 +11,9 @@ much again, for which a factor stands.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import factorial
 from typing import Any
 
@@ -21,6 +22,8 @@ import numpy as np
 import numpy.typing as npt
 from basix.ufl import element
 from dolfinx import fem
+
+from rotfem.numerics.by_mesh import ByMesh
 
 Array = npt.NDArray[Any]
 
@@ -32,6 +35,7 @@ SAFE = 3.0
 TINY = 1e-300
 
 
+@lru_cache
 def _sine(n: int) -> float:
     return (factorial(n) / factorial(2 * n)) ** 2 / (2 * n + 1)
 
@@ -93,6 +97,12 @@ class MeshEstimate:
             for p, q in pq:
                 order[basix.index(q, p)] = p + q
             self._levels = [total.get(cell, order)]
+
+    def of(self, V: Any) -> MeshEstimate:
+        """Return this of another space whose cells and nodes are the same ones, in the same order."""
+        out = copy(self)
+        out.V = V
+        return out
 
     def __call__(self, values: Array) -> float:
         """Return the estimated relative error of ω (half that of ω²) of nodal values (local nodes, components)."""
@@ -162,3 +172,7 @@ class MeshEstimate:
             function.x.scatter_forward()
             out.append(self(function.x.array.reshape(-1, size)[:, chosen]))
         return out
+
+
+#: Makes an estimate of a space, once for all with the same cells and nodes.
+mesh_estimate = ByMesh(MeshEstimate)

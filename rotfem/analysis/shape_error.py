@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
 
-from rotfem.analysis.mesh_estimate import SAFE, MeshEstimate
+from rotfem.analysis.mesh_estimate import SAFE, mesh_estimate
 from rotfem.numerics.projection import summed
 
 Array = npt.NDArray[np.float64]
@@ -40,7 +40,7 @@ class ShapeError:
     """
 
     def __init__(self, system: Any):
-        self.system, self.estimate = system, MeshEstimate(system.V)
+        self.system, self.estimate = system, mesh_estimate(system.V)
         names = system.structure.unknowns
         self._size = len(names)
         self._moves = [i for i, name in enumerate(names) if name.startswith("u")]

@@ -20,7 +20,7 @@ from rotfem.numerics.extended_cells import ExtendedCells
 from rotfem.numerics.linear import DirectSolver, Increment, NearbySolver, held
 from rotfem.numerics.low_rank import LowRank
 from rotfem.numerics.projection import times
-from rotfem.numerics.refined_before import refinement
+from rotfem.numerics.refinement import refinement
 from rotfem.structures.tip_values import TipValues
 
 Array = npt.NDArray[np.float64]

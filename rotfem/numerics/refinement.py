@@ -20,6 +20,7 @@ from dolfinx.fem.forms import get_integration_domains
 from mpi4py import MPI
 
 from rotfem.numerics import compat
+from rotfem.numerics.by_mesh import ByMesh
 from rotfem.numerics.extended_cells import ExtendedCells, InnerPoint
 
 Array = npt.NDArray[np.float64]
@@ -280,6 +281,10 @@ class Refinement:
         # How far it is outside: of a triangle its coordinates have a sum of at most 1, else each has.
         most = [x.sum() if self._cell == "triangle" else x.max() for x in inside]
         return int(np.argmin([max(-x.min(), top - 1.0) for x, top in zip(inside, most, strict=True)]))
+
+
+#: Refines a space, once for all with the same cells and nodes.
+refinement = ByMesh(Refinement)
 
 
 def _numbers(integral: Any) -> list[int]:

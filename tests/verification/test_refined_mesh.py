@@ -16,8 +16,7 @@ from rotfem.analysis.refined_mesh import RefinedMesh
 from rotfem.analysis.schemes import State
 from rotfem.equations.finer import FinerEquations
 from rotfem.mechanics.loads import PointLoads
-from rotfem.numerics.refined_before import refinement
-from rotfem.numerics.refinement import Refinement
+from rotfem.numerics.refinement import Refinement, refinement
 
 SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
 PLATE = {"length": 1.0, "width": 0.5, "thickness": 0.01, "E": 70e9, "nu": 0.3, "rho": 2700.0}
