@@ -34,7 +34,7 @@ WINDOWS, FEWEST, LARGE, MEMORY = 8, (50, 100), 2000, 64_000_000
 
 #: Steps of a window where the speed is constant, so that only the deflection changes a tangent, and more than two such
 #: windows are to come: of two halves one tells how far the other is off.
-STEADY = 80
+STEADY = 100
 
 
 @dataclass(frozen=True)

@@ -96,7 +96,7 @@ def test_phase_of_the_trapezoidal_rule() -> None:
     ("motion", "steps", "expected"),
     [
         (rotfem.Motion.spin_up(5.0, 1.0), 200, [50, 50, 50, 50]),
-        (rotfem.Motion.constant_speed(5.0), 200, [80, 60, 60]),
+        (rotfem.Motion.constant_speed(5.0), 260, [100, 80, 80]),
         (rotfem.Motion.constant_speed(5.0), 110, [55, 55]),
         (rotfem.Motion.constant_speed(5.0), 99, [99]),
     ],
@@ -104,7 +104,7 @@ def test_phase_of_the_trapezoidal_rule() -> None:
 def test_windows_are_longer_at_a_constant_speed(
     monkeypatch: pytest.MonkeyPatch, motion: rotfem.Motion, steps: int, expected: list[int]
 ) -> None:
-    """Windows of a varying speed have 50 steps; of a constant one up to 80, and two at least from 100 steps on."""
+    """Windows of a varying speed have 50 steps; of a constant one up to 100, and two at least from 100 steps on."""
     monkeypatch.setattr(MeshErrors, "of", lambda system: None)
     system = SimpleNamespace(clamp=None, hub=None, motion=motion, A=SimpleNamespace(getSize=lambda: (60, 60)))
     watch, q = ErrorWatch(system, 1.0), np.zeros(60)
