@@ -24,7 +24,7 @@ TURNED = 0.01
 FEWEST = 20
 
 
-def growth(history: dict[str, Array]) -> float:
+def growth(history: dict[str, Array], between: bool = False) -> float:
     """Return by how much the Jacobi integral grew, relative to the energy exchanged; 0 where that is nothing.
 
     Schemes let it fluctuate with the motion by h²; so the largest of the last tenth of the rows is compared with the
@@ -32,34 +32,47 @@ def growth(history: dict[str, Array]) -> float:
 
     Args:
         history: columns by name; a row that is not finite and all after it are left out.
+        between: whether rows lie between steps, see `_growth`.
     """
     energies = np.array([history[name] for name in ("jacobi", "kinetic", "strain")])
-    return _growth(energies[0], energies[1:])
+    return _growth(energies[0], energies[1:], between)
 
 
-def growth_on_hub(history: dict[str, Array]) -> float:
+def growth_on_hub(history: dict[str, Array], between: bool = False) -> float:
     """Return by how much the energy of hub and structure grew beyond the work of torque and brake (see `growth`)."""
     kinetic = history["kinetic"] + history["hub_kinetic"]
-    return _growth(kinetic + history["strain"] - history["work"], np.array([kinetic, history["strain"]]))
+    return _growth(kinetic + history["strain"] - history["work"], np.array([kinetic, history["strain"]]), between)
 
 
-def _growth(constant: Array, moving: Array) -> float:
-    """Return the growth of what should stay, shape (n,), relative to the range of energies, shape (m, n)."""
+def _growth(constant: Array, moving: Array, between: bool) -> float:
+    """Return the growth of what should stay, shape (n,), relative to the range of energies, shape (m, n).
+
+    Where rows lie between steps a polynomial in time stretches what turns far in a step, which the steps themselves do
+    not; the rows next to their ends have least of it, so the least of the last rows counts there, and not the largest.
+    """
     fine: npt.NDArray[np.bool_] = np.all(np.isfinite(np.vstack([constant, moving])), axis=0)
     n = len(fine) if fine.all() else int(np.argmin(fine))
     if n < FEWEST:
         return 0.0
     constant, moving, part = constant[:n], moving[:, :n], n // 10
     exchanged = float(np.max(np.ptp(moving, axis=1)))
-    grown = float(np.max(constant[-part:]) - np.max(constant[:part]))
+    last = np.min(constant[-part:]) if between else np.max(constant[-part:])
+    grown = float(last - np.max(constant[:part]))
     return grown / exchanged if exchanged > ROUND_OFF * np.max(np.abs(moving)) and grown > 0.0 else 0.0
 
 
-def said(system: Any, history: dict[str, Array]) -> str:
-    """Return what a run says of energy that came from nowhere; nothing where something gives it, or none came."""
+def said(system: Any, history: dict[str, Array], between: bool = False) -> str:
+    """Return what a run says of energy that came from nowhere; nothing where something gives it, or none came.
+
+    Args:
+        system: equations of motion.
+        history: columns by name.
+        between: whether rows lie between steps, see `_growth`.
+    """
     if system.hub is not None:
-        return _said_of_momentum(history) or (_said_of_hub(history) if system.inner.model.driven_by_hub else "")
-    share = growth(history) if system.model.closed else 0.0
+        by_hub = system.inner.model.driven_by_hub
+        return _said_of_momentum(history) or (_said_of_hub(history, between) if by_hub else "")
+    share = growth(history, between) if system.model.closed else 0.0
     if share < GROWN:
         return ""
     return (
@@ -81,8 +94,8 @@ def _said_of_momentum(history: dict[str, Array]) -> str:
     )
 
 
-def _said_of_hub(history: dict[str, Array]) -> str:
-    share = growth_on_hub(history)
+def _said_of_hub(history: dict[str, Array], between: bool) -> str:
+    share = growth_on_hub(history, between)
     if share < GROWN:
         return ""
     return (
@@ -92,9 +105,11 @@ def _said_of_hub(history: dict[str, Array]) -> str:
     )
 
 
-def with_cause(error: ComputationError, system: Any, history: dict[str, Array]) -> ComputationError:
+def with_cause(
+    error: ComputationError, system: Any, history: dict[str, Array], between: bool = False
+) -> ComputationError:
     """Return a failure of a history, with the energy that it had gained before as its cause."""
-    cause = said(system, history)
+    cause = said(system, history, between)
     if not cause or type(error) is not ComputationError:
         return error
     why, _, advice = cause.partition("; ")

@@ -247,8 +247,9 @@ class Simulation:
         """Return everything computed so far with a summary of how it went."""
         history = self.record.history.arrays()
         self._warn_of_steps()
-        if failure is None and self.stepper is not None and (said := energy_growth.said(self.system, history)):
-            self.warnings.append(said)
+        if failure is None and self.stepper is not None:
+            said = energy_growth.said(self.system, history, self.rows is not None)
+            self.warnings += [said] if said else []
         if status == "done" and self._critical_since is not None:
             self.warnings.append(
                 f"the speed is above {self.critical:.6g} rad/s, where the {self.problem.theory.name} stiffness is no "
@@ -274,7 +275,7 @@ class Simulation:
         """Return a failure, with what was wrong before it as its cause if something was."""
         if self.stepper is None:
             return error
-        return energy_growth.with_cause(error, self.system, self.record.history.arrays())
+        return energy_growth.with_cause(error, self.system, self.record.history.arrays(), self.rows is not None)
 
     def _warn_of_steps(self) -> None:
         self.warnings += [] if self.stepper is None else self.stepper.said()

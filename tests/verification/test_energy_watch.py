@@ -30,6 +30,14 @@ def test_growth_is_of_what_is_exchanged(jacobi: Any, grown: float) -> None:
     assert growth({**SHAPE, "jacobi": jacobi}) == pytest.approx(grown, abs=5e-3)
 
 
+def test_what_rows_between_steps_are_stretched_by_is_no_growth() -> None:
+    """A polynomial over steps of 0.5 s stretches more the farther from their ends and the larger the turns get."""
+    stretched = {**SHAPE, "jacobi": -1e3 + 0.02 * T * np.sin(2 * np.pi * T) ** 2}
+    assert growth(stretched) > 0.5
+    assert growth(stretched, between=True) < 0.02
+    assert growth({**SHAPE, "jacobi": stretched["jacobi"] + 0.01 * T}, between=True) == pytest.approx(0.3, abs=0.15)
+
+
 def test_what_does_not_move_does_not_grow() -> None:
     """Round-off of a steady state is no exchange."""
     noise = 1e-10 * np.random.default_rng(1).standard_normal((3, 1001))
