@@ -49,6 +49,15 @@ def test_limit_finds_order_and_bounds_its_own_error(order: float) -> None:
     assert found.error == pytest.approx(distance(levels[2], exact, each=False), rel=0.2)
 
 
+@pytest.mark.parametrize("sizes", [(0.1, 0.06, 0.03), (0.1, 0.05, 0.03), (0.2, 0.05, 0.025)])
+def test_limit_of_levels_that_are_not_halved(sizes: tuple[float, float, float]) -> None:
+    """As with plates whose numbers of elements are odd, and where a level is missing."""
+    found = limit([wave(h, 2.0) for h in sizes], each=False, ratios=(sizes[0] / sizes[1], sizes[1] / sizes[2]))
+    assert found.order == pytest.approx(2.0, abs=0.1)
+    exact = Samples(np.sin(TIMES)[:, None], TIMES)
+    assert distance(found.samples, exact, each=False) <= found.uncertainty < distance(wave(sizes[2], 2.0), exact, False)
+
+
 def test_limit_without_an_order_is_the_finest_level() -> None:
     levels = [wave(0.0, 2.0, noise) for noise in (1e-12, -2e-12, 3e-12)]
     found = limit(levels, each=False)

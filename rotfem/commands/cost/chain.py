@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from math import ceil, log2
 
 from rotfem.commands.cost.prediction import order
 from rotfem.commands.cost.record import Measurement
-from rotfem.commands.cost.reference import Limit, Samples, distance, limit
-from rotfem.commands.cost.settings import Setting
+from rotfem.commands.cost.reference import HALVED, Limit, Samples, distance, limit
+from rotfem.commands.cost.settings import Setting, cells
 
 #: Returns the measurement of a setting that may take a share of the time left; None where the budget refuses it.
 Get = Callable[[Setting, float], Measurement | None]
@@ -76,7 +77,8 @@ class Chain:
 
     def limit(self) -> Limit:
         """Return what the levels tend to."""
-        found = limit(self.samples, self.each, self.highest)
+        ratios = [ratio(*pair) for pair in pairwise(self.settings[-3:])]
+        found = limit(self.samples, self.each, self.highest, (ratios[0], ratios[-1]) if ratios else HALVED)
         return replace(found, uncertainty=max(found.uncertainty, self.doubt))
 
     @property
@@ -113,3 +115,13 @@ class Chain:
         if further * log2(growth) > ENDLESS:
             return float("inf")
         return self.costs[-1] * sum(growth**i for i in range(1, ceil(further) + 1))
+
+
+def ratio(coarse: Setting, fine: Setting) -> float:
+    """Return the ratio of steps, or of sizes of elements; 2 where only the degree is raised."""
+    if coarse.step is not None and fine.step is not None and coarse.step != fine.step:
+        return coarse.step / fine.step
+    if coarse.elements == fine.elements:
+        return 2.0
+    more = cells(fine.elements) / cells(coarse.elements)
+    return more**0.5 if isinstance(fine.elements, tuple) else more

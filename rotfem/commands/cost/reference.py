@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
 
 Array = npt.NDArray[np.float64]
 
@@ -17,6 +18,9 @@ LEAST_ORDER = 1.0
 
 #: Part of what an extrapolation of order 3/2 adds that is uncertain, however well levels agree; steeper, it is less.
 DOUBT = 0.2
+
+#: Ratios of the sizes of three levels that are halved, and the largest order that is looked for where they are not.
+HALVED, STEEPEST = (2.0, 2.0), 30.0
 
 #: Samples closer than this part of the interval are taken to be at the same time.
 SAME_TIME = 1e-9
@@ -117,22 +121,36 @@ def aligned(a: Samples, b: Samples) -> tuple[Array, Array]:
     return CubicSpline(a.times, a.values)(b.times[inside]), b.values[inside]
 
 
-def observed_order(coarse: Samples, middle: Samples, fine: Samples, each: bool) -> float | None:
+def observed_order(
+    coarse: Samples, middle: Samples, fine: Samples, each: bool, ratios: tuple[float, float] = HALVED
+) -> float | None:
     """Return p = log₂(|u_h − u_{h/2}| / |u_{h/2} − u_{h/4}|), None where the differences do not shrink as they should.
 
-    Roache 1998, "Verification and Validation in Computational Science and Engineering", sec. 5.10.
+    Roache 1998, "Verification and Validation in Computational Science and Engineering", sec. 5.10. Sizes with other
+    ratios r and s solve (r^p − 1) s^p / (s^p − 1) = |u_h − u_{h/r}| / |u_{h/r} − u_{h/rs}| for p.
     """
     first, second = distance(coarse, middle, each), distance(middle, fine, each)
-    if not (np.isfinite(first) and np.isfinite(second)) or second <= 0.0:
+    if not (np.isfinite(first) and np.isfinite(second)) or second <= 0.0 or first <= 0.0:
         return None
-    order = float(np.log2(first / second)) if first > 0.0 else -np.inf
-    return order if order >= LEAST_ORDER else None
+    r, s = ratios
+
+    def excess(p: float) -> float:
+        return float((r**p - 1.0) * s**p / (s**p - 1.0) - first / second)
+
+    if excess(LEAST_ORDER) > 0.0:
+        return None
+    return float(np.log(first / second) / np.log(s)) if r == s else float(_root(excess))
 
 
-def extrapolated(coarse: Samples, fine: Samples, order: float) -> Samples:
-    """Return Richardson's u_{h/2} + (u_{h/2} − u_h) / (2^p − 1), at the times of the fine one."""
+def _root(excess: Callable[[float], float]) -> float:
+    """Return where a function that increases with the order is zero, at most STEEPEST."""
+    return STEEPEST if excess(STEEPEST) <= 0.0 else float(brentq(excess, LEAST_ORDER, STEEPEST))
+
+
+def extrapolated(coarse: Samples, fine: Samples, order: float, ratio: float = 2.0) -> Samples:
+    """Return Richardson's u_{h/r} + (u_{h/r} − u_h) / (r^p − 1), at the times of the fine one."""
     rough, good = aligned(coarse, fine)
-    return shifted(fine, Samples((good - rough) / (2.0**order - 1.0), coarse.times))
+    return shifted(fine, Samples((good - rough) / (ratio**order - 1.0), coarse.times))
 
 
 def shifted(samples: Samples, change: Samples) -> Samples:
@@ -143,7 +161,9 @@ def shifted(samples: Samples, change: Samples) -> Samples:
     return Samples(samples.values + values, samples.times)
 
 
-def limit(levels: Sequence[Samples], each: bool, highest: float = np.inf) -> Limit:
+def limit(
+    levels: Sequence[Samples], each: bool, highest: float = np.inf, ratios: tuple[float, float] = HALVED
+) -> Limit:
     """Return what levels of refinement tend to, each with half the size of the one before; the last three count.
 
     Where the differences shrink with an order p, the two finest levels are extrapolated; the uncertainty is the
@@ -156,6 +176,7 @@ def limit(levels: Sequence[Samples], each: bool, highest: float = np.inf) -> Lim
         levels: the output for h, h/2, h/4, …
         each: see `distance`.
         highest: order of the method: levels that differ less than it says do so by chance.
+        ratios: of the sizes of the last three levels, where they are not halved.
     """
     fine = levels[-1]
     if len(levels) == 1:
@@ -163,14 +184,14 @@ def limit(levels: Sequence[Samples], each: bool, highest: float = np.inf) -> Lim
     last = _known(distance(levels[-2], fine, each))
     if len(levels) == 2:
         return Limit(fine, last, None, last)
-    order = observed_order(levels[-3], levels[-2], fine, each)
+    order = observed_order(levels[-3], levels[-2], fine, each, ratios)
     if order is None:
         worst = max(_known(distance(levels[-3], levels[-2], each)), last)
         return Limit(fine, worst, None, worst)
     p = min(order, highest)
-    best = extrapolated(levels[-2], fine, p)
+    best = extrapolated(levels[-2], fine, p, ratios[1])
     added = distance(fine, best, each)
-    unlike = min(distance(extrapolated(levels[-3], levels[-2], p), best, each), last)
+    unlike = min(distance(extrapolated(levels[-3], levels[-2], p, ratios[0]), best, each), last)
     uncertain = max(unlike, DOUBT * added / (p - 0.5))
     return Limit(best, uncertain, order, added)
 
