@@ -78,7 +78,10 @@ def use_direct_solver(ksp: Any, size: int, symmetric: bool = False, pivots: bool
     if ksp.comm.size > 1 and size <= small:
         # Every process factors the whole small matrix: far quicker than sharing it out.
         pc.setType(PETSc.PC.Type.REDUNDANT)
-        PETSc.Options()[f"{ksp.getOptionsPrefix() or ''}redundant_pc_factor_zeropivot"] = 0.0  # as below
+        options = PETSc.Options()
+        options[f"{ksp.getOptionsPrefix() or ''}redundant_pc_factor_zeropivot"] = 0.0  # as below
+        if not options.hasName("options_left"):  # nothing may be solved with it, of which PETSc would warn at the end
+            options["options_left"] = False
         ksp.setFromOptions()
         return
     pc.setType(PETSc.PC.Type.CHOLESKY if symmetric and size > small else PETSc.PC.Type.LU)

@@ -51,3 +51,10 @@ def test_reduced_history_is_that_of_one_process(tmp_path: Path, kind: str) -> No
         scale = float(np.max(np.abs(values)))
         digits = 2e-5 if column.startswith("root_") else 1e-6  # of forces the least vectors of the basis count
         np.testing.assert_allclose(parallel[column], values, rtol=0, atol=digits * scale, err_msg=column)
+
+
+def test_what_nothing_moves_is_no_trouble(tmp_path: Path) -> None:
+    """A basis without columns, and a solver that has nothing to solve, of which no library complains."""
+    (tmp_path / "beam.toml").write_text(BEAM + MOTIONS["collocation"].replace("2.0", "0.0"))
+    done = rotfem(tmp_path, 2, "run", "beam.toml", "--no-plots", "-q")
+    assert (done.returncode, done.stderr) == (0, "")
