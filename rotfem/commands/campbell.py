@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -13,7 +14,7 @@ from mpi4py import MPI
 
 from rotfem.analysis.branches import SPARE, Node, Sweep
 from rotfem.analysis.equilibrium import check_steady
-from rotfem.analysis.modal import ModalAnalysis
+from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
 from rotfem.commands.accuracy import changes_of, refuse, settings_of
@@ -166,7 +167,7 @@ class Diagram:
         crossings, onsets = sweep.crossings(orders), sweep.onsets()
         for crossing in crossings:
             crossing["label"] = labels[crossing["branch"] - 1]
-        ends = mode_rows(analysis, sweep.nodes[-1].spinning)[:count]
+        ends = mode_rows(analysis, first_modes(sweep.nodes[-1].spinning, count))
         warnings = [] if self.choice is not None else advice(analysis, fastest)
         warnings += [*held(self.analysis.problem), *told(sweep, labels, onsets, ends), *rough(analysis)]
         off = theory_error(analysis, sweep.nodes[-1].spinning)
@@ -235,10 +236,14 @@ def branch_summary(sweep: Sweep, b: int) -> dict[str, float | None]:
     return {"confidence": confidence, "frequency_first": first, "frequency_last": last}
 
 
+def first_modes(spinning: Spinning, count: int) -> Spinning:
+    """Return the first modes at a speed; what the mesh does to those far above would be taken for errors of theirs."""
+    return replace(spinning, pairs=spinning.pairs.select(np.arange(min(count, len(spinning.pairs.values)))))
+
+
 def node_rows(analysis: ModalAnalysis, node: Node, labels: list[str]) -> list[dict[str, Any]]:
     """Return one row a branch at one speed; `mode` is its present name, `label` the name of the branch."""
-    columns = mode_rows(analysis, node.spinning)
-    rows = []
+    columns, rows = mode_rows(analysis, first_modes(node.spinning, 1 + max(node.order[: len(labels)]))), []
     for b, label in enumerate(labels):
         if node.order[b] < 0:
             continue

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rotfem import ModesResult, modes
+from rotfem import ModesResult, campbell, modes
 
 BEAM = {
     "type": "planar_beam",
@@ -114,3 +114,17 @@ def test_what_is_said() -> None:
     assert result(plate(2.0), [8, 8], 6).summary["warnings"] == []
     thin = result(plate(1.0), [2, 60], 5)
     assert any(text.startswith("coarse") for text in thin.summary["warnings"])
+
+
+def test_rows_over_speed_say_what_modes_say() -> None:
+    """Modes that a diagram computes beside those asked for, far above them on few elements, change nothing."""
+    tables = {
+        "structure": BEAM,
+        "motion": {"type": "constant", "speed": 6.0},
+        "model": {"theory": "consistent_linear"},
+        "mesh": {"elements": 3},
+        "modes": {"count": 4},
+    }
+    over_speed = [row for row in campbell(tables, [0.0, 6.0]).rows if row["speed"] == 6.0]
+    alone = modes(tables).rows
+    assert [row["mesh_error"] for row in over_speed] == pytest.approx([row["mesh_error"] for row in alone], rel=1e-3)
