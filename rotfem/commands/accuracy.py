@@ -73,7 +73,16 @@ def models_of(scene: Scene, moving: bool) -> tuple[dict[str, Any], ...]:
     assert scene.accuracy is not None
     gives_back = linear is not None and bool(named[linear].prestress)
     quick = {"theory": linear, "reduced": PROJECTED * scene.accuracy, "foreshortening": gives_back}
-    return (quick, full) if linear else (full,)
+    return (quick, full) if linear and allows(scene, quick) else (full,)
+
+
+def allows(scene: Scene, model: dict[str, Any]) -> bool:
+    """Return whether a scene takes these keys of [model]: no reduced one has a torque by a controller."""
+    try:
+        scene.replace({f"model.{key}": value for key, value in model.items()})
+    except SceneError:
+        return False
+    return True
 
 
 def refuse(scene: Scene, wanted: tuple[str, ...], command: str) -> None:
