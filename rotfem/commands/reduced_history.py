@@ -10,7 +10,7 @@ import numpy.typing as npt
 from rotfem.analysis.critical_speed import critical_speed, critical_speed_within
 from rotfem.analysis.fixed_steps import Steps, grid
 from rotfem.analysis.reduced.energies import ReducedEnergies
-from rotfem.analysis.reduced.manifold import recover
+from rotfem.analysis.reduced.foreshortened import recover
 from rotfem.analysis.reduced.response import ACCURACY, Response, reduced_response
 from rotfem.analysis.reduced.root_forces import root_forces
 from rotfem.analysis.schemes import State

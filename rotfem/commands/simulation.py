@@ -18,7 +18,7 @@ from rotfem.analysis.error_watch import ErrorWatch
 from rotfem.analysis.farthest_state import Farthest
 from rotfem.analysis.left_aside import LeftAside
 from rotfem.analysis.lost_digits import said_of
-from rotfem.analysis.reduced.manifold import Foreshortened
+from rotfem.analysis.reduced.foreshortened import Foreshortened
 from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability, stability_of

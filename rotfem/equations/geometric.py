@@ -42,8 +42,19 @@ def geometric_stiffness(
     return out
 
 
+def second_order_work(model: Model, displacements: Sequence[Any], test: Any) -> Any:
+    """Return ∫ N(δq)·D²Γ[a, b] at rest, a UFL form, with all exact strains Γ and the forces N of a linear theory.
+
+    Args:
+        model: of a linear theory.
+        displacements: a and b, functions of the unknowns.
+        test: δq.
+    """
+    return _work_of(model, test, lambda strain, at: _along(strain, at, *displacements))
+
+
 def third_order_work(model: Model, displacements: Sequence[Any], test: Any) -> Any:
-    """Return ∫ N(δq)·(D³Γ[a, b, c] + D²Γ[d, e]) at rest, a UFL form, with the exact strains Γ of membrane and shear.
+    """Return ∫ N(δq)·(D³Γ[a, b, c] + D²Γ[d, e]) at rest, a UFL form, with all exact strains Γ.
 
     Args:
         model: of a linear theory, whose forces N are.
@@ -78,12 +89,11 @@ def _along(strain: Any, q: Any, *directions: Any) -> Any:
 
 
 def _work_of(model: Model, test: Any, change: Callable[[Any, Any], Any]) -> Any:
-    """Return the work of N(δq) of membrane and shear in a change at rest of their exact strains, (Γ, q) ↦ change."""
+    """Return the work of the forces of δq in a change at rest of all exact strains, (Γ, q) ↦ change."""
     s, out = model.structure, 0
     q, exact = s.k.functions[0], {strain.name: strain.value for strain in model.strains(richest().measures(s.type))}
     for strain in model.mechanics.strains:
-        if strain.name not in {*s.stiff, *s.prestressing}:
-            continue
         force = strain.force(ufl.replace(strain.value, {q: test}))
-        out += ufl.inner(force, forms.without(change(exact[strain.name], q), q)) * strain.measure
+        at_rest = forms.first_branches(exact[strain.name])
+        out += ufl.inner(force, forms.without(change(at_rest, q), q)) * strain.measure
     return out

@@ -15,6 +15,7 @@ from dolfinx import jit as dolfinx_jit
 from ufl.algorithms import expand_derivatives, extract_coefficients
 from ufl.algorithms.map_integrands import map_integrand_dags
 from ufl.constantvalue import Zero
+from ufl.corealg.map_dag import map_expr_dag
 from ufl.corealg.multifunction import MultiFunction
 
 from rotfem.numerics import form_cache
@@ -152,6 +153,20 @@ class _NoEmptyBranches(MultiFunction):  # type: ignore[misc]
         if isinstance(true, Zero) and isinstance(false, Zero):
             return Zero(o.ufl_shape, o.ufl_free_indices, o.ufl_index_dimensions)
         return self.reuse_if_untouched(o, condition, true, false)
+
+
+def first_branches(e: Any) -> Any:
+    """Return a UFL expression with the first branch of each conditional, the one that can be derived at rest."""
+    return map_expr_dag(_FirstBranches(), e)
+
+
+class _FirstBranches(MultiFunction):  # type: ignore[misc]
+    """Takes the first branch of a conditional: the derivatives of both are added up, 0/0 of the other with them."""
+
+    expr = MultiFunction.reuse_if_untouched
+
+    def conditional(self, o: Any, condition: Any, true: Any, false: Any) -> Any:
+        return true
 
 
 def quadrature_points(domain: Any, number: int) -> Any:

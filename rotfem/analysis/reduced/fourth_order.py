@@ -2,7 +2,7 @@
 
 A line that turns by θ and does not stretch comes nearer to its clamp by θ²/2 − θ⁴/24, and a force along it, as the
 centrifugal one, works on both: what is of third order in the forces of a turning structure is not all there without.
-Ψ is the answer of membrane and shear to what the exact strains Γ of V η + ½ Θ η η + Ξ η η η have of fourth order. Only
+Ψ is the answer to what the exact strains Γ of V η + ½ Θ η η + Ξ η η η have of fourth order. Only
 the work of the loads f in it is wanted, which the answers λ to the loads say,
 
     f·Ψ η η η η = −∫ N(λ)·Γ₄(η),    K₀ λ = f,

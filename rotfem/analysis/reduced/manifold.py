@@ -13,7 +13,6 @@ the linear equations lack: the answer to them is an estimate of what is left, an
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations_with_replacement
 from typing import Any
@@ -26,12 +25,13 @@ from dolfinx.fem import petsc as fem_petsc
 
 from rotfem.analysis.reduced.collocation import Lacking
 from rotfem.analysis.reduced.fourth_order import FourthOrder
+from rotfem.analysis.reduced.load_work import LoadWork
 from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.reduced.solution import Solution, Trajectory
-from rotfem.analysis.reduced.stretch import ringing, stretched
 from rotfem.analysis.reduced.third_order import Motion, ThirdOrder, expands, inside
 from rotfem.analysis.reduced.tips import largest, tips_of
-from rotfem.analysis.theory_error import TheoryError, stiffened
+from rotfem.analysis.theory_error import stiffened
+from rotfem.equations.geometric import second_order_work
 from rotfem.numerics import compat, forms
 from rotfem.numerics.projection import summed, times
 
@@ -39,6 +39,10 @@ Array = npt.NDArray[np.float64]
 
 #: Amplitude of a shape, relative to the largest, from which its foreshortening matters, and most shapes.
 MATTERS, MOST = 2e-3, 6
+
+#: How many times as long steps may be in which answers to forces are found, if that puts these, a small part of the
+#: motion, off by no more than this part of the error of the steps.
+LONGER, SMALL = (8, 4, 2, 1), 0.2
 
 #: Rounds in which forces of third order are balanced where all of them are known.
 ROUNDS = 2
@@ -67,22 +71,32 @@ class Manifold:
         self.pairs = list(combinations_with_replacement(range(self.shapes.shape[1]), 2))
         self._i, self._j = np.array(self.pairs, dtype=int).reshape(-1, 2).T
         self._factor = np.where(self._i == self._j, 0.5, 1.0)
-        self.Theta = self._answers()
-        self.tips = tips_of(self.model, self.Theta)
-        self._project()
         self.third: ThirdOrder | None = None
         self.fourth: FourthOrder | None = None
-        if third and expands(self.model):
+        self._loads: LoadWork | None = None
+        third = third and expands(self.model)
+        # what the exact strains have of second order is in the geometric stiffness, of all of them or of some
+        some = third and not all(map(self.model.system.model.prestresses, self.model.system.model.mechanics.strains))
+        self.Theta = self._answers(whole=some)
+        self.tips = tips_of(self.model, self.Theta)
+        self._project()
+        if some:
+            self._loads = LoadWork(self.model, self.shapes, self.pairs, self._factor * self.Theta)
+        if third:
             seconds = {p: f * x for p, f, x in zip(self.pairs, self._factor, self.Theta.T, strict=True)}
             self.third = ThirdOrder(self.model, self.shapes, seconds)
             if response.solution.hub is None:
                 self.fourth = FourthOrder(self.model, self.shapes, self._displaced)
 
-    def _answers(self) -> Array:
-        """Return Θ of all pairs, one solution each."""
+    def _answers(self, whole: bool) -> Array:
+        """Return Θ of all pairs, one solution each, of the prestressed strains or of the whole of them."""
         system, V = self.model.system, self.model.V @ self.shapes
         first, second = fem.Function(system.V), fem.Function(system.V)
-        work = system.geometric(first, second, ufl.TestFunction(system.V), stiffened())
+        test = ufl.TestFunction(system.V)
+        if whole:
+            work = second_order_work(system.model, (first, second), test)
+        else:
+            work = system.geometric(first, second, test, stiffened())
         out = np.zeros((len(V), len(self.pairs)))
         if not self.pairs:
             return out
@@ -161,6 +175,8 @@ class Manifold:
                 both = weight * (s @ P.T)
                 on_basis += both[:, :m]
                 on_pairs += weight * (x @ B.T) + third * both[:, m:]
+        if self._loads is not None:
+            on_basis += self._loads.forces(c, q)
         return on_basis + self._along(q, on_pairs)
 
     def _along(self, q: Array, on_pairs: Array) -> Array:
@@ -206,8 +222,17 @@ class Manifold:
         """The `corrections` of the response without and with forces of third order; a round more if all are known."""
         response, hub, path = self.response, self.response.solution.hub, self.response.trajectory
         if self.fourth is not None and self.model.size:
-            lacking = self._lacking(response.solution, (False, True))
-            return response.solution.rounds(self.model, (response.q[0], response.v[0]), lacking, ROUNDS)
+            size = largest(self.model, response.tips)
+            for longer in LONGER:
+                solution = response.solution.again(longer)
+                off = response.solution.of_longer(longer)
+                if longer > 1 and not off < size:
+                    continue
+                lacking = self._lacking(solution, (False, True))
+                path, answers = solution.rounds(self.model, (response.q[0], response.v[0]), lacking, ROUNDS)
+                moved = largest(self.model, answers[-1] @ tips_of(self.model).T)
+                if longer == 1 or off * moved <= SMALL * response.time_error * size**2:
+                    return path, answers
         if hub is None:
             return self.corrections(self.response.solution, (False, True))
         if self.third is not None:
@@ -242,59 +267,3 @@ class Manifold:
 
         answers: list[Array] = solution.corrections(model, lacking, rounds)
         return answers
-
-
-def recover(response: Response) -> Foreshortened:
-    """Return a response with its foreshortening and the answer to the forces of second order.
-
-    The forces of third order, which cubic terms of the strains oppose, move it by what is taken as the error left. With
-    these terms they belong to the answer; the error is what a further round moves it by, and what orders beyond do that
-    fall as those that are known. To it comes what the stretch may do that linear theories take for none.
-    """
-    # a start that is displaced is one of a linear theory, which third order would displace further
-    manifold = Manifold(response, third=response.solution.hub is not None or not np.any(response.q[0]))
-    path, answers = manifold.own
-    kept = answers[0] if manifold.fourth is None else answers[-1]
-    *_, before, last = (manifold.tip(response.q + answer) for answer in answers)
-    size = largest(response.model, before)
-    parts = [largest(response.model, last - before), stretched(response), ringing(response, path)]
-    if manifold.fourth is not None:
-        second = manifold.tip(response.q + answers[0], third=False)
-        orders = [largest(response.model, x) for x in (second - response.tips, last - second)]
-        parts.append(orders[1] * min(1.0, orders[1] / max(orders[0], 1e-300)))
-    off, by_stretch = (x / size if size > 0.0 else 0.0 for x in (sum(parts), parts[1]))
-    return Foreshortened(response, manifold, response.q + kept, off, by_stretch)
-
-
-@dataclass(frozen=True)
-class Foreshortened:
-    """A response with its foreshortening.
-
-    Attributes:
-        response: the linear one.
-        manifold: on which it moves.
-        q: coordinates in the rows, (n, m), with what the forces of second order add to those of the response.
-        error: estimate of what the foreshortened displacements are off, relative to the largest of the tip.
-        stretching: that part of it which the stretch makes; its law is known, that of the rest is not.
-    """
-
-    response: Response
-    manifold: Manifold
-    q: Array
-    error: float
-    stretching: float
-
-    @property
-    def tips(self) -> Array:
-        """The unknowns at the tip in all rows, (n, components)."""
-        return self.manifold.tip(self.q)
-
-    def theory_error(self) -> TheoryError:
-        """Return the error of the theory as far as the foreshortening does not take it away."""
-        left = "the forces of third order that it lacks" if self.manifold.third is None else "a further round of it"
-        basis = f"its foreshortening is given back; {left}"
-        return TheoryError(self.error, basis, self.response.model.system.model.theory.name)
-
-    def summary(self) -> dict[str, Any]:
-        """Return what a summary says of it."""
-        return {"shapes": self.manifold.shapes.shape[1], "error": self.error}

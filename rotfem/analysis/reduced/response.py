@@ -10,7 +10,6 @@ an estimate that sees what is not stiff, too.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil
 from time import perf_counter, process_time
 from typing import Any
 
@@ -20,6 +19,7 @@ import numpy.typing as npt
 from rotfem.analysis.reduced.drive import Drive
 from rotfem.analysis.reduced.free_hub import free_solution
 from rotfem.analysis.reduced.model import ReducedModel
+from rotfem.analysis.reduced.refinement import refined
 from rotfem.analysis.reduced.solution import Solution, Trajectory, after, nothing
 from rotfem.analysis.reduced.tips import largest, tips_of
 
@@ -39,15 +39,6 @@ INDEPENDENT, LOADS = 1e-9, 8
 
 #: Accuracy that is asked for if none is.
 ACCURACY = 1e-5
-
-#: Most parts into which a first step of a collocation is cut, most and least times as many as before, and most steps.
-PARTS, FINER, MOST_STEPS = 64, (1.25, 2.0), 200_000
-
-#: Order of their error that is taken for granted, and that which is believed at least and most: that of the nodes is 5.
-ORDER, SEEN = 3.0, (2.0, 4.0)
-
-#: Part of an accuracy that steps are cut for.
-AIM = 0.7
 
 
 @dataclass(frozen=True)
@@ -133,7 +124,7 @@ def reduced_response(
     solution = Solution(Drive(system, times), times) if system.hub is None else free_solution(system, times)
     growth = Growth(ReducedModel(system.held, solution.active), solution, start)
     path, projection = growth.narrow(*growth.grow(accuracy), accuracy)
-    path, error = growth.refine(path, accuracy, parts)
+    path, error = refined(growth, path, accuracy, parts)
     seconds = {"cpu": process_time() - began[0], "wall": perf_counter() - began[1]}
     met = projection <= accuracy and error <= accuracy
     return Response(growth.model, solution, path, projection, error, met, growth.rounds, seconds)
@@ -270,30 +261,3 @@ class Growth:
         for number, solver in enumerate(self._solvers):
             out[nearest == number] = -model.solve(solver, residuals[:, nearest == number]).T
         return out
-
-    def refine(self, path: Trajectory, accuracy: float, parts: int | None = None) -> tuple[Trajectory, float]:
-        """Return the history with steps short enough, or cut into parts, and the estimate of their error.
-
-        With errors that fall as n^−p with the number of steps, n_2 of them are off by the difference from n_1 over
-        (n_2/n_1)^p − 1. Two differences show p.
-        """
-        solution, rows = self.solution, tips_of(self.model).T
-        if path.exact:
-            return path, solution.off
-        if parts is not None:
-            solution.parts = parts
-            return self.solve(), np.inf
-        error, order, before, factor = np.inf, ORDER, 0.0, 2.0
-        while solution.parts < PARTS and factor * path.steps <= MOST_STEPS:
-            parts = min(PARTS, ceil(factor * solution.parts))
-            last, factor, solution.parts = factor, parts / solution.parts, parts
-            finer = self.solve()
-            size = largest(self.model, finer.q @ rows)
-            change = largest(self.model, (finer.q - path.q) @ rows) / size if size > 0.0 else 0.0
-            if before > 0.0 and change > 0.0:
-                order = float(np.clip(np.log(before / change) / np.log(last), *SEEN))
-            path, before, error = finer, change, change / (factor**order - 1)
-            if error <= accuracy:
-                break
-            factor = float(np.clip((error / (AIM * accuracy)) ** (1 / order), *FINER))
-        return path, error

@@ -14,6 +14,7 @@ from rotfem.analysis.reduced.collocation import NODES, Lacking, Operators, answe
 from rotfem.analysis.reduced.drive import Drive
 from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.analysis.reduced.propagator import Propagator, cubics
+from rotfem.analysis.reduced.vibrations import Vibrations
 from rotfem.errors import ComputationError
 
 Array = npt.NDArray[np.float64]
@@ -55,6 +56,7 @@ class Solution:
         active: numbers of the pieces that are ever there.
         parts: in how many parts each of the first steps is cut.
         constant: whether the matrices are constant.
+        vibrations: those of the history, once its steps are chosen and where they are known.
         off: relative error of the cubics that stand for the forces, of an exact solution.
     """
 
@@ -62,6 +64,7 @@ class Solution:
         self.drive, self.times = drive, times
         self.parts = 1
         self.off = 0.0
+        self.vibrations: Vibrations | None = None
         looks = drive.factors(drive.looks())
         self.active: Index = drive.active()
         kinds = np.array([p.kind for p in drive.system.pieces])
@@ -185,6 +188,15 @@ class Solution:
         if self._steps is None:
             self._steps = self._first_steps(model)
         return cut(self._steps, np.full(len(self._steps) - 1, -(-self.parts // longer)))
+
+    def vibrating(self, vibrations: Vibrations, parts: int) -> float:
+        """Return what the steps put vibrations off (m) if each of the first ones is cut in so many parts."""
+        return 0.0 if self._steps is None else vibrations.off(self._steps, parts)
+
+    def of_longer(self, longer: int) -> float:
+        """Return what steps so many times as long put vibrations off, m; infinite where that is not known."""
+        known = self.vibrations is not None and self.parts >= longer
+        return self.vibrating(self.vibrations, -(-self.parts // longer)) if known and self.vibrations else np.inf
 
     def _first_steps(self, model: ReducedModel) -> Array:
         """Return the ends of steps that land on all knots and resolve the lowest vibration."""

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.reduced.solution import Trajectory
 from rotfem.analysis.reduced.tips import largest, tips_of
+
+Array = npt.NDArray[np.float64]
 
 #: How many times as long the steps are by which two motions are only compared.
 COARSE = 4
@@ -25,6 +28,14 @@ def stretched(response: Response) -> float:
     same = response.trajectory.exact or other.steps == response.trajectory.steps
     own = response.q if same else solution.again(COARSE).solve(model, *start).q
     return largest(model, (other.q - own) @ tips_of(model).T)
+
+
+def unseen(response: Response, shapes: Array) -> float:
+    """Return the part of the largest stretch that shapes (m, r) leave out, whose products are not known."""
+    rows = tips_of(response.model)[0]
+    left = (response.q - (response.q @ shapes) @ shapes.T) @ rows
+    whole = float(np.abs(response.q @ rows).max(initial=0.0))
+    return min(1.0, float(np.abs(left).max(initial=0.0)) / whole) if whole > 0.0 else 0.0
 
 
 def ringing(response: Response, slow: Trajectory) -> float:

@@ -1,12 +1,13 @@
 """Displacements of third order of a structure that bends: Ξ η η η beside V η + ½ Θ η η (see `manifold`).
 
 A line that turns by θ and does not stretch moves by sin θ along the normal where a linear theory has θ. Ξ is the answer
-of membrane and shear to the third order of the exact strains Γ,
+to the third order of the exact strains Γ,
 
     K₀ Ξ + ∫ N(δq)·(⅙ D³Γ[V, V, V] + D²Γ[V, ½ Θ]) = 0,
 
-with which bending strains neither of them to that order. The inertia of these displacements is as large as that of the
-foreshortening of third order, and mostly opposed to it.
+N the forces of all of them, with which none is strained to that order but as the linear theory says: along a line
+nothing is in the way. In space the torsion takes part, which bending in two planes goes with. The inertia of these
+displacements is as large as that of the foreshortening of third order, and mostly opposed to it.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ from rotfem.numerics.projection import summed, times
 
 Array = npt.NDArray[np.float64]
 
-#: Structures whose exact strains are derived at rest. Those of rotation vectors have a branch with 0/0 there; plates
-#: come ten times nearer to the exact motion by it, but what is left is more than a further round moves.
-EXPANDED = ("planar_beam",)
+#: Structures all of whose exact strains vanish to third order: those of a line can. Plates come ten times nearer to the
+#: exact motion by it, but what is left is more than a further round moves.
+EXPANDED = ("planar_beam", "spatial_beam")
 
 
 @dataclass(frozen=True)
