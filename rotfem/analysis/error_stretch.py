@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.error_recursion import Index, Spans, settled
 from rotfem.analysis.error_samples import Inner
-from rotfem.analysis.error_window import Window
+from rotfem.analysis.error_window import TINY, Window
 
 Array = npt.NDArray[np.float64]
 
@@ -93,10 +93,20 @@ class Stretch:
         """What errors are handed on to every window by, (windows, r, r)."""
         return self._square([np.zeros((0, 0)) if w.turn is None else w.turn for w in self.windows], 0.0)
 
-    @property
-    def bends(self) -> Array:
-        """1 of coordinates with a phase to lose, else 0, (windows, r): what stretches has none."""
-        return self._rows([np.array([*window.bends, *[1.0] * window.free])[None] for window in self.windows])
+    @cached_property
+    def vibrations(self) -> Array:
+        """Amplitudes and rates, rad/s, of the vibrations that stretch, (windows, 2, r); ∞ of what bends, and of a hub.
+
+        Of what goes slowly, and follows what bends, c̈/ω² and ċ/ω are next to nothing.
+        """
+        _, v, a = self.motion
+        out = np.full((len(self.windows), 2, self.size), np.inf)
+        for (amplitude, rate), window, part in zip(out, self.windows, self.samples, strict=True):
+            which = np.flatnonzero(~window.bends)
+            omega = np.sqrt(np.maximum(np.abs(window.shapes.squares[which]), TINY))
+            amplitude[which] = np.hypot(a[part, which] / omega**2, v[part, which] / omega).max(axis=0)
+            rate[which] = omega
+        return out
 
     @property
     def tips(self) -> Array:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from rotfem.analysis.error_recursion import Complex, Index, Propagator, accumulated, interpolated, settled
 from rotfem.analysis.error_stretch import Stretch, in_windows, stretches
 from rotfem.analysis.error_unresolved import largest_unresolved
-from rotfem.analysis.error_window import Window
+from rotfem.analysis.error_window import TINY, Window
 
 Array = npt.NDArray[np.float64]
 
@@ -39,6 +39,9 @@ LARGE = 0.3
 #: Tracks: in which part of their scatter frequencies are tried, and the relative error below which none is; motions
 #: then count as large by the square of their size in lengths of the structure.
 FACTORS, SMALL = (0.0, -1.0, 1.0), 1e-3
+
+#: In amplitudes, what a vibration is off by at most that has another frequency or phase.
+OFF = 2.0
 
 #: Factor to what instants within steps say of an error: a scheme and polynomials through them fail alike.
 DOUBT = 2.0
@@ -131,6 +134,14 @@ def smoothed(windows: Sequence[Window]) -> tuple[tuple[list[Array], list[Array]]
     return (changes, around), phase
 
 
+def limited(errors: Array, most: Array, omega: Array) -> Array:
+    """Return errors c and ċ, (lanes, 2 r), with vibrations of c at rates ω (r,) that are no larger than `most` (r,)."""
+    c, rate = errors.reshape(len(errors), 2, -1).swapaxes(0, 1)
+    size = np.hypot(c, rate / omega)
+    factor = np.minimum(1.0, most / np.maximum(size, TINY))
+    return np.asarray(np.tile(factor, 2) * errors)
+
+
 def _padded(x: Array, window: Window) -> Array:
     """Return changes of all coordinates of a window."""
     out = np.zeros(len(window.K))
@@ -216,6 +227,8 @@ class Tracks:
         self.scheme, self.bounded, self.within = scheme, not linear, within
         #: Errors c and ċ at the end of the last window, (lanes, 2 r); a lane is an error on a track.
         self.carried: Array = np.zeros((0, 0))
+        #: Largest vibration so far of each coordinate that stretches, (r,).
+        self.ringing: Array = np.zeros(0)
         #: Names of the errors beside that of time.
         self.beside: list[str] = []
 
@@ -245,19 +258,22 @@ class Tracks:
         """Go on with the errors through the windows of a stretch; yield the largest of the tip and when they are."""
         exact = Propagator(stretch.C, K, stretch.lengths, stretch.of, self.bounded)
         defects, turns, tips = self._defects(exact, stretch, K), stretch.turns, stretch.tips
-        factors, phases = exact.carried[:, self.lanes], np.tile(stretch.bends, 2)
+        factors, vibrations = exact.carried[:, self.lanes], stretch.vibrations
         tracks, r = K.shape[1:3]
         if not self.carried.size:
-            self.carried = np.zeros((len(self.lanes), 2 * r))
+            self.carried, self.ringing = np.zeros((len(self.lanes), 2 * r)), np.zeros(r)
         for i, steps in enumerate(stretch.steps):
             turned = (self.carried.reshape(-1, 2, r) @ turns[i].T).reshape(-1, 2 * r)
             start = exact.started(i, self.lanes, turned)
             errors = accumulated(start, factors[steps], defects[steps])
-            self.carried = exact.sampled(i, self.lanes, errors[-1]) * phases[i]  # what stretches has none to lose
+            amplitude, omega = vibrations[i]
+            self.ringing = np.maximum(self.ringing, np.where(np.isfinite(amplitude), amplitude, 0.0))
+            own = np.where(np.isfinite(amplitude), OFF * self.ringing, np.inf)
+            self.carried = limited(exact.sampled(i, self.lanes, errors[-1]), own, omega)
             moved = exact.displacements(i, self.lanes, errors)
-            # A vibration of another frequency is off by twice its amplitude at most.
-            most = 2.0 * np.abs(stretch.motion[0][stretch.samples[i]]).max(axis=0)
-            np.clip(moved[tracks:], -most, most, out=moved[tracks:])
+            beside = OFF * np.abs(stretch.motion[0][stretch.samples[i]]).max(axis=0)
+            np.clip(moved[:tracks], -own, own, out=moved[:tracks])
+            np.clip(moved[tracks:], -beside, beside, out=moved[tracks:])
             sizes = np.linalg.norm(moved @ tips[i], axis=2)
             at, times = sizes.argmax(axis=1), stretch.t[stretch.end[steps]]
             yield [(float(size[k]), float(times[k])) for size, k in zip(sizes, at, strict=True)]
