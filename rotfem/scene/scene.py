@@ -215,7 +215,8 @@ class Scene(SceneModel):
                 "time",
                 None,
                 f'missing; with motion.type = "{self.motion.type}" a run is a time history: give [time] with end and '
-                "step (or tolerance). Only constant motion has a steady state to run without it",
+                "step (or tolerance, or neither with accuracy). Only constant motion has a steady state to run "
+                "without it",
             )
         if self.time is None and (key := self.initial.first) is not None:
             raise SceneError(self._file, f"initial.{key}", None, "needs [time]: a steady state has no beginning")
