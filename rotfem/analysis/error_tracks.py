@@ -135,7 +135,13 @@ def smoothed(windows: Sequence[Window]) -> tuple[tuple[list[Array], list[Array]]
 
 
 def limited(errors: Array, most: Array, omega: Array) -> Array:
-    """Return errors c and ċ, (lanes, 2 r), with vibrations of c at rates ω (r,) that are no larger than `most` (r,)."""
+    """Return errors c and ċ, (lanes, 2 r), with vibrations of c at rates ω, rad/s, that are no larger than `most`.
+
+    Args:
+        errors: c and ċ of every lane, (lanes, 2 r).
+        most: largest amplitude of each coordinate, (r,); ∞ where there is no bound.
+        omega: ω of each coordinate, (r,); ∞ where ċ does not count.
+    """
     c, rate = errors.reshape(len(errors), 2, -1).swapaxes(0, 1)
     size = np.hypot(c, rate / omega)
     factor = np.minimum(1.0, most / np.maximum(size, TINY))

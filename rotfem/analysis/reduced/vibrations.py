@@ -75,9 +75,10 @@ class Vibrations:
             ends: of the steps, s.
             parts: of each.
         """
-        whole, h = float(ends[-1] - ends[0]), np.diff(ends) / parts
-        z = self.rates[:, None] * np.unique(h.round(12))
-        number = parts * np.unique(h.round(12), return_counts=True)[1]
+        whole = float(ends[-1] - ends[0])
+        # steps that round-off alone tells apart are one
+        shares, number = np.unique(np.round(np.diff(ends) / (parts * whole), 12), return_counts=True)
+        z, number = self.rates[:, None] * whole * shares, parts * number
         taken = (1 + 2 * z / 5 + z**2 / 20) / (1 - 3 * z / 5 + 3 * z**2 / 20 - z**3 / 60)
         true = np.exp(z)
         lost = np.abs(taken - true) @ number
