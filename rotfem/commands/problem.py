@@ -55,6 +55,8 @@ class Problem(ProblemData):
         """
         scene = as_scene(scene)
         wanted = {name: Output.registry[name].form for name in scene.output.functionals}
+        if twice := [name for name in outputs or {} if name in wanted]:
+            raise SceneError(scene.file, "output.quantities", twice[0], "is the name of an output of the call, too")
         with input_of(scene.file):
             motion = with_pitch(scene, motion_of(scene))
             return cls(

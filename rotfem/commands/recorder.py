@@ -14,11 +14,24 @@ from rotfem.commands.finite import check_finite
 from rotfem.commands.moment import hub_values, write_state
 from rotfem.commands.resultant_rows import ResultantRows
 from rotfem.commands.station_rows import StationRows
+from rotfem.errors import InputError
 from rotfem.results.run import RunResult, Table
 from rotfem.scene import OutputTable
 from rotfem.structures.paraview import Snapshots
 
 Array = npt.NDArray[np.float64]
+
+
+def check_names(outputs: Sequence[str], taken: Sequence[str]) -> None:
+    """Refuse outputs of a user with the name of something that is recorded anyway.
+
+    Raises:
+        InputError: a name is taken.
+    """
+    for name in outputs:
+        if name in taken:
+            why = f"is the name of a column already; choose another one than {', '.join(taken)}"
+            raise InputError("output.quantities", name, why)
 
 
 class Recorder:
@@ -30,6 +43,9 @@ class Recorder:
 
     Attributes:
         history: rows so far.
+
+    Raises:
+        InputError: an output of a user has the name of a column.
     """
 
     def __init__(self, system: Any, output: OutputTable | None = None):
@@ -42,12 +58,15 @@ class Recorder:
         stress = ("von_mises_max",) if named else ()
         energies = ("kinetic", "strain", "jacobi")
         pitch = () if system.motion.pitch is None else ("pitch",)
-        self.history = Table(("t", "psi", "psi_dot", *names, *energies, *root, *free, *pitch, *further, *stress))
+        columns = ("t", "psi", "psi_dot", *names, *energies, *root, *free, *pitch)
         self._last: State | None = None
         self.formats = ("vtx",) if output is None else output.formats(system.structure.type)
         self.snapshots = Snapshots() if self.formats else None
         stations = output is not None and output.stations is not None
         self.stations = StationRows(system, output) if stations and output is not None else None
+        of_stations = ("x", *self.stations.names) if self.stations is not None else ()
+        check_names(further, (*columns, *stress, *of_stations, *named))
+        self.history = Table((*columns, *further, *stress))
 
     def __call__(self, state: State) -> None:
         """Add a row for a state.

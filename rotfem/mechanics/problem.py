@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any, Self, cast, overload
 
 from rotfem.errors import InputError
-from rotfem.mechanics.effects import Effect, Work, present_effects
+from rotfem.mechanics.effects import INERTIA, INTERNAL, LOADS, Effect, Work, present_effects
 from rotfem.mechanics.loads import Applied, Loads
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.outputs import Functional
@@ -83,6 +83,9 @@ class Problem:
             raise InputError("model.frame", self.frame, why)
         if self.prestress not in (None, "axial", "all"):
             raise InputError("model.prestress", self.prestress, "allowed: axial, all")
+        for name in self.terms:
+            if name in (*Effect.registry.names, INTERNAL.name, INERTIA.name, LOADS.name):
+                raise InputError("terms", name, "is the name of an effect already; a term needs one of its own")
         for name in self.effects or ():
             if name not in Effect.registry:
                 raise InputError("model.effects", name, f"is no effect; allowed: {', '.join(Effect.registry.names)}")

@@ -212,3 +212,23 @@ def test_outputs_and_terms_of_a_call(extension: Callable[[str], ModuleType]) -> 
     still = rotfem.run(scene, outputs={"root_M": form})
     assert "air" not in done.summary["effects"]
     assert np.max(np.abs(done.history["root_M"] - still.history["root_M"])) > 1e-6
+
+
+@pytest.mark.parametrize("name", ["tip_u1", "root_m3", "M", "x"])
+def test_output_needs_a_name_of_its_own(extension: Callable[[str], ModuleType], name: str) -> None:
+    """Neither a call nor a registered output replaces a column of the history or of the stations."""
+    form = extension("root_moment").form
+    scene = beam({"time.end": 0.02, "output.stations": 3})
+    with pytest.raises(SceneError, match=f'output.quantities = "{name}": is the name of a column already'):
+        rotfem.run(scene, outputs={name: form})
+    rotfem.register(rotfem.Output(name, form))
+    with pytest.raises(SceneError, match="is the name of a column already"):
+        rotfem.run(scene.replace({"output.quantities": [name]}))
+
+
+def test_names_that_a_call_cannot_take(extension: Callable[[str], ModuleType]) -> None:
+    form = extension("root_moment").form
+    with pytest.raises(SceneError, match="is the name of an output of the call, too"):
+        rotfem.run(beam({"output.quantities": ["root_moment"]}), outputs={"root_moment": form})
+    with pytest.raises(SceneError, match='terms = "internal": is the name of an effect already'):
+        rotfem.run(beam(), terms={"internal": lambda m, delta: 0})
