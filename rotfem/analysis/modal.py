@@ -216,6 +216,16 @@ class ModalAnalysis:
         shares = {name: np.real(np.diag(energy)) / total for name, energy in energies.items()}
         return {**shares, "hub": hub / total} if self.free else shares
 
+    def rotary_shares(self, spinning: Spinning) -> Array:
+        """Return the share of the rotations of the nodes in the kinetic energy x^H M x of every mode, (m,)."""
+        products = np.real(self.right(spinning).conj() * self.mass_times(spinning))
+        owned = self.system.V.dofmap.index_map.size_local * self.system.V.dofmap.index_map_bs
+        turns = np.array([not name.startswith("u") for name in self.structure.unknowns])
+        turned = products[:owned].reshape(-1, len(turns), products.shape[1])[:, turns].sum(axis=(0, 1))
+        local = np.array([turned, products.sum(axis=0)])
+        part, total = self.comm.allreduce(local) if self.comm.size > 1 else local
+        return np.asarray(part / total)
+
     def mesh_errors(self, spinning: Spinning) -> list[float]:
         """Return for every mode how far the mesh can put its frequency off, relative.
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from mpi4py import MPI
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
 
@@ -29,13 +28,15 @@ class ModeTables:
     Attributes:
         spinning: equilibrium and the eigenpairs kept.
         rows: one dictionary a mode (see `rotfem.ModesResult`), that of a rigid body first.
-        shapes: title ↦ columns along the structure.
+        shapes: title ↦ columns along the structure (see `scaled_shape`).
+        scaled: eigenvectors of the owned unknowns, (n, modes), divided by `scales`.
         warnings: of the model, and of instabilities.
     """
 
     spinning: Spinning
     rows: list[dict[str, Any]]
     shapes: dict[str, dict[str, Array]]
+    scaled: Array
     warnings: list[str]
 
 
@@ -57,8 +58,10 @@ def mode_tables(analysis: ModalAnalysis, speed: float, count: int, *, keep: bool
     rows = mode_rows(analysis, spinning)
     warnings = [*advice(analysis, speed), *instabilities(rows), *doubtful(rows), *rough(analysis)]
     rows = [{**row, "mode": row["mode"] + rigid} for row in rows]
-    shapes = {f"mode {row['mode']}: {row['label']}": scaled_shape(analysis, spinning, i) for i, row in enumerate(rows)}
-    return ModeTables(spinning, [rigid_row(rows), *rows] if rigid else rows, shapes, warnings)
+    scaled = spinning.pairs.right / scales(analysis, spinning)
+    titles = [f"mode {row['mode']}: {row['label']}" for row in rows]
+    shapes = {title: scaled_shape(analysis, x) for title, x in zip(titles, scaled.T, strict=True)}
+    return ModeTables(spinning, [rigid_row(rows), *rows] if rigid else rows, shapes, scaled, warnings)
 
 
 def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any]]:
@@ -144,18 +147,36 @@ def advice(analysis: ModalAnalysis, speed: float) -> list[str]:
     return []
 
 
-def scaled(comm: MPI.Comm, x: Array) -> Array:
-    """Return an eigenvector (owned unknowns) whose largest entry, over all ranks, is 1."""
-    largest = x[np.argmax(np.abs(x))] if x.size else 0.0
-    return np.asarray(x / max(comm.allgather(complex(largest)), key=abs))
+def scales(analysis: ModalAnalysis, spinning: Spinning) -> Array:
+    """Return what the eigenvectors are divided by, complex, (modes,).
+
+    The largest translation u of a mode is then 1 and real: that of the vector, over the structure and the phase,
+    max_φ |Re(u e^{iφ})|² = ½(|u|² + |u·u|), with u·u e^{2iφ} real. Of a mode whose kinetic energy is for the most part
+    that of rotations, it is the largest rotation times the length of the structure.
+    """
+    moves = np.array([name.startswith("u") for name in analysis.structure.components])
+    out, right, turned = [], spinning.pairs.right, analysis.rotary_shares(spinning) > 0.5
+    for i in range(right.shape[1]):
+        values = analysis.shape(right[:, i])[1]
+        translations, rotations = values[:, moves], analysis.structure.length * values[:, ~moves]
+        z = rotations if turned[i] or not np.any(translations) else translations
+        squares = np.sum(z * z, axis=1)
+        largest = int(np.argmax(np.sum(np.abs(z) ** 2, axis=1) + np.abs(squares)))
+        turn = np.exp(-0.5j * np.angle(squares[largest]))
+        real = np.real(z[largest] * turn)
+        size = np.linalg.norm(real) * np.sign(real[np.argmax(np.abs(real))])
+        out.append(size / turn)
+    return np.array(out)
 
 
-def scaled_shape(analysis: ModalAnalysis, spinning: Spinning, i: int) -> dict[str, Array]:
-    """Return a mode shape along the structure: x (m) and the real and imaginary part of each component, largest 1."""
-    coordinates, values = analysis.shape(spinning.pairs.right[:, i])
-    peak = values.ravel()[np.argmax(np.abs(values))]
-    values = values / peak
+def scaled_shape(analysis: ModalAnalysis, x: Array) -> dict[str, Array]:
+    """Return a scaled mode along the structure: x (m), real and imaginary part of each component.
+
+    Translations are parts of the largest one, rotations (rad) are multiplied by the length of the structure over it.
+    """
+    coordinates, values = analysis.shape(x)
     columns: dict[str, Array] = dict(coordinates)
     for c, name in enumerate(analysis.structure.components):
-        columns[name], columns[f"{name}_imag"] = values[:, c].real, values[:, c].imag
+        column = values[:, c] if name.startswith("u") else analysis.structure.length * values[:, c]
+        columns[name], columns[f"{name}_imag"] = column.real, column.imag
     return columns

@@ -26,7 +26,7 @@ from rotfem.commands.accuracy import changes_of, refuse, settings_of
 from rotfem.commands.finite import check_rows
 from rotfem.commands.known_error import error_of_modes
 from rotfem.commands.loads import held
-from rotfem.commands.mode_tables import advice, mode_tables, scaled
+from rotfem.commands.mode_tables import advice, mode_tables
 from rotfem.commands.pace import Pace
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.pursuit import pursue
@@ -121,6 +121,7 @@ def _modes(
         "theory_error": off.summary(),
         **({"error": error_of_modes(found.rows, off).summary()} if scene.output.error else {}),
         "modes": found.rows,
+        "shapes": {"length": analysis.structure.length},
         "checks": self_checks(analysis, spinning),
         "warnings": warnings,
         "advice": hints,
@@ -134,8 +135,7 @@ def _modes(
         spinning=spinning,
     )
     if done.triangles is not None:
-        first, right = 1 + int(spinning.rigid), spinning.pairs.right
-        states = [(float(first + i), scaled(comm, right[:, i])) for i in range(right.shape[1])]
+        states = [(float(1 + int(spinning.rigid) + i), x) for i, x in enumerate(found.scaled.T)]
         done.fields = writer(analysis.structure, "modes", states)
     if sensitivities:
         from rotfem.analysis.sensitivity import sensitivities as derivatives

@@ -166,6 +166,7 @@ class Problem(ProblemData):
         found = mode_tables(analysis, speed, count)
         summary = {"command": "modes", "status": "done", "theory": self.theory.name, "speed": speed}
         summary |= {"effects": list(analysis.model.effects), "modes": found.rows, "warnings": found.warnings}
+        summary["shapes"] = {"length": analysis.structure.length}
         surface = analysis.structure.surface()
         result = ModesResult(summary, found.rows, found.shapes, triangles=surface)
         result.analysis, result.spinning = analysis, found.spinning

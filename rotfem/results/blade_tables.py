@@ -54,7 +54,7 @@ def mode_table(result: ModesResult) -> list[dict[str, Any]]:
             if found is not None:
                 values |= {f"{direction}_displacement": found[0], f"{direction}_slope": found[1]}
         if "theta1" in columns:
-            values["twist"] = columns["theta1"]
+            values["twist"] = columns["theta1"] / x[-1]
         named = {name: row[name] for name in ("mode", "label", "frequency_hz")}
         out += [named | {name: float(column[i]) for name, column in values.items()} for i in range(len(x))]
     return out
@@ -134,8 +134,11 @@ def _real(columns: dict[str, Array]) -> dict[str, Array]:
 
 
 def _of(columns: dict[str, Array], direction: str) -> tuple[Array, Array] | None:
-    """Return displacement and slope in a direction; None where the beam has none."""
+    """Return displacement and slope (1/m) in a direction; None where the beam has none.
+
+    The rotations of a shape are multiplied by the length of the beam.
+    """
     for displacement, rotation, sign in DIRECTIONS[direction]:
         if displacement in columns and rotation in columns:
-            return columns[displacement], sign * columns[rotation]
+            return columns[displacement], sign * columns[rotation] / columns["x"][-1]
     return None

@@ -88,7 +88,8 @@ def described(column: str) -> tuple[str, str]:
         what, unit = described(column.removeprefix("tip_"))
         return f"tip {what}", unit
     if column.startswith("shape_"):
-        return f"shape, {described(column.removeprefix('shape_'))[0]}", "1"
+        what, unit = described(column.removeprefix("shape_"))
+        return f"shape, {what}{' × length' if unit == 'rad' else ''}", "1"
     if column.startswith("share_"):
         return f"share of the kinetic energy, {column.removeprefix('share_')}", "1"
     if column in outputs:

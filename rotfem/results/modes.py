@@ -36,7 +36,9 @@ class ModesResult(Result):
             `error_bound` (how far round-off can have moved the eigenvalue, relative to its size),
             `mesh_error` (how far the mesh is estimated to have put the frequency off, relative).
         shapes: title ↦ columns along the structure: `x` (m), of a plate `y`, each component and its imaginary part,
-            largest entry 1.
+            dimensionless: translations over the largest one of the mode, a vector at the phase where it is largest,
+            rotations (rad) times `summary["shapes"]["length"]` (m, of the structure) over it. A mode whose kinetic
+            energy is mostly that of rotations has a largest rotation, times the length, of 1.
         sensitivities: one dictionary a mode and parameter: `mode`, `parameter`, `value`, `dfrequency` (rad/s per unit),
             `dgrowth` (1/s per unit), `relative` (p/ω dω/dp); empty if not asked for.
         blade_tables: whether files of the modes for programs of wind turbines are wanted (see `blade_tables`).
@@ -167,7 +169,7 @@ class ModesResult(Result):
     def to_xarray(self) -> xarray.Dataset:
         """Return the columns of modes.csv over `mode`, and the shapes over `mode` and `node`.
 
-        Shapes `shape_u1`, … are complex, largest entry of a mode 1, NaN for the rigid-body mode, which has none.
+        Shapes `shape_u1`, … are complex, scaled as `shapes`, NaN for the rigid-body mode, which has none.
         Coordinates are the modes' labels, the speed (rad/s), the nodes' `x` (m), of a plate `y` and `triangles` too.
 
         Raises:

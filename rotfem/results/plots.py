@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from rotfem.results.columns import label
+from rotfem.results.columns import described, label
 from rotfem.results.files import write_whole
 from rotfem.results.units import ShownUnits
 
@@ -46,7 +46,7 @@ def shape_figure(result: RunResult) -> Figure:
 
 
 def shapes_figure(result: ModesResult) -> Figure:
-    """Return the shapes of all modes along the structure, largest component 1; imaginary parts dashed."""
+    """Return the shapes of all modes along the structure, scaled as in `ModesResult`; imaginary parts dashed."""
     shapes = result.shapes
     rows = result.rows[len(result.rows) - len(shapes) :]  # a rigid-body mode comes first and has no shape
     units = ShownUnits.of(result.summary)
@@ -55,7 +55,7 @@ def shapes_figure(result: ModesResult) -> Figure:
         axis = figure.add_subplot(len(shapes), 1, i)
         names = [name for name in columns if name != "x" and not name.endswith("_imag")]
         for c, name in enumerate(names):
-            axis.plot(columns["x"], columns[name], lw=1.3, color=f"C{c}", label=label(name).split(" (")[0])
+            axis.plot(columns["x"], columns[name], lw=1.3, color=f"C{c}", label=described(f"shape_{name}")[0][7:])
             if np.max(np.abs(columns[f"{name}_imag"])) > 1e-3:
                 axis.plot(columns["x"], columns[f"{name}_imag"], lw=1.0, ls="--", color=f"C{c}")
         axis.set_title(f"{title}, {units.frequencies(row['frequency']):.4g} {units.frequency}", fontsize=9, pad=3)

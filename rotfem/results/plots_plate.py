@@ -62,7 +62,7 @@ def leading(columns: dict[str, Array]) -> str:
 
 
 def modes_figure(result: ModesResult) -> Figure:
-    """Return a map of the leading displacement of every mode, largest component 1."""
+    """Return a map of the leading displacement of every mode, the largest translation 1."""
     shapes, triangles = result.shapes, result.triangles
     rows = result.rows[len(result.rows) - len(shapes) :]
     first = next(iter(shapes.values()))

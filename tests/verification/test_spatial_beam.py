@@ -724,3 +724,17 @@ def test_sensitivities() -> None:
         plus, minus = (np.array([f for _, f in frequencies(n, 2)]) for n in near)
         found = [r["dfrequency"] for r in rows if r["parameter"] == name]
         np.testing.assert_allclose(found, (plus - minus) / (2e-4 * value), rtol=1e-4, atol=1e-6)
+
+
+def test_shapes_are_scaled_by_translations_and_torsion_by_its_rotation() -> None:
+    """Bending: max |u| = 1, its slope times L 1.38 (Euler–Bernoulli). Torsion: θ₁ L = sin(πx/2L), u = 0."""
+    tables = {**BLADE, "motion": AT_REST, "model": {"theory": "consistent_linear"}, "modes": {"count": 6}}
+    result = modes(tables)
+    shapes = dict(zip(result.labels, result.shapes.values(), strict=True))
+    length = result.summary["shapes"]["length"]
+    assert length == BLADE["structure"]["length"]
+    assert np.max(np.abs(shapes["flap 1"]["u3"])) == pytest.approx(1.0)
+    assert np.max(np.abs(shapes["flap 1"]["theta2"])) == pytest.approx(1.3765, rel=1e-4)
+    torsion = shapes["torsion 1"]
+    np.testing.assert_allclose(np.abs(torsion["theta1"]), np.sin(np.pi / 2 * torsion["x"] / length), atol=1e-5)
+    assert max(np.max(np.abs(torsion[name])) for name in ("u1", "u2", "u3")) < 1e-5
