@@ -127,6 +127,8 @@ def __getattr__(name: str) -> Any:
     if name not in _LATER:
         raise AttributeError(f"module 'rotfem' has no attribute {name!r}")
     module, _, attribute = _LATER[name].partition(":")
+    if not module.startswith(("rotfem.scene", "rotfem.results")):
+        import_module("rotfem.numerics")  # before dolfinx, which would start PETSc in its own way
     value = globals()[name] = getattr(import_module(module), attribute)
     return value
 

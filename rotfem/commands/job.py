@@ -100,7 +100,7 @@ def job(
         loaded = load_scene(scene, [*(overrides or ()), *wanted])
         folder = session.folder(output or Path("results") / folder_name(loaded.name), command)
         with held_back():  # in the middle of an import what they raise becomes any error
-            import dolfinx  # noqa: F401
+            import rotfem.numerics  # noqa: F401  before dolfinx, which would start PETSc in its own way
         try:
             yield Job(loaded, folder, session, not no_plots, session.hint(no_advice))
         except (ComputationError, KeyboardInterrupt) as error:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import basix
-import ffcx
 import ffcx.codegeneration.jit as ffcx_jit
 import numpy.typing as npt
 import ufl
@@ -20,16 +19,13 @@ from ufl.corealg.multifunction import MultiFunction
 
 from rotfem.numerics import form_cache
 
-#: What dolfinx says on the other ranks when rank 0 could not compile a form.
-ELSEWHERE = "Compilation failed on root node"
-
 #: Levels of the C compiler by dimension of the cells, for what is assembled often, and what is assembled a few times or
 #: on a few cells. -O2 makes code for lines quicker by a tenth. That for surfaces is long: -O2 takes twice as long over
 #: it as -O1, and makes it no quicker up to degree 3, at degree 4 by a seventh; -O0 makes it three times slower.
 OFTEN, SELDOM = {1: "-O2", 2: "-O1"}, {1: "-O0", 2: "-O1"}
 
-#: Compiles several forms, (communicator, forms, …) ↦ (forms, module, code): rank 0 first, as dolfinx does one.
-_library: Any = dolfinx_jit.mpi_jit_decorator(lambda *args, **more: ffcx_jit.compile_forms(*args, **more))
+#: Further options of the C compiler.
+FLAGS = ("-g0", "-w")
 
 
 def form(f: Any, once: bool = False) -> Any:
@@ -42,9 +38,7 @@ def form(f: Any, once: bool = False) -> Any:
     Raises:
         RuntimeError: the compiler failed.
     """
-    domain = f.ufl_domains()[0].ufl_cargo()
-    more = {"cffi_extra_compile_args": _flags(domain, once)}
-    return _compiled(lambda options: fem.form(f, jit_options=options | more), domain.comm, f.signature())
+    return together([f], once)[0]
 
 
 def together(several: Sequence[Any], once: bool = False) -> list[Any]:
@@ -58,28 +52,17 @@ def together(several: Sequence[Any], once: bool = False) -> list[Any]:
         RuntimeError: the compiler failed.
     """
     domain = several[0].ufl_domains()[0].ufl_cargo()
-    more = {"cffi_extra_compile_args": _flags(domain, once)}
-
-    def compile_all(options: dict[str, Any]) -> list[Any]:
-        jit_options = dolfinx_jit.get_options(options | more)
-        library = _library(domain.comm, list(several), options=ffcx.get_options({}), **jit_options)
-        return [_taken(f, i, library) for i, f in enumerate(several)]
-
-    out: list[Any] = _compiled(compile_all, domain.comm, " ".join(f.signature() for f in several))
-    return out
+    flags = [(SELDOM if once else OFTEN)[domain.topology.dim], *FLAGS]
+    objects, module = _compiled(ffcx_jit.compile_forms, list(several), domain.comm, flags)
+    return [_given(compiled, module, fem.form, f) for f, compiled in zip(several, objects, strict=True)]
 
 
-def _flags(domain: Any, once: bool) -> list[str]:
-    return [(SELDOM if once else OFTEN)[domain.topology.dim], "-g0", "-w"]
-
-
-def _taken(f: Any, i: int, library: tuple[Any, Any, Any]) -> Any:
-    """Return a UFL form with the code of the i-th of a library, which dolfinx would look for by itself."""
-    compiled, module, code = library
+def _given(compiled: Any, module: Any, make: Callable[..., Any], *arguments: Any) -> Any:
+    """Return what dolfinx makes of a form or expression with this code, which it would compile by itself."""
     real = dolfinx_jit.ffcx_jit
-    dolfinx_jit.ffcx_jit = lambda *_, **__: (compiled[i], module, code)
+    dolfinx_jit.ffcx_jit = lambda *_, **__: (compiled, module, (None, None))
     try:
-        return fem.form(f)
+        return make(*arguments)
     finally:
         dolfinx_jit.ffcx_jit = real
 
@@ -101,7 +84,8 @@ def expression(e: Any, points: npt.NDArray[Any], comm: Any) -> fem.Expression:
     Raises:
         RuntimeError: the compiler failed.
     """
-    return _compiled(lambda options: fem.Expression(e, points, jit_options=options), comm, "expression")
+    (compiled,), module = _compiled(ffcx_jit.compile_expressions, [(e, points)], comm, ["-O2", *FLAGS])
+    return _given(compiled, module, fem.Expression, e, points, comm)
 
 
 def without(f: Any, *functions: Any) -> Any:
@@ -184,41 +168,18 @@ def integral_count(f: Any) -> int:
     return form_cache.noted(f.signature(), count)
 
 
-def _compiled(compile_it: Callable[[dict[str, Any]], Any], comm: Any, name: str) -> Any:
-    """Return what is compiled, on its rank 0 first; if that fails, from a mended cache, or from a temporary one."""
-    if comm.rank != 0:
-        return _followed(compile_it, comm)
-    watch = form_cache.Watch()
-    with form_cache.locked(name) as options:
+def _compiled(compile_all: Any, objects: list[Any], comm: Any, flags: list[str]) -> tuple[list[Any], Any]:
+    """Return (compiled objects, module): rank 0 finds or makes the library, all ranks load that one."""
+    library, failure = None, None
+    if comm.rank == 0:
         try:
-            with watch:
-                return compile_it(options)
+            library = form_cache.library(
+                lambda folder: compile_all(list(objects), cache_dir=folder, cffi_extra_compile_args=flags)
+            )
         except Exception as error:
             failure = error
-        if comm.bcast(watch.mend(failure)):
-            try:
-                with watch:
-                    return compile_it(options)
-            except Exception as error:
-                failure = error
-        if comm.bcast(form_cache.has_room()):
-            raise failure
-        return compile_it(options | {"cache_dir": comm.bcast(form_cache.temporary())})
-
-
-def _followed(compile_it: Callable[[dict[str, Any]], Any], comm: Any) -> Any:
-    """Return what rank 0 compiles, by the same tries: dolfinx lets all ranks fail when that one does."""
-    failure: Exception | None = None
-    for _ in ("at once", "mended"):
-        try:
-            return compile_it({})
-        except RuntimeError as error:
-            if ELSEWHERE not in str(error):
-                raise
-            if failure is not None or not comm.bcast(None):
-                failure = error
-                break
-            failure = error
-    if comm.bcast(None) and failure is not None:
-        raise failure
-    return compile_it({"cache_dir": comm.bcast(None)})
+    library, why = comm.bcast((library, repr(failure)))
+    if library is None:
+        raise failure or RuntimeError(f"rank 0 could not compile a form: {why}")
+    out: tuple[list[Any], Any] = library.load()
+    return out

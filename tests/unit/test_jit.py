@@ -1,53 +1,47 @@
-"""What a killed compiler leaves behind, and two programs that compile the same form."""
+"""The cache of compiled forms: what is loaded from it, what is made anew, and who may steer that."""
 
 from __future__ import annotations
 
 import importlib.metadata
+import json
+import os
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
-import dolfinx.jit
 import pytest
 import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from rotfem.numerics import forms
+from rotfem.numerics import form_cache, forms
 from tests.launch import environment
 
-COMPILE = """
+PROGRAM = """
 import sys, time
-from pathlib import Path
-import dolfinx.jit, ffcx.codegeneration.jit as ffcx_jit, ufl
-from dolfinx import fem, mesh
-from mpi4py import MPI
+import ffcx.codegeneration.jit as ffcx_jit
 from rotfem.numerics import forms
-from tests.launch import environment
+from tests.unit.test_jit import fem, mass
 
-cache = Path(sys.argv[1])
-dolfinx.jit.DOLFINX_DEFAULT_JIT_OPTIONS["cache_dir"] = (cache, "")
 real = ffcx_jit._compile_objects
 
 def slow(*args, **kwargs):
-    with (cache / "compiled.txt").open("a") as log:
+    with open("compiled.txt", "a") as log:
         log.write("once\\n")
-    time.sleep(3)
+    time.sleep(float(sys.argv[1]))
     return real(*args, **kwargs)
 
 ffcx_jit._compile_objects = slow
-domain = mesh.create_unit_interval(MPI.COMM_SELF, 2)
-v = ufl.TestFunction(fem.functionspace(domain, ("Lagrange", 1)))
-print(fem.assemble_vector(forms.form(v * ufl.dx)).array.sum())
+print(fem.assemble_matrix(forms.form(mass())).to_dense().sum())
 """
 
 
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty cache of compiled forms."""
-    monkeypatch.setitem(dolfinx.jit.DOLFINX_DEFAULT_JIT_OPTIONS, "cache_dir", (tmp_path, ""))
-    return tmp_path
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return tmp_path / "rotfem" / "forms"
 
 
 def mass() -> ufl.Form:
@@ -56,20 +50,46 @@ def mass() -> ufl.Form:
     return ufl.inner(ufl.TrialFunction(V), ufl.TestFunction(V)) * ufl.dx
 
 
-def test_form_left_behind_is_made_anew(cache: Path) -> None:
-    forms.form(mass())
-    (source,) = cache.glob("libffcx_forms_*.c")
-    for path in cache.glob("libffcx_forms_*"):
-        path.unlink()
-    source.touch()  # all that a compiler leaves which was killed at once
-    assert fem.assemble_matrix(forms.form(mass())).to_dense().sum() == pytest.approx(1.0, rel=1e-14)
-    assert source.with_suffix(".c.cached").exists()
+def assembled() -> float:
+    total: float = fem.assemble_matrix(forms.form(mass())).to_dense().sum()
+    return total
+
+
+def start(folder: Path, wait: float = 0.0) -> subprocess.Popen[str]:
+    """Start a process that assembles the form in a folder, where compiled.txt counts what it compiles."""
+    command = [sys.executable, "-c", PROGRAM, str(wait)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen(command, cwd=folder, env=environment(), text=True, **pipes)  # type: ignore[call-overload,no-any-return]
+
+
+def in_a_process(folder: Path) -> tuple[int, str]:
+    """Return (forms compiled so far, stderr) after the form was assembled: a damaged library would end the process."""
+    with start(folder) as program:
+        out, err = program.communicate(timeout=120)
+    assert program.returncode == 0, err
+    assert float(out) == pytest.approx(1.0, rel=1e-14)
+    return len((folder / "compiled.txt").read_text().split()), err
+
+
+def library(cache: Path) -> Path:
+    (path,) = cache.glob("libffcx_forms_*.so")
+    return path
+
+
+def test_what_a_killed_compiler_leaves_is_no_obstacle(cache: Path) -> None:
+    assert assembled() == pytest.approx(1.0, rel=1e-14)
+    work = library(cache).with_suffix(".work")
+    (cache / form_cache.INDEX).unlink()
+    work.mkdir()
+    (work / f"{work.stem}.c").touch()  # which FFCx would take for one that another process compiles
+    assert assembled() == pytest.approx(1.0, rel=1e-14)
+    assert not work.exists()
 
 
 def test_integrals_are_counted_once(cache: Path) -> None:
     """The second time nothing is differentiated; a note that is no number is counted anew."""
     assert forms.integral_count(mass()) == 1
-    (note,) = (cache / "rotfem-counts").iterdir()
+    (note,) = (cache / "counts").iterdir()
     note.write_text("2")
     assert forms.integral_count(mass()) == 2
     note.write_text("two")
@@ -77,9 +97,10 @@ def test_integrals_are_counted_once(cache: Path) -> None:
 
 
 def test_errors_of_the_compiler_are_errors(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(dolfinx.jit.DOLFINX_DEFAULT_JIT_OPTIONS, "cffi_libraries", (["no_such_library"], ""))
-    with pytest.raises(Exception, match=r"[Ll]inkError|failed"):
+    monkeypatch.setattr(forms, "FLAGS", ("-no-such-flag",))
+    with pytest.raises(Exception, match=r"[Cc]ompileError|failed"):
         forms.form(mass())
+    assert sorted(path.name for path in cache.iterdir()) == ["lock"]
 
 
 def test_plug_ins_are_looked_for_once(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -95,46 +116,24 @@ def test_plug_ins_are_looked_for_once(cache: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(importlib.metadata, "distributions", counted)
     forms.form(2 * mass())
     assert looked == []
-    monkeypatch.setitem(dolfinx.jit.DOLFINX_DEFAULT_JIT_OPTIONS, "cffi_libraries", (["no_such_library"], ""))
-    with pytest.raises(Exception, match=r"[Ll]inkError|failed"):
+    monkeypatch.setattr(forms, "FLAGS", ("-no-such-flag",))
+    with pytest.raises(Exception, match=r"[Cc]ompileError|failed"):
         forms.form(3 * mass())
     assert importlib.metadata.entry_points is entry_points
 
 
-def test_two_programs_want_one_form(tmp_path: Path) -> None:
+def test_two_programs_want_one_form(cache: Path, tmp_path: Path) -> None:
     """Both get it, the second after the first has made it: it is compiled once."""
-    command = [sys.executable, "-c", COMPILE, str(tmp_path)]
-    both = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    both = [start(tmp_path, wait=3.0) for _ in range(2)]
     out = [program.communicate(timeout=120)[0] for program in both]
     assert [float(text) for text in out] == pytest.approx([1.0, 1.0], rel=1e-14)
     assert (tmp_path / "compiled.txt").read_text() == "once\n"
 
 
-def library(cache: Path) -> Path:
-    (path,) = cache.glob("libffcx_forms_*.so")
-    return path
-
-
-SOUND = """
-import sys
-from pathlib import Path
-import dolfinx.jit
-from tests.unit.test_jit import forms, mass, fem
-dolfinx.jit.DOLFINX_DEFAULT_JIT_OPTIONS["cache_dir"] = (Path(sys.argv[1]), "")
-print(fem.assemble_matrix(forms.form(mass())).to_dense().sum())
-"""
-
-
-def in_a_process(cache: Path) -> subprocess.CompletedProcess[str]:
-    """Assemble the form in a process of its own: a damaged library ends it."""
-    command = [sys.executable, "-c", SOUND, str(cache)]
-    return subprocess.run(command, env=environment(), capture_output=True, text=True, check=False, timeout=120)
-
-
-@pytest.mark.parametrize("damage", ["half", "nothing", "one bit", "no library", "no note", "all"])
-def test_a_damaged_cache_is_made_anew(cache: Path, damage: str) -> None:
-    assert float(in_a_process(cache).stdout) == pytest.approx(1.0, rel=1e-14)
-    path = library(cache)
+@pytest.mark.parametrize("damage", ["half", "nothing", "one bit", "no library", "no index", "other sum", "all"])
+def test_a_damaged_cache_is_made_anew(cache: Path, tmp_path: Path, damage: str) -> None:
+    assert in_a_process(tmp_path) == (1, "")
+    path, index = library(cache), cache / form_cache.INDEX
     whole = path.read_bytes()
     if damage == "half":
         path.write_bytes(whole[: len(whole) // 2])
@@ -144,24 +143,75 @@ def test_a_damaged_cache_is_made_anew(cache: Path, damage: str) -> None:
         path.write_bytes(whole[:-1] + bytes([whole[-1] ^ 1]))
     elif damage == "no library":
         path.unlink()
-    elif damage == "no note":  # as another program leaves it, cut short at the head
-        next(cache.glob("*.c.cached")).write_text("")
-        path.write_bytes(whole[:30])
+    elif damage == "no index":
+        index.unlink()
+    elif damage == "other sum":
+        index.write_text(f"{index.read_text()[:-2]}\n")
     else:
-        for file in cache.glob("libffcx*"):
+        for file in cache.iterdir():
             file.write_bytes(b"\x7fELFspoilt")
-    done = in_a_process(cache)
-    assert done.returncode == 0, done.stderr
-    assert float(done.stdout) == pytest.approx(1.0, rel=1e-14)
-    assert done.stderr == ""
+    assert in_a_process(tmp_path) == (2, "")
     assert library(cache).stat().st_size == len(whole), "for ever"
+    assert in_a_process(tmp_path) == (2, "")
 
 
-def test_a_cache_that_cannot_be_written_is_replaced_by_a_temporary_one(tmp_path: Path) -> None:
+def test_a_cache_that_cannot_be_written_is_replaced_by_a_temporary_one(cache: Path, tmp_path: Path) -> None:
     """A file in its place refuses everybody, root too."""
-    (tmp_path / "cache").write_text("")
-    done = in_a_process(tmp_path / "cache")
-    assert done.returncode == 0, done.stderr
-    assert float(done.stdout) == pytest.approx(1.0, rel=1e-14)
-    assert done.stderr.count("cannot be written") == 1
-    assert "Traceback" not in done.stderr
+    (tmp_path / "rotfem").write_text("")
+    _, err = in_a_process(tmp_path)
+    assert err.count("cannot be written") == 1
+    assert "Traceback" not in err
+
+
+def test_only_a_folder_of_the_user_alone_is_trusted(cache: Path) -> None:
+    assert form_cache.unusable() == ""
+    assert cache.stat().st_mode & 0o777 == 0o700
+    for mode in (0o720, 0o702, 0o777):
+        cache.chmod(mode)
+        assert form_cache.unusable() == "can be written by others"
+    cache.chmod(0o700)
+    cache.parent.chmod(0o777)
+    assert form_cache.unusable() == f"can be replaced by others, who can write to {cache.parent}"
+    cache.parent.chmod(0o1777)  # where only its owner can replace a folder
+    assert form_cache.unusable() == ""
+
+
+def test_a_folder_of_somebody_else_is_not_trusted(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert form_cache.unusable() == ""
+    uid = os.geteuid()
+    monkeypatch.setattr(os, "geteuid", lambda: uid + 1)
+    assert form_cache.unusable() == "belongs to another user"
+
+
+@pytest.mark.parametrize("index", ["link", "of others"])
+def test_only_the_users_own_index_is_believed(cache: Path, tmp_path: Path, index: str) -> None:
+    assert in_a_process(tmp_path) == (1, "")
+    path = cache / form_cache.INDEX
+    if index == "link":
+        path.rename(tmp_path / "elsewhere")
+        path.symlink_to(tmp_path / "elsewhere")
+    else:
+        path.chmod(0o666)
+    assert in_a_process(tmp_path) == (2, "")
+    assert path.stat().st_mode & 0o777 == 0o600
+    assert not path.is_symlink()
+
+
+def test_files_of_the_current_folder_have_no_effect(cache: Path, tmp_path: Path) -> None:
+    """Nor have those of the user's configuration: options of dolfinx, of FFCx and of PETSc."""
+    here, config = tmp_path / "here", tmp_path / "config"
+    for name, options in (
+        ("dolfinx_jit_options.json", {"cache_dir": "sent", "cffi_extra_compile_args": ["-no-such"], "unknown": 1}),
+        ("ffcx_options.json", {"table_atol": 0.05, "table_rtol": 0.05, "scalar_type": "float32", "unknown": 1}),
+    ):
+        for folder in (here, config / "dolfinx", config / "ffcx"):
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text(json.dumps(options))
+    (here / ".petscrc").write_text("-log_view\n-dll_append sent/libsent.so\n")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CONFIG_HOME", str(config))
+        assert in_a_process(here) == (1, "")
+    assert library(cache).exists(), "where it always is"
+    assert not (here / "sent").exists()
+    assert assembled() == pytest.approx(1.0, rel=1e-14)
+    assert len(list(cache.glob("*.so"))) == 1, "the same form"
