@@ -101,8 +101,6 @@ shapes: Registry[Shape] = Registry("section shape", "rotfem.scene.section_shapes
 outputs: Registry[Output] = Registry("output", "rotfem.mechanics.outputs")
 blade_formats: Registry[BladeFormat] = Registry(
     "format of blade files",
-    "rotfem.scene.blades.elastodyn",
-    "rotfem.scene.blades.beamdyn",
     "rotfem.scene.blades.openfast",
     "rotfem.scene.blades.bmodes",
     "rotfem.scene.blades.hawc2",

@@ -107,6 +107,8 @@ def beamdyn_driver(primary: str = "primary.dat") -> str:
     """Return the input file of BeamDyn's driver."""
     return f"""------- BEAMDYN Driver with OpenFAST INPUT FILE --------------------------------
 a small blade
+---------------------- FRAME PARAMETER --------------------------------------
+          0   GlbPos(1)     - Component of position vector of the reference blade frame along X direction (m)
 ---------------------- PRIMARY INPUT FILE --------------------------------------
 "{primary}"    InputFile - Name of the primary BeamDyn input file
 """

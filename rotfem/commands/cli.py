@@ -219,6 +219,9 @@ def import_(
         scene = import_blade(file, kind, overrides or ())
         if session.first:
             write_imported(scene, file, output)
+        if hint := session.hint(False):
+            for line in scene.hints:
+                hint(line)
         structure = scene.structure
         session.say([f"{output}: {structure.type} of {file.name}, rows at {len(structure.knots) + 2} places"])
 

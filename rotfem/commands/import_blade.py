@@ -31,11 +31,14 @@ def import_blade(file: str | Path, format: str | None = None, changes: Sequence[
         "motion": {"type": "constant", "speed": 0.0},
     }
     tables = apply_overrides(path.name, tables, changes)
-    read = Scene.from_dict(tables, path.stem).structure
+    scene = Scene.from_dict(tables, path.stem)
+    read = scene.structure
     structure: dict[str, Any] = {"type": read.type} | {
         key: value for key, value in plain(read).items() if key in read.model_fields_set
     }
-    return Scene.from_dict({**tables, "structure": structure}, path.stem)
+    imported = Scene.from_dict({**tables, "structure": structure}, path.stem)
+    imported._hints = scene._hints
+    return imported
 
 
 def write_imported(scene: Scene, source: Path, path: Path) -> Path:

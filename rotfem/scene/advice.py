@@ -68,7 +68,7 @@ def advise(
         return []
     end = None if scene.time is None else scene.time.end
     speed = scene.motion.top_speed(end) if speed is None else abs(speed)
-    out = _rows(scene)
+    out = [*scene.hints, *_rows(scene)]
     if command == "run":
         out += _step(scene, speed)
     if command != "run" or scene.modes.model_fields_set:

@@ -59,7 +59,8 @@ def with_tables(data: Any, info: ValidationInfo, keys: Sequence[str] | None) -> 
     if "from" in section:
         path = _named("section.from", lambda: existing_file(section["from"], info))
         without = {key: value for key, value in out.items() if key != "section"}
-        return _located(lambda: keys_of(path, Asked(without, section)))
+        asked = Asked(without, section, (info.context or {}).get("hints", []))
+        return _located(lambda: keys_of(path, asked))
     if "format" in section:
         raise problem("section.format", section["format"], "has no meaning without section.from")
     return out

@@ -11,7 +11,6 @@ from typing import Any, Protocol
 import numpy as np
 from pydantic import ValidationInfo
 
-from rotfem.errors import show, shown
 from rotfem.scene.limits import limits_in
 from rotfem.scene.reading import Unreadable, read_bytes
 from rotfem.scene.values import Array, Matrix, are_numbers, as_increasing_rows, problem, rows_of
@@ -52,22 +51,6 @@ class Reader(Protocol):
 
     def __call__(self, value: Any, columns: Sequence[int], shape: str, row_name: Callable[[int], str] = ...) -> Matrix:
         """Return the rows."""
-
-
-def existing_file_beside(deck: Path, name: str, line: int) -> Path:
-    """Return the absolute path of a file that another file names on a line, relative to that one's folder.
-
-    Raises:
-        PydanticCustomError: there is no such file.
-    """
-    try:
-        path = (deck.parent / name.replace("\\", "/")).resolve()  # as Windows has them
-        found = path.is_file()
-    except (OSError, ValueError):
-        found = False
-    if not name or not found:
-        raise problem("", shown(deck), f"line {line}: there is no file {show(name)} beside it")
-    return path
 
 
 def as_time_table(value: Any, info: ValidationInfo, columns: Sequence[int], shape: str) -> Matrix:

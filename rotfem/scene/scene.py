@@ -101,6 +101,7 @@ class Scene(SceneModel):
     _file: str = PrivateAttr("scene")
     _directory: str = PrivateAttr(".")
     _tables: dict[str, Any] = PrivateAttr(default_factory=dict)
+    _hints: list[str] = PrivateAttr(default_factory=list)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], name: str = "scene", directory: str | Path = ".") -> Self:
@@ -118,15 +119,13 @@ class Scene(SceneModel):
 
     @classmethod
     def _validate(cls, tables: dict[str, Any], name: str, file: str, directory: str) -> Self:
-        tables = in_si(tables, file)
+        tables, hints = in_si(tables, file), list[str]()
+        context = {"directory": directory, "limits": limits_of(tables), "accuracy": tables.get("accuracy")}
         try:
-            scene = cls.model_validate(
-                tables,
-                context={"directory": directory, "limits": limits_of(tables), "accuracy": tables.get("accuracy")},
-            )
+            scene = cls.model_validate(tables, context={**context, "hints": hints})
         except ValidationError as error:
             raise scene_error(file, error) from None
-        scene._name, scene._file, scene._directory, scene._tables = name, file, directory, tables
+        scene._name, scene._file, scene._directory, scene._tables, scene._hints = name, file, directory, tables, hints
         return scene
 
     @property
@@ -143,6 +142,11 @@ class Scene(SceneModel):
     def directory(self) -> str:
         """Folder where relative paths in the scene start."""
         return self._directory
+
+    @property
+    def hints(self) -> tuple[str, ...]:
+        """What files that the scene names have and it does not get, one line each."""
+        return tuple(dict.fromkeys(self._hints))
 
     @property
     def tables(self) -> dict[str, Any]:

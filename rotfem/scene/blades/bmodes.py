@@ -15,7 +15,6 @@ from rotfem.registry import register
 from rotfem.scene.blades.axes import coned_root, scaled_rows
 from rotfem.scene.blades.deck import Deck
 from rotfem.scene.blades.formats import Asked, BladeFormat
-from rotfem.scene.files import existing_file_beside
 from rotfem.scene.values import Array
 
 COLUMNS = [
@@ -80,9 +79,8 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
         deck.fail(
             f"hub_rad = {hub:g} must be at least 0 and less than radius = {radius:g}", deck.named("hub_rad")[0], 1
         )
-    line, name = deck.named("sec_props_file")
     factors = {column: deck.number(factor) for factor, column in FACTORS.items()}
-    properties = Deck(existing_file_beside(deck.path, name, line))
+    properties = deck.file("sec_props_file")
     keys = _keys(properties, asked, radius - hub, factors)
     return {"length": radius - hub, **coned_root(hub, float(np.radians(deck.number("precone")))), **keys}
 

@@ -8,16 +8,36 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from rotfem.errors import shown
-from rotfem.scene.files import SHOWN_CELL, read_text
+from rotfem.errors import show, shown
+from rotfem.scene.files import SHOWN_CELL
+from rotfem.scene.reading import Unreadable, read_bytes
 from rotfem.scene.values import problem
 
 #: Bytes of a blade file, at most.
 LARGEST = 50_000_000
 
 
+def find_file(folder: Path, name: str) -> Path | None:
+    r"""Return the path of a file, from a folder, None if there is none.
+
+    Programs on Windows wrote the name: its parts may be joined by \\ and have letters of another case, if only one
+    entry of the folder has that name then.
+    """
+    path = folder
+    try:
+        for part in Path(name.replace("\\", "/")).parts:
+            here = path / part
+            if not here.exists() and path.is_dir():
+                others = [each for each in path.iterdir() if each.name.lower() == part.lower()]
+                here = others[0] if len(others) == 1 else here
+            path = here
+        return path.resolve() if name and path.is_file() else None
+    except (OSError, ValueError):
+        return None
+
+
 class Deck:
-    """A blade file.
+    """A blade file, in UTF-8 or else in Latin-1, as old ones are.
 
     Args:
         path: the file.
@@ -31,7 +51,18 @@ class Deck:
     """
 
     def __init__(self, path: Path):
-        self.path, self.text = path, read_text(path, LARGEST)
+        self.path = path
+        try:
+            content = read_bytes(path, LARGEST)
+        except Unreadable as error:
+            raise problem("", shown(path), f"cannot be read: {error.reason}") from None
+        if b"\0" in content:
+            raise problem("", shown(path), "cannot be read: it is no text")
+        try:
+            text = content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = content.decode("latin-1")
+        self.text = text.replace("\r\n", "\n").replace("\r", "\n")
         self.lines = self.text.split("\n")
 
     def fail(self, reason: str, line: int | None = None, column: int | None = None) -> NoReturn:
@@ -90,6 +121,13 @@ class Deck:
             if words and words[2].rstrip(":-,").lower() == name.lower():
                 return number, words[1].strip("\"'")
         return None
+
+    def file(self, name: str) -> Deck:
+        """Return the file that the line `value  name …` names, beside this one."""
+        line, value = self.named(name)
+        if (path := find_file(self.path.parent, value)) is None:
+            self.fail(f"there is no file {show(value)} beside it", line)
+        return Deck(path)
 
     def number(self, name: str, start: int = 1) -> float:
         """Return the number of the line `value  name …`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -16,6 +16,9 @@ from rotfem.scene.blades.deck import Deck
 from rotfem.scene.problems import did_you_mean
 from rotfem.scene.values import problem
 
+#: Keys of [structure] that a scene may give beside a file that has them: they say how the blade is used.
+SETTINGS = ("damping", "root")
+
 
 @dataclass(frozen=True)
 class Asked:
@@ -24,10 +27,12 @@ class Asked:
     Attributes:
         structure: the table [structure] as it is given, without its section.
         section: the table of the section as it is given.
+        hints: what the files have and the scene does not get; readers add to it.
     """
 
     structure: Mapping[str, Any]
     section: Mapping[str, Any]
+    hints: list[str] = field(default_factory=list)
 
     def length(self, deck: Deck, why: str) -> float:
         """Return structure.length (m), which the file does not have.
@@ -49,6 +54,10 @@ class Asked:
         missing = [key for key in keys if key not in self.section]
         if missing:
             raise problem("section", None, f"must have {', '.join(missing)} beside {deck.path.name}: {why}")
+
+    def leaves_out(self, deck: Deck, what: str, key: str = "") -> None:
+        """Say what a file has that is not taken, and the key of the scene that takes its place."""
+        self.hints.append(f"{deck.path.name}: left out: {what}" + (f"; {key} is the key for it" if key else ""))
 
 
 @dataclass(frozen=True)
@@ -91,6 +100,8 @@ def format_of(deck: Deck, name: Any) -> BladeFormat:
 def keys_of(path: Path, asked: Asked) -> dict[str, Any]:
     """Return the keys of [structure] that a blade file stands for, merged with those of the scene.
 
+    Damping and pitch are the scene's, where it has them.
+
     Raises:
         PydanticCustomError: the file is not one of a known format and version, naming line and column; or the scene
             gives what the file has.
@@ -102,6 +113,7 @@ def keys_of(path: Path, asked: Asked) -> dict[str, Any]:
     own = {key: value for key, value in asked.section.items() if key not in ("from", "format", "set", "body")}
     for where, given, there in (("section.", own, read["section"]), ("", asked.structure, read)):
         for key in there:
-            if key in given and key != "section":
+            if key in given and key not in ("section", *SETTINGS):
                 raise problem(f"{where}{key}", None, f"given twice; {path.name} has it too")
-    return {**asked.structure, **read, "section": {**read["section"], **own}}
+    settings = {key: asked.structure[key] for key in SETTINGS if key in asked.structure}
+    return {**asked.structure, **read, **settings, "section": {**read["section"], **own}}

@@ -7,20 +7,26 @@ torsion. Radii of gyration are about the mass centre along the principal axes, a
 turbines, whose matrices of OpenFAST say the same (the manual speaks of the elastic centre). The line and its twist are
 not in this file but in c2_def: `line` and `pretwist` of the scene, or a straight blade. A main body of the htc file has
 both, from the half chord, whose first point is the clamp here; its twist is about z, right-handed, as `pretwist` is.
+
+In an htc file a command is the words of a line up to a semicolon; `begin NAME` and `end` bracket blocks,
+`continue_in_file` goes on in another file, which `exit` ends. Paths start where HAWC2 is run, which the file does not
+say: here at the folder of the htc file or at one of the two above, where its models have `htc` and `htc/_master`.
 """
 
 from __future__ import annotations
 
 import re
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, NoReturn
 
 import numpy as np
 
+from rotfem.errors import show
 from rotfem.registry import register
 from rotfem.scene.blades.axes import FROM_HAWC2, about_axis, is_positive, rows_over, shifted, turned_matrix
-from rotfem.scene.blades.deck import Deck
+from rotfem.scene.blades.deck import Deck, find_file
 from rotfem.scene.blades.formats import Asked, BladeFormat
-from rotfem.scene.blades.hawc2_body import c2_def, is_htc, main_body, named_file
 from rotfem.scene.reference_line import as_line, line_through
 from rotfem.scene.values import Array, problem
 
@@ -53,13 +59,17 @@ POSITIVE = (
     "K66",
 )
 
-#: Part by which the last r may differ from the length of the line, which HAWC2 has by a spline of its own.
-SAME_LENGTH = 1e-3
+#: Part by which the last r may differ from the arc length of the line, and from which on that is said. Both describe
+#: one blade; r often counts along its straight axis, which is shorter than a prebent line.
+LONGER, SAID = 1e-2, 1e-6
+
+#: Files within files, at most.
+DEEPEST = 8
 
 
 def recognises(deck: Deck) -> bool:
     """Return whether there are main bodies, or lines of sets (#1) and of their parts ($1 with a number of rows)."""
-    return is_htc(deck) or (
+    return _is_htc(deck) or (
         any(re.match(r"\s*#\d+", line) for line in deck.lines) and any(_part(line) for line in deck.lines)
     )
 
@@ -70,12 +80,12 @@ def _part(line: str) -> re.Match[str] | None:
 
 def read(deck: Deck, asked: Asked) -> dict[str, Any]:
     """Return length and section of an st file, or line, pretwist and section of the body that section.body names."""
-    if is_htc(deck):
+    if _is_htc(deck):
         return _body(deck, asked)
     if "body" in asked.section:
         raise problem("section.body", asked.section["body"], "is only of an htc file; section.set is of an st file")
-    r, stiffness, mass = _sections(deck, asked.section.get("set"))
-    return {"length": float(r[-1]), "section": {"stiffness": rows_over(r, stiffness), "mass": rows_over(r, mass)}}
+    table = _table(deck, asked.section.get("set"))
+    return {"length": float(table["r"][-1]), "section": _section(table)}
 
 
 def _body(deck: Deck, asked: Asked) -> dict[str, Any]:
@@ -85,33 +95,47 @@ def _body(deck: Deck, asked: Asked) -> dict[str, Any]:
     wanted = asked.section.get("body")
     if wanted is not None and not isinstance(wanted, str):
         raise problem("section.body", wanted, "must be the name of a main body")
-    body = main_body(deck, wanted)
+    body = _main_body(deck, wanted)
     kind = body.command("type")
     if kind.words[1].lower() != "timoschenko":
         kind.fail(f"the type {kind.words[1]} is not known; known: timoschenko", 2)
     if (extra := body.find("concentrated_mass")) is not None:
         extra.fail("concentrated_mass is not read; take it out and give structure.masses in the scene")
-    points, head = c2_def(body)
-    table = np.array(points)
-    line = (table[:, :3] - table[0, :3]) @ FROM_HAWC2.T
+    rows, head = _c2_def(body)
+    points = np.array(rows)
+    line = (points[:, :3] - points[0, :3]) @ FROM_HAWC2.T
     through = line_through(as_line(line.tolist()))
     at = np.array([0.0, *through.knots, through.length])
     if len(at) != len(line):
         head.fail("two points of c2_def are the same")
     beam = body.block("timoschenko_input")
     which, full = beam.command("set"), beam.find("fpm")
-    st = named_file(beam.command("filename"), deck)
-    r, stiffness, mass = _sections(st, [which.whole(2), which.whole(3)], None if full is None else bool(full.whole(2)))
-    if abs(r[-1] / through.length - 1.0) > SAME_LENGTH:
-        which.fail(f"its sections end at r = {r[-1]:g} m, and the line of c2_def at {through.length:g} m")
-    r = r * (through.length / r[-1])
-    r[-1] = through.length
-    section = {"stiffness": rows_over(r, stiffness), "mass": rows_over(r, mass)}
-    return {"line": line.tolist(), "pretwist": rows_over(at, np.radians(table[:, 3])), "section": section}
+    st = _named_file(beam.command("filename"), deck)
+    table = _table(st, [which.whole(2), which.whole(3)], None if full is None else bool(full.whole(2)))
+    if abs(table["r"][-1] / through.length - 1.0) > LONGER:
+        which.fail(f"its sections end at r = {table['r'][-1]:g} m, and the line of c2_def at {through.length:g} m")
+    if abs(table["r"][-1] / through.length - 1.0) > SAID:
+        asked.hints.append(
+            f"{st.path.name}: its sections end at r = {table['r'][-1]:g} m and the line of c2_def at "
+            f"{through.length:g} m: the last section holds up to there"
+        )
+    for name in ("damping", "damping_posdef", "damping_aniso"):
+        if body.find(name) is not None:
+            asked.leaves_out(deck, f"{name} of {body.command('name').words[1]}", "structure.damping")
+    section = _section(_up_to(table, through.length))
+    return {"line": line.tolist(), "pretwist": rows_over(at, np.radians(points[:, 3])), "section": section}
 
 
-def _sections(deck: Deck, wanted: Any, full: bool | None = None) -> tuple[Array, Array, Array]:
-    """Return r (n,) and matrices (n, 6, 6) of stiffness and mass of a set, which must be given where there are several.
+def _up_to(table: dict[str, Array], length: float) -> dict[str, Array]:
+    """Return the columns up to a length (m) beyond which nothing is; the last row holds where they end before."""
+    r = table["r"]
+    inside = r < length * (1.0 - SAID)
+    x = np.append(r[inside], length)
+    return {name: np.interp(x, r, values) for name, values in table.items()} | {"r": x}
+
+
+def _table(deck: Deck, wanted: Any, full: bool | None = None) -> dict[str, Array]:
+    """Return the columns (n,) of a set, which must be given where there are several.
 
     Args:
         deck: the st file.
@@ -137,13 +161,10 @@ def _sections(deck: Deck, wanted: Any, full: bool | None = None) -> tuple[Array,
     for column, name in enumerate(known[columns], start=1):
         for i in np.flatnonzero(table[name] <= 0.0) if name in POSITIVE else ():
             deck.fail(f"{name} must be greater than 0, not {table[name][i]:g}", first + int(i), column)
-    rows = [{name: float(values[i]) for name, values in table.items()} for i in range(count)]
-    stiffness = np.array([_stiffness(row) for row in rows])
-    for i, matrix in enumerate(stiffness):
-        if not is_positive(matrix):
+    for i in range(count) if "K11" in table else ():
+        if not is_positive(_stiffness({name: values[i] for name, values in table.items()})):
             deck.fail("the stiffness matrix is not positive definite", first + i)
-    mass = np.array([_mass(row) for row in rows])
-    return table["r"], stiffness, mass
+    return table
 
 
 def _parts(deck: Deck) -> dict[tuple[int, int], tuple[int, int]]:
@@ -164,20 +185,39 @@ def _parts(deck: Deck) -> dict[tuple[int, int], tuple[int, int]]:
     return out
 
 
+def _section(table: dict[str, Array]) -> dict[str, Any]:
+    """Return the section of columns; with centres as properties about them, which vary between rows as columns do."""
+    r = table["r"]
+    if "K11" in table:
+        rows = [{name: float(values[i]) for name, values in table.items()} for i in range(len(r))]
+        matrices = {"stiffness": [_stiffness(row) for row in rows], "mass": [_mass(row) for row in rows]}
+        return {name: rows_over(r, np.array(found)) for name, found in matrices.items()}
+    m, E, GA = table["m"], table["E"], table["G"] * table["A"]
+    properties = {
+        "EA": E * table["A"],
+        "GA2": table["k_x"] * GA,
+        "GA3": table["k_y"] * GA,
+        "GJ": table["G"] * table["I_p"],
+        "EI2": E * table["I_x"],
+        "EI3": E * table["I_y"],
+        "mass_per_length": m,
+        "rotary_inertia2": m * table["ri_x"] ** 2,
+        "rotary_inertia3": m * table["ri_y"] ** 2,
+        "principal_angle": np.radians(table["pitch"]),
+    }
+    centres = {"mass_center": "cg", "shear_center": "sh", "tension_center": "e"}
+    points = {key: np.stack([table[f"x_{at}"], table[f"y_{at}"]], axis=-1) for key, at in centres.items()}
+    return {key: rows_over(r, values) for key, values in (properties | points).items()}
+
+
 def _stiffness(row: dict[str, float]) -> Array:
-    """Return the stiffness matrix along our axes about the line of c2_def."""
+    """Return the stiffness matrix along our axes about the line of c2_def, of a row with a full one."""
+    K = np.zeros((6, 6))
+    for i, j in zip(*np.triu_indices(6), strict=True):
+        K[i, j] = K[j, i] = row[f"K{i + 1}{j + 1}"]
     elastic, turn = (row["x_e"], row["y_e"]), about_axis(np.radians(row["pitch"]))
-    if "K11" in row:
-        K = np.zeros((6, 6))
-        for i, j in zip(*np.triu_indices(6), strict=True):
-            K[i, j] = K[j, i] = row[f"K{i + 1}{j + 1}"]
-        principal, B = turned_matrix(K, FROM_HAWC2), shifted(elastic, elastic)
-    else:
-        E, G, A = row["E"], row["G"], row["A"]
-        shear = (row["k_x"] * G * A, row["k_y"] * G * A)
-        principal = np.diag([E * A, *shear, G * row["I_p"], E * row["I_x"], E * row["I_y"]])
-        B = shifted(elastic, (row["x_sh"], row["y_sh"]))
-    return np.asarray(B.T @ turn @ principal @ turn.T @ B)
+    B = shifted(elastic, elastic)
+    return np.asarray(B.T @ turn @ turned_matrix(K, FROM_HAWC2) @ turn.T @ B)
 
 
 def _mass(row: dict[str, float]) -> Array:
@@ -187,6 +227,173 @@ def _mass(row: dict[str, float]) -> Array:
     center = (row["x_cg"], row["y_cg"])
     B = shifted(center, center)
     return np.asarray(B.T @ turn @ np.diag([m, m, m, flap + edge, flap, edge]) @ turn.T @ B)
+
+
+# --- main bodies of an htc file ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Command:
+    """The words of a line, and where it stands."""
+
+    deck: Deck
+    line: int
+    words: list[str]
+
+    def fail(self, reason: str, column: int | None = None) -> NoReturn:
+        """Refuse the file here."""
+        self.deck.fail(reason, self.line, column)
+
+    def number(self, column: int) -> float:
+        """Return a word as a finite number; columns count from 1."""
+        if column > len(self.words):
+            self.fail(f"has {len(self.words)} columns; {self.words[0]} has a number in column {column}")
+        return self.deck.value(self.words[column - 1], self.line, column)
+
+    def whole(self, column: int) -> int:
+        """Return a word as a whole number."""
+        number = self.number(column)
+        if number != int(number):
+            self.fail(f"{number:g} must be a whole number", column)
+        return int(number)
+
+
+@dataclass
+class Block:
+    """What stands between `begin NAME` and its end: commands and blocks in it."""
+
+    begin: Command
+    commands: list[Command] = field(default_factory=list)
+    blocks: list[Block] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        """What `begin` says."""
+        return self.begin.words[1].lower() if len(self.begin.words) > 1 else ""
+
+    def find(self, name: str) -> Command | None:
+        """Return the last command of a name; None if there is none."""
+        found = [each for each in self.commands if each.words[0].lower() == name]
+        return found[-1] if found else None
+
+    def command(self, name: str) -> Command:
+        """Return a command that must be there, with something behind its name."""
+        found = self.find(name)
+        if found is None:
+            self.begin.fail(f"begin {self.name} has no {name}")
+        if len(found.words) < 2:
+            found.fail(f"{name} has nothing behind it")
+        return found
+
+    def block(self, name: str) -> Block:
+        """Return a block that must be there."""
+        found = next((each for each in self.blocks if each.name == name), None)
+        if found is None:
+            self.begin.fail(f"begin {self.name} has no begin {name}")
+        return found
+
+
+def _is_htc(deck: Deck) -> bool:
+    """Return whether there is a main body."""
+    return any(line.lower().split(";")[0].split()[:2] == ["begin", "main_body"] for line in deck.lines) or any(
+        line.lower().split()[:1] == ["continue_in_file"] for line in deck.lines
+    )
+
+
+def _main_body(deck: Deck, wanted: str | None) -> Block:
+    """Return a main body by its name, or the only one there is; a copy is the body that it copies.
+
+    Raises:
+        PydanticCustomError: there is none of that name, or the scene must say which.
+    """
+    bodies = {block.command("name").words[1]: block for block in _main_bodies(deck)}
+    allowed = ", ".join(show(name) for name in bodies)
+    if not bodies:
+        deck.fail("has no begin main_body")
+    if wanted is None and len(bodies) > 1:
+        raise problem("section.body", None, f"must say which of the main bodies of {deck.path.name}: {allowed}")
+    name = next(iter(bodies)) if wanted is None else wanted
+    for _ in bodies:
+        if name not in bodies:
+            raise problem("section.body", name, f"is not in {deck.path.name}; allowed: {allowed}")
+        copied = bodies[name].find("copy_main_body")
+        if copied is None:
+            return bodies[name]
+        name = copied.words[1] if len(copied.words) > 1 else ""
+    bodies[name].begin.fail("main bodies copy each other in a circle")
+
+
+def _c2_def(body: Block) -> tuple[list[list[float]], Command]:
+    """Return rows (x, y, z in m, twist in degrees) of a body's line, and the command that says how many there are."""
+    block = body.block("c2_def")
+    head = block.command("nsec")
+    count = head.whole(2)
+    sections = [each for each in block.commands if each.words[0].lower() == "sec"]
+    if count < 2 or len(sections) != count:
+        head.fail(f"nsec is {count}, at least 2, and there are {len(sections)} lines of sec", 2)
+    for number, section in enumerate(sections, start=1):
+        if section.whole(2) != number:
+            section.fail(f"must be section {number}, not {section.words[1]}", 2)
+        if len(section.words) != 6:
+            section.fail(f"has {len(section.words)} columns; must be sec, its number, x, y, z and twist")
+    return [[section.number(column) for column in range(3, 7)] for section in sections], head
+
+
+def _main_bodies(deck: Deck) -> list[Block]:
+    """Return all main bodies of a file and of those in which it continues."""
+    found: list[Block] = []
+    stack: list[Block] = []
+    for command in _commands(deck, deck, DEEPEST):
+        word = command.words[0].lower()
+        if word == "begin":
+            block = Block(command)
+            if stack:
+                stack[-1].blocks.append(block)
+            stack.append(block)
+        elif word == "end":
+            if not stack:
+                command.fail("an end without a begin")
+            if (closed := stack.pop()).name == "main_body":
+                found.append(closed)
+        elif stack:
+            stack[-1].commands.append(command)
+    if stack:
+        stack[-1].begin.fail(f"begin {stack[-1].name} has no end")
+    return found
+
+
+def _commands(deck: Deck, main: Deck, depth: int) -> Iterator[Command]:
+    """Yield the commands of a file, with those of files in which it continues in their places."""
+    for line, text in enumerate(deck.lines, start=1):
+        words = text.split(";")[0].split()
+        if not words:
+            continue
+        command = Command(deck, line, words)
+        word = words[0].lower()
+        if word == "exit":
+            return
+        if word != "continue_in_file":
+            yield command
+        elif depth == 0:
+            command.fail(f"continues in more than {DEEPEST} files, one in the other")
+        else:
+            if len(words) < 2:
+                command.fail("continue_in_file has nothing behind it")
+            yield from _commands(_named_file(command, main), main, depth - 1)
+
+
+def _named_file(command: Command, main: Deck) -> Deck:
+    """Return the file that a command names, from the folder of the main file or from one of the two above.
+
+    Raises:
+        PydanticCustomError: it is in none of them, or there are several.
+    """
+    name = command.words[1].strip("\"'")
+    found = sorted({path for folder in list(main.path.parents)[:3] if (path := find_file(folder, name)) is not None})
+    if len(found) != 1:
+        what = "there is no file" if not found else "there are several files"
+        command.fail(f"{what} {show(name)} from the folder of {main.path.name} or the two above", 2)
+    return Deck(found[0])
 
 
 register(BladeFormat("hawc2", "HAWC2's st file, with centres or full matrices, or its htc file", recognises, read))

@@ -1,41 +1,266 @@
-"""OpenFAST's main file (.fst): which of its modules has the blades, ElastoDyn or BeamDyn, and where their root is."""
+"""OpenFAST's files: the main file (.fst), ElastoDyn's main and blade file, BeamDyn's driver, primary and blade file.
+
+A file is recognised by its keys (`value  NAME`), as these programs read it; the words of its first line are anybody's.
+Files of FAST 7 and 8 have the same keys: the main file of FAST 7 is one of ElastoDyn.
+
+ElastoDyn has mass, flap and edge stiffness and twist over fractions of the length. Files that FAST 7 shared with ADAMS
+have more columns: torsional and axial stiffness and inertias are taken, though ElastoDyn computes without them.
+
+BeamDyn's matrices are about the reference axis in the order of x (flapwise), y (edgewise) and z (along the blade),
+displacements before rotations. Its primary file has key points with the initial twist, about −z, and names the blade
+file; a driver's file names the primary file. BeamDyn's axes of a section without twist are those whose x has no
+component along y (`BD_ComputeIniNodalCrv`), not ours, whose axis 2 has none along 3: where a blade has both sweep and
+prebend the twist makes up for it.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from rotfem.registry import register
-from rotfem.scene.blades import beamdyn, elastodyn
+from rotfem.scene.blades.axes import (
+    FROM_IEC,
+    coned_root,
+    iec_pretwist,
+    is_positive,
+    is_symmetric,
+    rows_over,
+    scaled_rows,
+    symmetric,
+    turned_matrix,
+)
 from rotfem.scene.blades.deck import Deck
 from rotfem.scene.blades.formats import Asked, BladeFormat
-from rotfem.scene.files import existing_file_beside
+from rotfem.scene.reference_line import as_line, line_through
+from rotfem.scene.values import Array
 
 #: Values of CompElast that are known: blades of ElastoDyn, and of BeamDyn on ElastoDyn's hub.
 ELASTODYN, BEAMDYN = 1, 2
 
+#: Columns of ElastoDyn's blade file that must be there.
+NEEDED = ("BlFract", "StrcTwst", "BMassDen", "FlpStff", "EdgStff")
 
-def recognises(deck: Deck) -> bool:
-    """Return whether the first line says so, and of no module."""
-    return deck.lines[0].upper().strip(" -`").startswith("OPENFAST INPUT FILE")
+#: Those that may be there ↦ the property of a section; they are taken where all their values are greater than 0.
+TAKEN = {"GJStff": "GJ", "EAStff": "EA", "FlpIner": "rotary_inertia2", "EdgIner": "rotary_inertia3"}
+
+#: Those that are left out. Of offsets the signs are not documented, and ElastoDyn computes without them.
+LEFT_OUT = ("Alpha", "PrecrvRef", "PreswpRef", "FlpcgOf", "EdgcgOf", "FlpEAOf", "EdgEAOf")
+
+#: Those that the motion does not depend on.
+PASSED_OVER = ("PitchAxis", "AeroCent")
+
+#: Part of the length by which BeamDyn's first key point may miss the origin: files have round-off.
+ORIGIN = 1e-9
 
 
-def read(deck: Deck, asked: Asked) -> dict[str, Any]:
+# --- OpenFAST's main file -----------------------------------------------------------------------------------------
+
+
+def _is_openfast(deck: Deck) -> bool:
+    return deck.has("CompElast") and deck.has("EDFile")
+
+
+def _openfast(deck: Deck, asked: Asked) -> dict[str, Any]:
     """Return what the files of blade 1 have; of BeamDyn's, with root and precone of ElastoDyn's main file."""
-    if not recognises(deck):
-        deck.fail("the first line must say OpenFAST INPUT FILE; main files of FAST 8 and before are not known", 1)
     which = deck.count("CompElast", 0)
     if which not in (ELASTODYN, BEAMDYN):
         line, _ = deck.named("CompElast")
         deck.fail(f"CompElast = {which} is not known; known: 1 (ElastoDyn) and 2 (BeamDyn)", line, 1)
-    main = _named(deck, "EDFile")
+    main = deck.file("EDFile")
     if which == ELASTODYN:
-        return elastodyn.read(main, asked)
-    return beamdyn.read(_named(deck, "BDBldFile(1)"), asked) | elastodyn.root(main)
+        return _elastodyn(main, asked)
+    if (mass := _tip_mass(main)) > 0.0:
+        asked.leaves_out(main, f"TipMass(1) = {mass:g} kg, as the blade is BeamDyn's", "structure.tip_mass")
+    return _beamdyn(deck.file("BDBldFile(1)"), asked) | _root(main, asked)
 
 
-def _named(deck: Deck, name: str) -> Deck:
-    line, value = deck.named(name)
-    return Deck(existing_file_beside(deck.path, value, line))
+# --- ElastoDyn ----------------------------------------------------------------------------------------------------
 
 
-register(BladeFormat("openfast", "OpenFAST's main file (.fst)", recognises, read))
+def _is_elastodyn(deck: Deck) -> bool:
+    return _is_main(deck) or deck.has("NBlInpSt")
+
+
+def _is_main(deck: Deck) -> bool:
+    return deck.has("TipRad")
+
+
+def _elastodyn(deck: Deck, asked: Asked) -> dict[str, Any]:
+    """Return section, pretwist and damping; of a main file length, root and tip mass too."""
+    if not _is_main(deck):
+        return _blade(deck, asked, asked.length(deck, "BlFract is a part of TipRad − HubRad of ElastoDyn's main file"))
+    length, place = deck.number("TipRad") - deck.number("HubRad"), _root(deck, asked)
+    blade = deck.file("BldFile1" if deck.has("BldFile1") else "BldFile(1)")
+    return {"length": length, **place, "tip_mass": _tip_mass(deck), **_blade(blade, asked, length)}
+
+
+def _tip_mass(deck: Deck) -> float:
+    """Return the mass at the tip of blade 1, kg."""
+    mass = deck.number("TipMass(1)")
+    if mass < 0.0:
+        deck.fail(f"TipMass(1) = {mass:g} must be at least 0", deck.named("TipMass(1)")[0], 1)
+    return mass
+
+
+def _root(deck: Deck, asked: Asked) -> dict[str, Any]:
+    """Return where a main file has the root of blade 1, its precone and its pitch, about −z there."""
+    if not _is_main(deck):
+        deck.fail("must be ElastoDyn's main file, with a value of TipRad")
+    tip, hub = deck.number("TipRad"), deck.number("HubRad")
+    if not 0.0 <= hub < tip:
+        deck.fail(f"HubRad = {hub:g} must be at least 0 and less than TipRad = {tip:g}", deck.named("HubRad")[0], 1)
+    if deck.has("RotSpeed") and (speed := deck.number("RotSpeed")) != 0.0:
+        asked.leaves_out(deck, f"RotSpeed = {speed:g} rpm = {speed * np.pi / 30:.6g} rad/s", "motion.speed")
+    keys = coned_root(hub, float(np.radians(deck.number("PreCone(1)"))))
+    pitch = deck.number("BlPitch(1)") if deck.has("BlPitch(1)") else 0.0
+    return keys if pitch == 0.0 else keys | {"root": {"pitch": -float(np.radians(pitch))}}
+
+
+def _blade(deck: Deck, asked: Asked, length: float) -> dict[str, Any]:
+    """Return section, pretwist and damping of a blade file; other stiffness is the scene's."""
+    count = deck.count("NBlInpSt", 2)
+    factors = {name: deck.number(name) for name in ("AdjBlMs", "AdjFlSt", "AdjEdSt")}
+    head = deck.find("BlFract BMassDen")
+    table = _columns(deck, head, count)
+    x = table["BlFract"]
+    taken = {key: table[name] for name, key in TAKEN.items() if name in table and np.all(table[name] > 0.0)}
+    without = [key for key in ("EA", "GA2", "GA3", "GJ") if key not in taken]
+    asked.needs(deck, tuple(without), "blades of ElastoDyn do not stretch, shear or twist")
+    if left := [name for name in LEFT_OUT if name in table and np.any(table[name] != 0.0)]:
+        asked.leaves_out(deck, f"{', '.join(left)}, without which ElastoDyn computes")
+    section = {
+        "mass_per_length": table["BMassDen"] * factors["AdjBlMs"],
+        "EI2": table["FlpStff"] * factors["AdjFlSt"],
+        "EI3": table["EdgStff"] * factors["AdjEdSt"],
+    } | taken
+    keys: dict[str, Any] = {
+        "pretwist": scaled_rows(x, length, -np.radians(table["StrcTwst"])),
+        "section": {key: scaled_rows(x, length, values) for key, values in section.items()},
+    }
+    ratios = {
+        family: [deck.number(name) / 100.0 for name in names if deck.has(name)]
+        for family, names in (("flap", ("BldFlDmp(1)", "BldFlDmp(2)")), ("lag", ("BldEdDmp(1)",)))
+    }
+    if given := {family: found for family, found in ratios.items() if any(found)}:
+        keys["damping"] = {"modal": given}
+    return keys
+
+
+def _columns(deck: Deck, head: int, count: int) -> dict[str, Array]:
+    """Return the columns (count,) of a blade file below the line of their names, and of the units."""
+    known = {name.lower(): name for name in (*NEEDED, *TAKEN, *LEFT_OUT, *PASSED_OVER)}
+    names = [known.get(word.lower(), word) for word in deck.lines[head - 1].split()]
+    for column, name in enumerate(names, start=1):
+        if name not in known.values() or name in names[: column - 1]:
+            allowed = ", ".join(known.values())
+            deck.fail(f'the column "{name}" is not known, or stands twice; known: {allowed}', head, column)
+    if missing := [name for name in NEEDED if name not in names]:
+        deck.fail(f"the columns {', '.join(missing)} are missing", head)
+    first = head + 2
+    table = dict(zip(names, np.array(deck.rows(first, count, len(names))).T, strict=True))
+    deck.increasing(table["BlFract"], first, 1.0, "BlFract")
+    for name in ("BMassDen", "FlpStff", "EdgStff"):
+        for i in np.flatnonzero(table[name] <= 0.0):
+            deck.fail(f"{name} must be greater than 0, not {table[name][i]:g}", first + int(i), names.index(name) + 1)
+    return table
+
+
+# --- BeamDyn ------------------------------------------------------------------------------------------------------
+
+
+def _is_beamdyn(deck: Deck) -> bool:
+    return any(deck.has(name) for name in ("station_total", "member_total")) or _is_driver(deck)
+
+
+def _is_driver(deck: Deck) -> bool:
+    return deck.has("InputFile") and deck.has("GlbPos(1)")
+
+
+def _beamdyn(deck: Deck, asked: Asked) -> dict[str, Any]:
+    """Return section and damping of a blade file; of a primary file, or a driver's, line and pretwist too."""
+    if _is_driver(deck):
+        deck = deck.file("InputFile")
+    if deck.has("member_total"):
+        return _primary(deck, asked)
+    return _matrices(
+        deck, asked, asked.length(deck, "stations are parts of the arc length; BeamDyn's primary file has the line")
+    )
+
+
+def _primary(deck: Deck, asked: Asked) -> dict[str, Any]:
+    """Return line, pretwist, section and damping of a primary file."""
+    members, count = deck.count("member_total", 1), deck.count("kp_total", 3)
+    if members != 1:
+        line, _ = deck.named("member_total")
+        deck.fail(f"has {members} members; only blades of one member are known, as a line of splines", line, 1)
+    first = deck.find("kp_xr kp_yr kp_zr initial_twist") + 2
+    points = np.array(deck.rows(first, count, 4))
+    line = points[:, :3] @ FROM_IEC.T
+    if np.linalg.norm(line[0]) > ORIGIN * np.linalg.norm(line[-1]):
+        deck.fail("the first key point must be (0, 0, 0)", first)
+    line -= line[0]
+    through = line_through(as_line(line.tolist()))
+    at = np.array([0.0, *through.knots, through.length])
+    if len(at) != count:
+        deck.fail("two key points are the same", first)
+    pretwist = iec_pretwist(through.at(at)[1], np.radians(points[:, 3]))
+    return {
+        "line": line.tolist(),
+        "pretwist": rows_over(at, pretwist),
+        **_matrices(deck.file("BldFile"), asked, through.length),
+    }
+
+
+def _matrices(deck: Deck, asked: Asked, length: float) -> dict[str, Any]:
+    """Return the tables of matrices of a blade file, and its damping."""
+    count = deck.count("station_total", 2)
+    line = deck.find("DISTRIBUTED PROPERTIES") + 1
+    stations: list[float] = []
+    matrices: dict[str, list[Array]] = {"stiffness": [], "mass": []}
+    for _ in range(count):
+        line = _next(deck, line, "the station")
+        eta = deck.row(line, 1)[0]
+        if eta <= stations[-1] if stations else eta != 0.0:
+            deck.fail(f"stations must increase from 0 to 1; this one is {eta:g}", line, 1)
+        stations.append(eta)
+        line += 1
+        for name, found in matrices.items():
+            line = _next(deck, line, f"the matrix of {name}")
+            matrix = np.array(deck.rows(line, 6, 6))
+            if not is_symmetric(matrix):
+                deck.fail(f"the {name} matrix of station {len(stations)} is not symmetric", line)
+            if not is_positive(symmetric(matrix), definite=name == "stiffness"):
+                deck.fail(f"the {name} matrix of station {len(stations)} is not positive definite", line)
+            found.append(symmetric(turned_matrix(matrix, FROM_IEC)))
+            line += 6
+    if not np.isclose(stations[-1], 1.0, rtol=1e-6):
+        deck.fail(f"stations must end at 1; the last of {count} is {stations[-1]:g}", line - 14, 1)
+    section = {name: scaled_rows(stations, length, np.array(found)) for name, found in matrices.items()}
+    return {"section": section, **_damping(deck, asked)}
+
+
+def _damping(deck: Deck, asked: Asked) -> dict[str, Any]:
+    """Return Kelvin and Voigt's coefficient, where those of all six strains, mu1 to mu6 (s), are the same."""
+    if not deck.has("damp_type") or deck.count("damp_type", 0) == 0:
+        return {}
+    mu = deck.row(deck.find("mu1 mu6") + 2, 6)
+    if len(set(mu)) == 1 and mu[0] >= 0.0:
+        return {"damping": {"kelvin_voigt": mu[0]}} if mu[0] > 0.0 else {}
+    asked.leaves_out(deck, f"mu1 … mu6 = {', '.join(f'{each:g}' for each in mu)} s, which differ", "structure.damping")
+    return {}
+
+
+def _next(deck: Deck, line: int, what: str) -> int:
+    """Return the next line that is not empty."""
+    while line <= len(deck.lines) and not deck.lines[line - 1].strip():
+        line += 1
+    if line > len(deck.lines):
+        deck.fail(f"the file ends before {what}; station_total says that there is another")
+    return line
+
+
+register(BladeFormat("openfast", "OpenFAST's main file (.fst)", _is_openfast, _openfast))
+register(BladeFormat("elastodyn", "ElastoDyn's blade file, or its main file", _is_elastodyn, _elastodyn))
+register(BladeFormat("beamdyn", "BeamDyn's blade, primary or driver's file", _is_beamdyn, _beamdyn))
