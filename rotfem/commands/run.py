@@ -20,7 +20,7 @@ from rotfem.commands.pursuit import pursue
 from rotfem.commands.result_folder import ResultFolder
 from rotfem.commands.root_accuracy import ROOT_MOMENT, first_settings, judged
 from rotfem.commands.simulation import Simulation
-from rotfem.errors import ComputationError, input_of
+from rotfem.errors import ComputationError, InputError, input_of
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.outputs import Functional
@@ -131,7 +131,13 @@ def run_to_accuracy(
 
     def attempt(settings: Settings) -> RunResult:
         variant = scene.replace(changes_of(scene, settings))
-        simulation = Simulation(variant, Problem.of(variant, terms=terms, outputs=outputs), keeper.comm, keeper=keeper)
+        problem = Problem.of(variant, terms=terms, outputs=outputs)
+        try:
+            simulation = Simulation(variant, problem, keeper.comm, keeper=keeper)
+        except InputError as error:
+            if problem.theory.name == scene.model.theory:
+                raise
+            raise ComputationError(str(error)) from None  # a poorer theory that the scene does not name
         simulation.settings, simulation.pace = settings, pace
         try:
             return simulation.run(progress)

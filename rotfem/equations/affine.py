@@ -18,7 +18,9 @@ from rotfem.equations.clamp_rows import ClampRows
 from rotfem.equations.modal_damping import EFFECT
 from rotfem.equations.model import Model
 from rotfem.equations.pieces import PRESTRESS, Piece, Pieces
+from rotfem.errors import InputError
 from rotfem.mechanics.motion import Motion
+from rotfem.mechanics.theories import theories
 from rotfem.numerics import compat, forms
 from rotfem.numerics.linear import Increment, combine, set_diagonal
 
@@ -65,6 +67,21 @@ class AffineSystem(AffineStiffness, AffineEnergies):
         self._increment: Increment | None = None
         self.settled = False
         return pattern.duplicate()
+
+    def check_terms(self) -> None:
+        """Refuse terms of a user that no linear theory can have.
+
+        Raises:
+            InputError: one is no polynomial of second degree of the constants.
+        """
+        problem = self.model.problem
+        for name in self._decomposed.not_polynomial:
+            others = ", ".join(f'"{theory.name}"' for theory in theories() if not theory.linear)
+            why = (
+                "is no polynomial of second degree in speed, its rate, gravity and loads, or not of those that its "
+                f'effect declares, so model.theory = "{problem.theory.name}" cannot have it; allowed: {others}'
+            )
+            raise InputError("terms" if name in problem.terms else "model.effects", name, why)
 
     @property
     def integrals(self) -> dict[str, int]:

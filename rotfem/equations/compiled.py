@@ -25,12 +25,17 @@ def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bo
             problem (see `NonlinearSystem`), and those of planar beams, whose steps hardly feel it, compiled in haste.
 
     Raises:
-        InputError: a mesh or a section that cannot be computed with.
+        InputError: a mesh or a section that cannot be computed with; a term that the theory cannot have.
     """
     view = View()
     seen, courses = watched(problem, view) if moving else (problem, [])
     model = Model(seen, comm)
-    linear = problem.theory.linear
-    system = AffineSystem(model, moving) if linear else NonlinearSystem(model, moving, parted)
+    system: Any
+    if problem.theory.linear:
+        system = AffineSystem(model, moving)
+        if not parted:
+            system.check_terms()
+    else:
+        system = NonlinearSystem(model, moving, parted)
     system.view, system.courses = view, tuple(courses)
     return system if model.hub is None else BorderedSystem(system, once=parted and model.structure.planar)

@@ -39,6 +39,9 @@ Key = tuple[tuple[str, int], ...]
 #: What the pieces of the geometric stiffness are marked with; without them a prestressed theory is the linear one.
 PRESTRESS = "prestress"
 
+#: Part of a term by which round-off, of sums of some hundred numbers, may change it.
+ROUND_OFF = 1e-10
+
 
 @dataclass
 class Piece:
@@ -55,6 +58,36 @@ class Piece:
     operator: Any
     of: frozenset[str]
     at_root: Array
+
+
+class PolynomialCheck:
+    """Compares a term at constants of no special size with what its pieces make of them.
+
+    The pieces are found with constants that are 0, 1 and −1, where a polynomial of second degree is told by its values;
+    c|v|v has values there too, but is none.
+
+    Args:
+        pieces: where the term is assembled; its switches are set.
+        kind: "f", "K", "C" or "M".
+        name: of the term.
+    """
+
+    def __init__(self, pieces: Pieces, kind: str, name: str):
+        self._values = {entry: 1.7 + 0.3 * i for i, entry in enumerate(pieces.entries_of(name))}
+        self._left = pieces.assemble_at(kind, self._values)
+        self._same = () if kind == "f" else (SAME,)
+        self._size = self._left.norm()
+
+    def subtract(self, key: Key, operator: Any) -> None:
+        """Take off the part of a piece, all bodies in it."""
+        factor = float(np.prod([self._values[entry] for entry in key]))
+        self._size += abs(factor) * operator.norm()
+        self._left.axpy(-factor, operator, *self._same)
+
+    @property
+    def failed(self) -> bool:
+        """Whether something is left, or not finite: the term is no polynomial of second degree."""
+        return not self._left.norm() <= ROUND_OFF * self._size
 
 
 class Pieces:
@@ -76,6 +109,7 @@ class Pieces:
         axis: components of the spin axis that w and dw have.
         pattern: a matrix with the pattern of all.
         all: the pieces.
+        not_polynomial: names of terms that the pieces do not make up, as they are no polynomials of the constants.
         assembled: time spent on assembly, s.
     """
 
@@ -97,6 +131,7 @@ class Pieces:
         self._assembled = Assembler(self._forms["K"], self.bcs)
         self.pattern = self._assembled.pattern
         self.all: list[Piece] = []
+        self.not_polynomial: list[str] = []
         for kind in self.at_rest:
             self._decompose(kind)
         self._set_switches(model.switches)
@@ -135,9 +170,18 @@ class Pieces:
                 return [()]
             entries = self._entries(declared[0])
             return list(combinations_with_replacement(entries, len(declared)))
-        mine = extract_constants(self.model.terms[name])
-        found = [entry for known, c in self.constants.items() if c in mine for entry in self._entries(known)]
+        found = self.entries_of(name)
         return [(), *((entry,) for entry in found), *combinations_with_replacement(found, 2)]
+
+    def entries_of(self, name: str) -> list[tuple[str, int]]:
+        """Return the components of the constants that a term has."""
+        mine = extract_constants(self.model.terms[name])
+        return [entry for known, c in self.constants.items() if c in mine for entry in self._entries(known)]
+
+    def _is_checked(self, name: str) -> bool:
+        """Return whether a term is one of a user, or one of which no constants are declared."""
+        effect = self.model.acting[name]
+        return effect.constants is None or callable(effect.work)
 
     def _parts(self, kind: str) -> list[tuple[str, tuple[str, ...]]]:
         """Return the terms in one of the forms, each with the switches of the bodies it acts on there, none first."""
@@ -157,15 +201,21 @@ class Pieces:
             bodiless: dict[Key, Any] = {}
             same = () if kind == "f" else (SAME,)
             for part in parts:
+                self._set_switches((name, part))
+                check = self._is_checked(name) and PolynomialCheck(self, kind, name)
                 for key in self._keys(name):
                     self._set_switches((name, part))
                     operator = self._polarised(kind, key, declared=self.model.acting[name].constants is not None)
+                    if check:
+                        check.subtract(key, operator)
                     if part and key in bodiless:
                         operator.axpy(-1.0, bodiless[key], *same)
                     elif not part:
                         bodiless[key] = operator
                     if operator.norm() > 0.0:
                         found.append((key, operator, frozenset((name, part))))
+                if check and check.failed and name not in self.not_polynomial:
+                    self.not_polynomial.append(name)
         for key, operator, of in found:
             self._keep(kind, key, operator, of)
         self.assembled += perf_counter() - started
@@ -191,7 +241,7 @@ class Pieces:
         """
 
         def at(*entries: tuple[tuple[str, int], float]) -> Any:
-            return self._assemble_at(kind, dict(entries))
+            return self.assemble_at(kind, dict(entries))
 
         same = () if kind == "f" else (SAME,)
         if len(key) == 2 and key[0] != key[1]:
@@ -210,7 +260,8 @@ class Pieces:
             operator.axpy(-1.0, at(), *same)
         return operator
 
-    def _assemble_at(self, kind: str, values: dict[tuple[str, int], float]) -> Any:
+    def assemble_at(self, kind: str, values: dict[tuple[str, int], float]) -> Any:
+        """Return one of the forms with these components of constants, all others zero."""
         constants = self.constants
         self._zero_constants()
         for (name, i), value in values.items():

@@ -43,6 +43,19 @@ class Dear(ComputationError):
     """A trial would take about as long as the run it is to spare."""
 
 
+def check_terms(system: Any) -> None:
+    """Refuse to compare a linear theory that cannot have a term of the user.
+
+    Raises:
+        ComputationError: it has one that is no polynomial of the constants.
+    """
+    if system.linear:
+        try:
+            system.held.check_terms()
+        except InputError as error:
+            raise ComputationError(str(error)) from None
+
+
 class Trial:
     """A case to be tried out.
 
@@ -234,6 +247,7 @@ class Trial:
         candidate, out = self.candidate(theory, without), Outputs()
         for name in names:
             try:
+                check_terms(candidate.system)
                 if name == MODES:
                     out.values = candidate.eigenvalues(self.speeds)
                 elif name == STEADY:

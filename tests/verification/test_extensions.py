@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import ufl
 
 import rotfem
 from rotfem import registry
@@ -232,3 +233,26 @@ def test_names_that_a_call_cannot_take(extension: Callable[[str], ModuleType]) -
         rotfem.run(beam({"output.quantities": ["root_moment"]}), outputs={"root_moment": form})
     with pytest.raises(SceneError, match='terms = "internal": is the name of an effect already'):
         rotfem.run(beam(), terms={"internal": lambda m, delta: 0})
+
+
+@pytest.mark.parametrize("constants", [None, ("w",), ("w", "w")])
+def test_linear_theories_refuse_what_is_no_polynomial_of_the_speed(constants: tuple[str, ...] | None) -> None:
+    """Quadratic drag c |v| v: |w| w is odd as w, and 1 at 1 as w and w²; linear drag with a wrong declaration."""
+
+    def quadratic(m: Any, delta: Any) -> Any:
+        v = [m.velocity(body) for body in m.positions()]
+        size = [ufl.sqrt(ufl.inner(x, x) + 1e-12) for x in v]
+        bodies = zip(v, size, m.positions(), strict=True)
+        return sum(0.05 * s * ufl.inner(x, delta.of(body)) * body.measure for x, s, body in bodies)
+
+    rotfem.register(rotfem.Effect("drag", quadratic, constants=constants))
+    try:
+        for theory in ("linear", "consistent_linear"):
+            with pytest.raises(SceneError, match='model.effects = "drag": is no polynomial'):
+                rotfem.run(beam({"model.theory": theory}))
+        answered = rotfem.run(beam({"accuracy": 1e-2, "time.end": 0.2, "time.step": None}))
+        assert answered.summary["theory"] == "reissner"  # not the reduced linear model that is tried first
+    finally:
+        registry.effects.remove("drag")
+    with pytest.raises(SceneError, match='terms = "air": is no polynomial'):
+        rotfem.modes(beam({"model.theory": "linear"}), terms={"air": quadratic})
