@@ -10,6 +10,7 @@ from typing import Any
 from rotfem.analysis.equilibrium import check_steady
 from rotfem.analysis.load_steps import balance
 from rotfem.analysis.stability import Stability, stability_of
+from rotfem.equations.compiled import with_all_unknowns
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.loads import named
 from rotfem.mechanics.problem import Problem
@@ -27,13 +28,13 @@ def stability_ahead(system: Any, newton: Newton) -> Stability | None:
     """Return the stability of the equilibrium of constant conditions; None where there is none that is found at once.
 
     Args:
-        system: equations of motion; state and time are left at the equilibrium.
+        system: equations of motion; state and time are left at the equilibrium where it has all unknowns.
         newton: iteration control.
     """
     problem = system.model.problem
     if not are_constant(problem):
         return None
-    speed = problem.motion.speed(0.0)
+    system, speed = with_all_unknowns(system), problem.motion.speed(0.0)
     try:
         check_steady(problem)
         q = balance(system, speed, 1.0, system.zeros(), newton, looked_at=False)

@@ -26,7 +26,6 @@ import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
-from ufl.algorithms import expand_derivatives
 
 from rotfem.equations.geometric import geometric_stiffness
 from rotfem.mechanics.motion import Motion
@@ -250,7 +249,7 @@ class TheoryCheck:
         u, w, base = ufl.TestFunction(system.V), ufl.TrialFunction(system.V), fem.Function(system.V)
         base.x.array[:] = q
         out = geometric_stiffness(model, (system.q, base), u, w, stiffened())
-        if model.problem.left_out and expand_derivatives(out).empty():  # what is left has none of these strains
+        if isinstance(out, int):
             G = system.matrix(1.0, 0.0, 0.0, 0.0)
             G.zeroEntries()
             return G

@@ -131,7 +131,6 @@ class Memory:
             "resultants": None if run.record.resultants is None else run.record.resultants.kept_arrays(),
             "snapshots": None if snapshots is None else self._packed(vars(snapshots)),
             "choice": None if run.choice is None else vars(run.choice),
-            "left_out": list(run.problem.left_out),
             "settings": None if run.settings is None else vars(run.settings),
         }
 

@@ -12,9 +12,8 @@ from rotfem.analysis.equilibrium import static_tip_shape, steady_state
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.stability import stability_of
 from rotfem.commands.problem import first_motion
-from rotfem.equations.compiled import compile_system
+from rotfem.equations.compiled import compile_system, with_all_unknowns
 from rotfem.numerics.newton import Newton
-from rotfem.selection.left_out import with_all
 
 if TYPE_CHECKING:
     from rotfem.commands.simulation import Simulation
@@ -39,7 +38,7 @@ def first_state(run: Simulation) -> tuple[Array | None, Array | None]:
 def _shape(run: Simulation) -> Array | None:
     initial, solver = run.scene.initial, run.scene.solver
     if initial.state != "steady":
-        run.stability = stability_ahead(with_all(run.system), Newton.of(solver))
+        run.stability = stability_ahead(run.system, Newton.of(solver))
         if run.stability is not None and (said := run.stability.warning()):
             run.warnings.append(f"what constant conditions hold in balance: {said}")
     if initial.tip_displacement is not None:
@@ -51,7 +50,9 @@ def _shape(run: Simulation) -> Array | None:
         system = compile_system(run.problem.replace(frame="rotating"), run.comm, moving=False)
     speed = run.problem.motion.speed(0.0)
     q = steady_state(system, speed, Newton.of(solver), past_limits=solver.past_limits, notes=run.warnings)
-    run.stability = stability_of(system, q, speed)
+    whole = with_all_unknowns(system)
+    shape = q if whole is system else steady_state(whole, speed, Newton.of(solver), past_limits=solver.past_limits)
+    run.stability = stability_of(whole, shape, speed)
     if said := run.stability.warning():
         run.warnings.append(f"the motion starts from an equilibrium of its own: {said}")
     return q

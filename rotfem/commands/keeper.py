@@ -135,10 +135,6 @@ class Keeper:
 
         return Choice(**self._tree["choice"])
 
-    def left_out(self) -> tuple[str, ...] | None:
-        """Return the unknowns that the run which is gone on with has left out; None where there is none."""
-        return None if self._tree is None else tuple(self._tree.get("left_out", ()))
-
     def settings(self) -> Any:
         """Return the settings of the run that goes on, which an accuracy has led to; None where none has."""
         if self._tree is None or self._tree["settings"] is None:

@@ -16,7 +16,6 @@ from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.error_estimate import ErrorEstimate
 from rotfem.analysis.error_watch import ErrorWatch
 from rotfem.analysis.farthest_state import Farthest
-from rotfem.analysis.left_aside import LeftAside
 from rotfem.analysis.lost_digits import said_of
 from rotfem.analysis.reduced.foreshortened import Foreshortened
 from rotfem.analysis.reduced.response import Response
@@ -45,8 +44,8 @@ from rotfem.numerics.newton import Newton
 from rotfem.results.run import RunResult
 from rotfem.scene import Scene, Time
 from rotfem.selection.accuracy import Settings
-from rotfem.selection.left_out import leave_out, without, worth_a_look
 from rotfem.selection.model_choice import Choice, RangeExceeded
+from rotfem.structures.symmetry import inactive_unknowns
 
 Array = npt.NDArray[np.float64]
 
@@ -80,8 +79,7 @@ class Simulation:
         if scene.time is None and problem.frame == "inertial":
             problem = problem.replace(frame="rotating")
             self.warnings.append("a steady state is one only in the rotating frame, where it was computed")
-        problem, beside = self._with_few_unknowns(problem)
-        self.problem = problem
+        self.problem = problem = self._of_active_unknowns(problem)
         self.system: Any = compile_system(problem, comm, moving=scene.time is not None)
         self.system.compile_readings()
         self.compiled = perf_counter() - self.started
@@ -97,8 +95,6 @@ class Simulation:
         self.critical = None if by_basis else critical_speed(self.system)
         self.stability: Stability | None = None
         self.farthest = Farthest(self.system)
-        self.aside = None if beside is None else LeftAside(self.system, beside)
-        self.left_out: dict[str, Any] | None = None
         self.theory_error: TheoryError | None = None
         self.watch: ErrorWatch | None = None
         self.track: TipTrack | None = None
@@ -108,16 +104,12 @@ class Simulation:
         self._critical_since: float | None = None
         self._exceeded = ""
 
-    def _with_few_unknowns(self, problem: Problem) -> tuple[Problem, Any]:
-        """Return the problem without unknowns that stay zero, and the equations of these, None of none."""
-        scene, model, known = self.scene, self.scene.model, self.keeper.left_out()
-        if known is not None:
-            return without(problem, known, self.comm)
-        if scene.time is None or self.choice is not None or model.all_unknowns or model.reduced:
-            return problem, None
-        if scene.initial.state == "steady" or scene.initial.moves or not worth_a_look(problem, scene.time):
-            return problem, None
-        return leave_out(problem, self.comm, scene.initial.tip_displacement is not None)
+    def _of_active_unknowns(self, problem: Problem) -> Problem:
+        """Return the problem of a history without the unknowns that symmetry keeps at zero."""
+        model, initial = self.scene.model, self.scene.initial
+        if self.scene.time is None or model.all_unknowns or model.reduced or initial.moves:
+            return problem
+        return problem.replace(inactive=inactive_unknowns(problem, initial.tip_displacement is not None))
 
     def run(self, progress: Progress | None = None) -> RunResult:
         """Return the result of the scene (see `rotfem.run`).
@@ -213,8 +205,6 @@ class Simulation:
         self.record(state)
         self.last = state
         self.farthest(state.q, state.t)
-        if self.aside is not None:
-            self.aside(state.q, state.t)
         if self.choice is None or self._exceeded:
             return
         sizes = self.system.sizes(state.q)
@@ -255,10 +245,6 @@ class Simulation:
                 f"the speed is above {self.critical:.6g} rad/s, where the {self.problem.theory.name} stiffness is no "
                 f"longer definite, since t = {self._critical_since:.4g} s"
             )
-        if self.aside is not None:
-            self.left_out = self.aside.summary()
-            if said := self.aside.warning(self.left_out):
-                self.warnings.append(said)
         self.theory_error = self.farthest.error() if self.foreshortened is None else self.foreshortened.theory_error()
         if self.theory_error is not None and (said := self.theory_error.warning()):
             self.warnings.append(said)

@@ -122,6 +122,7 @@ def _told(run: Simulation) -> dict[str, Any]:
         out["resumed"] = run.resumed
     if run.stepper is not None and run.stepper.rejected:
         out["rejected_steps"] = run.stepper.rejected
-    if run.left_out is not None:
-        out["left_out"] = run.left_out
+    if run.problem.inactive:
+        why = "structure, loads and spin are symmetric, so that nothing moves them"
+        out["left_out"] = {"unknowns": list(run.problem.inactive), "why": why}
     return out

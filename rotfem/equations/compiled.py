@@ -39,3 +39,9 @@ def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bo
         system = NonlinearSystem(model, moving, parted)
     system.view, system.courses = view, tuple(courses)
     return system if model.hub is None else BorderedSystem(system, once=parted and model.structure.planar)
+
+
+def with_all_unknowns(system: Any) -> Any:
+    """Return a system, or if some of its components are inactive that of all, at rest: stability is about all."""
+    problem = system.model.problem
+    return compile_system(problem.replace(inactive=()), system.comm, moving=False) if problem.inactive else system

@@ -9,16 +9,17 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import ufl
+from ufl.algorithms import expand_derivatives
 
 from rotfem.equations.model import Model
 from rotfem.mechanics.theories import Theory, richest
 from rotfem.numerics import forms
 
 
-def geometric_stiffness(
-    model: Model, state: tuple[Any, Any], u: Any, w: Any, theory: Theory, along: Any | None = None
-) -> Any:
+def geometric_stiffness(model: Model, state: tuple[Any, Any], u: Any, w: Any, theory: Theory) -> Any:
     """Return ∫ σ⁰·D²Γ[u, w] at rest, a UFL form: of N⁰ alone, or of all stress resultants (`Model.prestresses`).
+
+    It is 0 where no active component makes such forces.
 
     Args:
         model: whose strains have the forces σ⁰.
@@ -26,20 +27,17 @@ def geometric_stiffness(
         u: a displacement, or an argument of the form.
         w: another.
         theory: with the second-order strains Γ that σ⁰ works on.
-        along: function of the unknowns that u and w are of, where these are not those of q; zero in σ⁰.
     """
     q, base = state
-    others = () if along is None else (along,)
-    of = q if along is None else along
-    s, out = model.structure, 0
+    s = model.structure
+    out: Any = 0
     second = model.strains(theory.prestress_measures(s.type))
     for first, higher in zip(model.mechanics.strains, second, strict=True):
         if model.prestresses(first):
             force = first.force(ufl.replace(first.value, {q: base}))
-            force = forms.without(force, *others) if others else force
-            curvature = ufl.derivative(ufl.derivative(higher.value, of, u), of, w)
-            out += ufl.inner(force, forms.without(curvature, q, *others)) * higher.measure
-    return out
+            curvature = ufl.derivative(ufl.derivative(higher.value, q, u), q, w)
+            out += ufl.inner(force, forms.without(curvature, q)) * higher.measure
+    return 0 if isinstance(out, int) or expand_derivatives(out).empty() else out
 
 
 def second_order_work(model: Model, displacements: Sequence[Any], test: Any) -> Any:

@@ -135,7 +135,8 @@ class Pieces:
         for kind in self.at_rest:
             self._decompose(kind)
         self._set_switches(model.switches)
-        if model.theory.prestress:
+        self._geometric = self.geometric(ufl.TestFunction(self.V), ufl.TrialFunction(self.V), self.prestressed)
+        if not isinstance(self._geometric, int):
             self._prestress()
 
     def _forms_at_rest(self) -> dict[str, Any]:
@@ -308,7 +309,7 @@ class Pieces:
         return fem.Function(self.V)
 
     def geometric(self, u: Any, w: Any, base: Any, theory: Theory | None = None) -> Any:
-        """Return ∫ N⁰ D²Γ₁[u, w] with N⁰ of the displacement `base`, a UFL form; 0 without a prestressed theory.
+        """Return ∫ N⁰ D²Γ₁[u, w] with N⁰ of the displacement `base`, a UFL form; 0 where there is no such force.
 
         Args:
             u: a displacement, or an argument of the form.
@@ -325,7 +326,6 @@ class Pieces:
 
     def _prestress(self) -> None:
         """Add the geometric stiffness of the stresses that each load piece causes in the linear structure."""
-        self._geometric = self.geometric(ufl.TestFunction(self.V), ufl.TrialFunction(self.V), self.prestressed)
         self._forms["G"] = forms.form(self._geometric, once=True)
         started = perf_counter()
         for load, K, added in geometric_pieces(self):

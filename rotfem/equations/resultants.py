@@ -75,13 +75,13 @@ class Resultants:
         return bool(system.structure.stiff)
 
     def _at_rest(self, form: Any) -> Any:
-        k = self.model.mechanics.k
-        gone = (k.q, k.v, k.a) if self.system.linear else (k.v, k.a)
+        q, v, a, _ = self.model.mechanics.k.functions
+        gone = (q, v, a) if self.system.linear else (v, a)
         return forms.without(form, *gone)
 
     def _compile(self, strain: Any) -> tuple[Any, Any]:
         """Return the forms of R_C and W_C of one strain."""
-        mesh, q = self.V.mesh, self.model.mechanics.k.q
+        mesh, q = self.V.mesh, self.system.q
         shape, degree = ufl.as_ufl(strain.value).ufl_shape, strain.measure.metadata()["quadrature_degree"]
         element = basix.ufl.quadrature_element(mesh.basix_cell(), value_shape=shape, degree=degree)
         Q = fem.functionspace(mesh, element)
@@ -97,9 +97,9 @@ class Resultants:
         if not self.system.linear:
             inner += sum(term for name, term in self.model.terms.items() if name != "internal")
             for s in stiff:  # the stress of the state, which the derivative does not see
-                stress = s.force(ufl.replace(s.value, {m.k.q: self._state}))
+                stress = s.force(ufl.replace(s.value, {self.system.q: self._state}))
                 inner += ufl.inner(stress, m.k.variation(s.value)) * s.measure
-        form = self._at_rest(ufl.derivative(inner, m.k.q, du))
+        form = self._at_rest(ufl.derivative(inner, self.system.q, du))
         return None if form.empty() else forms.form(form, once=True)
 
     def _compile_stressed(self) -> Any:
@@ -111,7 +111,7 @@ class Resultants:
             if strain.name in {*s.stiff, *s.prestressing}:
                 shape = ufl.as_ufl(strain.value).ufl_shape
                 force = first.force(ufl.as_vector([1.0] * shape[0]) if shape else ufl.as_ufl(1.0))
-                out += ufl.inner(force, ufl.derivative(m.k.variation(strain.value), m.k.q, du)) * strain.measure
+                out += ufl.inner(force, ufl.derivative(m.k.variation(strain.value), self.system.q, du)) * strain.measure
         form = self._at_rest(out)
         return None if form.empty() else forms.form(form, once=True)
 

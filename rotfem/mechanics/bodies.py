@@ -168,7 +168,6 @@ class Kinematics:
 
     Attributes:
         made_of: see `functions`; None for themselves.
-        varied: another function that q is made of too, and its test function, where the equations are those of it.
     """
 
     q: Any
@@ -176,13 +175,12 @@ class Kinematics:
     a: Any
     dq: Any
     made_of: tuple[Any, Any, Any, Any] | None = None
-    varied: tuple[Any, Any] | None = None
 
     @property
     def functions(self) -> tuple[Any, Any, Any, Any]:
         """The coefficients q, v, a and the test function of the space of the unknowns.
 
-        Themselves, unless components are left out, which then are zeros in q, v, a and dq.
+        Themselves, unless components are inactive, which then are zeros in q, v, a and dq.
         """
         return self.made_of or (self.q, self.v, self.a, self.dq)
 
@@ -199,4 +197,4 @@ class Kinematics:
     def variation(self, x: Any) -> Any:
         """Return δx of an expression x(q)."""
         q, _, _, dq = self.functions
-        return ufl.derivative(x, *(self.varied or (q, dq)))
+        return ufl.derivative(x, q, dq)

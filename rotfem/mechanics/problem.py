@@ -51,7 +51,7 @@ class Problem:
         outputs: functionals that are recorded, by name, mechanics ↦ UFL form, as of an `Output`.
         prestress: "axial" or "all", whose geometric stiffness the prestressed linear theories have; None for what is
             usual for the structure: that of forces and moments of a spatial beam, else of axial and membrane forces.
-        left_out: names of the unknowns that are zero at all times and are none (see `rotfem.selection.left_out`).
+        inactive: names of the components that are zero at all times and no unknowns (`rotfem.structures.symmetry`).
     """
 
     structure: Any
@@ -64,7 +64,7 @@ class Problem:
     terms: Mapping[str, Work] = field(default_factory=dict)
     outputs: Mapping[str, Functional] = field(default_factory=dict)
     prestress: str | None = None
-    left_out: tuple[str, ...] = ()
+    inactive: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("terms", "outputs"):

@@ -114,7 +114,7 @@ class Beam(Structure):
             return False
         basis, cells = self.V.element.basix_element, np.arange(self.mesh.topology.index_map(1).size_local)
         at, by_x = basis.tabulate(1, quadrature_points(self.mesh, basis.degree))[..., 0]
-        nodes = self.k.q.x.array.reshape(-1, len(self.unknowns))[self.V.dofmap.list[cells]]
+        nodes = self.k.functions[0].x.array.reshape(-1, len(self.unknowns))[self.V.dofmap.list[cells]]
         values = np.einsum("pn,cni->cpi", at, nodes)
         slopes = np.einsum("pn,cni->cpi", by_x, nodes) / self.mesh.h(1, cells.astype(np.int32))[:, None, None]
         moves = np.array([name.startswith("u") for name in self.unknowns])

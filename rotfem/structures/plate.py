@@ -59,7 +59,7 @@ class Plate(Structure):
     type = "plate"
     components = ("u1", "u2", "u3", "alpha1", "alpha2")
     planes: ClassVar = {2: (0, 1)}
-    across: ClassVar = {2: (2, 3, 4)}
+    is_flat = True
     prestressing: ClassVar = ("membrane",)
     stiff: ClassVar = ("shear",)
     #: Frequencies of the exact theory at constant speeds are off by a tenth to all of that.
@@ -96,6 +96,11 @@ class Plate(Structure):
         self.tip_values = TipValues(self.V, self._tip_point(low, high))
         self._properties()
         self.turns = DirectorTurns.of(self) if self.size == len(self.components) else None
+
+    @classmethod
+    def is_symmetric(cls, data: Any, normal: int) -> bool:
+        """Return whether these data are symmetric about the middle surface, as those of any plate are."""
+        return True
 
     # --- mesh -------------------------------------------------------------------------------------------------------
 

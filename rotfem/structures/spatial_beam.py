@@ -24,7 +24,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from rotfem.errors import InputError
-from rotfem.mechanics.bodies import AppliedLoad, Body, Kinematics, Strain
+from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
 from rotfem.mechanics.loads import Load
 from rotfem.mechanics.problem import Problem
 from rotfem.structures.beam import Beam
@@ -60,7 +60,6 @@ class SpatialBeam(Beam):
     turns_of: ClassVar = {1: 3, 2: 4, 3: 5}
     components = ("u1", "u2", "u3", "theta1", "theta2", "theta3")
     planes: ClassVar = {1: (0, 2, 4), 2: (0, 1, 5)}
-    across: ClassVar = {1: (1, 5), 2: (2, 4)}
     dimension = 3
     prestress = "all"
     #: Conjugates of the tip's components: inputs of the state-space model (a moment works on θ there).
@@ -75,6 +74,7 @@ class SpatialBeam(Beam):
         #: Pitch at t = 0; that of later times is in the motion of the frame.
         self._first_pitch = s.root.pitch.constant if pitch is None else pitch.start
         super().__init__(problem, comm, s.knots)
+        self._turn = SectionTurn(rotation_part(self.k.q), exact=not problem.theory.linear)
         self._forms = SectionForms(self, s.section)
         if s.hub_offset is None:
             self._root = ufl.as_vector((self.scalar("hub_radius", self.hub_radius), 0, 0))
@@ -86,10 +86,27 @@ class SpatialBeam(Beam):
         whole = self.size == len(self.components) and not self.hinges  # whose turns are counted from the hub
         self.turns = SectionTurns.of(self) if whole else None
 
-    def use(self, kinematics: Kinematics) -> None:
-        """Take these unknowns, and the turn of the sections that they are."""
-        super().use(kinematics)
-        self._turn = SectionTurn(rotation_part(kinematics.q), exact=not self.problem.theory.linear)
+    @classmethod
+    def is_symmetric(cls, data: Any, normal: int) -> bool:
+        """Return whether the undeformed beam is symmetric about the plane through its root with this normal, 1 or 2.
+
+        Its axis is in the plane then, section axis `normal` + 1 is the normal all along, and no entry of section
+        matrices and inertia tensors couples what a reflection turns round, of (Γ, K) or (v, ω), with the rest.
+        """
+        if np.any(np.atleast_2d(data.pretwist)[:, -1]) or data.pitches or data.root.pitch.constant != 0.0:
+            return False
+        leaves = {1: data.sweep, 2: data.precone}[normal]  # the plane (1, 3) by sweep, the plane (1, 2) by precone
+        if np.any(np.atleast_2d(leaves)[:, -1]) or np.any(np.array(data.line or [(0.0, 0.0, 0.0)])[:, normal]):
+            return False
+        rigid = [(data.tip_offset, data.tip_inertia_matrix), *((m.offset, m.inertia_matrix) for m in data.masses)]
+        if any(offset[normal] != 0.0 or np.any(np.delete(J[normal], normal)) for offset, J in rigid):
+            return False
+        knots = np.array([0.0, *data.section.breakpoints, data.length])
+        places = np.union1d(knots, (knots[1:] + knots[:-1]) / 2)
+        across = np.arange(3) == normal
+        mirrored = np.concatenate([across, ~across])
+        coupling = mirrored[:, None] != mirrored
+        return not any(np.any(matrix[..., coupling]) for matrix in data.section.at(places).values())
 
     # --- the undeformed beam ------------------------------------------------------------------------------------
 

@@ -46,10 +46,10 @@ class Structure(LoadsOfStructure):
     planar: ClassVar[bool] = False
     #: Names of the unknowns.
     components: ClassVar[tuple[str, ...]]
-    #: Direction that is normal to a plane of symmetry ↦ the components of motions in that plane.
+    #: Normal of a plane that it may be symmetric about, 0 to 2 ↦ the components of motions in that plane.
     planes: ClassVar[dict[int, tuple[int, ...]]] = {}
-    #: Direction of forces ↦ the components that, in a linear theory, may be moved by them alone.
-    across: ClassVar[dict[int, tuple[int, ...]]] = {}
+    #: Whether such a plane is its middle surface, so that to first order its bending is apart from its stretching.
+    is_flat: ClassVar[bool] = False
     #: Axis of a hinge at the root, 1 to 3 ↦ the component that turns in it.
     turns_of: ClassVar[dict[int, int]] = {}
     #: Strains whose force makes geometric stiffness in the prestressed linear theories, where not those of all do.
@@ -72,9 +72,9 @@ class Structure(LoadsOfStructure):
 
     def __init__(self, problem: Problem, comm: MPI.Comm):
         self.problem, self.comm, self.data = problem, comm, problem.structure
-        #: Numbers of the components that are unknowns; the others are left out, and zero.
-        self.kept = tuple(i for i, name in enumerate(self.components) if name not in problem.left_out)
-        self.size = len(self.kept)
+        #: Numbers of the components that are unknowns; the others are inactive, and zero.
+        self.active = tuple(i for i, name in enumerate(self.components) if name not in problem.inactive)
+        self.size = len(self.active)
         #: Section properties by name: a constant each where the section is uniform, a field each where it is not.
         self.section: dict[str, Any] = {}
         #: Single numbers that the forms contain, by name.
@@ -88,44 +88,33 @@ class Structure(LoadsOfStructure):
         self.mesh = mesh
         self.V = fem.functionspace(mesh, element("Lagrange", mesh.basix_cell(), degree, shape=(self.size,)))
         q, v, a = (fem.Function(self.V, name=name) for name in "qva")
-        self.use(self.kinematics((q, v, a, ufl.TestFunction(self.V))))
+        self.k = self._kinematics((q, v, a, ufl.TestFunction(self.V)))
 
-    def use(self, kinematics: Kinematics) -> None:
-        """Take these unknowns for those that positions, strains, bodies and loads are written in."""
-        self.k = kinematics
-
-    def kinematics(self, functions: tuple[Any, Any, Any, Any], beside: tuple[Any, Any] | None = None) -> Kinematics:
-        """Return q, v, a and δq with all components, made of functions of those kept, zeros in the place of others.
-
-        Args:
-            functions: q, v, a and the test function of the components that are kept.
-            beside: q and test function of those that are left out, for equations of their own.
-        """
+    def _kinematics(self, functions: tuple[Any, Any, Any, Any]) -> Kinematics:
+        """Return q, v, a and δq with all components, made of functions of the active ones and zeros."""
         if self.size == len(self.components):
             return Kinematics(*functions)
-        others = [i for i in range(len(self.components)) if i not in self.kept]
-        if beside is None:
-            q, v, a, dq = (self._whole({c: f[i] for i, c in enumerate(self.kept)}) for f in functions)
-            return Kinematics(q, v, a, dq, made_of=functions)
-        kept = [{c: f[i] for i, c in enumerate(self.kept)} for f in functions[:3]]
-        p, test = ({c: f[i] for i, c in enumerate(others)} for f in beside)
-        q, v, a, dq = (self._whole(parts) for parts in (kept[0] | p, *kept[1:], test))
-        return Kinematics(q, v, a, dq, made_of=functions, varied=beside)
+        places = {component: i for i, component in enumerate(self.active)}
+        numbers = range(len(self.components))
+        q, v, a, dq = (ufl.as_vector([f[places[i]] if i in places else 0 for i in numbers]) for f in functions)
+        return Kinematics(q, v, a, dq, made_of=functions)
+
+    @classmethod
+    def is_symmetric(cls, data: Any, normal: int) -> bool:
+        """Return whether the undeformed structure of these data is symmetric about one of its `planes`."""
+        return False
 
     @property
     def unknowns(self) -> tuple[str, ...]:
-        """Names of the unknowns of a node: of the components that are not left out."""
-        return tuple(self.components[i] for i in self.kept)
-
-    def _whole(self, parts: dict[int, Any]) -> Any:
-        return ufl.as_vector([parts.get(i, 0) for i in range(len(self.components))])
+        """Names of the unknowns of a node: of the active components."""
+        return tuple(self.components[i] for i in self.active)
 
     def whole_values(self, values: Array) -> Array:
-        """Return all components of values (…, unknowns of a node), zeros for those left out."""
+        """Return all components of values (…, unknowns of a node), zeros for inactive ones."""
         if self.size == len(self.components):
             return values
         out = np.zeros((*values.shape[:-1], len(self.components)), dtype=values.dtype)
-        out[..., self.kept] = values
+        out[..., self.active] = values
         return out
 
     def check_shared(self) -> None:
@@ -161,10 +150,10 @@ class Structure(LoadsOfStructure):
         """Return what holds the hinges; none here."""
         return []
 
-    def _held(self, components: Collection[int]) -> list[int]:
-        """Return which of these components, by their place among them, the clamp holds."""
+    def _held(self) -> list[int]:
+        """Return which of the unknowns of a node the clamp holds."""
         free = {self.turns_of[axis] for axis in self.hinges}
-        return [place for place, i in enumerate(components) if i not in free]
+        return [place for place, i in enumerate(self.active) if i not in free]
 
     def clamped_unknowns(self, nodes: npt.NDArray[np.int32] | None = None) -> npt.NDArray[np.int32]:
         """Return the local numbers of the unknowns that the clamp holds, in order.
@@ -172,11 +161,11 @@ class Structure(LoadsOfStructure):
         Args:
             nodes: that are clamped; the owned ones if None.
         """
-        return self._numbers(nodes, self._held(self.kept))
+        return self._numbers(nodes, self._held())
 
     def hinged_unknowns(self, nodes: npt.NDArray[np.int32] | None = None) -> npt.NDArray[np.int32]:
         """Return the local numbers of those that turn in hinges of the clamp, in order (see `clamped_unknowns`)."""
-        held = self._held(self.kept)
+        held = self._held()
         return self._numbers(nodes, [i for i in range(self.size) if i not in held])
 
     def _numbers(self, nodes: npt.NDArray[np.int32] | None, components: list[int]) -> npt.NDArray[np.int32]:
@@ -187,22 +176,19 @@ class Structure(LoadsOfStructure):
     def clamp_conditions(
         self,
         V: fem.FunctionSpace | None = None,
-        others: Collection[int] | None = None,
         nodes: npt.NDArray[np.int32] | None = None,
     ) -> list[Any]:
         """Return the boundary conditions of the clamp.
 
         Args:
-            V: space of the unknowns, or of other components; that of the structure if None.
-            others: these components; those that are kept if None.
+            V: another space of the unknowns, as of a finer mesh; that of the structure if None.
             nodes: clamped nodes of that space; those of the structure if None.
         """
-        V, components = V or self.V, self.kept if others is None else others
-        nodes, held = self.clamped if nodes is None else nodes, self._held(components)
-        if len(held) == len(components):
+        V, nodes, held = V or self.V, self.clamped if nodes is None else nodes, self._held()
+        if len(held) == self.size:
             return [fem.dirichletbc(fem.Function(V), nodes)]
         zero = default_scalar_type(0.0)
-        return [fem.dirichletbc(zero, nodes * len(components) + i, V.sub(i)) for i in held]
+        return [fem.dirichletbc(zero, nodes * self.size + i, V.sub(i)) for i in held]
 
     def stretch(self, strains: list[Strain]) -> Any:
         """Return an expression that is 1 where the structure is undeformed and at most 0 where it is inside out."""

@@ -34,6 +34,16 @@ BEAM: dict[str, Any] = {
     "time": {"end": 0.4, "step": 0.01},
 }
 PLATE = tomllib.loads(PLATE_TABLES)["structure"]
+SPATIAL = {
+    **STRUCTURE,
+    "type": "spatial_beam",
+    "section": {
+        **dict.fromkeys(("GA2", "GA3"), 1e7),
+        **dict.fromkeys(("EI2", "EI3", "GJ"), 1.4e4),
+        "EA": 2.8e7,
+        "mass_per_length": 1.2,
+    },
+}
 HUB = {"type": "torque", "hub_inertia": 50.0, "pulses": [[0.0, 0.17, 30.0]]}
 
 #: Kinds of runs, each with something of its own to be remembered.
@@ -49,6 +59,15 @@ KINDS: dict[str, dict[str, Any]] = {
     "free hub": {"motion": HUB},
     "chosen model": {"model": {"tolerance": 0.05}},
     "release": {"initial": {"tip_displacement": 0.5}},
+    "inactive unknowns": {"structure": SPATIAL, "time": {"end": 0.4, "tolerance": 1e-3}},
+    "plate that bends": {
+        "structure": PLATE,
+        "motion": {"type": "constant", "speed": 0.0},
+        "mesh": {"elements": [5, 3]},
+        "model.theory": "consistent_linear",
+        "loads": {"pressure": [[0.0, 0.0], [0.1, 30.0]]},
+        "time": {"end": 4e-2, "step": 1e-3},
+    },
     "plate": {
         "structure": PLATE,
         "mesh": {"elements": [5, 3]},
