@@ -32,8 +32,8 @@ ABOUT_PEAK = np.array([-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0])
 UNDAMPED = 1e-8
 BESIDE = 1e-3
 
-#: Part of the inertia that brakes the motion where damping is by mode, in a matrix that is factorised without it: that
-#: of the structure alone would be singular at its resonances.
+#: Part of the inertia that brakes the motion in a matrix near by, where the damping of low rank is none of what is
+#: factorised: that of the structure alone would be singular at its resonances.
 BRAKED = 0.05
 
 #: Frequencies, as parts of the lowest one of a free hub's vibrating modes, at which its rigid turn is told.
@@ -60,8 +60,7 @@ class FrequencyResponse:
         self.force = np.array(force, dtype=np.complex128)
         self.force[analysis.system.held.clamped] = 0.0
         pencil = spinning.pencil
-        self._values = [A.getValuesCSR()[2] for A in (pencil.K, pencil.C, pencil.M)]
-        self._solver = ComplexSolver(pencil.K)
+        self._solver = ComplexSolver((pencil.K, pencil.C, pencil.M))
 
     def direct(self, omega: float) -> Array:
         """Return the complex amplitudes of the outputs at a frequency (rad/s), from one solution.
@@ -76,12 +75,10 @@ class FrequencyResponse:
 
     def _solved(self, omega: float) -> Array:
         """Return q̂ of the owned unknowns."""
-        K, C, M = self._values
-        by_mode = self.spinning.pencil.by_mode
-        if by_mode is None:
-            self._solver.factor(K + 1j * omega * C - omega**2 * M)
+        if not self._solver.updates:
+            self._solver.factor((1.0, 1j * omega, -(omega**2)))
             return np.asarray(self._solver.solve(self.force))
-        self._solver.factor(K + 1j * omega * C - (1 - 1j * BRAKED) * omega**2 * M, by_mode, 1j * omega)
+        self._solver.factor((1.0, 1j * omega, -(1 - 1j * BRAKED) * omega**2))
         return np.asarray(
             solve_by_nearby(lambda x: self._times(omega, x), self._solver.solve, self.force, self.analysis.comm)
         )

@@ -12,6 +12,7 @@ from rotfem.errors import ComputationError
 from rotfem.numerics.balance import power_of_two
 from rotfem.numerics.bounds import ROUNDED, RoundOff, relative
 from rotfem.numerics.eigenproblem import Eigenpairs, Pencil
+from rotfem.numerics.low_rank import sparse_part
 
 Array = npt.NDArray[Any]
 
@@ -37,12 +38,12 @@ class KeptDigits:
         """Return the pairs, or those of the saddle form where digits are lost and it keeps more of them.
 
         Args:
-            pencil: M, C and K at the state that is set; with damping by mode nothing better is tried.
+            pencil: M, C and K at the state that is set; where C is not sparse nothing better is tried.
             pairs: its eigenpairs.
             count: number of pairs wanted.
         """
         worst = float(np.max(pairs.bounds[:count], initial=0.0))
-        if worst <= LOST or pencil.by_mode is not None or not Resultants.possible(self.system):
+        if worst <= LOST or sparse_part(pencil.C) is not pencil.C or not Resultants.possible(self.system):
             return pairs
         if self._in_damping(pairs, count) > WORTH:
             return pairs

@@ -129,8 +129,8 @@ class ModalAnalysis:
         q = self.equilibrium(speed, start)
         t1 = perf_counter()
         matrices = self.system.mass_damping_stiffness(keep)
-        clamped = Pencil(*matrices, by_mode=self.system.held.by_mode)
-        pencil = Pencil(*self.system.with_hub(matrices), by_mode=self.system.by_mode) if self.free else clamped
+        clamped = Pencil(*matrices)
+        pencil = Pencil(*self.system.with_hub(matrices)) if self.free else clamped
         t2 = perf_counter()
         clamped.unit = pencil.unit = self._unit
         pencil.sizes = self.stiffness_sizes(pencil.K)

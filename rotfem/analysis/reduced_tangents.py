@@ -22,6 +22,7 @@ from petsc4py import PETSc
 
 from rotfem.analysis.ritz_vectors import RitzVectors
 from rotfem.numerics.linear import transposed
+from rotfem.numerics.low_rank import sparse_part
 
 Array = npt.NDArray[np.float64]
 
@@ -66,7 +67,6 @@ class Tangents:
             for x in (inner.q, inner.v, inner.a):
                 x.x.scatter_forward()
         self.speed = abs(float(system.motion.speed(state.t)))
-        self.by_mode = inner.by_mode
         #: C, if it has been found.
         self._damping: Any = None
         self.matrices = {"M": self._matrix("M") if mass is None else mass, "K": self._matrix("K")}
@@ -90,8 +90,8 @@ class Tangents:
         forward = FAR / rate
         self._damping = self._matrix("C")
         inner.q.x.array[:] += forward * v
-        change = self._matrix("C")
-        change.axpy(-1.0, self._damping, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        change = sparse_part(self._matrix("C"))  # the rest of C is constant
+        change.axpy(-1.0, sparse_part(self._damping), PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         inner.q.x.array[:], inner.v.x.array[:] = q, 0.0
         still = self._matrix("K")
         inner.v.x.array[:] = v
@@ -114,9 +114,6 @@ class Tangents:
         """
         C = self._matrix("C") if self._damping is None else self._damping
         parts = {"M": np.eye(len(shapes.squares)), "C": shapes.product(C), "K": shapes.stiffness}
-        if self.by_mode is not None:
-            along = self.by_mode.along(shapes.V)
-            parts["C"] = parts["C"] + along.T @ along
         for name in parts if self.system.hub is not None else ():
             border = self._border(name)
             row, column = shapes.sum(np.array([border.row @ shapes.V, border.column @ shapes.V]))

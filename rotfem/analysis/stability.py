@@ -110,9 +110,9 @@ def stability_of(system: Any, q: Array, speed: float) -> Stability:
         return Stability()
     matrices = (held.matrix(0.0, 0.0, 1.0, 0.0), held.matrix(0.0, 1.0, 0.0, 0.0), K)
     if system.hub is None:
-        return by_motions(Pencil(*matrices, by_mode=held.by_mode), negative)
+        return by_motions(Pencil(*matrices), negative)
     # A free hub keeps its momentum, not its speed: K of the structure alone decides nothing.
-    pencil = Pencil(*system.with_hub(matrices), by_mode=system.by_mode)
+    pencil = Pencil(*system.with_hub(matrices))
     return by_motions(pencil, None, Pencil(*matrices).scale())
 
 

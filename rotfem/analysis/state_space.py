@@ -20,6 +20,7 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.equations.modal_damping import KEY
 from rotfem.errors import InputError, OutputError, SceneError
 from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.low_rank import PlusLowRank, sparse_part
 
 Array = npt.NDArray[Any]
 
@@ -122,18 +123,19 @@ def write_matrices(analysis: ModalAnalysis, spinning: Spinning, folder: Path) ->
     serial(analysis, "the export of matrices")
     structure = analysis.structure
     free = np.setdiff1d(np.arange(len(spinning.q)), analysis.system.clamped)
-    by_mode, paths = spinning.pencil.by_mode, []
-    if by_mode is not None and len(free) > FULL:
+    paths = []
+    if sparse_part(spinning.pencil.C) is not spinning.pencil.C and len(free) > FULL:
         why = f"C is full with damping by mode; it is written for up to {FULL} free unknowns, and here are {len(free)}"
         raise InputError(KEY, analysis.problem.structure.damping.modal, why)
     try:
         for name in "MCK":
             A = getattr(spinning.pencil, name)
-            indptr, indices, data = A.getValuesCSR()
-            matrix = csr_array((data, indices, indptr), shape=A.getSize())[free][:, free]
+            sparse = sparse_part(A)
+            indptr, indices, data = sparse.getValuesCSR()
+            matrix = csr_array((data, indices, indptr), shape=sparse.getSize())[free][:, free]
             matrix.eliminate_zeros()
-            if name == "C" and by_mode is not None:
-                matrix = csr_array(matrix.toarray() + by_mode.B[free] @ by_mode.B[free].T)
+            if isinstance(A, PlusLowRank):
+                matrix = csr_array(matrix.toarray() + A.added(np.eye(len(spinning.q))[:, free])[free])
             mmwrite(folder / f"{name}.mtx", matrix, symmetry="general", precision=17)
             save_npz(folder / f"{name}.npz", matrix)
             paths += [folder / f"{name}.mtx", folder / f"{name}.npz"]

@@ -191,20 +191,20 @@ class AffineSystem(AffineStiffness, AffineEnergies):
         if changed:
             combine(self.A, [self._operators[k] for k in "KCM"], np.array(shift))
             self._changed, self._shift = False, shift
-        return self.A, changed
+        return self.with_modes(self.A, c_v), changed
 
     def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
         """Return a new matrix c_k K + c_v C + c_m M with `diagonal` at clamped unknowns (where K has 1)."""
         A = self.A.duplicate()
         combine(A, [self._operators[k] for k in "KCM"], np.array([c_k, c_v, c_m]))
         set_diagonal(self.clamped, A, diagonal)
-        return A
+        return self.with_modes(A, c_v)
 
     def mass_damping_stiffness(self, keep: bool = True) -> tuple[Any, Any, Any]:
         """Return (M, C, K) (see `System`); without keeping, these are the system's own matrices, no copies."""
         if keep:
             return super().mass_damping_stiffness()
-        return self._operators["M"], self._operators["C"], self._operators["K"]
+        return self._operators["M"], self.with_modes(self._operators["C"], 1.0), self._operators["K"]
 
     @cached_property
     def _spun(self) -> Any:

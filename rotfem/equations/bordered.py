@@ -23,7 +23,7 @@ from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.motion import Motion
 from rotfem.numerics.linear import Increment
-from rotfem.numerics.low_rank import LowRank
+from rotfem.numerics.low_rank import PlusLowRank
 from rotfem.structures.root_reaction import along_axis
 
 Array = npt.NDArray[np.float64]
@@ -123,7 +123,7 @@ class BorderedSystem:
         b, c = s.spin_derivative(c_v, c_m), row.row(shifts)
         r, d = -row.residual(s.time), row.diagonal(c_v, c_m) + row.torque_slope(c_k, c_v)
         assembled_at = perf_counter()
-        out = self._eliminated(s.factor(A, c_v, changed), (R, b), c, r, d)
+        out = self._eliminated(s.factor(A, changed), (R, b), c, r, d)
         s.seconds["assemble"] += assembled_at - started
         s.seconds["solve"] += perf_counter() - assembled_at
         return out
@@ -163,12 +163,6 @@ class BorderedSystem:
     def linearised(self) -> BorderedLinearised:
         """Return the equations linearised about the state and time set."""
         return BorderedLinearised(self)
-
-    @property
-    def by_mode(self) -> LowRank | None:
-        """What damping by mode adds to C, with the angle of the hub as last unknown: it acts in the frame."""
-        part = self.inner.by_mode
-        return None if part is None else part.bordered()
 
     def with_hub(self, matrices: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
         """Return M, C, K of the structure with the angle of the hub as last unknown, about the state and speed set."""
@@ -276,14 +270,16 @@ class OverStep(BorderedSystem):
 
 
 def bordered(A: Any, row: Array, column: Array, corner: float) -> Any:
-    """Return [[A, column], [row, corner]] as a new PETSc matrix; the last rank holds the new row.
+    """Return [[A, column], [row, corner]] as a new matrix of the kind of A; the last rank holds the new row.
 
     Args:
-        A: square PETSc matrix.
+        A: square PETSc matrix, or `PlusLowRank`.
         row: owned part of the new row.
         column: owned part of the new column.
         corner: the last diagonal entry.
     """
+    if isinstance(A, PlusLowRank):
+        return PlusLowRank(bordered(A.sparse, row, column, corner), A.part.bordered(), A.factor)
     comm = A.comm.tompi4py()
     size, last = A.getSize()[0], comm.rank == comm.size - 1
     indptr, indices, data = A.getValuesCSR()

@@ -47,7 +47,8 @@ class DampedStress:
         if viscosity is not None:
             out.append(viscosity * ufl.derivative(force, q, v))
         if self._displaced is not None:
-            out.append(forms.without(ufl.derivative(force, q, self._displaced), q))
+            at_rest = forms.first_branches(force)  # at rest the other branches of its rotations divide by zero
+            out.append(forms.without(ufl.derivative(at_rest, q, self._displaced), q))
         return out
 
     def update(self, v: Array) -> None:

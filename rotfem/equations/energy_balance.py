@@ -32,7 +32,6 @@ from petsc4py import PETSc
 from rotfem.equations.solutions import Solutions
 from rotfem.mechanics.effects import INTERNAL
 from rotfem.numerics import compat, forms
-from rotfem.numerics.low_rank import LowRank
 
 Array = npt.NDArray[np.float64]
 
@@ -166,24 +165,15 @@ class EnergyBalance(Solutions):
         self.system.set_state(q, v)
         return float(self.system.total(self._energy))
 
-    @property
-    def by_mode(self) -> LowRank | None:
-        """What damping by mode adds to C; None without."""
-        part: LowRank | None = self.system.by_mode
-        return part
-
     def _given(self) -> float:
         """Return the work of the clamp and of the terms without energy over the step to the state set, J."""
         work = -self.system.total(self._work)
-        if self.by_mode is not None:
-            work -= self._product(self._damping_by_mode(self.by_mode), self._move.x.array[self._owned], slice(None))
+        if (part := self.system.by_mode) is not None:
+            force = part.times(self._state[1][self._owned])
+            work -= self._product(force, self._move.x.array[self._owned], slice(None))
         if self.system.clamp is not None:
             work += self._product(self._assembled(), self._move.x.array, self.system.clamped)
         return float(work)
-
-    def _damping_by_mode(self, part: LowRank) -> Array:
-        """Return its force at the middle of the step, owned rows."""
-        return part.times(self._state[1][self._owned])
 
     def _assembled(self) -> Array:
         self._b.array[:] = 0.0
@@ -205,8 +195,8 @@ class EnergyBalance(Solutions):
         b = self._assembled()
         if self.model.hub is None:
             self._balance(b)
-        if self.by_mode is not None:
-            b[self._owned] += self._damping_by_mode(self.by_mode)
+        if (part := self.system.by_mode) is not None:
+            b[self._owned] += part.times(self._state[1][self._owned])
         np.negative(b, out=b)
         b[self.system.clamped] = 0.0
         return self.b
@@ -235,7 +225,7 @@ class EnergyBalance(Solutions):
         fem_petsc.assemble_matrix(self.A, self._J, self.system.bcs)
         self.A.assemble()
         self.A.axpy(self._factor, self._N, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
-        return self.A, True
+        return self.system.with_modes(self.A, c_v), True
 
     def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
         """Return c_k K + c_v C + c_m M of the system."""

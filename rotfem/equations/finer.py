@@ -18,7 +18,7 @@ from petsc4py import PETSc
 from rotfem.numerics import compat
 from rotfem.numerics.extended_cells import ExtendedCells
 from rotfem.numerics.linear import DirectSolver, Increment, NearbySolver, held
-from rotfem.numerics.low_rank import LowRank
+from rotfem.numerics.low_rank import LowRank, PlusLowRank
 from rotfem.numerics.projection import times
 from rotfem.numerics.refinement import refinement
 from rotfem.structures.tip_values import TipValues
@@ -105,6 +105,16 @@ class FinerEquations:
         if kind not in self._matrices:
             self._matrices[kind] = self._assembled(names, diagonal)
         return self._matrices[kind]
+
+    def mass_damping_stiffness(self) -> tuple[Any, Any, Any]:
+        """Return (M, C, K) on the refined mesh, as those of the system."""
+        M, K = self.matrix("M"), self.matrix("K")
+        if self.system.tangent_forms("C")[0]:
+            C = self.matrix("C")
+        else:
+            C = K.duplicate()
+            C.assemble()
+        return M, C if self.system.by_mode is None else PlusLowRank(C, self._by_mode), K
 
     def at_rest(self) -> Any:
         """Return K of the undeformed structure, if that is the state that was taken, with 1 at clamped unknowns."""

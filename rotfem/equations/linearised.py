@@ -32,13 +32,12 @@ class Linearised:
     def __init__(self, system: Any):
         self.system, self.datum, self.serves = system, system.datum, True
         self._matrices = tuple(reversed(system.held.mass_damping_stiffness()))
-        self._values = [A.getValuesCSR()[2] for A in self._matrices]
         self._shift: float | None = None
         self._part = Increment(system.held.V)
         self._owned = len(self._matrices[0].createVecLeft().array)
         self._real_matrix = self._matrices[0].duplicate()
         self._real = DirectSolver(self._real_matrix)
-        self._complex = ComplexSolver(self._matrices[0])
+        self._complex = ComplexSolver(self._matrices)
         self._b = self._real_matrix.createVecLeft()
 
     def take(self, shifts: tuple[float, complex]) -> None:
@@ -46,11 +45,8 @@ class Linearised:
         if self._shift == shifts[0]:
             return
         s, z = shifts
-        part = self.system.held.by_mode
-        combine(self._real_matrix, list(self._matrices), np.array([1.0, s, s * s]))
-        self._real.refresh(part, s)
-        k, c, m = self._values
-        self._complex.factor(k + z * c + z * z * m, part, z)
+        self._real.refresh(combine(self._real_matrix, list(self._matrices), np.array([1.0, s, s * s])))
+        self._complex.factor((1.0, z, z * z))
         self._shift = s
 
     def solve(self, real: Array, complex_: Array) -> tuple[Array, Array]:

@@ -201,13 +201,13 @@ class NonlinearSystem(System):
             self.shift((c_k, c_v, c_m))
             fem_petsc.assemble_matrix(self.A, self._on_the_way, self.bcs)
             self.A.assemble()
-        return self.A, True
+        return self.with_modes(self.A, c_v), True
 
     def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
         """Return a new matrix c_k K + c_v C + c_m M at the state with `diagonal` at clamped unknowns."""
         A = self._empty.duplicate()
         self._assemble(A, (c_k, c_v, c_m), diagonal)
-        return A
+        return self.with_modes(A, c_v)
 
     @cached_property
     def _empty(self) -> Any:

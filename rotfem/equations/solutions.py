@@ -12,7 +12,6 @@ from petsc4py import PETSc
 
 from rotfem.equations.linearised import Linearised
 from rotfem.numerics.linear import DirectSolver, Increment, SingularSolver, is_regular
-from rotfem.numerics.low_rank import LowRank
 
 Array = npt.NDArray[np.float64]
 
@@ -71,11 +70,6 @@ class Solutions:
         """What rotations are counted from; None for the undeformed structure."""
         return None
 
-    @property
-    def by_mode(self) -> LowRank | None:
-        """What damping by mode adds to C; None without."""
-        return None
-
     def correction(self, shifts: tuple[float, float, float], before: Array | None = None) -> Array:
         """Return −(c_k K + c_v C + c_m M)⁻¹ F at the state, Newton's correction of q (a local array, reused).
 
@@ -91,7 +85,7 @@ class Solutions:
             known = {"t": self.time, "q": q, "v": v, "a": a, "shifts": shifts, "before": before}
             self.factored = {**known, "datum": self.datum}
         assembled = perf_counter()
-        dq = self._dx.solve(self.factor(A, shifts[1], changed), b)
+        dq = self._dx.solve(self.factor(A, changed), b)
         self.seconds["assemble"] += assembled - started
         self.seconds["solve"] += perf_counter() - assembled
         return dq
@@ -123,14 +117,11 @@ class Solutions:
         """Return the equations linearised about the state and time set."""
         return Linearised(self)
 
-    def factor(self, A: Any, c_v: float, changed: bool = True) -> DirectSolver:
-        """Return the solver of the system's tangent A, whose C has a factor c_v, with a new one where it has changed.
-
-        Damping by mode is none of A.
-        """
+    def factor(self, A: Any, changed: bool = True) -> DirectSolver:
+        """Return the solver of the system's tangent A, with a new factor where it has changed."""
         if self._solver is None or changed:
             self._solver = self._solver or DirectSolver(A)
-            self._solver.refresh(self.by_mode, c_v)
+            self._solver.refresh(A)
         return self._solver
 
     @property

@@ -25,6 +25,7 @@ from rotfem.mechanics.motion import IDENTITY, Motion
 from rotfem.numerics import compat
 from rotfem.numerics.caching import forget
 from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.low_rank import PlusLowRank
 from rotfem.structures.root_reaction import RootReaction
 from rotfem.structures.turning_clamp import TurningClamp
 
@@ -158,8 +159,12 @@ class System(Readings, Solutions, ABC):
 
     @property
     def by_mode(self) -> ByMode | None:
-        """What damping by mode adds to C, which has it nowhere else; None without, and where damping is left out."""
+        """The part of C that is damping by mode; None without, and where damping is left out."""
         return self._by_mode if self._damped else None
+
+    def with_modes(self, A: Any, c_v: float) -> Any:
+        """Return A + c_v times the part of C that is damping by mode, of an A with c_v times all else in C."""
+        return A if self.by_mode is None or c_v == 0.0 else PlusLowRank(A, self.by_mode, c_v)
 
     @property
     def balance(self) -> Any:
@@ -231,7 +236,7 @@ class System(Readings, Solutions, ABC):
     # --- matrices --------------------------------------------------------------------------------------------------
 
     def mass_damping_stiffness(self, keep: bool = True) -> tuple[Any, Any, Any]:
-        """Return (M, C, K) at the state and time set, C without `by_mode`; clamped unknowns have 1 in K, 0 in M and C.
+        """Return (M, C, K) at the state and time set; clamped unknowns have 1 in K, 0 in M and C.
 
         Args:
             keep: whether they must outlast the next state or time that is set.

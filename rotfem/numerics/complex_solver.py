@@ -6,6 +6,7 @@ that the factor fills in as that of A does.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,19 +14,26 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from rotfem.numerics.linear import DirectSolver
-from rotfem.numerics.low_rank import LowRank, Update
+from rotfem.numerics.low_rank import PlusLowRank, Update, sparse_part
 
 Complex = npt.NDArray[np.complex128]
 
 
 class ComplexSolver:
-    """LU factorisation of complex matrices of one pattern.
+    """LU factorisation of complex sums of real matrices of one pattern.
 
     Args:
-        pattern: assembled real PETSc matrix; all matrices have its non-zeros.
+        matrices: assembled PETSc matrices; one may be `PlusLowRank`. Their entries are those of now.
+
+    Attributes:
+        updates: whether solutions are those of another matrix, updated: it must not be singular where the sum is not.
     """
 
-    def __init__(self, pattern: Any):
+    def __init__(self, matrices: Sequence[Any]):
+        self._entries = [sparse_part(A).getValuesCSR()[2] for A in matrices]
+        self._added = [(i, A) for i, A in enumerate(matrices) if isinstance(A, PlusLowRank)]
+        self.updates = bool(self._added)
+        pattern = sparse_part(matrices[0])
         indptr, indices, _ = pattern.getValuesCSR()
         length = np.diff(indptr)
         rows = np.repeat(2 * length, 2)
@@ -47,20 +55,17 @@ class ComplexSolver:
         self._update: Update | None = None
         self._x, self._b = self._matrix.createVecs()
 
-    def factor(self, values: Complex, beside: LowRank | None = None, factor: complex = 1.0) -> None:
-        """Factorise the matrix whose non-zeros (owned rows, row by row) these are.
-
-        Args:
-            values: non-zeros.
-            beside: what times a factor is to be added to the matrix in solutions.
-            factor: that factor.
-        """
+    def factor(self, weights: Sequence[complex]) -> None:
+        """Factorise Σ weight · matrix."""
+        values = np.asarray(sum(w * x for w, x in zip(weights, self._entries, strict=True)), dtype=np.complex128)
         self._values[self._upper] = np.stack([values.real, -values.imag], axis=1)
         self._values[self._lower] = np.stack([values.imag, values.real], axis=1)
         self._matrix.setValuesCSR(self._indptr, self._indices, self._values)
         self._matrix.assemble()
         self._solver.refresh()
-        self._update = None if beside is None else Update(beside, factor, self._column)
+        self._update = None
+        for i, A in self._added:
+            self._update = Update(A.part, weights[i] * A.factor, self._column)
 
     def _column(self, b: Any) -> Complex:
         return self._solved(b.astype(np.complex128))

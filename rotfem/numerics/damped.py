@@ -19,11 +19,11 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics.linear import DirectSolver
-from rotfem.numerics.low_rank import LowRank
+from rotfem.numerics.low_rank import sparse_part
 from rotfem.numerics.projection import times
 
 Array = npt.NDArray[Any]
-Matrices: TypeAlias = tuple[Any, Any, Any, LowRank | None]
+Matrices: TypeAlias = tuple[Any, Any, Any]
 
 #: A size that is none, and that of an eigenvalue whose square, times anything, may be no number any more.
 TINY, BEYOND = 1e-300, 1e140
@@ -130,10 +130,10 @@ def _real_span(v: Array) -> Array:
 
 
 class RitzPairs:
-    """Ritz pairs of M, C and K (balanced PETSc matrices) in a growing real basis.
+    """Ritz pairs of M, C and K (balanced matrices) in a growing real basis.
 
     Args:
-        matrices: M, C, K, and what damping by mode adds to C, None without.
+        matrices: M, C, K.
         start: first directions, columns of owned unknowns.
         target: where K + σ C + σ² M is factorised, 0 or beside the zero eigenvalue of a free hub.
         fast: whether the fast eigenvalues of overdamped modes are wanted.
@@ -143,15 +143,13 @@ class RitzPairs:
     """
 
     def __init__(self, matrices: Matrices, start: Array, target: float, fast: bool = True):
-        self.matrices, self.by_mode, self.target, self.fast = matrices[:3], matrices[3], target, fast
+        self.matrices, self.target, self.fast = matrices, target, fast
         self.comm: MPI.Comm = matrices[2].comm.tompi4py()
         self.norms = np.array([A.norm(PETSc.NormType.INFINITY) for A in self.matrices])
-        if self.by_mode is not None:
-            self.norms[1] += self.by_mode.bound()
         P = matrices[2].copy()
         for A, factor in ((matrices[1], target), (matrices[0], target**2)):
             if factor != 0.0:
-                P.axpy(factor, A)
+                P.axpy(factor, sparse_part(A))  # near enough to find new directions
         self._solver = DirectSolver(P)
         self._x, self._b = P.createVecs()
         self.V = np.zeros((self._x.getLocalSize(), 0))
@@ -160,10 +158,6 @@ class RitzPairs:
 
     def _sum(self, local: Array) -> Array:
         return np.asarray(self.comm.allreduce(local) if self.comm.size > 1 else local)
-
-    def _apply(self, A: Any, X: Array) -> Array:
-        out = times(A, X)
-        return out if self.by_mode is None or A is not self.matrices[1] else out + self.by_mode.times(X)
 
     def add(self, columns: Array) -> int:
         """Put what is new in real columns into the orthonormal basis; return how many directions that were."""
@@ -175,7 +169,7 @@ class RitzPairs:
             W = W @ (turns[:, keep] / np.sqrt(sizes[keep]))
         self.V = np.hstack([self.V, W])
         old = self._products
-        self._products = [np.hstack([P, self._apply(A, W)]) for P, A in zip(old, self.matrices, strict=True)]
+        self._products = [np.hstack([P, times(A, W)]) for P, A in zip(old, self.matrices, strict=True)]
         return int(W.shape[1])
 
     def solve(self, count: int) -> None:
@@ -212,7 +206,7 @@ class RitzPairs:
                     self._x.array[:] = part[:, j]
                     A.multTranspose(self._x, self._b)
                     total[:, j] += factor * np.conj(self.values[j]) ** power * self._b.array
-        return total if self.by_mode is None else total + np.conj(self.values) * self.by_mode.times(Y)
+        return total
 
     def grow(self) -> int:
         """Add K⁻¹ times the residuals of pairs that are not done; return how many directions are new."""
@@ -235,7 +229,7 @@ def damped_pairs(
     """Return (λ, x, y, backward errors) of the shapes that vibrate slowest without damping.
 
     Args:
-        matrices: M, C, K, balanced, and what damping by mode adds to C.
+        matrices: M, C, K, balanced.
         undamped: vectors of the pencil without damping, columns of owned unknowns.
         count: number of pairs.
         target: see `RitzPairs`.

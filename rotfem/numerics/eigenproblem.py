@@ -21,7 +21,7 @@ from rotfem.numerics.bounds import RoundOff
 from rotfem.numerics.damped import MORE, damped_pairs, heavily_damped
 from rotfem.numerics.left_vectors import matched, mirror_error, mirrored
 from rotfem.numerics.linear import transposed, use_direct_solver
-from rotfem.numerics.low_rank import LowRank
+from rotfem.numerics.low_rank import sparse_part
 
 Array = npt.NDArray[Any]
 
@@ -66,15 +66,14 @@ class Pencil:
     """M, C and K of small motions about an equilibrium (PETSc matrices, clamped unknowns 0, 0 and 1).
 
     Args:
-        M: mass, C: gyroscopic and damping, K: stiffness matrix.
-        by_mode: what damping by mode adds to C; None without.
+        M: mass, C: gyroscopic and damping (it may be `PlusLowRank`), K: stiffness matrix.
 
     Attributes:
         owner: kept alive with the matrices.
     """
 
-    def __init__(self, M: Any, C: Any, K: Any, *, by_mode: LowRank | None = None):
-        self.M, self.C, self.K, self.by_mode = M, C, K, by_mode
+    def __init__(self, M: Any, C: Any, K: Any):
+        self.M, self.C, self.K = M, C, K
         self.owner: Any = None
         self.comm: MPI.Comm = M.comm.tompi4py()
         self._x, self._y = K.createVecs()
@@ -94,9 +93,9 @@ class Pencil:
         self.spectrum_error: float | None = None
 
     def apply(self, A: Any, X: Array) -> Array:
-        """Return A X for complex columns X of locally owned unknowns; C has damping by mode in it."""
-        out = self._apply(A, X)
-        return out if A is not self.C or self.by_mode is None else out + self.by_mode.times(X)
+        """Return A X for complex columns X of locally owned unknowns."""
+        sparse = sparse_part(A)
+        return self._apply(A, X) if sparse is A else self._apply(sparse, X) + np.asarray(A.added(X))
 
     def _apply(self, A: Any, X: Array) -> Array:
         if self.comm.size == 1:
@@ -127,7 +126,7 @@ class Pencil:
 
     def scale(self) -> float:
         """Return the least |λ|."""
-        return float(np.min(np.abs(self._right(self.M, self.C, self.K, 1, 0.0)[0])))
+        return float(np.min(np.abs(self._right(self.M, sparse_part(self.C), self.K, 1, 0.0)[0])))
 
     def solve(self, count: int, target: float = 0.0) -> Eigenpairs:
         """Return at least `count` pairs (fewer if there are no more) of smallest |λ|, sorted by |λ|.
@@ -161,7 +160,7 @@ class Pencil:
             self._fast = True
 
     def _solve(self, count: int, target: float) -> Eigenpairs:
-        if self.by_mode is not None:
+        if sparse_part(self.C) is not self.C:  # SLEPc's solver takes sparse matrices alone
             return self._damped(count, target)
         try:
             values, right, errors = self._right(self.M, self.C, self.K, count, target)
@@ -198,16 +197,16 @@ class Pencil:
 
     def _damped(self, count: int, target: float) -> Eigenpairs:
         """Return pairs in the order of the undamped frequencies of their shapes (see `rotfem.numerics.damped`)."""
-        gyroscopic = transposed(self.C)
-        gyroscopic.aypx(-1.0, self.C)
+        C = sparse_part(self.C)  # what it has of low rank is symmetric
+        gyroscopic = transposed(C)
+        gyroscopic.aypx(-1.0, C)
         gyroscopic.scale(0.5)
         undamped = Pencil(self.M, gyroscopic, self.K)
         undamped._judged = False  # they only begin the basis
         shapes = undamped.solve(count + MORE, target).right
         self.unit, self._smallest = undamped.unit or 1.0, undamped._smallest
         with balanced(self.M, self.C, self.K, self.unit) as d:
-            by_mode = None if self.by_mode is None else self.by_mode.scaled(np.sqrt(self.unit) * d)
-            matrices, more = (self.M, self.C, self.K, by_mode), min(2 * count, count + MORE)
+            matrices, more = (self.M, self.C, self.K), min(2 * count, count + MORE)
             start = shapes / d[:, None]
             values, right, left, errors = damped_pairs(matrices, start, more, target / self.unit, self._fast)
         vectors = d[:, None] * right, d[:, None] * left

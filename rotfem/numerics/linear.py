@@ -11,7 +11,7 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics import compat
-from rotfem.numerics.low_rank import LowRank, Update
+from rotfem.numerics.low_rank import PlusLowRank, Update, sparse_part
 from rotfem.numerics.projection import dense
 
 Array = npt.NDArray[np.float64]
@@ -32,12 +32,15 @@ LOST = 1e-2
 CLOSE, ITERATIONS = 1e-8, 15
 
 
-def combine(target: Any, matrices: list[Any], weights: Array) -> None:
-    """Write Σ weight · matrix into target; all share one non-zero pattern."""
+def combine(target: Any, matrices: list[Any], weights: Array) -> Any:
+    """Return Σ weight · matrix, its sparse part in target; all share one pattern, and one of them may have B Bᵀ."""
+    out = target
     target.zeroEntries()
     for A, weight in zip(matrices, weights, strict=True):
         if weight != 0.0:
-            target.axpy(weight, A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            target.axpy(weight, sparse_part(A), PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+            out = PlusLowRank(target, A.part, weight * A.factor) if isinstance(A, PlusLowRank) else out
+    return out
 
 
 def held(K: Any, numbers: npt.NDArray[Any]) -> None:
@@ -94,14 +97,14 @@ class DirectSolver:
     """LU factorisation of a matrix that keeps its pattern; the factor is renewed only when told.
 
     Args:
-        A: assembled PETSc matrix.
+        A: assembled PETSc matrix, or `PlusLowRank`, of which the sparse part is factorised.
         symmetric: whether it is symmetric.
     """
 
     def __init__(self, A: Any, symmetric: bool = False):
-        self.A, self.factorisations = A, 0
-        self._beside: tuple[LowRank, float] | None = None
+        self._whole, self.A, self.factorisations = A, sparse_part(A), 0
         self._update: Update | None = None
+        A = self.A
         self._ksp = PETSc.KSP().create(A.comm)
         if symmetric:
             A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
@@ -111,13 +114,14 @@ class DirectSolver:
         self._ksp.setErrorIfNotConverged(False)
         self._stale = True
 
-    def refresh(self, beside: LowRank | None = None, factor: float = 1.0) -> None:
-        """Say that the entries of A have changed, and what times a factor is to be added to A in solutions."""
+    def refresh(self, A: Any = None) -> None:
+        """Say that the entries of A have changed, or that it is another matrix of its pattern now."""
         self._stale = True
-        self._beside = None if beside is None or factor == 0.0 else (beside, factor)
+        if A is not None:
+            self._whole, self.A = A, sparse_part(A)
 
     def solve(self, b: Any, x: Any) -> None:
-        """Solve A x = b, or with what is added to A.
+        """Solve A x = b.
 
         Raises:
             ComputationError: A is singular to working precision.
@@ -126,7 +130,8 @@ class DirectSolver:
             self._ksp.setOperators(self.A)
             self.factorisations += 1
             self._stale = False
-            self._update = None if self._beside is None else Update(*self._beside, self._column)
+            whole = self._whole
+            self._update = Update(whole.part, whole.factor, self._column) if isinstance(whole, PlusLowRank) else None
         self._apply(b, x)
         if self._update is not None:
             x.array[:] = self._update(x.array)

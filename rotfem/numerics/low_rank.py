@@ -1,4 +1,4 @@
-"""A symmetric matrix B Bᵀ of few columns that is never written out: beside a sparse one it would fill it.
+"""A symmetric matrix B Bᵀ of few columns that is never written out, as it would fill a sparse one; A + c B Bᵀ.
 
 Equations with A + c B Bᵀ are solved with a factor of A (Sherman, Morrison & Woodbury; Golub & Van Loan 2013, 2.1.4):
 
@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.numerics.projection import summed
+from rotfem.numerics.projection import summed, times
 
 Array = npt.NDArray[Any]
 
@@ -67,6 +67,66 @@ class LowRank:
         """Return it with one unknown more, the last on the last rank, that it has no part in."""
         more = int(self.comm.rank == self.comm.size - 1)
         return LowRank(np.vstack([self.B, np.zeros((more, self.B.shape[1]))]), self._like)
+
+
+class PlusLowRank:
+    """S + c B Bᵀ of a sparse S; to those who multiply, scale or solve (`DirectSolver`), it looks like a PETSc matrix.
+
+    Args:
+        sparse: S, a PETSc matrix.
+        part: B Bᵀ.
+        factor: c.
+    """
+
+    def __init__(self, sparse: Any, part: LowRank, factor: float = 1.0):
+        self.sparse, self.part, self.factor = sparse, part, factor
+
+    @property
+    def comm(self) -> Any:
+        """The communicator that its rows are distributed over."""
+        return self.sparse.comm
+
+    def createVecs(self) -> tuple[Any, Any]:
+        """Return two PETSc vectors that fit."""
+        return tuple(self.sparse.createVecs())
+
+    def times(self, X: Array) -> Array:
+        """Return (S + c B Bᵀ) X of columns of owned rows (n, m)."""
+        return times(self.sparse, X) + self.added(X)
+
+    def added(self, X: Array) -> Array:
+        """Return c B Bᵀ X of columns or a vector of owned rows."""
+        return np.asarray(self.factor * self.part.times(X))
+
+    def mult(self, x: Any, y: Any) -> None:
+        """Write the product with a PETSc vector into another one."""
+        self.sparse.mult(x, y)
+        y.array[:] += self.added(x.array)
+
+    def multTranspose(self, x: Any, y: Any) -> None:
+        """Write the product of the transpose with a PETSc vector into another one."""
+        self.sparse.multTranspose(x, y)
+        y.array[:] += self.added(x.array)
+
+    def norm(self, kind: Any = None) -> float:
+        """Return a bound of a norm, Frobenius or the PETSc kind INFINITY: that of S and that of the rest."""
+        rest = self.part.norm() if kind is None else self.part.bound()
+        return float(self.sparse.norm(kind) + abs(self.factor) * rest)
+
+    def scale(self, factor: float) -> None:
+        """Multiply it by a number."""
+        self.sparse.scale(factor)
+        self.factor *= factor
+
+    def diagonalScale(self, left: Any, right: Any) -> None:
+        """Make it D (S + c B Bᵀ) D of one diagonal D, a PETSc vector, given twice."""
+        self.sparse.diagonalScale(left, right)
+        self.part = self.part.scaled(left.array)
+
+
+def sparse_part(A: Any) -> Any:
+    """Return the sparse part of a matrix: itself, or S of S + c B Bᵀ."""
+    return A.sparse if isinstance(A, PlusLowRank) else A
 
 
 class Update:

@@ -26,8 +26,10 @@ def summed(comm: MPI.Comm, local: Any) -> Any:
 
 
 def times(A: Any, X: Array) -> Array:
-    """Return A X of a PETSc matrix and columns (n, m)."""
-    if X.shape[1] > 1 and isinstance(A, PETSc.Mat) and A.getType() in ENTRIES:
+    """Return A X of a matrix and columns (n, m)."""
+    if not isinstance(A, PETSc.Mat):
+        return np.asarray(A.times(X))
+    if X.shape[1] > 1 and A.getType() in ENTRIES:
         right, product = dense(A.comm, X), PETSc.Mat()
         return np.array(A.matMult(right, product).getDenseArray())
     x, y = A.createVecs()

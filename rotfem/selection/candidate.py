@@ -131,10 +131,10 @@ class Candidate:
         else:
             self.plainly(lambda: steady_state(held, speed, self.case.newton()))
         matrices = held.mass_damping_stiffness()
-        pencil = Pencil(*matrices, by_mode=held.by_mode)
+        pencil = Pencil(*matrices)
         if self.system.hub is None:
             return pencil.lasting(count)
-        whole = Pencil(*self.system.with_hub(matrices), by_mode=self.system.by_mode)
+        whole = Pencil(*self.system.with_hub(matrices))
         values: Array = whole.lasting(count, pencil.scale())
         flexible: Array = np.abs(values) > ZERO * np.median(np.abs(values))
         return values[flexible][: count - int(not flexible.all())]

@@ -98,15 +98,9 @@ def halved(mesh: Any, structure: Any) -> Any:
 
 
 def _eigenvalues(held: Any, fine: FinerEquations, speed: float, count: int) -> tuple[npt.NDArray[Any], ...]:
-    """Return λ of a linear theory at a speed (rad/s), the hub held and without damping by mode, here and there."""
+    """Return λ of a linear theory at a speed (rad/s), the hub held, here and there."""
     held.set_time(0.0, held.motion.at_speed(speed))
     held.set_state(held.zeros())
     here = held.mass_damping_stiffness()
     fine.take()
-    M, K = fine.matrix("M"), fine.matrix("K")
-    if held.tangent_forms("C")[0]:
-        C = fine.matrix("C")
-    else:
-        C = K.duplicate()
-        C.assemble()
-    return tuple(Pencil(*matrices).lasting(count) for matrices in (here, (M, C, K)))
+    return tuple(Pencil(*matrices).lasting(count) for matrices in (here, fine.mass_damping_stiffness()))

@@ -13,7 +13,7 @@ from rotfem.numerics import linear
 from rotfem.numerics.asymmetry import is_symmetric
 from rotfem.numerics.left_vectors import mirror_error
 from rotfem.numerics.linear import DirectSolver, NearbySolver, SingularSolver, combine, is_regular
-from rotfem.numerics.low_rank import LowRank
+from rotfem.numerics.low_rank import LowRank, PlusLowRank
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.old_factor import OldFactor
 from rotfem.numerics.projection import times
@@ -185,16 +185,35 @@ def test_solutions_for_many_sides_at_once_are_those_one_by_one(
     monkeypatch.setattr(linear, "MIDDLE", 5000 if small else 10)
     rng, n = np.random.default_rng(5), 60
     A, right = spread(rng, n), rng.normal(size=(60, 7))
-    beside = LowRank(rng.normal(size=(n, 2)), A)
-    for part, whole in ((None, A[:, :]), (beside, A[:, :] + 3.0 * beside.B @ beside.B.T)):
-        solver, one = DirectSolver(A, symmetric), DirectSolver(A, symmetric)
-        for each in (solver, one):
-            each.refresh(part, 3.0)
+    part = LowRank(rng.normal(size=(n, 2)), A)
+    for matrix, whole in ((A, A[:, :]), (PlusLowRank(A, part, 3.0), A[:, :] + 3.0 * part.B @ part.B.T)):
+        solver = DirectSolver(matrix, symmetric)
         X = solver.solve_all(right)
         assert solver.factorisations == 1
         np.testing.assert_allclose(whole @ X, right, atol=1e-9)
         np.testing.assert_allclose(solver.solve_all(right[:, :1]), X[:, :1], rtol=1e-9)
-    np.testing.assert_allclose(times(A, right), A[:, :] @ right, rtol=1e-12, atol=1e-9)
+        np.testing.assert_allclose(times(matrix, right), whole @ right, rtol=1e-12, atol=1e-9)
+
+
+def test_a_matrix_with_a_part_of_low_rank_is_scaled_and_bounded_as_one() -> None:
+    """D (S + c B Bᵀ) D, sums with others, products with the transpose, and bounds of two norms."""
+    rng, n = np.random.default_rng(6), 30
+    S = spread(rng, n)
+    A = PlusLowRank(S.copy(), LowRank(rng.normal(size=(n, 2)), S), 0.5)
+    d = S.createVecLeft()
+    d.array[:] = rng.uniform(1.0, 2.0, n)
+    whole = S[:, :] + 0.5 * A.part.B @ A.part.B.T
+    total = combine(S.duplicate(), [S, A], np.array([2.0, -3.0]))
+    np.testing.assert_allclose(times(total, np.eye(n)), 2.0 * S[:, :] - 3.0 * whole, rtol=1e-9, atol=1e-9)
+    A.diagonalScale(d, d)
+    A.scale(4.0)
+    whole = 4.0 * d.array[:, None] * whole * d.array
+    x, y = A.createVecs()
+    x.array[:] = rng.normal(size=n)
+    A.multTranspose(x, y)
+    np.testing.assert_allclose(y.array, whole.T @ x.array, rtol=1e-9, atol=1e-9)
+    assert np.linalg.norm(whole) <= A.norm() <= 2.0 * np.linalg.norm(whole)
+    assert np.linalg.norm(whole, np.inf) <= A.norm(PETSc.NormType.INFINITY) <= 4.0 * np.linalg.norm(whole, np.inf)
 
 
 def test_a_small_skew_part_is_none_of_round_off() -> None:
