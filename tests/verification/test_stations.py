@@ -17,6 +17,17 @@ from tests.beams import SPIN_UP, STRUCTURE
 REFERENCE = Path(__file__).resolve().parents[1] / "reference" / "spin_up_moment.csv"
 PLACES = [0.0, 0.7, 2.5, 5.3, 9.1, 10.0]
 LOADS = {"tip_force": [0.0, 3.0], "distributed": [0.0, 2.0]}
+SECTION = STRUCTURE["section"]
+SPATIAL: dict[str, Any] = {
+    "type": "spatial_beam",
+    "length": 10.0,
+    "hub_radius": 0.5,
+    "section": {
+        **{"EA": SECTION["EA"], "GA2": SECTION["GA"], "GA3": SECTION["GA"], "GJ": 1e4},
+        **{"EI2": 3e4, "EI3": SECTION["EI"], "mass_per_length": SECTION["mass_per_length"]},
+    },
+}
+STILL = {"type": "constant", "speed": 0.0}
 STEADY: dict[str, Any] = {
     "structure": {**STRUCTURE, "hub_radius": 0.5},
     "motion": {"type": "constant", "speed": 3.0},
@@ -125,19 +136,9 @@ def test_moments_of_the_spin_up() -> None:
 
 def test_a_spatial_beam_in_a_plane_is_a_planar_one() -> None:
     """N, Q, M are N, Q2, M3 there, and T, Q3, M2 of a moment at the tip constant, with pretwist along turned axes."""
-    section = STRUCTURE["section"]
-    spatial = {
-        "type": "spatial_beam",
-        "length": 10.0,
-        "hub_radius": 0.5,
-        "section": {
-            **{"EA": section["EA"], "GA2": section["GA"], "GA3": section["GA"], "GJ": 1e4},
-            **{"EI2": 3e4, "EI3": section["EI"], "mass_per_length": section["mass_per_length"]},
-        },
-    }
     scene = {**STEADY, "model": {"theory": "linear"}, "motion": {"type": "constant", "speed": 0.0}}
     loads = {"tip_force": [5.0, 3.0, 0.0], "tip_moment": [2.0, 0.0, 0.0], "distributed": [0.0, 2.0, 0.0]}
-    three = rotfem.run({**scene, "structure": spatial, "loads": loads}).stations
+    three = rotfem.run({**scene, "structure": SPATIAL, "loads": loads}).stations
     plane = rotfem.run({**scene, "loads": {"tip_force": [5.0, 3.0], "distributed": [0.0, 2.0]}}).stations
     assert three is not None
     assert plane is not None
@@ -174,19 +175,30 @@ def test_a_resumed_run_has_the_same_rows(tmp_path: Path) -> None:
     assert resumed.stations.text() == whole.stations.text()
 
 
-def test_damping_by_mode_is_a_stress() -> None:
+HUB = {"type": "torque", "hub_inertia": 20.0, "pulses": [[0.0, 0.3, 10.0]]}
+#: A structure, a theory and a motion that damping by mode meets ↦ columns of stations and of the hub, to the mesh.
+MEETS: dict[str, tuple[dict[str, Any], str, dict[str, Any], dict[str, tuple[str, float]]]] = {
+    "linear": (STRUCTURE, "linear", STILL, {"M": ("root_m3", 2e-4), "Q": ("root_f2", 2e-3)}),
+    "on a free hub": (STRUCTURE, "reissner", HUB, {"M": ("root_m3", 2e-4), "Q": ("root_f2", 2e-3)}),
+    "exact in space": (SPATIAL, "reissner", STILL, {"M3": ("root_m3", 2e-4), "Q2": ("root_f2", 2e-3)}),
+}
+
+
+@pytest.mark.parametrize("case", MEETS)
+def test_damping_by_mode_is_a_stress(case: str) -> None:
     """M and Q at the root are those of the hub at every step, to the mesh: 5e-5 and 5e-4. It makes 2e-2 of them."""
+    structure, theory, motion, columns = MEETS[case]
     scene = {
-        "structure": {**STRUCTURE, "damping": {"modal": [0.02, 0.03, 0.05]}},
-        "motion": {"type": "constant", "speed": 0.0},
+        "structure": {**structure, "damping": {"modal": [0.02, 0.03, 0.05]}},
+        "motion": motion,
         "mesh": {"elements": 16, "degree": 3},
-        "model": {"theory": "linear"},
-        "loads": {"tip_force": [0.0, 1.0]},
+        "model": {"theory": theory},
+        "loads": {} if motion is HUB else {"tip_force": [0.0, 1.0, 0.0][: 2 + (structure is SPATIAL)]},
         "time": {"end": 0.5, "step": 0.005},
-        "output": {"stations": [0.0, 10.0], "quantities": ["M", "Q"], "error": False},
+        "output": {"stations": [0.0, 10.0], "quantities": list(columns), "error": False},
     }
     result = rotfem.run(scene)
     assert result.stations is not None
-    for name, root, close in (("M", "root_m3", 2e-4), ("Q", "root_f2", 2e-3)):
+    for name, (root, close) in columns.items():
         hub = result.history[root]
         assert np.max(np.abs(result.stations[name][1:, 0] + hub[1:])) < close * np.max(np.abs(hub)), name
