@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from rotfem.commands.console import Session
+from rotfem.commands.console import Session, missing
 from rotfem.commands.job import Job, app, command
 from rotfem.commands.options import as_path, listed
 from rotfem.commands.printed import (
@@ -22,6 +23,9 @@ from rotfem.commands.printed import (
 )
 from rotfem.commands.result_folder import Writer
 from rotfem.errors import input_of
+from rotfem.results.result_set import read_summary, said_of
+from rotfem.scene import load_scene
+from rotfem.scene.reading import noted_files
 
 
 @command()
@@ -131,12 +135,30 @@ def response(
     todo.finish(result, response_report)
 
 
-@command(computes=False)
-def check(todo: Job) -> None:
-    """Say what the structure of SCENE is, mass, moments, inertias, and draw it, before anything is computed."""
-    from rotfem.commands.check import check as look
+def look(session: Session, path: Path, overrides: Sequence[str]) -> bool:
+    """Say how the results of a folder ended, or, without FEniCSx, that a scene is valid; return whether either was."""
+    if path.is_dir():
+        said = said_of(path)
+        session.print_json({**read_summary(path), "found": said})
+    elif lacking := missing():
+        scene = load_scene(path, overrides)
+        said = f"{path} is a valid scene; for more, {lacking}"
+        session.print_json({"command": "check", "name": scene.name, "found": said})
+    else:
+        return False
+    session.say([said])
+    return True
 
-    todo.finish(look(todo.scene), check_report)
+
+@command(computes=False, first=look)
+def check(todo: Job) -> None:
+    """Say what the structure of SCENE is, mass, moments, inertias, and draw it; or how the results in a folder ended.
+
+    Nothing is computed yet.
+    """
+    from rotfem.commands.check import check as weigh
+
+    todo.finish(weigh(todo.scene), check_report)
 
 
 @command(computes=False)
@@ -174,7 +196,7 @@ def cost(
     from rotfem import cost as study
 
     if write is not None:
-        todo.session.check_writable("--write", write)
+        todo.session.check_writable("--write", write, todo.scene.inputs)
     with todo.progress("cost") as progress:
         result = study(
             todo.scene,
@@ -215,8 +237,9 @@ def import_(
     from rotfem.commands.import_blade import import_blade, write_imported
 
     with Session(False, quiet, debug) as session:
-        session.check_writable("-o", output)
-        scene = import_blade(file, kind, overrides or ())
+        with noted_files() as inputs:
+            scene = import_blade(file, kind, overrides or ())
+        session.check_writable("-o", output, inputs)
         if session.first:
             write_imported(scene, file, output)
         if hint := session.hint(False):

@@ -10,6 +10,8 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
+from importlib.util import find_spec
 from pathlib import Path
 from time import sleep
 from typing import Any, NoReturn
@@ -23,6 +25,26 @@ from rotfem.results.files import json_text
 PASSED_ON = 0.2
 
 
+#: Where to find out what is to be done without FEniCSx.
+MISSING = "FEniCSx is not here (there is no module {}); see docs/installation.md"
+
+
+def missing() -> str:
+    """Return what is to be said where a module of FEniCSx is missing; empty where none is."""
+    names = ("mpi4py", "petsc4py", "slepc4py", "dolfinx")
+    return next((MISSING.format(name) for name in names if find_spec(name) is None), "")
+
+
+class _Alone:
+    """The communicator of a process where there is no MPI."""
+
+    rank, size = 0, 1
+
+    def bcast(self, value: Any) -> Any:
+        """Return what is sent to all."""
+        return value
+
+
 class Session:
     """One command under one set of flags: speaks on rank 0 only, and turns errors into messages and exit status.
 
@@ -33,9 +55,11 @@ class Session:
     """
 
     def __init__(self, as_json: bool, quiet: bool, debug: bool):
-        from mpi4py import MPI
+        self.comm: Any = _Alone()
+        with suppress(ImportError):  # some commands do without FEniCSx
+            from mpi4py import MPI
 
-        self.comm = MPI.COMM_WORLD
+            self.comm = MPI.COMM_WORLD
         self.as_json, self.quiet, self.debug = as_json, quiet, debug
         self.first = self.comm.rank == 0
         self._folder: ResultFolder | None = None
@@ -50,7 +74,7 @@ class Session:
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         if self._folder is not None:
-            self._folder.close()
+            self._folder.close(error)
         if error is not None:
             self._tidy()
         self._pass_on()
@@ -98,26 +122,28 @@ class Session:
             except OSError:
                 return
 
-    def folder(self, path: Path, command: str) -> ResultFolder:
-        """Return the result folder, made and locked.
+    def folder(self, path: Path, command: str, inputs: Sequence[Path]) -> ResultFolder:
+        """Return the result folder, made and locked; say so if the command before was killed there.
 
         Raises:
-            OutputError: it cannot be written, or another process writes its results there.
+            OutputError: it is not to be written (see `rotfem.results.result_set.ResultSet`).
         """
         if self.first:
             self._made = [p for p in (path, *path.parents) if not os.path.exists(p)]  # Path.exists may raise
-        self._folder = ResultFolder(self.comm, path, command)
+        self._folder = ResultFolder(self.comm, path, command, inputs)
+        if self._folder.set is not None and self._folder.set.before and not self.quiet:
+            print(f"warning: {self._folder.set.before}", file=sys.stderr)
         return self._folder
 
-    def check_writable(self, option: str, path: Path) -> None:
-        """See that the file of an option can be written, before anything is computed.
+    def check_writable(self, option: str, path: Path, inputs: Sequence[Path]) -> None:
+        """See that the file of an option can be written, before anything is computed, and is none that was read.
 
         Raises:
             SceneError: it cannot.
         """
         from rotfem.results.files import unwritable
 
-        reason = self.comm.bcast(unwritable(path) if self.first else None)
+        reason = self.comm.bcast(unwritable(path, inputs) if self.first else None)
         if reason:
             raise SceneError("command line", option, str(path), reason)
 

@@ -6,11 +6,12 @@ import signal
 import threading
 from collections.abc import Callable
 from types import FrameType
-from typing import Any, Self
-
-from mpi4py import MPI
+from typing import TYPE_CHECKING, Any, Self
 
 from rotfem.commands.signals import SIGNALS
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 
 class Interrupted(KeyboardInterrupt):

@@ -11,12 +11,13 @@ from typing import Annotated, Any
 
 import typer
 
-from rotfem.commands.console import Session
+from rotfem.commands.console import Session, missing
 from rotfem.commands.options import as_path, folder_name
 from rotfem.commands.result_folder import ResultFolder, Writer
 from rotfem.commands.signals import held_back
-from rotfem.errors import ComputationError
+from rotfem.errors import ComputationError, InputError
 from rotfem.scene import Scene, load_scene
+from rotfem.version import __version__
 
 app = typer.Typer(
     name="rotfem",
@@ -29,8 +30,18 @@ app = typer.Typer(
 
 
 @app.callback()
-def _root() -> None:
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", help="print the version", callback=lambda wanted: _version(wanted))
+    ] = False,
+) -> None:
     """Rotating beams and plates with FEniCSx."""
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"rotfem {__version__}")
+        raise typer.Exit
 
 
 @dataclass
@@ -98,9 +109,11 @@ def job(
 
             wanted.append(f"accuracy_budget={seconds_of(budget, 'command line', '--budget')!r}")
         loaded = load_scene(scene, [*(overrides or ()), *wanted])
-        folder = session.folder(output or Path("results") / folder_name(loaded.name), command)
+        if lacking := missing():
+            raise InputError("", None, lacking)
+        folder = session.folder(output or Path("results") / folder_name(loaded.name), command, loaded.inputs)
         with held_back():  # in the middle of an import what they raise becomes any error
-            import rotfem.numerics  # noqa: F401  before dolfinx, which would start PETSc in its own way
+            import rotfem.numerics.forms  # noqa: F401  PETSc first, which dolfinx would start in its own way
         try:
             yield Job(loaded, folder, session, not no_plots, session.hint(no_advice))
         except (ComputationError, KeyboardInterrupt) as error:
@@ -110,11 +123,14 @@ def job(
             raise
 
 
-def command(computes: bool = True) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def command(
+    computes: bool = True, first: Callable[[Session, Path, Sequence[str]], bool] | None = None
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Make a command of a function of a job and its own options.
 
     Args:
         computes: whether it computes the scene, with advice, to an accuracy, and does not compare ways to.
+        first: what it does before there is a job, (session, path, overrides) ↦ whether that was all.
     """
 
     def decorate(work: Callable[..., None]) -> Callable[..., None]:
@@ -124,6 +140,10 @@ def command(computes: bool = True) -> Callable[[Callable[..., None]], Callable[.
 
         def call(**given: Any) -> None:
             options = {p.name: given.pop(p.name) for p in own}
+            if first is not None:
+                with Session(given["as_json"], given["quiet"], given["debug"]) as session:
+                    if first(session, given["scene"], given["overrides"] or ()):
+                        return
             with job(work.__name__, **given) as todo:
                 work(todo, **options)
 

@@ -14,6 +14,7 @@ from rotfem.analysis.schemes import State
 from rotfem.commands.interrupts import Interrupted, Interrupts
 from rotfem.commands.result_folder import ResultFolder
 from rotfem.errors import OutputError, SceneError
+from rotfem.results.files import CHECKPOINT
 from rotfem.results.live import LiveTable
 from rotfem.results.result_set import ResultSet, read_summary
 from rotfem.scene import Scene
@@ -103,9 +104,9 @@ class Keeper:
         if self.folder is None:
             raise SceneError("command line", option, None, "needs a folder")
         from rotfem.commands.checkpoint import check_end, check_identity, identity
-        from rotfem.results.checkpoint_file import NAME, read_checkpoint
+        from rotfem.results.checkpoint_file import read_checkpoint
 
-        self._identity, path, end = identity(scene, terms, outputs), self.folder.path / NAME, scene.time.end
+        self._identity, path, end = identity(scene, terms, outputs), self.folder.path / CHECKPOINT, scene.time.end
 
         def read(files: ResultSet) -> Tree:
             tree = read_checkpoint(path)
@@ -157,9 +158,7 @@ class Keeper:
         """
         if self.folder is None:
             return None
-        from rotfem.results.checkpoint_file import NAME
-
-        state, path = None, self.folder.path / NAME
+        state, path = None, self.folder.path / CHECKPOINT
         if self.every is not None or self._tree is not None:
             from rotfem.commands.checkpoint import Memory
 
@@ -167,7 +166,7 @@ class Keeper:
         if self._tree is not None and self._memory is not None:
             state = self._memory.put_back(path, self._tree)
             run.resumed.append({"time": state.t, "ranks": self.comm.size})
-        keep = (NAME,) if self._tree is not None else ()
+        keep = (CHECKPOINT,) if self._tree is not None else ()
         self._tree = None  # a richer model would start afresh
 
         def begin(files: ResultSet) -> None:
@@ -217,12 +216,12 @@ class Keeper:
         """Write a checkpoint, unless the last step is shorter than it would be in a run with a later end."""
         if self._memory is None or self.every is None or self._left(run, state) < 1 - 1e-6:
             return
-        from rotfem.results.checkpoint_file import NAME, write_checkpoint
+        from rotfem.results.checkpoint_file import write_checkpoint
 
         tree = self._memory.taken(state, self._identity) | {"every": vars(self.every)}
         if self.folder is not None and self.folder.set is not None:
             try:
-                write_checkpoint(self.folder.path / NAME, tree)
+                write_checkpoint(self.folder.path / CHECKPOINT, tree)
             except OutputError as error:
                 if not self._failed:
                     run.warnings.append(f"a checkpoint could not be written at t = {state.t:.6g} s: {error.reason}")

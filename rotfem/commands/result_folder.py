@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
-
-from mpi4py import MPI
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from rotfem.errors import OutputError, SceneError
 from rotfem.results.result import Result
 from rotfem.results.result_set import ResultSet
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 T = TypeVar("T")
 
@@ -26,23 +27,30 @@ class ResultFolder:
         comm: communicator of the command.
         path: the folder, made where it is not there.
         command: its verb.
+        inputs: files that it has read.
 
     Attributes:
         set: the files, on rank 0.
 
     Raises:
-        OutputError: the folder cannot be written, or another process writes its results there.
+        OutputError: the folder is not to be written (see `ResultSet`).
     """
 
-    def __init__(self, comm: MPI.Comm, path: Path, command: str):
+    def __init__(self, comm: MPI.Comm, path: Path, command: str, inputs: Sequence[Path] = ()):
         self.comm, self.path = comm, path
         self.set: ResultSet | None = None
-        self.set = self._on_first(lambda: ResultSet(path, command), shared=False)
+        self.set = self._on_first(lambda: ResultSet(path, command, inputs), shared=False)
 
-    def close(self) -> None:
-        """Give the folder free."""
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        self.close(error)
+
+    def close(self, error: BaseException | None = None) -> None:
+        """Give the folder free, with what ended the command if it did not end well."""
         if self.set is not None:
-            self.set.close()
+            self.set.close(error)
 
     def first_does(self, work: Callable[[ResultSet], T]) -> T:
         """Return on every rank what rank 0 makes of some work with the files.

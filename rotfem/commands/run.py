@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +66,7 @@ def run(
     every = None if checkpoint is None else Interval.of(checkpoint)
     if folder is None:
         return simulate(scene, Keeper(comm, None, every, resume), progress, hint, terms, outputs)
-    with closing(ResultFolder(comm, Path(folder), "run")) as results:
+    with ResultFolder(comm, Path(folder), "run", scene.inputs) as results:
         try:
             done = simulate(scene, Keeper(comm, results, every, resume), progress, hint, terms, outputs)
         except (ComputationError, KeyboardInterrupt) as error:

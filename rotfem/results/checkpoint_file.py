@@ -18,15 +18,14 @@ import h5py
 import numpy as np
 
 from rotfem.errors import OutputError, SceneError
+from rotfem.results.files import CHECKPOINT_MAGIC as MAGIC
 from rotfem.results.files import PART
-
-NAME = "checkpoint.h5"
 
 #: Number of the format; another one is refused.
 FORMAT = 1
 
-#: First word of the file, and length of its head.
-MAGIC, HEAD = "rotfem-checkpoint", 512
+#: Length of the head of the file.
+HEAD = 512
 
 
 def write_checkpoint(path: Path, tree: dict[str, Any]) -> None:

@@ -21,6 +21,9 @@ Array = npt.NDArray[np.float64]
 #: How the names of hidden files begin that are not whole yet; what a killed process leaves of them may be removed.
 PART = ".rotfem-"
 
+#: Name of the file with a checkpoint, and its first word.
+CHECKPOINT, CHECKPOINT_MAGIC = "checkpoint.h5", "rotfem-checkpoint"
+
 
 def prepare_folder(folder: str | Path) -> Path:
     """Make the result folder and see that it can be written, before anything is computed.
@@ -38,8 +41,15 @@ def prepare_folder(folder: str | Path) -> Path:
     return path
 
 
-def unwritable(path: Path) -> str:
-    """Return why a file cannot be written there; nothing where it can. Neither folder nor file is made or changed."""
+def unwritable(path: Path, inputs: Iterable[Path] = ()) -> str:
+    """Return why a file cannot be written there; nothing where it can. Neither folder nor file is made or changed.
+
+    Args:
+        path: the file.
+        inputs: files that have been read.
+    """
+    if os.path.realpath(path) in map(os.path.realpath, inputs):
+        return "is what has been read; must be another file"
     if path.is_dir():
         return "is a folder; must be the path of a file"
     if not path.parent.is_dir():
@@ -131,6 +141,23 @@ def write_whole(path: Path, content: bytes) -> Path:
     except OSError as error:
         raise OutputError(path, error.strerror or str(error)) from None
     return path
+
+
+def overwrite(path: Path, text: str) -> None:
+    """Write a text into the room that a file has on the disk, the rest of it blank; nothing where it is too long.
+
+    Unlike `write_whole` this needs no room on the disk.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    descriptor = os.open(path, os.O_WRONLY | os.O_NOFOLLOW)
+    try:
+        room, content = os.fstat(descriptor).st_size, text.encode()
+        if len(content) <= room:
+            os.pwrite(descriptor, content.ljust(room), 0)
+    finally:
+        os.close(descriptor)
 
 
 def _umask() -> int:

@@ -16,7 +16,7 @@ INTERVAL = 1.0
 class LiveTable:
     """CSV file of a table that grows: what is new is written once a second, by one call of the system.
 
-    A disk that is full is no end: what could not be written is tried again the next time.
+    A disk that is full is no end: lines that fit are there, and the others are tried again the next time.
 
     Args:
         path: the file; one that is there is replaced.
@@ -50,19 +50,18 @@ class LiveTable:
             self._busy = False
 
     def _append(self) -> bool:
-        self._written, count = monotonic(), len(self.table)
+        self._written = monotonic()
         data = "".join(map(line, self.table.rows(self.rows))).encode()
         if not data:
             return True
         try:
-            descriptor = os.open(self.path, os.O_WRONLY)
+            descriptor = os.open(self.path, os.O_WRONLY | os.O_NOFOLLOW)
             try:
-                if os.pwrite(descriptor, data, self._size) < len(data):
-                    os.ftruncate(descriptor, self._size)  # no line is left torn
-                    return False
+                whole = data[: os.pwrite(descriptor, data, self._size)].rfind(b"\n") + 1
+                os.ftruncate(descriptor, self._size + whole)  # no line is left torn
             finally:
                 os.close(descriptor)
         except OSError:
             return False
-        self._size, self.rows = self._size + len(data), count
-        return True
+        self._size, self.rows = self._size + whole, self.rows + data.count(b"\n", 0, whole)
+        return whole == len(data)

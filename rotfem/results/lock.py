@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import socket
@@ -41,6 +42,8 @@ class FolderLock:
             try:
                 descriptor = self._locked()
             except OSError as error:
+                if error.errno == errno.ELOOP:
+                    raise OutputError(self.folder / NAME, "it is a symbolic link, which is not followed") from None
                 raise OutputError(self.folder, error.strerror or str(error)) from None
         _held[self._key] = (descriptor, times + 1)
         self._mine = True
@@ -61,11 +64,11 @@ class FolderLock:
         """Return the descriptor of the file, locked."""
         path = Path(self._key, NAME)
         while True:
-            descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                owner = os.pread(descriptor, 200, 0).decode(errors="replace").strip() or "another process"
+                owner = _named_in(descriptor)
                 os.close(descriptor)
                 raise OutputError(self.folder, f"{owner} is writing its results there") from None
             except OSError:  # a file system without locks: whoever shares it must take care
@@ -79,3 +82,22 @@ class FolderLock:
                 os.pwrite(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
                 return descriptor
             os.close(descriptor)  # whoever held it has removed the file in between
+
+
+def holder(folder: Path) -> str:
+    """Return which process holds the lock on a folder, in words; empty where none does. Nothing is changed."""
+    try:
+        descriptor = os.open(folder / NAME, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    except OSError:
+        return ""
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        return ""
+    except OSError:  # it is held, or the file system has no locks and whoever wrote the file may be there
+        return _named_in(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _named_in(descriptor: int) -> str:
+    return os.pread(descriptor, 200, 0).decode(errors="replace").strip() or "another process"

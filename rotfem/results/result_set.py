@@ -4,6 +4,9 @@ At every instant a folder holds the complete set of one computation, or a summar
 complete. The steps are ordered for that: new files are written under hidden names; a summary.json that says "writing"
 replaces the old one; the old set's files are removed, by the list in its summary, so that nothing else in the folder is
 touched; the new files get their names; large files follow; summary.json, renamed into place, ends it.
+
+A folder whose summary.json has the version of rotfem in it is one of rotfem's. In any other one nothing is removed, and
+nothing is written over; nor is a file that the computation has read, wherever it is.
 """
 
 from __future__ import annotations
@@ -15,21 +18,37 @@ import re
 import shutil
 import socket
 import tempfile
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from rotfem.errors import OutputError
-from rotfem.results.files import PART, json_text, prepare_folder, write_text
+from rotfem.errors import ComputationError, InputError, OutputError
+from rotfem.results.files import (
+    CHECKPOINT,
+    CHECKPOINT_MAGIC,
+    PART,
+    json_text,
+    overwrite,
+    prepare_folder,
+    read_csv,
+    write_text,
+)
 from rotfem.results.live import LiveTable
-from rotfem.results.lock import FolderLock
+from rotfem.results.lock import FolderLock, holder
+from rotfem.version import __version__
 
 if TYPE_CHECKING:
     from rotfem.results.result import Result
     from rotfem.results.run import Table
 
 SUMMARY = "summary.json"
+
+#: Words for a set that is not complete while a process is at work on it.
+AT_WORK = ("running", "writing")
+
+#: Characters for which summary.json has room while a process is at work: what went wrong must fit on a full disk.
+ROOM = 1000
 
 #: Names that are those of results in a folder with a summary of one; a set with others lists them in its summary.
 OURS = re.compile(
@@ -46,33 +65,79 @@ class ResultSet:
     Args:
         folder: result folder, made where it is not there.
         command: verb that computes.
+        inputs: files that it has read.
 
     Attributes:
         files: names of the set's files so far.
         live: table that is on disk while it grows, if there is one.
+        before: what became of the set before, in words, if the process that was at work on it has vanished.
 
     Raises:
-        OutputError: the folder cannot be written, or another process writes in it.
+        OutputError: the folder cannot be written, another process writes in it, or it has a file of the name of a
+            result that is an input, or none of rotfem's.
     """
 
-    def __init__(self, folder: Path, command: str = ""):
+    def __init__(self, folder: Path, command: str = "", inputs: Iterable[Path] = ()):
         self.folder, self.command = prepare_folder(folder), command
         self.files: list[str] = []
-        self.begun = False
+        self.begun = self.ended = False
         self.live: LiveTable | None = None
         self._staged: set[str] = set()
+        self.before = said_of(folder) if self._was_left() else ""
         self._lock = FolderLock(folder)
         self._lock.acquire()
+        taken = self._taken(inputs)
+        if taken is not None:
+            self._lock.release()
+            raise taken
+
+    def _was_left(self) -> bool:
+        """Return whether a process has vanished that was at work on the set there."""
+        summary = read_summary(self.folder)
+        return is_ours(summary) and summary["status"] in AT_WORK and not holder(self.folder)
+
+    def _taken(self, inputs: Iterable[Path]) -> OutputError | None:
+        """Return the error of a file that is not to be lost and has the name of a result; None where there is none."""
+        summary = read_summary(self.folder)
+        top, listed = Path(os.path.realpath(self.folder)), summary.get("files") or ()
+        for path in map(Path, map(os.path.realpath, inputs)):
+            first = path.relative_to(top).parts[0] if path.is_relative_to(top) else ""
+            if OURS.fullmatch(first) or first in (SUMMARY, *listed):
+                return OutputError(self.folder / first, "the scene reads it")
+        if is_ours(summary):
+            return None
+        for name in sorted(os.listdir(self.folder), key=lambda name: (name != SUMMARY, name)):
+            drawn = name.endswith(".png")  # by a script, maybe, from a result that it writes now
+            if name == SUMMARY or (OURS.fullmatch(name) and not drawn and not _is_checkpoint(self.folder / name)):
+                return OutputError(self.folder / name, "it is there already, in a folder that is none of rotfem's")
+        return None
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        self.close(error)
 
-    def close(self) -> None:
-        """Give the folder free."""
+    def close(self, error: BaseException | None = None) -> None:
+        """Give the folder free; a set that has not ended by now has failed.
+
+        Args:
+            error: what ended it.
+        """
+        if self.begun and not self.ended:
+            self._fail(error)
         self._lock.release()
+
+    def _fail(self, error: BaseException | None) -> None:
+        kind = "" if isinstance(error, ComputationError | InputError | OutputError) else f"{type(error).__name__}: "
+        what = " ".join(f"{kind}{error}".split())[: ROOM // 4]
+        status = "interrupted" if isinstance(error, KeyboardInterrupt) else "failed"
+        summary = self._owned(status) | {"failure": {"what": what, "time": None, "advice": ""}}
+        try:
+            self._summarise(summary)
+        except OutputError:
+            with suppress(OSError):
+                overwrite(self.folder / SUMMARY, self._text(summary))
 
     def begin(self, status: str, keep: Collection[str] = ()) -> None:
         """Say that the folder's set is this one and not complete, and remove the one before.
@@ -99,12 +164,21 @@ class ResultSet:
         Raises:
             OutputError: it cannot be written.
         """
+        self._summarise(self._owned(status))
+        self.ended = status not in AT_WORK
+
+    def _owned(self, status: str) -> dict[str, Any]:
         owner = {"pid": os.getpid(), "host": socket.gethostname()}
-        self._summarise({"command": self.command, "status": status, **owner, "warnings": []})
+        return {"command": self.command, "status": status, **owner, "warnings": []}
 
     def _summarise(self, summary: Mapping[str, Any]) -> Path:
+        text = self._text(summary)
+        return write_text(self.folder / SUMMARY, text.ljust(ROOM) if summary["status"] in AT_WORK else text)
+
+    def _text(self, summary: Mapping[str, Any]) -> str:
         further = sorted(name for name in self.files if not OURS.fullmatch(name))
-        return write_text(self.folder / SUMMARY, json_text({**summary, **({"files": further} if further else {})}))
+        mark = {"versions": {"rotfem": __version__}}
+        return json_text({**mark, **summary, **({"files": further} if further else {})})
 
     def put(self, texts: Mapping[str, str]) -> list[Path]:
         """Write files, all or none; return their paths.
@@ -218,13 +292,57 @@ class ResultSet:
             OutputError: it cannot be written.
         """
         self.begin("writing")
-        return self._summarise({**summary, "status": status or summary["status"]})
+        path = self._summarise({**summary, "status": status or summary["status"]})
+        self.ended = status not in AT_WORK
+        return path
+
+
+def is_ours(summary: Mapping[str, Any]) -> bool:
+    """Return whether a summary is one of rotfem's; one without a version was left by an early one that was killed."""
+    if not summary.keys() - {"files"} ^ {"command", "status", "pid", "host", "warnings"}:
+        return True
+    versions = summary.get("versions")
+    return isinstance(versions, dict) and "rotfem" in versions and "status" in summary
+
+
+def said_of(folder: Path) -> str:
+    """Return in words how the set of a folder ended, and what is left of one that is not complete.
+
+    Raises:
+        OutputError: it is no folder with results.
+    """
+    summary = read_summary(folder)
+    if not is_ours(summary):
+        raise OutputError(folder, "there are no results of rotfem")
+    status, parts = summary["status"], [f"{folder}: {summary.get('command', 'results')}"]
+    at_work = holder(folder) if status in AT_WORK else ""
+    if at_work:
+        parts[0] += f" {status}, by {at_work}"
+    elif status in AT_WORK:
+        process = f"process {summary.get('pid')} on {summary.get('host')}"
+        parts[0] += f" failed: {process} was {status} and has ended without a word"
+    else:
+        parts[0] += f" {status}" + (f": {summary['failure']['what']}" if "failure" in summary else "")
+    with suppress(OSError, ValueError, IndexError, KeyError):
+        t = read_csv(folder / "history.csv")["t"]
+        parts.append(f"history.csv has {len(t)} rows, up to t = {t[-1]:.6g} s")
+    if not at_work and status != "done" and _is_checkpoint(folder / CHECKPOINT):
+        parts.append("--resume goes on from its checkpoint")
+    return "; ".join(parts)
+
+
+def _is_checkpoint(path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            return path.name == CHECKPOINT and file.read(len(CHECKPOINT_MAGIC)) == CHECKPOINT_MAGIC.encode()
+    except OSError:
+        return False
 
 
 def previous(folder: Path) -> list[str]:
     """Return the names of the files there that belong to the set of the folder's summary, but for that itself."""
     summary = read_summary(folder)
-    if "status" not in summary:
+    if not is_ours(summary):
         return []
     listed = summary.get("files")
     further = listed if isinstance(listed, list) else []

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import ValidationInfo
 
 from rotfem.scene.limits import limits_in
-from rotfem.scene.reading import Unreadable, read_bytes
+from rotfem.scene.reading import Unreadable, note, read_bytes
 from rotfem.scene.values import Array, Matrix, are_numbers, as_increasing_rows, problem, rows_of
 
 #: Bytes of a table, at most, for each row that it may have.
@@ -43,6 +43,7 @@ def existing_file(value: Any, info: ValidationInfo) -> Path:
     if not found:
         what = "is no regular file" if there else "file not found"
         raise problem("", str(value), f"{what} (looked for {path})")
+    note(path)
     return path
 
 

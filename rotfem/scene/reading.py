@@ -5,12 +5,39 @@ from __future__ import annotations
 import os
 import select
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
 #: What a pipe may keep one waiting (s) before it has anything to say.
 PATIENCE = 10.0
 
 _PIECE = 1 << 20
+
+#: Files that a scene which is being read consists of; None where nobody asks.
+_read: ContextVar[list[Path] | None] = ContextVar("read", default=None)
+
+
+@contextmanager
+def noted_files() -> Iterator[list[Path]]:
+    """Give a list that the paths of all files are in which are read in the meantime."""
+    files: list[Path] = []
+    before = _read.get()
+    token = _read.set(files)
+    try:
+        yield files
+    finally:
+        _read.reset(token)
+        if before is not None:
+            before += files
+
+
+def note(path: Path) -> None:
+    """Take note of a file that is read."""
+    files = _read.get()
+    if files is not None:
+        files.append(path.absolute())
 
 
 class Unreadable(Exception):
@@ -35,6 +62,7 @@ def read_bytes(path: Path, most: int) -> bytes:
     Raises:
         Unreadable: there is none, it is a directory, it has more bytes, or nothing comes out of a pipe.
     """
+    note(path)
     try:
         # A pipe that nobody writes to would stop here.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)

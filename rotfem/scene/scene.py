@@ -42,6 +42,7 @@ from rotfem.scene.loads import Loads
 from rotfem.scene.motion import AnyMotion, Swept
 from rotfem.scene.output import OutputTable
 from rotfem.scene.problems import scene_error
+from rotfem.scene.reading import noted_files
 from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh, Solver
 from rotfem.scene.stepping import Time
 from rotfem.scene.toml import apply_overrides, read_toml, set_key, to_builtin
@@ -102,6 +103,7 @@ class Scene(SceneModel):
     _directory: str = PrivateAttr(".")
     _tables: dict[str, Any] = PrivateAttr(default_factory=dict)
     _hints: list[str] = PrivateAttr(default_factory=list)
+    _inputs: tuple[Path, ...] = PrivateAttr(())
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], name: str = "scene", directory: str | Path = ".") -> Self:
@@ -122,10 +124,12 @@ class Scene(SceneModel):
         tables, hints = in_si(tables, file), list[str]()
         context = {"directory": directory, "limits": limits_of(tables), "accuracy": tables.get("accuracy")}
         try:
-            scene = cls.model_validate(tables, context={**context, "hints": hints})
+            with noted_files() as files:
+                scene = cls.model_validate(tables, context={**context, "hints": hints})
         except ValidationError as error:
             raise scene_error(file, error) from None
         scene._name, scene._file, scene._directory, scene._tables, scene._hints = name, file, directory, tables, hints
+        scene._inputs = tuple(files)
         return scene
 
     @property
@@ -149,6 +153,11 @@ class Scene(SceneModel):
         return tuple(dict.fromkeys(self._hints))
 
     @property
+    def inputs(self) -> tuple[Path, ...]:
+        """Files that were read for it: its own, and those that it names."""
+        return self._inputs
+
+    @property
     def tables(self) -> dict[str, Any]:
         """Nested tables of what was set, without defaults; not to be changed."""
         return self._tables
@@ -165,7 +174,9 @@ class Scene(SceneModel):
         tables = self._tables
         for key, value in changes.items():
             tables = set_key(self._file, tables, key, to_builtin(value))
-        return type(self)._validate(tables, self._name, self._file, self._directory)
+        variant = type(self)._validate(tables, self._name, self._file, self._directory)
+        variant._inputs = tuple(dict.fromkeys(variant._inputs + self._inputs))
+        return variant
 
     def to_dict(self) -> dict[str, Any]:
         """Return tables of what was set and of all defaults, fit for JSON and TOML; functions become their names."""
@@ -277,8 +288,11 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
         SceneError: the file cannot be read, an override is malformed, or anything in the scene is not valid.
     """
     path = Path(path)
-    tables = apply_overrides(path.name, read_toml(path), overrides)
-    return Scene._validate(tables, path.stem, path.name, str(path.parent))
+    with noted_files() as files:
+        tables = apply_overrides(path.name, read_toml(path), overrides)
+        scene = Scene._validate(tables, path.stem, path.name, str(path.parent))
+    scene._inputs = tuple(files)
+    return scene
 
 
 def as_scene(scene: Scene | str | Path | Mapping[str, Any]) -> Scene:

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from rotfem.results import ModesResult, RunResult
 from rotfem.results.files import csv_text, read_csv
 from rotfem.results.live import LiveTable
 from rotfem.results.lock import NAME, FolderLock
-from rotfem.results.result_set import OURS, ResultSet, read_summary
+from rotfem.results.result_set import OURS, ResultSet, read_summary, said_of
 from rotfem.results.run import Table
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -56,10 +57,97 @@ def test_a_set_takes_the_place_of_the_one_before_and_of_nothing_else(tmp_path: P
     assert (tmp_path / "notes.txt").read_text() == (tmp_path / "measured.csv").read_text() == "mine"
 
 
-def test_files_like_results_in_a_folder_without_any_stay(tmp_path: Path) -> None:
-    (tmp_path / "modes.csv").write_text("mine")
-    run_result(1.0).write(tmp_path)
-    assert (tmp_path / "modes.csv").read_text() == "mine"
+@pytest.mark.parametrize("name", ["modes.csv", "summary.json", "M.npz", "checkpoint.h5"])
+def test_nothing_is_written_where_somebody_else_has_files_like_results(tmp_path: Path, name: str) -> None:
+    """With a figure in it, which a script may have drawn, a folder can be one of rotfem's; it stays, too."""
+    (tmp_path / "modes.png").write_text("mine")
+    run_result(1.0).write(tmp_path / "drawn")
+    (tmp_path / name).write_text('{"status": "mine"}')
+    before = {path: path.read_text() for path in tmp_path.iterdir() if path.is_file()}
+    with pytest.raises(OutputError, match=rf"{name}: cannot be written: it is there already"):
+        run_result(1.0).write(tmp_path)
+    assert {path: path.read_text() for path in tmp_path.iterdir() if path.is_file()} == before
+
+
+def test_the_folder_of_an_early_rotfem_that_was_killed_is_one_of_ours(tmp_path: Path) -> None:
+    left = {"command": "run", "status": "running", "pid": 1, "host": "x", "warnings": []}
+    (tmp_path / "summary.json").write_text(json.dumps(left))
+    (tmp_path / "history.csv").write_text("t\n")
+    modes_result().write(tmp_path)
+    assert "history.csv" not in files(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["history.csv", "summary.json", "fields.bp/data.0", "path.csv"])
+def test_inputs_are_never_outputs(tmp_path: Path, name: str) -> None:
+    """Also in a folder of rotfem's, where a table may be that an earlier run has written; and through a link."""
+    with ResultSet(tmp_path / "results", "run") as results:
+        results.put({"path.csv": "t\n", "history.csv": "t\n"})
+        results.finish({"command": "run", "status": "done"})
+    (tmp_path / "link").symlink_to(tmp_path / "results")
+    for folder, path in (("results", tmp_path / "link" / name), ("link", tmp_path / "results" / name)):
+        with pytest.raises(OutputError, match=rf"{name.split('/')[0]}: cannot be written: the scene reads it"):
+            ResultSet(tmp_path / folder, "modes", [path])
+    with ResultSet(tmp_path / "results", "modes", [tmp_path / "history.csv", tmp_path / "results" / "gusts.csv"]):
+        assert "history.csv" in files(tmp_path / "results")
+
+
+def test_no_link_is_followed(tmp_path: Path) -> None:
+    target = tmp_path / "precious"
+    target.write_text("mine")
+    folder = tmp_path / "results"
+    folder.mkdir()
+    (folder / NAME).symlink_to(target)
+    with pytest.raises(OutputError, match=r"\.rotfem\.lock: cannot be written: it is a symbolic link"):
+        run_result(1.0).write(folder)
+    (folder / NAME).unlink()
+    with ResultSet(folder, "run") as results:
+        live = results.grow("history.csv", Table(("t",)))
+        live.path.unlink()
+        live.path.symlink_to(target)
+        live.table.append((1.0,))
+        assert not live.flush()
+        results.put({"history.csv": "t\n2.0\n"})
+        results.finish({"command": "run", "status": "done"})
+    assert not (folder / "history.csv").is_symlink()
+    assert target.read_text() == "mine"
+
+
+def test_what_ends_unexpectedly_has_failed(tmp_path: Path) -> None:
+    for error, status in ((KeyboardInterrupt(), "interrupted"), (ZeroDivisionError("by zero"), "failed")):
+        results = ResultSet(tmp_path, "run")
+        results.grow("history.csv", Table(("t",)))
+        results.close(error)
+        assert read_summary(tmp_path)["status"] == status
+    assert said_of(tmp_path).startswith(f"{tmp_path}: run failed: ZeroDivisionError: by zero")
+
+
+def test_a_summary_says_failed_on_a_full_disk_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(**_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(OutputError), ResultSet(tmp_path, "run") as results:  # noqa: PT012
+        results.grow("history.csv", Table(("t",)))
+        monkeypatch.setattr(tempfile, "mkstemp", full)
+        results.finish({"command": "run", "status": "done"})
+    assert read_summary(tmp_path)["status"] == "failed"
+    assert "No space left on device" in said_of(tmp_path)
+
+
+def test_what_a_killed_process_was_at_is_said(tmp_path: Path) -> None:
+    table = Table(("t", "x"))
+    results = ResultSet(tmp_path, "run")
+    live = results.grow("history.csv", table)
+    table.append((0.5, 1.0))
+    live.flush()
+    assert f"run running, by process {os.getpid()}" in said_of(tmp_path)
+    results._lock.release()  # as the end of a process does
+    said = said_of(tmp_path)
+    assert f"run failed: process {os.getpid()}" in said
+    assert "was running and has ended without a word; history.csv has 1 rows, up to t = 0.5 s" in said
+    with ResultSet(tmp_path, "run") as after:
+        assert after.before == said
+    with pytest.raises(OutputError, match="no results"):
+        said_of(tmp_path / "elsewhere")
 
 
 def test_names_of_all_files_are_known() -> None:
@@ -233,11 +321,12 @@ def test_a_growing_table_outlives_a_full_disk(tmp_path: Path, monkeypatch: pytes
     live = LiveTable(path, table)
     table.append((0.0, 1.0))
     real = os.pwrite
-    monkeypatch.setattr(os, "pwrite", lambda descriptor, data, at: real(descriptor, data[:4], at))
-    assert not live.flush()
-    assert path.read_text() == "t,x\n", "a torn line"
-    monkeypatch.undo()
     table.append((1.0, 2.0))
+    monkeypatch.setattr(os, "pwrite", lambda descriptor, data, at: real(descriptor, data[:12], at))
+    assert not live.flush()
+    assert path.read_text() == "t,x\n0.0,1.0\n", "a torn line"
+    monkeypatch.undo()
+    table.append((2.0, 3.0))
     assert live.flush()
     assert path.read_text() == csv_text(table.arrays())
 

@@ -12,6 +12,7 @@ import pytest
 from rotfem.errors import OutputError
 from rotfem.results.files import csv_text, json_text, prepare_folder, read_csv, write_text
 from rotfem.results.run import RunResult, Table
+from rotfem.version import __version__
 
 
 def test_table_grows_by_rows() -> None:
@@ -46,7 +47,11 @@ def test_write_and_read_a_result(tmp_path: Path) -> None:
     assert sorted(p.name for p in written) == ["history.csv", "summary.json"]  # no shape, so no file of it
     assert sorted(os.listdir(tmp_path)) == ["history.csv", "summary.json"]
     np.testing.assert_array_equal(read_csv(tmp_path / "history.csv")["tip_u1"], history["tip_u1"])
-    assert json.loads((tmp_path / "summary.json").read_text()) == {"status": "done", "x": 1.5}
+    assert json.loads((tmp_path / "summary.json").read_text()) == {
+        "versions": {"rotfem": __version__},
+        "status": "done",
+        "x": 1.5,
+    }
 
 
 def test_a_failed_write_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -101,10 +101,13 @@ class Record:
             return
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
+            text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+            if text and not text.startswith('{"study": '):
+                raise FileExistsError(0, "it is there already, and no record of measurements")
             if fresh:
                 path.unlink(missing_ok=True)
-            elif path.exists():
-                self._read(path.read_text(encoding="utf-8", errors="replace"))
+            else:
+                self._read(text)
         except OSError as error:
             raise OutputError(path, error.strerror or str(error)) from None
 
@@ -146,7 +149,7 @@ class Record:
         entry = {"study": self.identity, "setting": setting.key(), "measurement": measurement.to_json()}
         line = (json.dumps(entry) + "\n").encode()
         try:
-            descriptor = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o666)
+            descriptor = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW, 0o666)
             try:
                 end = os.lseek(descriptor, 0, os.SEEK_END)
                 if end and os.pread(descriptor, 1, end - 1) != b"\n":

@@ -1,0 +1,177 @@
+"""What the files of a computation do to those around them, and what is left of one that did not end."""
+
+from __future__ import annotations
+
+import json
+import resource
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rotfem.commands.simulation import Simulation
+from rotfem.results.files import read_csv
+from tests.beams import BEAM_TABLE
+from tests.cli.conftest import Done
+from tests.launch import environment
+
+SCENE = f"""\
+{BEAM_TABLE}[motion]
+type = "table"
+table = "history.csv"
+[mesh]
+elements = 2
+[time]
+end = 8.0
+step = 0.01
+[output]
+error = false
+"""
+
+TABLE = "t,omega\n0,0\n5,6\n10,6\n"
+
+
+@pytest.fixture(autouse=True)
+def _table(folder: Path) -> None:
+    (folder / "history.csv").write_text(TABLE)
+
+
+def status(folder: str) -> str:
+    found: str = json.loads(Path(folder, "summary.json").read_text())["status"]
+    return found
+
+
+def test_a_table_is_not_written_over(rotfem: Any) -> None:
+    for command in (["run"], ["modes"], ["check"]):
+        done: Done = rotfem(*command, "beam.toml", "-o", ".", "--no-plots")
+        assert done.status == 2
+        assert "output history.csv: cannot be written: the scene reads it" in done.err
+        assert done.err.count("\n") == 1
+    assert sorted(path.name for path in Path().iterdir()) == ["beam.toml", "history.csv"]
+    assert Path("history.csv").read_text() == TABLE
+    done = rotfem("cost", "beam.toml", "--write", "./history.csv")
+    assert (done.status, done.err.count("\n")) == (2, 1)
+    assert "is what has been read" in done.err
+
+
+def test_a_blade_file_is_not_written_over(rotfem: Any) -> None:
+    Path("blade.toml").write_text("no blade")
+    Path("link").symlink_to("blade.toml")
+    done: Done = rotfem("import", "link", "-o", "blade.toml", "--format", "beamdyn")
+    assert done.status == 2
+    assert Path("blade.toml").read_text() == "no blade"
+
+
+def test_a_table_of_an_earlier_run_may_be_read_elsewhere(rotfem: Any) -> None:
+    assert rotfem("run", "beam.toml", "-o", "out", "--no-plots", "--set", "time.end=0.1").status == 0
+    Path("out/history.csv").write_text(TABLE)
+    again = ["--set", "motion.table=out/history.csv", "--set", "time.end=0.1", "--no-plots"]
+    assert rotfem("run", "beam.toml", "-o", "out", *again).status == 2
+    assert rotfem("run", "beam.toml", "-o", "further", *again).status == 0
+    assert Path("out/history.csv").read_text() == TABLE
+
+
+def test_an_error_nobody_foresaw_leaves_the_status_failed(rotfem: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def spoilt(self: Simulation, state: Any) -> None:
+        raise ZeroDivisionError("nobody foresaw it")
+
+    monkeypatch.setattr(Simulation, "_check", spoilt)
+    with pytest.raises(ZeroDivisionError):
+        rotfem("run", "beam.toml", "-o", "out")
+    assert status("out") == "failed"
+    done: Done = rotfem("check", "out")
+    assert done.status == 0
+    assert "out: run failed: ZeroDivisionError: nobody foresaw it" in done.out
+    assert json.loads(rotfem("check", "out", "--json").out)["status"] == "failed"
+
+
+def test_a_kill_is_said_by_the_next_command_and_by_check(rotfem: Any) -> None:
+    program = f"""
+import os
+from rotfem.commands.cli import main
+from rotfem.commands.keeper import Keeper
+saved = Keeper._save
+def killed(*given):
+    saved(*given)
+    os.kill(os.getpid(), {int(signal.SIGKILL)})
+Keeper._save = killed
+main()
+"""
+    command = [sys.executable, "-c", program, "run", "beam.toml", "-o", "out", "--checkpoint", "50"]
+    killed = subprocess.run(command, env=environment(), capture_output=True, check=False, timeout=300)
+    assert killed.returncode == -signal.SIGKILL
+    assert status("out") == "running"
+    done: Done = rotfem("check", "out")
+    assert done.status == 0
+    assert "out: run failed: process" in done.out
+    assert "has ended without a word" in done.out
+    assert "--resume goes on from its checkpoint" in done.out
+    done = rotfem("run", "beam.toml", "-o", "out", "--resume", "--no-plots", "--set", "time.end=0.7")
+    assert done.status == 0
+    assert "warning: out: run failed: process" in done.err
+    assert rotfem("check", "out").out == "out: run done; history.csv has 71 rows, up to t = 0.7 s\n"
+    assert rotfem("check", ".").status == 2
+
+
+def test_on_a_full_disk_rows_that_fit_and_the_checkpoint_are_usable(rotfem: Any) -> None:
+    """The system refuses files beyond a size, as it does where there is no room: some 500 rows of 800."""
+    assert rotfem("run", "beam.toml", "-o", "whole", "--no-plots").status == 0
+    whole = Path("whole/history.csv").read_bytes()
+    most = len(whole) * 5 // 8
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most, before[1]))
+    try:
+        done: Done = rotfem("run", "beam.toml", "-o", "out", "--no-plots", "--checkpoint", "100")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert done.status == 2
+    assert "history.csv: cannot be written: File too large" in done.err
+    assert status("out") == "failed"
+    there = Path("out/history.csv").read_bytes()
+    assert most - 300 < len(there) <= most, "all rows that fit"
+    assert whole.startswith(there)
+    assert there.endswith(b"\n")
+    assert read_csv("out/history.csv")["t"][-1] > 4.0
+    assert rotfem("run", "beam.toml", "-o", "out", "--no-plots", "--resume").status == 0
+    assert Path("out/history.csv").read_bytes() == whole
+
+
+BARE = """
+import sys
+for name in ("mpi4py", "petsc4py", "slepc4py", "dolfinx", "ufl", "basix", "ffcx", "gmsh"):
+    sys.modules[name] = None  # as if it were not installed
+from rotfem.commands.cli import main
+main()
+"""
+
+
+def bare(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Start rotfem where there is no FEniCSx."""
+    command = [sys.executable, "-c", BARE, *arguments]
+    return subprocess.run(command, env=environment(), capture_output=True, text=True, check=False, timeout=60)
+
+
+def test_without_fenicsx_help_version_and_syntax_are_there(folder: Path) -> None:
+    from rotfem import __version__
+
+    assert "campbell" in bare("--help").stdout
+    assert bare("--version").stdout == f"rotfem {__version__}\n"
+    done = bare("check", "beam.toml")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "beam.toml is a valid scene" in done.stdout
+    done = bare("check", "beam.toml", "--set", "time.end=soon")
+    assert (done.returncode, done.stderr) == (2, 'rotfem: beam.toml: time.end = "soon": must be a number\n')
+
+
+@pytest.mark.parametrize("command", [["run"], ["modes"], ["campbell", "--speeds", "1,2"], ["explain"], ["cost"]])
+def test_without_fenicsx_all_else_names_the_page(folder: Path, command: list[str]) -> None:
+    verb, *options = command
+    done = bare(verb, "beam.toml", *options)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert "docs/installation.md" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert sorted(path.name for path in folder.iterdir()) == ["beam.toml", "history.csv"]
