@@ -1,46 +1,96 @@
-"""The loads of a scene as a problem has them: tables over the span, harmonics and functions made into parts."""
+"""The loads of a scene as sums of shapes times amplitudes (see `rotfem.mechanics.loads`)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rotfem.errors import InputError
-from rotfem.mechanics.composed_loads import ComposedLoad, LoadOfPlace, Part
 from rotfem.mechanics.courses import TINY
-from rotfem.mechanics.loads import Load, Loads, PointLoads, named
+from rotfem.mechanics.loads import WHOLE, AnyLoad, Load, Loads, PlaceLoad, PointLoads, Shapes, Term, named, replaced
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
-from rotfem.mechanics.span import FunctionOfPlace, Shapes
 from rotfem.scene import Scene
 
 Array = npt.NDArray[np.float64]
 
-#: Places along the structure at which a function of the place is looked at.
+#: Places along the structure at which a function of the place is sampled to see how it changes with time.
 PROBES = 9
 
 
-def loads_of(scene: Scene, motion: Motion, maker: type[LoadsMaker] | None = None) -> Loads:
-    """Return the loads of a scene, under a motion that says how its hub turns, by another maker than the usual one."""
-    given = scene.loads
-    made = (maker or LoadsMaker)(scene.structure, motion)
+def loads_of(scene: Scene, motion: Motion) -> Loads:
+    """Return the loads of a scene, under a motion that says how its hub turns."""
+    given, structure = scene.loads, scene.structure
     points = []
     for i, point in enumerate(given.at):
-        pair = {name: getattr(point, name) for name in ("force", "moment")}
-        kinds = {n: p.kind if p is not None and "kind" in p.model_fields_set else point.kind for n, p in pair.items()}
-        both = {n: made.load(f"at.{i}.{n}", load, kinds[n]) for n, load in pair.items()}
-        points.append(PointLoads(point.x, **both))
-    names = ("tip_force", "tip_moment", "distributed", "pressure")
-    whole: dict[str, Any] = {name: made.load(name, getattr(given, name)) for name in names}
-    return Loads(gravity=given.gravity, at=tuple(points), **whole)
+        made = {
+            name: load_of(f"at.{i}.{name}", load, structure, motion, point.kind_of(load))
+            for name, load in (("force", point.force), ("moment", point.moment))
+            if load is not None
+        }
+        points.append(PointLoads(point.x, **made))
+    whole: dict[str, Any] = {name: load for name in WHOLE if (load := getattr(given, name)) is not None}
+    made = {name: load_of(name, load, structure, motion, load.kind) for name, load in whole.items()}
+    return Loads(gravity=given.gravity, at=tuple(points), **made)
+
+
+def load_of(name: str, given: Any, structure: Any, motion: Motion, kind: str) -> AnyLoad:
+    """Return one load.
+
+    Args:
+        name: key in [loads].
+        given: what the scene has there.
+        structure: of the scene.
+        motion: of the hub.
+        kind: "dead" or "follower".
+    """
+    key, planar = f"loads.{name}", structure.is_planar
+    size = 1 if name == "pressure" or (planar and name.endswith("moment")) else 3
+    if (place := given.place_function) is not None:
+        timed = given.over_span_and_time is not None
+        function = checked(place, key, size, "place and time" if timed else "place", planar)
+        at = function if timed else (lambda x, t: function(x))
+        return PlaceLoad(kind, at, _probes(structure), constant=not timed)
+    terms = [_harmonic(harmonic, motion) for harmonic in given.harmonic]
+    if given.value is not None:
+        terms.append(Term(Shapes.uniform([given.value])))
+    elif given.time_function is not None:
+        of_time = checked(given.time_function, key, size, "time", planar)
+        each = Shapes.uniform(np.eye(size))
+        terms.append(Term(each, lambda t: np.array([of_time(float(s)) for s in t]), linear=False))
+    elif (rows := given.time_table) is not None:
+        terms.append(Term.table(rows, Shapes.uniform(np.eye(len(rows[0]) - 1))))
+    elif getattr(given, "over_span", None) is not None:
+        terms.append(Term(Shapes.along_span(given.over_span)))
+    elif getattr(given, "over_span_and_time", None) is not None:
+        terms.append(Term.both(given.over_span_and_time))
+    elif getattr(given, "regions", None) is not None:
+        terms += [Term(Shapes(np.array([[[p]]]), region=region)) for region, p in given.regions.items()]
+    return Load(kind, tuple(terms))
+
+
+def _harmonic(harmonic: Any, motion: Motion) -> Term:
+    amplitude, per_rev = harmonic.amplitude, harmonic.per_rev
+    shapes = Shapes.along_span(amplitude) if isinstance(amplitude[0], tuple) else Shapes.uniform([amplitude])
+    if per_rev is None:
+        return Term.harmonic(shapes, lambda t: harmonic.frequency * t, harmonic.phase)
+    return Term.harmonic(shapes, lambda t: per_rev * np.array([motion.angle(float(s)) for s in t]), harmonic.phase)
+
+
+def _probes(structure: Any) -> tuple[Any, ...]:
+    """Return places along the structure; of a plate from a file one."""
+    length = structure.length
+    x = np.linspace(0.0, length, PROBES) if length is not None else np.zeros(1)
+    return tuple((float(s), 0.0) if structure.type == "plate" else float(s) for s in x)
 
 
 def held(problem: Problem) -> list[str]:
     """Return a warning where what is computed at one time, as modes are, takes pitch and loads for those of t = 0."""
-    given = {name: getattr(load, "unpitched", load) for name, load in named(problem.loads).items()}
+    given = {name: load.unpitched or load for name, load in named(problem.loads).items()}
     names = [f"loads.{name}" for name, load in given.items() if not (load.constant or load.is_zero)]
     said = [f"{', '.join(names)} {'change' if len(names) > 1 else 'changes'} with time: taken as at t = 0"]
     return [*held_pitch(problem), *(said if names else [])]
@@ -64,137 +114,25 @@ def swept_loads(scene: Scene, motion: Motion) -> Loads:
     Raises:
         InputError: there is no harmonic load, or one that changes with time in another way.
     """
-    made = loads_of(scene, motion, SweptLoadsMaker)
-    swept = named(made)
-    if not any(isinstance(part, SweptPart) for load in swept.values() for part in getattr(load, "parts", ())):
+    made = loads_of(scene, motion)
+    swept: dict[str, AnyLoad] = {}
+    for name, load in named(made).items():
+        if load.constant:
+            continue
+        if isinstance(load, PlaceLoad) or any(t.amplitudes is not None and t.phase is None for t in load.terms):
+            raise InputError(f"loads.{name}", None, "must be constant or harmonic in a frequency response")
+        swept[name] = replace(load, terms=tuple(map(_swept, load.terms)))
+    if not swept:
         why = "a frequency response needs a harmonic load, such as loads.tip_force.harmonic = "
         raise InputError("loads", None, why + "{ amplitude = [0, 1], frequency = 1 }; its frequency is swept")
-    for name, load in swept.items():
-        parts = getattr(load, "parts", None)
-        still = load.constant if parts is None else all(p.amplitudes is None or isinstance(p, SweptPart) for p in parts)
-        if not still:
-            raise InputError(f"loads.{name}", None, "must be constant or harmonic in a frequency response")
-    return made
+    return replaced(made, swept)
 
 
-class LoadsMaker:
-    """Makes loads of those of a scene.
-
-    Args:
-        structure: of the scene.
-        motion: of the hub.
-    """
-
-    def __init__(self, structure: Any, motion: Motion):
-        self.structure, self.motion = structure, motion
-        self.plate, self.planar = structure.type == "plate", structure.is_planar
-
-    def load(self, name: str, given: Any, kind: str | None = None) -> Load | None:
-        """Return a load: that of the scene itself where it is a value or a table over time, else one with parts.
-
-        Args:
-            name: key in [loads].
-            given: what the scene has there, or None.
-            kind: "dead" or "follower"; that of the load if None.
-        """
-        if given is None:
-            return None
-        turns: Any = kind or given.kind
-        size = getattr(given, "SIZE", 1 if self.structure.is_planar and name.endswith("moment") else 3)
-        place = getattr(given, "place_function", None)
-        if place is not None:
-            timed = given.over_span_and_time is not None
-            of = "place and time" if timed else "place"
-            function = checked(place, f"loads.{name}", size, of, self.planar)
-            at = function if timed else (lambda x, t: function(x))
-            span = FunctionOfPlace(at, self.plate)
-            return LoadOfPlace(turns, span, self._probes(), constant=not timed)
-        if not (given.harmonic or given.varies_over_span) and given.time_function is None and turns == given.kind:
-            simple: Load = given
-            return simple
-        return ComposedLoad(turns, tuple(self._parts(f"loads.{name}", given, size)))
-
-    def _parts(self, key: str, given: Any, size: int) -> list[Part]:
-        """Return the parts of a load that is no function of the place."""
-        parts = [self._harmonic(h) for h in given.harmonic]
-        if given.value is not None:
-            parts.append(Part(uniform([given.value])))
-        elif given.time_function is not None:
-            function = checked(given.time_function, key, size, "time", self.planar)
-            each = uniform(np.eye(size))
-            parts.append(Part(each, lambda t: np.array([function(float(s)) for s in t]), linear=False))
-        elif given.time_table is not None:
-            parts.append(Part.table(given.time_table, uniform(np.eye(len(given.time_table[0]) - 1))))
-        elif getattr(given, "regions", None) is not None:
-            parts += [Part(Shapes(None, np.array([[[p]]]), name)) for name, p in given.regions.items()]
-        elif getattr(given, "over_span", None) is not None:
-            parts.append(Part(along(given.over_span)))
-        elif getattr(given, "over_span_and_time", None) is not None:
-            parts.append(over_both(given.over_span_and_time))
-        return parts
-
-    def _harmonic(self, harmonic: Any) -> Part:
-        shapes, phase, per_rev = shapes_of(harmonic), harmonic.phase, harmonic.per_rev
-        if per_rev is None:
-            return Part.harmonic(shapes, lambda t: harmonic.frequency * t + phase)
-        angle = self.motion.angle
-        return Part.harmonic(shapes, lambda t: per_rev * np.array([angle(float(s)) for s in t]) + phase)
-
-    def _probes(self) -> Array:
-        """Return points along the structure, shape (n, 3); of a plate from a file one point."""
-        length = self.structure.length
-        x = np.linspace(0.0, length, PROBES) if length is not None else np.zeros(1)
-        return np.column_stack([x, np.zeros((len(x), 2))])
-
-
-class SweptPart(Part):
-    """A harmonic part whose frequency is swept."""
-
-
-class SweptLoadsMaker(LoadsMaker):
-    """Makes loads whose harmonic parts are swept (see `swept_loads`)."""
-
-    def _harmonic(self, harmonic: Any) -> Part:
-        shapes, phase = shapes_of(harmonic), harmonic.phase
-        factors = np.array([0.0, np.cos(phase), np.sin(phase)])
-
-        def amplitudes(t: Array) -> Array:
-            return np.asarray(factors[np.searchsorted(SWEPT, t)][:, None])
-
-        return SweptPart(shapes, amplitudes, linear=False, largest=np.ones(1))
-
-
-def shapes_of(harmonic: Any) -> Shapes:
-    """Return how the amplitude of a harmonic load is spread."""
-    amplitude = harmonic.amplitude
-    return along(amplitude) if isinstance(amplitude[0], tuple) else uniform([amplitude])
-
-
-def uniform(vectors: Any) -> Shapes:
-    """Return the shapes that are these vectors everywhere."""
-    return Shapes(None, np.array(vectors, dtype=float)[:, None, :])
-
-
-def along(rows: Any) -> Shapes:
-    """Return one shape from rows (x, components)."""
-    table = np.array(rows, dtype=float)
-    return Shapes(table[:, 0], table[None, :, 1:])
-
-
-def over_both(rows: Any) -> Part:
-    """Return the part of rows (x, t, components) in the order of x, then t: a shape for every station and component.
-
-    Those that are zero at all times are left out.
-    """
-    table = np.array(rows, dtype=float)
-    x, t = np.unique(table[:, 0]), np.unique(table[:, 1])
-    values = table[:, 2:].reshape(len(x), len(t), -1).transpose(1, 0, 2)  # (t, x, component)
-    n = values.shape[2]
-    hats = np.eye(len(x) * n).reshape(-1, len(x), n)
-    amplitudes = values.reshape(len(t), -1)
-    there = np.flatnonzero(np.any(amplitudes != 0.0, axis=0))
-    there = there if len(there) else np.arange(1)
-    return Part.table(np.column_stack([t, amplitudes[:, there]]), Shapes(x, hats[there]))
+def _swept(term: Term) -> Term:
+    if term.phase is None:
+        return term
+    factors = np.array([0.0, np.cos(term.phase), np.sin(term.phase)])
+    return replace(term, amplitudes=lambda t: np.asarray(factors[np.searchsorted(SWEPT, t)][:, None]))
 
 
 def checked(function: Callable[..., Any], key: str, size: int, of: str, planar: bool = False) -> Callable[..., Array]:

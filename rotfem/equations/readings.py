@@ -15,6 +15,7 @@ from rotfem.equations.functionals import Functionals
 from rotfem.equations.model import Model
 from rotfem.mechanics.loads import is_moment
 from rotfem.mechanics.motion import Motion
+from rotfem.mechanics.sums import added
 from rotfem.numerics import forms
 from rotfem.structures.root_reaction import RootReaction
 from rotfem.structures.structure import Structure
@@ -120,6 +121,12 @@ class Readings:
         return Functionals(self.model.energies(), self.structure.mesh)
 
     @cached_property
+    def _moment(self) -> Any:
+        """The sum of all applied moments, compiled; None without. Of planar beams, whose axis is that of the spin."""
+        moments = [load for load in self.model.mechanics.loads if is_moment(load.name)]
+        return forms.form(added(load.force * load.measure for load in moments)) if moments else None
+
+    @cached_property
     def _outputs(self) -> dict[str, Any]:
         return {name: forms.form(form) for name, form in self.model.outputs().items()}
 
@@ -153,7 +160,5 @@ class Readings:
             jacobi = e["T2"] - e.get("T0", 0.0) + e["strain"]
         potential = e.get("potential", 0.0)
         if self.clamp is not None:  # a dead moment works on the rotation relative to the hub, alpha − psi
-            given = self.structure.load_constants.items()
-            moments = sum(float(m.value[0]) for name, (m, _) in given if is_moment(name))
-            potential += moments * self.clamp.angle(self.time)
+            potential += self.total(self._moment) * self.clamp.angle(self.time)
         return {"kinetic": kinetic, "strain": e["strain"], "jacobi": jacobi + potential}

@@ -19,11 +19,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.mechanics.free_hub import FreeHub, Torque
-from rotfem.mechanics.loads import Load, named, replaced
+from rotfem.mechanics.loads import AnyLoad, PlaceLoad, named, replaced
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.pitch import Pitch
 from rotfem.mechanics.problem import Problem
-from rotfem.mechanics.span import Span
 
 Array = npt.NDArray[np.float64]
 
@@ -105,42 +104,6 @@ class Course:
 
 
 @dataclass(frozen=True)
-class SeenLoad:
-    """A load as a view shows it (see `Load`)."""
-
-    load: Load
-    at: Callable[[float], Array]
-    course: Course
-    view: View
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.load, name)
-
-    @property
-    def span(self) -> Any:
-        """How it is spread; of a function of place this, as the view shows it."""
-        span = self.load.span
-        return span if span is None or span.shapes is not None else SeenSpan(span, self.course, self.view)
-
-
-@dataclass(frozen=True)
-class SeenSpan:
-    """A function of place and time as a view shows it (see `Span`), with the knots of its course."""
-
-    span: Span
-    course: Course
-    view: View
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.span, name)
-
-    def over(self, points: Array) -> Callable[[float], Array]:
-        """Return t (s) ↦ components at points (n, 3) in m, one after the other."""
-        at, course = self.span.over(points), self.course
-        return lambda t: np.asarray(Course(course.name, at, course.knots, course.marks).seen(self.view)(t))
-
-
-@dataclass(frozen=True)
 class SeenTorque(Torque):
     """A torque as a view shows it."""
 
@@ -160,13 +123,24 @@ def watched(problem: Problem, view: View) -> tuple[Problem, list[Course]]:
         return course.seen(view)
 
     motion = _watched_motion(problem.motion, see)
-    changing: dict[str, Load] = {}
-    for name, load in named(problem.loads).items():
-        if not load.constant:
-            course = _load_course(f"loads.{name}", load)
-            changing[name] = SeenLoad(load, see(course), course, view)
-    loads = replaced(problem.loads, changing) if changing else problem.loads
-    return problem.replace(motion=motion, loads=loads), courses
+    changing = {name: load for name, load in named(problem.loads).items() if not load.constant}
+    seen = {name: _seen_load(f"loads.{name}", load, see, view) for name, load in changing.items()}
+    return problem.replace(motion=motion, loads=replaced(problem.loads, seen)), courses
+
+
+def _seen_load(name: str, load: AnyLoad, see: Callable[[Course], Callable[[float], Any]], view: View) -> AnyLoad:
+    """Return a load as a view shows it; a function of place at every place, with the knots found at its probes."""
+    course = Course(name, load.at, _times(load.knots), np.empty(0), load.many, known=load.linear)
+    sampled = see(course)
+    if not isinstance(load, PlaceLoad):
+        return replace(load, seen=sampled)
+    function = load.function
+
+    def at(place: Any, t: float) -> Array:
+        one = Course(name, lambda s: function(place, s), course.knots, course.marks)
+        return np.asarray(one.seen(view)(t))
+
+    return replace(load, function=at)
 
 
 def _watched_motion(motion: Motion, see: Callable[[Course], Callable[[float], Any]]) -> Motion:
@@ -207,10 +181,6 @@ def _watched_hub(hub: FreeHub, see: Callable[[Course], Callable[[float], Any]]) 
     torque = hub.torque
     course = Course("motion.torque", torque.at, torque.knots, np.empty(0), lambda t: torque.many(t)[:, None])
     return replace(hub, torque=SeenTorque(torque.pulses, torque.table, see(course)))
-
-
-def _load_course(name: str, load: Load) -> Course:
-    return Course(name, load.at, _times(load.knots), np.empty(0), load.many, known=load.linear)
 
 
 def _times(knots: Iterable[float] | None) -> Array:

@@ -1,84 +1,250 @@
-"""Applied loads as functions of time: what the forms' amplitude constants are set to."""
+"""Applied loads: f(x, t) = Σ_k a_k(t) s_k(x), shapes over the structure times amplitudes over time.
+
+A value, a table over the span and a harmonic have one shape, a table over time one for every component, a table over
+span and time one for every station and component. A linear theory assembles one piece for every shape. A function of
+place and time takes the nodes of the mesh for stations (`PlaceLoad`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.mechanics.span import Span
+from rotfem.mechanics.pitch import Pitch
 
 Array = npt.NDArray[np.float64]
 
 
-class Load(Protocol):
-    """A force or moment over time, and over the structure if it has a `span`."""
+@dataclass(frozen=True)
+class Shapes:
+    """Some shapes with common stations: linear between them, nothing outside.
+
+    Attributes:
+        values: of the shapes at the stations, (shapes, stations, components); (shapes, 1, components) without stations.
+        x: stations along the span (m), increasing; one that stands twice is a jump. None: the same everywhere.
+        region: name of the only region of the mesh where they are; "" everywhere.
+    """
+
+    values: Array
+    x: Array | None = None
+    region: str = ""
+
+    @classmethod
+    def uniform(cls, vectors: npt.ArrayLike) -> Shapes:
+        """Return the shapes that are these vectors (shapes, components) everywhere."""
+        return cls(np.asarray(vectors, dtype=float)[:, None, :])
+
+    @classmethod
+    def along_span(cls, rows: npt.ArrayLike) -> Shapes:
+        """Return one shape from rows (x, components)."""
+        table = np.asarray(rows, dtype=float)
+        return cls(table[None, :, 1:], table[:, 0])
 
     @property
-    def kind(self) -> str:
-        """What its direction does: "dead" keeps it in the frame, "follower" turns with the section."""
+    def is_uniform(self) -> bool:
+        """Whether they are the same everywhere."""
+        return self.x is None and not self.region
 
-    @property
-    def is_zero(self) -> bool:
-        """Whether it is zero at all times."""
+    def along(self, x: Array, towards: Array) -> Array:
+        """Return the shapes at places (n,), (shapes, n, components).
 
-    @property
-    def constant(self) -> bool:
-        """Whether it does not change with time."""
-
-    @property
-    def knots(self) -> tuple[float, ...] | None:
-        """Times (s) between which it is smooth, as far as they are known."""
-
-    @property
-    def linear(self) -> bool:
-        """Whether it is linear between its knots; otherwise it has to be looked at."""
-
-    @property
-    def span(self) -> Span | None:
-        """How it is spread over the structure; None where it is the same everywhere."""
-
-    def at(self, t: float) -> Array:
-        """Return its components at time t (s); with a span its amplitudes, as many as the span has shapes."""
-
-    def many(self, t: Array) -> Array:
-        """Return the same at times (n,), shape (n, components)."""
-
-    def sizes(self) -> Array | None:
-        """Return the largest size of each component at all times and places; None where that is not known."""
+        Args:
+            x: places along the span, m.
+            towards: places on the side of each from which a jump is seen, as the middles of their cells.
+        """
+        if self.x is None:
+            return np.repeat(self.values, len(x), axis=1)
+        side = x + 1e-6 * (towards - x)
+        i = np.searchsorted(self.x, side, side="right") - 1
+        there = (i >= 0) & (side <= self.x[-1])
+        i = np.clip(i, 0, len(self.x) - 2)
+        share = (x - self.x[i]) / np.where(self.x[i + 1] > self.x[i], self.x[i + 1] - self.x[i], 1.0)
+        share = np.where(there, share, 0.0)[:, None]
+        found = (1.0 - share) * self.values[:, i] + share * self.values[:, i + 1]
+        return np.where(there[:, None], found, 0.0)
 
 
 @dataclass(frozen=True)
-class ConstantLoad:
-    """A load that does not change with time.
+class Term:
+    """Σ_k a_k(t) s_k(x).
 
     Attributes:
-        value: components, N, N/m or N·m.
+        shapes: s_k.
+        amplitudes: times (n,) ↦ a_k, shape (n, k); None where all are 1 at all times.
+        knots: times (s) between which they are smooth, as far as they are known.
+        linear: whether they are linear between knots.
+        largest: largest size of each; None where that is not known. Not asked for where all are 1.
+        phase: of a harmonic (rad); None of anything else.
+    """
+
+    shapes: Shapes
+    amplitudes: Callable[[Array], Array] | None = None
+    knots: tuple[float, ...] = ()
+    linear: bool = True
+    largest: Array | None = None
+    phase: float | None = None
+
+    @classmethod
+    def table(cls, rows: npt.ArrayLike, shapes: Shapes) -> Term:
+        """Return amplitudes that are given by rows (t, a…), linear between them and constant outside."""
+        t, *columns = np.asarray(rows, dtype=float).T
+        if not np.any(np.ptp(columns, axis=1)):
+            values = np.einsum("k,ksc->sc", np.array([column[0] for column in columns]), shapes.values)
+            return cls(replace(shapes, values=values[None]), knots=tuple(t))
+
+        def amplitudes(s: Array) -> Array:
+            return np.stack([np.interp(s, t, column) for column in columns], axis=1)
+
+        return cls(shapes, amplitudes, tuple(t), largest=np.abs(columns).max(axis=1))
+
+    @classmethod
+    def both(cls, rows: npt.ArrayLike) -> Term:
+        """Return the term of rows (x, t, components), every x with every t: a shape for every station and component."""
+        table = np.asarray(rows, dtype=float)
+        x, t = np.unique(table[:, 0]), np.unique(table[:, 1])
+        values = table[np.lexsort((table[:, 1], table[:, 0])), 2:].reshape(len(x), len(t), -1).transpose(1, 0, 2)
+        n = values.shape[2]
+        hats, amplitudes = np.eye(len(x) * n).reshape(-1, len(x), n), values.reshape(len(t), -1)
+        there = np.flatnonzero(np.any(amplitudes != 0.0, axis=0))
+        there = there if len(there) else np.arange(1)
+        return cls.table(np.column_stack([t, amplitudes[:, there]]), Shapes(hats[there], x))
+
+    @classmethod
+    def harmonic(cls, shapes: Shapes, angle: Callable[[Array], Array], phase: float) -> Term:
+        """Return one shape with the amplitude cos(angle(t) + phase), in rad."""
+        return cls(shapes, lambda t: np.cos(angle(t) + phase)[:, None], linear=False, largest=np.ones(1), phase=phase)
+
+    def at(self, t: Array) -> Array:
+        """Return the amplitudes at times (n,), shape (n, k)."""
+        return np.ones((len(t), len(self.shapes.values))) if self.amplitudes is None else self.amplitudes(t)
+
+    def sizes(self) -> Array | None:
+        """Return an upper bound of the size of each component at all times and places; None if there is none."""
+        most = np.abs(self.shapes.values).max(axis=1)
+        largest = np.ones(len(most)) if self.amplitudes is None else self.largest
+        return None if largest is None else largest @ most
+
+
+@dataclass(frozen=True)
+class Load:
+    """A force or moment, or a density of one: a sum of terms.
+
+    Attributes:
+        kind: "dead" keeps its direction in the frame, "follower" turns with the section.
+        terms: of the sum.
+        seen: time (s) ↦ what `at` returns in the place of the sum, as a march sees it (`rotfem.mechanics.courses`).
+        unpitched: the load in the frame of the hub, where this one is in that of a blade that pitches.
+    """
+
+    kind: str
+    terms: tuple[Term, ...]
+    seen: Callable[[float], Array] | None = None
+    unpitched: Load | None = None
+
+    @cached_property
+    def is_uniform(self) -> bool:
+        """Whether it is the same everywhere; its amplitudes are its components then."""
+        return all(term.shapes.is_uniform for term in self.terms)
+
+    @cached_property
+    def is_zero(self) -> bool:
+        """Whether it is zero at all times and places."""
+        sizes = self.sizes()
+        return sizes is not None and not np.any(sizes)
+
+    @cached_property
+    def constant(self) -> bool:
+        """Whether it does not change with time."""
+        return all(term.amplitudes is None for term in self.terms)
+
+    @cached_property
+    def knots(self) -> tuple[float, ...]:
+        """Times (s) between which it is smooth, as far as they are known."""
+        return tuple(sorted({t for term in self.terms for t in term.knots}))
+
+    @cached_property
+    def linear(self) -> bool:
+        """Whether it is linear between its knots; otherwise it has to be sampled."""
+        return all(term.linear for term in self.terms)
+
+    @cached_property
+    def stations(self) -> tuple[float, ...]:
+        """Places along the span (m) at which it has kinks or jumps, which are nodes of the mesh."""
+        return tuple(sorted({float(x) for term in self.terms if term.shapes.x is not None for x in term.shapes.x}))
+
+    def many(self, t: Array) -> Array:
+        """Return the components of a uniform load, else all amplitudes, at times (n,), shape (n, components)."""
+        if self.is_uniform:
+            return np.asarray(sum(term.at(t) @ term.shapes.values[:, 0] for term in self.terms))
+        return np.concatenate([term.at(t) for term in self.terms], axis=1)
+
+    def at(self, t: float) -> Array:
+        """Return the same at time t (s)."""
+        return self.seen(t) if self.seen is not None else np.asarray(self.many(np.array([t]))[0])
+
+    def sizes(self) -> Array | None:
+        """Return an upper bound of the size of each component at all times and places; None if there is none."""
+        parts = [size for term in self.terms if (size := term.sizes()) is not None]
+        return np.sum(parts, axis=0) if len(parts) == len(self.terms) else None
+
+
+class ConstantLoad(Load):
+    """A load that does not change with time and is the same everywhere.
+
+    Args:
+        value: components, N, N/m, N/m² or N·m.
         kind: see `Load`.
     """
 
-    value: tuple[float, ...]
-    kind: Literal["dead", "follower"] = "dead"
-    constant: bool = True
-    is_zero: bool = False
+    def __init__(self, value: tuple[float, ...], kind: str = "dead"):
+        super().__init__(kind, (Term(Shapes.uniform([value])),))
+
+
+@dataclass(frozen=True)
+class PlaceLoad:
+    """A load that is a function of place and time, with the interface of `Load`.
+
+    Attributes:
+        kind: see `Load`.
+        function: (place, t) ↦ components (components,); place is x (m) along a beam, (x, y) on a plate.
+        probes: places at which it is sampled to see how it changes with time.
+        constant: whether it does not change with time.
+        knots: times (s) between which it is smooth, as far as they are known.
+        unpitched: see `Load`.
+    """
+
+    kind: str
+    function: Callable[[Any, float], Array]
+    probes: tuple[Any, ...]
+    constant: bool
     knots: tuple[float, ...] = ()
-    linear: bool = True
-    span: None = None
+    unpitched: PlaceLoad | None = None
+    is_zero = is_uniform = linear = False
+    stations: tuple[float, ...] = ()
+
+    def on(self, places: tuple[Any, ...], t: float) -> Array:
+        """Return the components at places, one after the other."""
+        return np.concatenate([self.function(place, t) for place in places])
 
     def at(self, t: float) -> Array:
-        """Return its components."""
-        return np.array(self.value, dtype=np.float64)
+        """Return the components at the probes, one after the other."""
+        return self.on(self.probes, t)
 
     def many(self, t: Array) -> Array:
-        """Return its components at times (n,), shape (n, components)."""
-        return np.tile(self.at(0.0), (len(t), 1))
+        """Return the same at times (n,), shape (n, components)."""
+        return np.array([self.at(float(s)) for s in t])
 
-    def sizes(self) -> Array:
-        """Return the size of each component."""
-        return np.abs(self.at(0.0))
+    def sizes(self) -> None:
+        """Return None: it is not known how large it becomes."""
+        return
+
+
+AnyLoad: TypeAlias = Load | PlaceLoad
 
 
 @dataclass(frozen=True)
@@ -92,64 +258,48 @@ class PointLoads:
     """
 
     x: tuple[float, ...]
-    force: Load | None = None
-    moment: Load | None = None
-
-
-class Applied(Protocol):
-    """Gravity and the loads on a structure, None where there is none."""
-
-    @property
-    def gravity(self) -> tuple[float, ...]:
-        """Acceleration of gravity, m/s², inertial axes."""
-
-    @property
-    def tip_force(self) -> Load | None:
-        """Force at the tip, N."""
-
-    @property
-    def tip_moment(self) -> Load | None:
-        """Moment at the tip, N·m."""
-
-    @property
-    def distributed(self) -> Load | None:
-        """Force per length of a beam, N/m, or per area of a plate, N/m²."""
+    force: AnyLoad | None = None
+    moment: AnyLoad | None = None
 
 
 @dataclass(frozen=True)
 class Loads:
-    """Gravity and applied loads (see `Applied`); none by default.
+    """Gravity and the loads on a structure; none by default.
 
     Attributes:
+        gravity: acceleration, m/s², inertial axes.
+        tip_force: N.
+        tip_moment: N·m.
+        distributed: force per length of a beam, N/m, or per area of a plate, N/m².
+        distributed_moment: moment per length of a beam, N.
         pressure: force per area along the normal of a plate, N/m²: one component.
         at: what works at places along the structure.
     """
 
     gravity: tuple[float, ...] = (0.0, 0.0, 0.0)
-    tip_force: Load | None = None
-    tip_moment: Load | None = None
-    distributed: Load | None = None
-    pressure: Load | None = None
+    tip_force: AnyLoad | None = None
+    tip_moment: AnyLoad | None = None
+    distributed: AnyLoad | None = None
+    distributed_moment: AnyLoad | None = None
+    pressure: AnyLoad | None = None
     at: tuple[PointLoads, ...] = ()
 
 
-#: Loads of the whole structure and of its tip: forces and moments.
-FORCES, MOMENTS = ("tip_force", "distributed", "pressure"), ("tip_moment",)
+#: Loads of the whole structure and of its tip.
+WHOLE = ("tip_force", "tip_moment", "distributed", "distributed_moment", "pressure")
 
 
-def named(loads: Applied) -> dict[str, Load]:
+def named(loads: Loads) -> dict[str, AnyLoad]:
     """Return name ↦ load of all that are given, zero ones too: "tip_force", …, "at.0.force", "at.0.moment"."""
-    out = {name: getattr(loads, name, None) for name in (*FORCES, *MOMENTS)}
-    for i, point in enumerate(getattr(loads, "at", ())):
+    out = {name: getattr(loads, name) for name in WHOLE}
+    for i, point in enumerate(loads.at):
         out |= {f"at.{i}.force": point.force, f"at.{i}.moment": point.moment}
     return {name: load for name, load in out.items() if load is not None}
 
 
-def stations(loads: Applied) -> set[float]:
+def stations(loads: Loads) -> set[float]:
     """Return the places along the structure (m) at which loads have kinks or jumps, or work at a point."""
-    spans = (load.span for load in named(loads).values())
-    points = (point.x for point in getattr(loads, "at", ()))
-    return {x for span in spans if span is not None for x in span.stations} | {x[0] for x in points if len(x) == 1}
+    return {x for load in named(loads).values() for x in load.stations} | {p.x[0] for p in loads.at if len(p.x) == 1}
 
 
 def is_moment(name: str) -> bool:
@@ -157,15 +307,66 @@ def is_moment(name: str) -> bool:
     return name.endswith("moment")
 
 
-def replaced(loads: Applied, changed: Mapping[str, Load]) -> Loads:
+def replaced(loads: Loads, changed: Mapping[str, AnyLoad]) -> Loads:
     """Return the loads with other ones in the place of those of some names (see `named`)."""
-
-    def now(name: str, load: Load | None) -> Load | None:
-        return changed.get(name, load)
-
-    whole: dict[str, Any] = {name: now(name, getattr(loads, name, None)) for name in (*FORCES, *MOMENTS)}
     points = tuple(
-        PointLoads(point.x, now(f"at.{i}.force", point.force), now(f"at.{i}.moment", point.moment))
-        for i, point in enumerate(getattr(loads, "at", ()))
+        replace(p, **{part: changed.get(f"at.{i}.{part}", getattr(p, part)) for part in ("force", "moment")})
+        for i, p in enumerate(loads.at)
     )
-    return Loads(gravity=loads.gravity, at=points, **whole)
+    whole: dict[str, Any] = {name: load for name, load in changed.items() if name in WHOLE}
+    return replace(loads, at=points, **whole)
+
+
+# --- a blade that pitches -------------------------------------------------------------------------------------------
+
+
+def pitched(loads: Loads, pitch: Pitch | None) -> Loads:
+    """Return the loads in the frame of a blade that pitches; the same without a pitch over time.
+
+    Dead loads keep their direction in the frame of the hub. With φ, e of `rotfem.mechanics.pitch` a vector f of it is
+
+        Rᵀ f = e (e·f) + cos φ (f − e (e·f)) − sin φ e×f
+
+    in that of the blade: three linear maps of the shapes with the amplitudes 1, cos φ and −sin φ. Followers turn with
+    the blade.
+    """
+    if pitch is None:
+        return loads
+    dead = {name: load for name, load in named(loads).items() if load.kind == "dead" and not load.is_zero}
+    return replaced(loads, {name: _in_blade(load, pitch) for name, load in dead.items()})
+
+
+def _in_blade(load: AnyLoad, pitch: Pitch) -> AnyLoad:
+    knots = tuple(sorted({*load.knots, *pitch.knots}))
+    if isinstance(load, PlaceLoad):
+        given = load.function
+
+        def function(place: Any, t: float) -> Array:
+            return np.asarray(given(place, t) @ pitch.rotation(t))
+
+        return replace(load, function=function, constant=False, knots=knots, unpitched=load)
+    return Load("dead", tuple(new for term in load.terms for new in _turned(term, pitch, knots)), unpitched=load)
+
+
+def _turned(term: Term, pitch: Pitch, knots: tuple[float, ...]) -> Iterator[Term]:
+    e = pitch.axis
+    along = np.outer(e, e)
+    maps = (along, np.eye(3) - along, np.cross(e, np.eye(3)).T)
+
+    def cosine(phi: Array) -> Array:
+        return np.cos(phi)
+
+    def minus_sine(phi: Array) -> Array:
+        return -np.sin(phi)
+
+    for matrix, factor in zip(maps, (None, cosine, minus_sine), strict=True):
+        shapes = replace(term.shapes, values=term.shapes.values @ matrix.T)
+        if factor is None:
+            yield replace(term, shapes=shapes, phase=None)
+            continue
+
+        def amplitudes(t: Array, factor: Callable[[Array], Array] = factor) -> Array:
+            return factor(np.array([pitch.turned(float(s)) for s in t]))[:, None] * term.at(t)
+
+        largest = np.ones(len(shapes.values)) if term.amplitudes is None else term.largest
+        yield Term(shapes, amplitudes, knots, linear=False, largest=largest)

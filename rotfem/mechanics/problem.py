@@ -9,7 +9,7 @@ from typing import Any, Self, cast, overload
 
 from rotfem.errors import InputError
 from rotfem.mechanics.effects import INERTIA, INTERNAL, LOADS, Effect, Work, present_effects
-from rotfem.mechanics.loads import Applied, Loads
+from rotfem.mechanics.loads import Loads
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.outputs import Functional
 from rotfem.mechanics.theories import Theory
@@ -59,7 +59,7 @@ class Problem:
     mesh: Any
     theory: TheoryByName = TheoryByName()
     effects: tuple[str, ...] | None = None
-    loads: Applied = field(default_factory=Loads)
+    loads: Loads = field(default_factory=Loads)
     frame: str = "rotating"
     terms: Mapping[str, Work] = field(default_factory=dict)
     outputs: Mapping[str, Functional] = field(default_factory=dict)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from rotfem import registry
 from rotfem.errors import show
 from rotfem.scene.beams import PlanarBeamStructure, SpatialBeamStructure
 from rotfem.scene.limits import Limits
+from rotfem.scene.load_tables import FORCE
 from rotfem.scene.loads import Loads
 from rotfem.scene.motion import Motion, TorqueMotion
 from rotfem.scene.output import OutputTable
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh
-from rotfem.scene.signals import Signal
 from rotfem.scene.stepping import Time
 from rotfem.scene.values import problem
 
@@ -22,12 +24,8 @@ def check_planar(motion: Motion, loads: Loads) -> None:
     """Refuse what would move a planar beam out of its plane."""
     if motion.axis[0] != 0.0 or motion.axis[1] != 0.0:
         raise problem("motion.axis", list(motion.axis), "must be [0, 0, 1] or [0, 0, -1] for a planar_beam")
-    vectors: dict[str, Signal | None] = {
-        "motion.base_acceleration": motion.base_acceleration,
-        "loads.tip_force": loads.tip_force,
-        "loads.distributed": loads.distributed,
-        **{f"loads.at.{i}.force": point.force for i, point in enumerate(loads.at)},
-    }
+    vectors: dict[str, Any] = {"motion.base_acceleration": motion.base_acceleration}
+    vectors |= {f"loads.{name}": load for name, load in loads.named.items() if load.VECTORS is FORCE}
     for key, signal in vectors.items():
         if signal is not None and not signal.is_planar:
             value = list(signal.value) if signal.value is not None else None

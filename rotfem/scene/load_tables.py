@@ -1,29 +1,62 @@
-"""Tables of loads over the span, and over span and time: rows, the path of a CSV file, or, in Python, a function."""
+"""How loads are written: vectors of some kind, and their tables over time, over the span, and over both."""
 
 from __future__ import annotations
 
-import inspect
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeAlias
 
 from pydantic import ValidationInfo
 
-from rotfem.scene.files import as_table
-from rotfem.scene.values import Matrix, as_rows, problem
+from rotfem.scene.files import Reader, as_table
+from rotfem.scene.signals import arguments
+from rotfem.scene.values import Matrix, as_increasing_rows, as_number, as_rows, as_vector, problem
 
 #: A table, or a function in its place.
-Over = Matrix | Callable[..., Any]
+Over: TypeAlias = Matrix | Callable[..., Any]
 
 
-def arguments(function: Callable[..., Any]) -> int:
-    """Return how many arguments a function must be given; 1 where that cannot be told."""
-    try:
-        parameters = inspect.signature(function).parameters.values()
-    except (TypeError, ValueError):
-        return 1
-    return sum(p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) and p.default is p.empty for p in parameters)
+@dataclass(frozen=True)
+class Kind:
+    """What the vectors of a load are.
+
+    Attributes:
+        sizes: numbers of components that are allowed.
+        columns: how rows of components are written, for messages.
+        padded: number of components that vectors are filled up to with zeros.
+    """
+
+    sizes: tuple[int, ...]
+    columns: tuple[str, ...]
+    padded: int = 0
+
+    def vector(self, value: Any) -> tuple[float, ...]:
+        """Return components; raise if they are none. A number will do where one is allowed."""
+        if 1 in self.sizes and not (isinstance(value, list | tuple) and len(self.sizes) > 1):
+            return (as_number(value),)
+        return self._filled(as_vector(value, self.sizes))
+
+    def rows(self, over: tuple[str, ...], value: Any, info: ValidationInfo) -> Over:
+        """Return rows (what they are over, components), or the function of the same that stands in their place."""
+        names = ", ".join(over)
+        if callable(value):
+            if arguments(value) != len(over):
+                raise problem("", value, f"must be a function f({names}); it takes {arguments(value)} arguments")
+            function: Callable[..., Any] = value
+            return function
+        shape = "a table " + " or ".join(f"[[{names}, {columns}], …]" for columns in self.columns)
+        table = as_table(value, info, [len(over) + size for size in self.sizes], shape, READERS[over])
+        return tuple((*row[: len(over)], *self._filled(row[len(over) :])) for row in table)
+
+    def _filled(self, vector: tuple[float, ...]) -> tuple[float, ...]:
+        return (*vector, *(0.0,) * (self.padded - len(vector)))
+
+
+FORCE = Kind((2, 3), ("f1, f2", "f1, f2, f3"), padded=3)
+MOMENT = Kind((1, 3), ("m", "m1, m2, m3"))
+PRESSURE = Kind((1,), ("p",))
 
 
 def span_rows(
@@ -62,46 +95,5 @@ def grid_rows(
     return tuple(sorted(rows))
 
 
-def as_over_time(rows: Callable[[Any, ValidationInfo], Matrix]) -> Callable[[Any, ValidationInfo], Over]:
-    """Return what reads rows over time, or a function f(t) in their place."""
-    return lambda value, info: _function(value, 1, "f(t)") if callable(value) else rows(value, info)
-
-
-def as_over_span(sizes: Sequence[int], to: int) -> Callable[[Any, ValidationInfo], Over]:
-    """Return what reads rows (x, components), or a function f(x) in their place.
-
-    Args:
-        sizes: numbers of components that are allowed.
-        to: number that they are filled up to with zeros.
-    """
-    return _reader(("x",), span_rows, sizes, to)
-
-
-def as_over_both(sizes: Sequence[int], to: int) -> Callable[[Any, ValidationInfo], Over]:
-    """Return what reads rows (x, t, components), or a function f(x, t) in their place (see `as_over_span`)."""
-    return _reader(("x", "t"), grid_rows, sizes, to)
-
-
-def _reader(
-    over: tuple[str, ...], rows_of: Callable[..., Matrix], sizes: Sequence[int], to: int
-) -> Callable[[Any, ValidationInfo], Over]:
-    """Return what reads rows (what they are over, components), checked by `rows_of`, or a function of the same."""
-    n, names = len(over), ", ".join(over)
-
-    def read(value: Any, info: ValidationInfo) -> Over:
-        if callable(value):
-            return _function(value, n, f"f({names})")
-        rows = as_table(value, info, [n + size for size in sizes], f"a table [[{names}, {_names(sizes)}], …]", rows_of)
-        return tuple((*row, *(0.0,) * (n + to - len(row))) for row in rows)
-
-    return read
-
-
-def _names(sizes: Sequence[int]) -> str:
-    return "p" if max(sizes) == 1 else ", ".join(f"f{i}" for i in range(1, max(sizes) + 1))
-
-
-def _function(value: Callable[..., Any], number: int, call: str) -> Callable[..., Any]:
-    if arguments(value) != number:
-        raise problem("", value, f"must be a function {call}; it takes {arguments(value)} arguments")
-    return value
+#: What a table is over ↦ what reads its rows.
+READERS: dict[tuple[str, ...], Reader] = {("t",): as_increasing_rows, ("x",): span_rows, ("x", "t"): grid_rows}

@@ -2,57 +2,92 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, PlainValidator, ValidationInfo, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
+from pydantic_core import PydanticCustomError
 
-from rotfem.scene.files import as_time_table
-from rotfem.scene.harmonic import Harmonic, HarmonicForce, HarmonicMoment, HarmonicPressure, HarmonicSpan
-from rotfem.scene.load_tables import Over, arguments, as_over_both, as_over_span, as_over_time
-from rotfem.scene.signals import Signal, as_rows4
-from rotfem.scene.values import Matrix, PaddedVector, SceneModel, as_number, as_vector, problem
+from rotfem.scene.load_tables import FORCE, MOMENT, PRESSURE, Kind, Over
+from rotfem.scene.motion import Motion
+from rotfem.scene.signals import Given, TimeFunction, arguments
+from rotfem.scene.values import Matrix, Number, PaddedVector, Positive, SceneModel, as_number, as_vector, problem
 
-Kind = Literal["dead", "follower"]
+#: Part of the length by which a place may be off the structure.
+NEAR = 1e-9
 
-
-def _as_moment(value: Any) -> tuple[float, ...]:
-    if isinstance(value, list | tuple):
-        return as_vector(value, (1, 3))
-    return (as_number(value),)
+#: How tables are written that are not mistaken for others.
+KEYS = "write over_time = [[t, …], …], over_span = [[x, …], …] or over_span_and_time = [[x, t, …], …]"
 
 
-def _as_moment_rows(value: Any, info: ValidationInfo) -> Matrix:
-    return as_time_table(value, info, (2, 4), "a table [[t, M], …] or [[t, M1, M2, M3], …]")
-
-
-def _as_pressure(value: Any) -> tuple[float, ...]:
-    return (as_number(value),)
-
-
-def _as_pressure_rows(value: Any, info: ValidationInfo) -> Matrix:
-    return as_time_table(value, info, (2,), "a table [[t, p], …]")
-
-
-def _one_or_more(value: Any) -> Any:
-    """Return a list of tables, where one may be given by itself."""
-    return [value] if isinstance(value, Mapping | Harmonic) else value
-
-
-class Load(Signal):
-    """A force over time, components in the rotating frame (N, or N/m if distributed).
+class Harmonic(SceneModel):
+    """amplitude · cos(frequency · t + phase), or cos(per_rev · ψ + phase) with the angle ψ of the hub.
 
     Attributes:
+        amplitude: components, as those of the load's value; of a load over the span also rows (x, components).
+        frequency: rad/s; or
+        per_rev: periods in a revolution of the hub.
+        phase: rad.
+    """
+
+    amplitude: Any = Field(description="given")
+    frequency: Positive | None = None
+    per_rev: Positive | None = None
+    phase: Number = 0.0
+
+    @model_validator(mode="after")
+    def _check_one(self) -> Self:
+        if (self.frequency is None) == (self.per_rev is None):
+            raise problem("frequency", self.frequency, "give exactly one of frequency and per_rev")
+        return self
+
+
+class Load(Given):
+    """A force over time (N), components in the rotating frame; vectors of two get a third component, zero.
+
+    Attributes:
+        value: constant components, or None.
+        table, over_time: rows (t, components), linear between them and constant outside, or None; `over_time` also a
+            function.
+        function: Python function t (s) ↦ components, or None.
         kind: "dead" (keeps its direction in the rotating frame) or "follower" (turns with the section).
-        over_time: rows (t, a1, a2, a3) as `table`, or a function of time, or None.
         harmonic: what varies harmonically, added to the rest; it may be all there is.
     """
 
     WAYS: ClassVar[tuple[str, ...]] = ("value", "table", "over_time", "function")
+    VECTORS: ClassVar[Kind] = FORCE
 
-    kind: Kind = "dead"
-    over_time: Annotated[Over, PlainValidator(as_over_time(as_rows4))] | None = None
-    harmonic: tuple[HarmonicForce, ...] = ()
+    value: tuple[float, ...] | None = None
+    table: Matrix | None = None
+    function: TimeFunction | None = None
+    kind: Literal["dead", "follower"] = "dead"
+    over_time: Any = None
+    harmonic: tuple[Harmonic, ...] = ()
+
+    @field_validator("value", mode="plain")
+    @classmethod
+    def _read_value(cls, value: Any) -> tuple[float, ...] | None:
+        return None if value is None else cls.VECTORS.vector(value)
+
+    @field_validator("table", "over_time", mode="plain")
+    @classmethod
+    def _read_rows(cls, value: Any, info: ValidationInfo) -> Over | None:
+        return None if value is None else cls.VECTORS.rows(("t",), value, info)
+
+    @field_validator("harmonic", mode="after")
+    @classmethod
+    def _read_harmonics(cls, given: tuple[Harmonic, ...], info: ValidationInfo) -> tuple[Harmonic, ...]:
+        out = []
+        for i, part in enumerate(given):
+            try:
+                out.append(part.model_copy(update={"amplitude": cls._read_amplitude(part.amplitude, info)}))
+            except PydanticCustomError as error:
+                raise problem(f"{i}.amplitude", part.amplitude, error.message()) from None
+        return tuple(out)
+
+    @classmethod
+    def _read_amplitude(cls, value: Any, info: ValidationInfo) -> Any:
+        return cls.VECTORS.vector(value)
 
     @property
     def time_table(self) -> Matrix | None:
@@ -65,85 +100,71 @@ class Load(Signal):
         return self.over_time if callable(self.over_time) else self.function
 
     @property
-    def span(self) -> None:
-        """How it is spread: it is the same everywhere; `rotfem.commands.loads` makes the other ones."""
+    def place_function(self) -> Callable[..., Any] | None:
+        """The function of place, or of place and time, that it is, None where it is none."""
         return None
 
     @property
-    def varies_over_span(self) -> bool:
-        """Whether it is not the same everywhere."""
-        return False
+    def span_rows(self) -> Iterator[tuple[float, ...]]:
+        """All rows (x, components) of tables over the span."""
+        yield from ()
 
     @property
-    def constant(self) -> bool:
-        """Whether it does not change with time."""
-        return super().constant and not self.harmonic
-
-    @property
-    def is_zero(self) -> bool:
-        """Whether it is zero at all times."""
-        return super().is_zero and not self.harmonic
-
-    @property
-    def is_planar(self) -> bool:
-        """Whether the third component is zero at all times and places, as far as that is known."""
-        return super().is_planar and all(is_planar(h.amplitude) for h in self.harmonic)
+    def vectors(self) -> Iterator[tuple[float, ...]]:
+        """All vectors that are known of it: of the value, of tables and of harmonics."""
+        yield from () if self.value is None else (self.value,)
+        yield from (row[1:] for row in (*(self.time_table or ()), *self.span_rows))
+        yield from (h.amplitude for h in self.harmonic if not isinstance(h.amplitude[0], tuple))
 
     @model_validator(mode="before")
     @classmethod
     def _list_harmonics(cls, data: Any) -> Any:
-        if isinstance(data, Mapping) and "harmonic" in data:
-            return {**data, "harmonic": _one_or_more(data["harmonic"])}
+        if isinstance(data, Mapping) and isinstance(data.get("harmonic"), Mapping | Harmonic):
+            return {**data, "harmonic": [data["harmonic"]]}
         return data
 
     @model_validator(mode="after")
     def _check_one(self) -> Self:
         if len(self.given) > 1 or not (self.given or self.harmonic):
-            ways = ", ".join(name for name in self.WAYS if name != "function")
-            raise problem("", ", ".join(self.given) or None, f"give exactly one of {ways}; harmonic may stand beside")
+            why = f"give exactly one of {self.alternatives()}; harmonic may stand beside"
+            raise problem("", ", ".join(self.given) or None, why)
         return self
-
-
-def is_planar(amplitude: Any) -> bool:
-    """Return whether the third component of a vector, or of all rows (x, vector), is zero; that of a number is."""
-    rows = amplitude if amplitude and isinstance(amplitude[0], tuple) else ((0.0, *amplitude),)
-    return not any(row[3] for row in rows if len(row) > 3)
 
 
 class MomentLoad(Load):
     """A moment over time (N·m): one component, about axis 3, for a planar beam and three for a spatial one."""
 
-    value: Annotated[tuple[float, ...], PlainValidator(_as_moment)] | None = None
-    table: Annotated[Matrix, PlainValidator(_as_moment_rows)] | None = None
-    over_time: Annotated[Over, PlainValidator(as_over_time(_as_moment_rows))] | None = None
-    harmonic: tuple[HarmonicMoment, ...] = ()  # type: ignore[assignment]
-
-    @property
-    def components(self) -> int:
-        """Number of components; 3 of a function."""
-        return super().components if self.given else len(self.harmonic[0].amplitude)
-
-    @property
-    def is_planar(self) -> bool:
-        """Whether it is about axis 3: it has one component then."""
-        return True
+    VECTORS: ClassVar[Kind] = MOMENT
 
 
 class SpanLoad(Load):
-    """A load along the structure, which may vary over the span, over time, and over both.
+    """A force along the structure (N/m, or N/m² on a plate), which may vary over the span, over time, and over both.
 
     Attributes:
-        over_span: rows (x, f1, f2, f3), linear between them, no load outside, two of one x are a jump; or a function
+        over_span: rows (x, components), linear between them, no load outside, two of one x are a jump; or a function
             of the place; or None.
-        over_span_and_time: rows (x, t, f1, f2, f3), every t at every x, or a function of place and time; or None.
+        over_span_and_time: rows (x, t, components), every t at every x, or a function of place and time; or None.
     """
 
     WAYS: ClassVar[tuple[str, ...]] = ("value", "over_span", "over_time", "over_span_and_time", "table", "function")
-    SIZE: ClassVar[int] = 3
 
-    over_span: Annotated[Over, PlainValidator(as_over_span((2, 3), 3))] | None = None
-    over_span_and_time: Annotated[Over, PlainValidator(as_over_both((2, 3), 3))] | None = None
-    harmonic: tuple[HarmonicSpan, ...] = ()  # type: ignore[assignment]
+    over_span: Any = None
+    over_span_and_time: Any = None
+
+    @field_validator("over_span", mode="plain")
+    @classmethod
+    def _read_over_span(cls, value: Any, info: ValidationInfo) -> Over | None:
+        return None if value is None else cls.VECTORS.rows(("x",), value, info)
+
+    @field_validator("over_span_and_time", mode="plain")
+    @classmethod
+    def _read_over_both(cls, value: Any, info: ValidationInfo) -> Over | None:
+        return None if value is None else cls.VECTORS.rows(("x", "t"), value, info)
+
+    @classmethod
+    def _read_amplitude(cls, value: Any, info: ValidationInfo) -> Any:
+        rows = isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple)
+        return cls.VECTORS.rows(("x",), value, info) if rows or isinstance(value, str) else cls.VECTORS.vector(value)
 
     @property
     def place_function(self) -> Callable[..., Any] | None:
@@ -152,34 +173,12 @@ class SpanLoad(Load):
         return given if callable(given) else None
 
     @property
-    def span_rows(self) -> Matrix:
-        """All rows (x, …) of tables over the span, and over span and time."""
-        tables = [t for t in (self.over_span, self.over_span_and_time) if isinstance(t, tuple)]
-        tables += [h.amplitude for h in self.harmonic if isinstance(h.amplitude[0], tuple)]
-        return tuple(row for table in tables for row in table)
-
-    @property
-    def varies_over_span(self) -> bool:
-        """Whether it is not the same everywhere."""
-        return bool(self.span_rows) or self.place_function is not None
-
-    @property
-    def constant(self) -> bool:
-        """Whether it does not change with time."""
-        return super().constant and self.over_span_and_time is None
-
-    @property
-    def is_zero(self) -> bool:
-        """Whether it is zero at all times and places."""
-        return super().is_zero and not self.varies_over_span
-
-    @property
-    def is_planar(self) -> bool:
-        """Whether the third component is zero at all times and places, as far as that is known."""
-        own = self.over_span_and_time if isinstance(self.over_span_and_time, tuple) else ()
-        alone = self.over_span if isinstance(self.over_span, tuple) else ()
-        rows = (*(row[2:] for row in own), *(row[1:] for row in alone))
-        return super().is_planar and not any(row[2] for row in rows if len(row) > 2)
+    def span_rows(self) -> Iterator[tuple[float, ...]]:
+        """All rows (x, components) of tables over the span, and over span and time."""
+        tables = (self.over_span, *(h.amplitude for h in self.harmonic if isinstance(h.amplitude[0], tuple)))
+        yield from (row for table in tables if isinstance(table, tuple) for row in table)
+        both = self.over_span_and_time
+        yield from ((row[0], *row[2:]) for row in (both if isinstance(both, tuple) else ()))
 
     @model_validator(mode="before")
     @classmethod
@@ -198,6 +197,12 @@ class SpanLoad(Load):
         return self
 
 
+class SpanMoment(SpanLoad):
+    """A moment per length of a beam (N): one component, about axis 3, for a planar beam and three for a spatial one."""
+
+    VECTORS: ClassVar[Kind] = MOMENT
+
+
 class Pressure(SpanLoad):
     """A pressure on a plate (N/m²), along direction 3 if dead, along the normal of the deformed surface if follower.
 
@@ -206,25 +211,9 @@ class Pressure(SpanLoad):
     """
 
     WAYS: ClassVar[tuple[str, ...]] = (*SpanLoad.WAYS[:-2], "regions", *SpanLoad.WAYS[-2:])
-    SIZE: ClassVar[int] = 1
+    VECTORS: ClassVar[Kind] = PRESSURE
 
-    value: Annotated[tuple[float, ...], PlainValidator(_as_pressure)] | None = None
-    table: Annotated[Matrix, PlainValidator(_as_pressure_rows)] | None = None
-    over_time: Annotated[Over, PlainValidator(as_over_time(_as_pressure_rows))] | None = None
-    over_span: Annotated[Over, PlainValidator(as_over_span((1,), 1))] | None = None
-    over_span_and_time: Annotated[Over, PlainValidator(as_over_both((1,), 1))] | None = None
-    harmonic: tuple[HarmonicPressure, ...] = ()  # type: ignore[assignment]
     regions: dict[str, Annotated[float, PlainValidator(as_number)]] | None = None
-
-    @property
-    def varies_over_span(self) -> bool:
-        """Whether it is not the same everywhere."""
-        return super().varies_over_span or self.regions is not None
-
-    @property
-    def is_planar(self) -> bool:
-        """Whether it has no third component: nobody asks a plate."""
-        return True
 
 
 def _as_place(value: Any) -> tuple[float, ...]:
@@ -246,7 +235,11 @@ class PointLoad(SceneModel):
     )
     force: Load | None = None
     moment: MomentLoad | None = None
-    kind: Kind = "dead"
+    kind: Literal["dead", "follower"] = "dead"
+
+    def kind_of(self, load: Load) -> str:
+        """Return the kind of one of the two."""
+        return load.kind if "kind" in load.model_fields_set else self.kind
 
     @model_validator(mode="after")
     def _check_any(self) -> Self:
@@ -263,6 +256,7 @@ class Loads(SceneModel):
         tip_force: force at the free end (N), or None.
         tip_moment: moment at the free end (N·m), or None.
         distributed: force per length (N/m), for a plate per area (N/m²), or None.
+        distributed_moment: moment per length of a beam (N), or None.
         pressure: on a plate (N/m²), or None.
         at: forces and moments at places of the structure.
     """
@@ -271,11 +265,93 @@ class Loads(SceneModel):
     tip_force: Load | None = None
     tip_moment: MomentLoad | None = None
     distributed: SpanLoad | None = None
+    distributed_moment: SpanMoment | None = None
     pressure: Pressure | None = None
     at: tuple[PointLoad, ...] = ()
 
     @property
-    def spread(self) -> dict[str, SpanLoad]:
-        """Those that may vary over the span, by name."""
-        given = {"distributed": self.distributed, "pressure": self.pressure}
+    def named(self) -> dict[str, Load]:
+        """All that are given, by name: "tip_force", …, "at.0.force", "at.0.moment"."""
+        names = ("tip_force", "tip_moment", "distributed", "distributed_moment", "pressure")
+        given = {name: getattr(self, name) for name in names}
+        for i, point in enumerate(self.at):
+            given |= {f"at.{i}.force": point.force, f"at.{i}.moment": point.moment}
         return {name: load for name, load in given.items() if load is not None}
+
+
+# --- checks against what the loads work on ------------------------------------------------------------------------
+
+
+def check_loads(structure: Any, motion: Motion, loads: Loads) -> None:
+    """Refuse loads that the structure cannot bear, and what its motion does not have."""
+    for i, point in enumerate(loads.at):
+        check_place(f"loads.at.{i}.x", structure, point.x)
+    if loads.pressure is not None and structure.type != "plate":
+        raise problem("loads.pressure", None, f"needs a plate; on a {structure.type} give loads.distributed")
+    for name, load in loads.named.items():
+        key = f"loads.{name}"
+        if load.VECTORS is MOMENT:
+            _check_moment(key, structure, load)
+        for x, *_ in load.span_rows:
+            if structure.length is not None and not -NEAR <= x / structure.length <= 1 + NEAR:
+                raise problem(
+                    key, None, f"x = {x:g} is not on the structure, which runs from 0 to {structure.length:g}"
+                )
+        per_rev = next((h.per_rev for h in load.harmonic if h.per_rev is not None), None)
+        if motion.is_free and per_rev is not None:
+            why = 'needs an angle of the hub that is prescribed, not motion.type = "torque"; give frequency'
+            raise problem(f"{key}.harmonic.per_rev", per_rev, why)
+    _check_regions(structure, loads.pressure)
+
+
+def _check_moment(key: str, structure: Any, moment: Load) -> None:
+    if structure.type == "plate" and key != "loads.tip_moment":
+        why = "is not available on a plate; give loads.tip_moment, which is spread over the edge"
+        if not isinstance(moment, SpanMoment):
+            why = "is not available on a plate: at a point it turns the director without limit as the mesh is refined"
+        raise problem(key, None, why)
+    # A function is looked at where it is called; its moment of a planar beam may have one component or three.
+    sizes = {len(vector) for vector in moment.vectors}
+    if structure.is_planar and sizes - {1}:
+        raise problem(key, None, "must have one component, about axis 3, for a planar_beam")
+    if not structure.is_planar and sizes - {3}:
+        raise problem(key, None, f"must have three components for a {structure.type}")
+
+
+def _check_regions(structure: Any, pressure: Pressure | None) -> None:
+    known = structure.thickness if pressure is not None and isinstance(structure.thickness, dict) else {}
+    for name in () if pressure is None else pressure.regions or ():
+        if name not in known:
+            has = (
+                f"there are {', '.join(known)}" if known else "needs structure.mesh with structure.thickness by region"
+            )
+            raise problem(f"loads.pressure.regions.{name}", None, f"is no region of the plate; {has}")
+
+
+def check_place(key: str, structure: Any, x: tuple[float, ...]) -> None:
+    """Refuse a place that is not on the structure; one on a plate that is a mesh is looked for later."""
+    if len(x) != (2 if structure.type == "plate" else 1):
+        allowed = "[x, y], m, for a plate" if structure.type == "plate" else f"a number, m, for a {structure.type}"
+        raise problem(key, list(x), f"must be {allowed}")
+    if structure.length is not None and not -NEAR <= x[0] / structure.length <= 1 + NEAR:
+        raise problem(key, x[0] if len(x) == 1 else list(x), f"must be from 0 to the length {structure.length:g}")
+
+
+def doubtful_table(structure: Any, loads: Loads, when: str) -> tuple[str, str] | None:
+    """Return (key, what is wrong) of a table without a key that may be over the span; None if there is none.
+
+    Args:
+        structure: of the scene.
+        loads: on it.
+        when: what is computed at one time, as "a steady state"; "" for a history, where such a table is over time
+            unless it runs from 0 to the length.
+    """
+    for name, load in loads.named.items():
+        if not isinstance(load, SpanLoad) or load.table is None:
+            continue
+        if when:
+            return f"loads.{name}", f"is a table [[t, …], …] over time, which {when} does not have; {KEYS}"
+        if load.table[0][0] == 0.0 and load.table[-1][0] == structure.length:
+            what = f"is a table from 0 to {structure.length:g}, the length: it may be one over time or over the span"
+            return f"loads.{name}", f"{what}; {KEYS}"
+    return None

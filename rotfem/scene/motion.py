@@ -9,8 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from rotfem.scene.files import as_time_table
-from rotfem.scene.load_tables import arguments
-from rotfem.scene.signals import Signal, as_function
+from rotfem.scene.signals import Signal, arguments, as_function
 from rotfem.scene.values import Matrix, NonNegative, Number, Positive, SceneModel, Vector3, as_rows, as_vector3, problem
 
 

@@ -10,8 +10,8 @@ from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from rotfem.errors import InputError
 from rotfem.scene.files import as_time_table
-from rotfem.scene.harmonic import Harmonic
-from rotfem.scene.load_tables import arguments
+from rotfem.scene.loads import Harmonic
+from rotfem.scene.signals import arguments
 from rotfem.scene.values import Matrix, Number, SceneModel, problem
 
 KEY = "structure.root.pitch"

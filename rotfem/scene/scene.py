@@ -37,8 +37,7 @@ from rotfem.scene.consistency import (
 )
 from rotfem.scene.digest import abridged
 from rotfem.scene.limits import Limits, limits_of
-from rotfem.scene.load_checks import check_loads, doubtful_table
-from rotfem.scene.loads import Loads
+from rotfem.scene.loads import Loads, check_loads, doubtful_table
 from rotfem.scene.motion import AnyMotion, Swept
 from rotfem.scene.output import OutputTable
 from rotfem.scene.problems import scene_error

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import inspect
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self
 
@@ -10,13 +11,16 @@ import numpy as np
 from pydantic import PlainValidator, ValidationInfo, model_validator
 
 from rotfem.scene.files import as_time_table
-from rotfem.scene.values import (
-    Array,
-    Matrix,
-    SceneModel,
-    as_padded_vector3,
-    problem,
-)
+from rotfem.scene.values import Array, Matrix, SceneModel, as_padded_vector3, problem
+
+
+def arguments(function: Callable[..., Any]) -> int:
+    """Return how many arguments a function must be given; 1 where that cannot be told."""
+    try:
+        parameters = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        return 1
+    return sum(p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) and p.default is p.empty for p in parameters)
 
 
 def as_function(value: Any) -> Callable[[float], Any]:
@@ -27,7 +31,7 @@ def as_function(value: Any) -> Callable[[float], Any]:
     return function
 
 
-def as_rows4(value: Any, info: ValidationInfo) -> Matrix:
+def _as_rows4(value: Any, info: ValidationInfo) -> Matrix:
     """Return rows (t, a1, a2, a3), the last column zero where it is not given; raise on anything else."""
     rows = as_time_table(value, info, (3, 4), "a table [[t, a1, a2, a3], …] (a3 may be left out)")
     return tuple((*row, 0.0)[:4] for row in rows)
@@ -36,12 +40,47 @@ def as_rows4(value: Any, info: ValidationInfo) -> Matrix:
 TimeFunction = Annotated[Callable[[float], Any], PlainValidator(as_function)]
 
 
-class Signal(SceneModel):
-    """A vector over time, given by exactly one of value, table and function.
+class Given(SceneModel):
+    """A quantity that is given in one of several ways.
 
-    In a scene it may be written without its table: […] is a value, [[t, …], …] a table, as is the path of a
-    CSV file. Vectors with two components get a third one, zero. Ask `at`, which
-    covers all three.
+    In a scene it may be written without its table: a value, a table (rows, or the path of a CSV file), or a function.
+    """
+
+    #: Its keys of which exactly one is given.
+    WAYS: ClassVar[tuple[str, ...]]
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """The keys by which it is given."""
+        return tuple(name for name in self.WAYS if getattr(self, name) is not None)
+
+    @property
+    def vectors(self) -> Iterator[tuple[float, ...]]:
+        """All vectors that are known of it."""
+        raise NotImplementedError
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether the third component of all vectors is zero."""
+        return not any(vector[2] for vector in self.vectors if len(vector) > 2)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_bare(cls, data: Any) -> Any:
+        if isinstance(data, Mapping | Given):
+            return data
+        if callable(data):
+            return {"function": data}
+        rows = isinstance(data, list | tuple) and bool(data) and isinstance(data[0], list | tuple)
+        return {"table" if rows or isinstance(data, str) else "value": data}
+
+    def alternatives(self) -> str:
+        """Return the keys of which one is to be given, for messages."""
+        return ", ".join(name for name in self.WAYS if name != "function")
+
+
+class Signal(Given):
+    """A vector over time; one with two components gets a third one, zero. Ask `at`, which covers all ways.
 
     Attributes:
         value: constant components, or None.
@@ -49,102 +88,50 @@ class Signal(SceneModel):
         function: Python function t (s) ↦ 2 or 3 components, or None.
     """
 
-    #: Its keys of which exactly one is given.
     WAYS: ClassVar[tuple[str, ...]] = ("value", "table", "function")
 
     value: Annotated[tuple[float, ...], PlainValidator(as_padded_vector3)] | None = None
-    table: Annotated[Matrix, PlainValidator(as_rows4)] | None = None
+    table: Annotated[Matrix, PlainValidator(_as_rows4)] | None = None
     function: TimeFunction | None = None
 
     @property
-    def time_table(self) -> Matrix | None:
-        """Its rows over time, None where there are none."""
-        return self.table
-
-    @property
-    def time_function(self) -> Callable[[float], Any] | None:
-        """The function of time that it is, None where it is none."""
-        return self.function
+    def vectors(self) -> Iterator[tuple[float, ...]]:
+        """The value, or the rows without their times; none of a function."""
+        yield from (row[1:] for row in self.table or ())
+        yield from () if self.value is None else (self.value,)
 
     @property
     def constant(self) -> bool:
         """Whether it does not change with time; a function is taken to."""
-        return self.time_function is None and len({row[1:] for row in self._rows}) == 1
+        return self.function is None and len(set(self.vectors)) == 1
 
     @property
     def is_zero(self) -> bool:
         """Whether it is zero at all times; a function is taken not to be."""
-        return self.time_function is None and not any(component for row in self._rows for component in row[1:])
+        return self.function is None and not any(any(vector) for vector in self.vectors)
 
     @property
     def knots(self) -> tuple[float, ...] | None:
         """Times (s) between which it is linear; None of a function."""
-        return None if self.time_function is not None else tuple(row[0] for row in self._rows)
-
-    @property
-    def linear(self) -> bool:
-        """Whether it is linear between its knots."""
-        return self.time_function is None
-
-    def many(self, t: Array) -> Array:
-        """Return the components at times (n,), shape (n, components)."""
-        if self.time_table is None:
-            return np.array([self.at(float(s)) for s in t]).reshape(len(t), -1)
-        times, *columns = self._columns
-        return np.stack([np.interp(t, times, column) for column in columns], axis=1)
-
-    def sizes(self) -> Array | None:
-        """Return the largest size of each component at all times; None of a function."""
-        return None if self.time_function is not None else np.abs(np.array(self._rows)[:, 1:]).max(axis=0)
-
-    @property
-    def components(self) -> int:
-        """Number of components; 3, but for a moment 1 or 3."""
-        return 3 if self.time_function is not None else len(self._rows[0]) - 1
+        return None if self.function is not None else tuple(row[0] for row in self.table or ())
 
     def at(self, t: float) -> Array:
         """Return the components at time t (s), shape (components,)."""
-        if self.time_function is not None:
-            given = np.asarray(self.time_function(t), dtype=np.float64).ravel()
+        if self.function is not None:
+            given = np.asarray(self.function(t), dtype=np.float64).ravel()
             return np.append(given, 0.0) if given.size == 2 else given
-        if self.time_table is not None:
+        if self.table is not None:
             times, *columns = self._columns
             return np.array([np.interp(t, times, column) for column in columns])
         return np.array(self.value, dtype=np.float64)
 
-    @property
-    def is_planar(self) -> bool:
-        """Whether the third component is zero at all times; that of a function is taken to be."""
-        return self.time_function is not None or not any(row[3] for row in self._rows if len(row) > 3)
-
     @cached_property
     def _columns(self) -> tuple[Array, ...]:
         """Columns of the table as arrays; kept, because a time history asks for them at every step."""
-        return tuple(np.array(self.time_table, dtype=np.float64).T)
-
-    @property
-    def _rows(self) -> Matrix:
-        """Rows (t, components…); one of them if the value is constant."""
-        return self.time_table if self.time_table is not None else ((0.0, *(self.value or ())),)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _from_bare(cls, data: Any) -> Any:
-        if isinstance(data, Mapping | Signal):
-            return data
-        if callable(data):
-            return {"function": data}
-        rows = isinstance(data, list | tuple) and bool(data) and isinstance(data[0], list | tuple)
-        return {"table" if rows or isinstance(data, str) else "value": data}
-
-    @property
-    def given(self) -> tuple[str, ...]:
-        """The keys by which it is given."""
-        return tuple(name for name in self.WAYS if getattr(self, name) is not None)
+        return tuple(np.array(self.table, dtype=np.float64).T)
 
     @model_validator(mode="after")
     def _check_one(self) -> Self:
         if len(self.given) != 1:
-            ways = ", ".join(name for name in self.WAYS if name != "function")
-            raise problem("", ", ".join(self.given) or None, f"give exactly one of {ways}")
+            raise problem("", ", ".join(self.given) or None, f"give exactly one of {self.alternatives()}")
         return self

@@ -59,6 +59,7 @@ UNITS: dict[str, Unit] = {
     "loads.gravity": "m/s**2",
     "loads.tip_force": "N",
     "loads.tip_moment": "N*m",
+    "loads.distributed_moment": "N",
     "loads.pressure": "Pa",
     "loads.at.x": "m",
     "loads.at.force": "N",

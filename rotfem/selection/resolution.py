@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.mechanics.loads import Load, named
+from rotfem.mechanics.loads import AnyLoad, named
 from rotfem.mechanics.problem import Problem
 
 Array = npt.NDArray[Any]
@@ -138,8 +138,8 @@ def _looks(signal: Given, times: Array, number: int) -> Array:
     return np.union1d(between, found)
 
 
-def _load(load: Load) -> Given:
-    return Given(load.many, np.array(load.knots or ()), linear=load.linear)
+def _load(load: AnyLoad) -> Given:
+    return Given(load.many, np.array(load.knots), linear=load.linear)
 
 
 def _table(rows: Sequence[Sequence[float]]) -> Given:

@@ -1,9 +1,13 @@
-"""What is applied to a structure: forces and moments with their amplitudes in the forms."""
+"""The loads of a structure in its forms: the work of each, and the constants or fields that their amplitudes are.
+
+The force (or moment) of a load in the forms is f = Σ_k a_k s_k (see `rotfem.mechanics.loads`). Of a uniform load the
+amplitudes are the components of a constant; of any other one the factors of shapes, whose sum is a field, linear in
+each cell; of a function of place the values at the nodes of the mesh.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,16 +16,125 @@ import ufl
 from dolfinx import fem
 
 from rotfem.mechanics.bodies import AppliedLoad, Kinematics
-from rotfem.mechanics.loads import Load, PointLoads, named
+from rotfem.mechanics.loads import AnyLoad, Load, PlaceLoad, PointLoads, is_moment, named
 from rotfem.mechanics.problem import Problem
-from rotfem.structures.load_fields import Amplitude, Components, SpanField
 from rotfem.structures.points import Points
 
 Array = npt.NDArray[np.float64]
 
 
-def _first(load: Load, n: int, t: float) -> Array:
-    return load.at(t)[:n]
+class Amplitude:
+    """The components of a vector that is the same everywhere: a constant of the forms.
+
+    Attributes:
+        spread: whether these are factors of shapes over the span, not the components of a vector.
+        follows_nodes: whether these are values at the nodes of the mesh, not amplitudes of the load itself.
+        value: the amplitudes, the same on every process; what is written there holds after `update`.
+        vector: the force in the forms.
+    """
+
+    spread: ClassVar[bool] = False
+    follows_nodes: bool = False
+
+    def __init__(self, constant: fem.Constant):
+        self.vector: Any = constant
+
+    @property
+    def value(self) -> Any:
+        """The amplitudes."""
+        return self.vector.value
+
+    def turned(self, value: Array, turn: Array) -> Array:
+        """Return the amplitudes of the turned vector (3, 3); one alone is about the axis of the turn."""
+        n = value.size
+        return np.asarray(turn[:n, :n] @ value) if n > 1 else value
+
+    def update(self, turn: Array | None = None) -> None:
+        """Do nothing: what is written to a constant holds."""
+
+
+class SpanField(Amplitude):
+    """A field f(x) = Σ_k a_k s_k(x).
+
+    Args:
+        function: the field, blocked by the components.
+        basis: s_k, (k, local dofs); None where the amplitudes are the values at all nodes.
+        places: number of each local node among all of these, then.
+        size: number of amplitudes.
+    """
+
+    spread = True
+
+    def __init__(self, function: fem.Function, basis: Array | None, places: npt.NDArray[np.int64] | None, size: int):
+        self._function, self._basis, self._places = function, basis, places
+        self.follows_nodes, self._value = basis is None, np.zeros(size)
+        self.vector = function if function.ufl_shape else ufl.as_vector([function])
+
+    @property
+    def value(self) -> Any:
+        """The amplitudes a_k."""
+        return self._value
+
+    @classmethod
+    def of_shapes(cls, structure: Any, load: Load, n: int) -> SpanField:
+        """Return the field of the shapes of a load, with n components."""
+        f = fem.Function(_space(structure, "DG", 1, n))  # the stations are nodes of the mesh
+        cells = f.function_space.dofmap.list
+        x = f.function_space.tabulate_dof_coordinates()[:, 0]
+        middles = np.empty(len(x))
+        middles[cells] = x[cells].mean(axis=1)[:, None]
+        parts = []
+        for shapes in (term.shapes for term in load.terms):
+            values = first(shapes.along(x, middles), n)
+            if shapes.region:
+                there = np.zeros(len(x), dtype=bool)
+                there[cells[structure.cells_of(shapes.region)].ravel()] = True
+                values = np.where(there[:, None], values, 0.0)
+            parts.append(values.reshape(len(values), -1))
+        basis = np.concatenate(parts)
+        return cls(f, basis, None, len(basis))
+
+    @classmethod
+    def of_place(cls, structure: Any, load: PlaceLoad, n: int) -> tuple[SpanField, Callable[[float], Array]]:
+        """Return the field through the nodes of the structure, and time (s) ↦ its amplitudes.
+
+        That of a function which does not change is evaluated once, and has the single amplitude 1.
+        """
+        f = fem.Function(_space(structure, "Lagrange", structure.V.element.basix_element.degree, n))
+        index, x = f.function_space.dofmap.index_map, f.function_space.tabulate_dof_coordinates()
+        points = np.concatenate(structure.comm.allgather(x[: index.size_local]))
+        nodes = index.local_to_global(np.arange(len(x), dtype=np.int32))
+        places = tuple(map(structure.place, points))
+
+        def amplitudes(t: float) -> Array:
+            return np.ravel(first(load.on(places, t).reshape(len(places), -1), n))
+
+        if load.constant:
+            field = cls(f, amplitudes(0.0).reshape(-1, n)[nodes].reshape(1, -1), None, 1)
+            field.follows_nodes = True
+            return field, lambda t: np.ones(1)
+        return cls(f, None, nodes, len(places) * n), amplitudes
+
+    def turned(self, value: Array, turn: Array) -> Array:
+        """Return the amplitudes as they are: the field is turned in `update`."""
+        return value
+
+    def update(self, turn: Array | None = None) -> None:
+        """Make the field of the amplitudes; vectors turned by a matrix (3, 3) if that is given."""
+        n, a = self._function.function_space.dofmap.bs, self._value
+        dofs = a @ self._basis if self._basis is not None else a.reshape(-1, n)[self._places].ravel()
+        if turn is not None and n > 1:
+            dofs = (dofs.reshape(-1, n) @ turn[:n, :n].T).ravel()
+        self._function.x.array[:] = dofs
+
+
+def first(values: Array, n: int) -> Array:
+    """Return the first n components (…, n); the last one if it is one alone: a moment about axis 3, or a pressure."""
+    return values[..., -1:] if n == 1 else values[..., :n]
+
+
+def _space(structure: Any, family: str, degree: int, n: int) -> fem.FunctionSpace:
+    return fem.functionspace(structure.mesh, (family, degree, (n,) if n > 1 else ()))
 
 
 class LoadsOfStructure:
@@ -31,8 +144,9 @@ class LoadsOfStructure:
         load_constants: name of a load ↦ its amplitude, and what this is at time t (s).
     """
 
-    #: Components of a force.
+    #: Components of a force, and of a moment.
     dimension: ClassVar[int] = 3
+    turns_in: ClassVar[int] = 3
 
     problem: Problem
     comm: Any
@@ -56,58 +170,64 @@ class LoadsOfStructure:
         """Return a constant on the mesh: its value can change without a new compilation."""
         raise NotImplementedError
 
-    def loads(self) -> list[AppliedLoad]:
-        """Return the problem's non-zero loads."""
+    def moment(self, name: str, m: Any, measure: Any, dead: bool) -> list[AppliedLoad]:
+        """Return the work of a moment m (components of its amplitude) on the rotations."""
         raise NotImplementedError
 
-    def forces(self) -> list[AppliedLoad]:
-        """Return the problem's non-zero forces; dead ones keep their direction in the frame, followers turn."""
-        loads, q = self.problem.loads, self.k.q
-        given = [("tip_force", loads.tip_force, self.tip), ("distributed", loads.distributed, self.dx)]
-        given += [(f"at.{i}.force", p.force, self.points.measure(p.x)) for i, p in enumerate(self.point_loads)]
-        out = []
-        for name, load, measure in given:
-            if load is None or load.is_zero:
-                continue
-            f = self.amplitude(name, load, self.dimension)
-            dead = load.kind == "dead"
-            vector = ufl.as_vector([f[i] if i < self.dimension else 0 for i in range(3)])
-            force = vector if dead else self.turned(q, vector)
-            out.append(AppliedLoad(name, self.spread(name, force), self.position(q), measure, dead))
-        return out
+    def place(self, point: Array) -> Any:
+        """Return the place of a point (3,) of the mesh as functions of place are given it: x (m) along a beam."""
+        return float(point[0])
+
+    def cells_of(self, region: str) -> npt.NDArray[np.int32]:
+        """Return the local cells of a region of the mesh; a structure without regions is not asked."""
+        raise NotImplementedError
 
     @property
     def point_loads(self) -> tuple[PointLoads, ...]:
         """What works at points of the structure."""
-        return getattr(self.problem.loads, "at", ())
+        return self.problem.loads.at
 
-    def moments(self) -> Iterator[tuple[str, Load, Any]]:
-        """Yield name, load and measure of the problem's non-zero moments."""
-        given = [("tip_moment", self.problem.loads.tip_moment, self.tip)]
-        given += [(f"at.{i}.moment", p.moment, self.points.measure(p.x)) for i, p in enumerate(self.point_loads)]
-        yield from ((name, load, measure) for name, load, measure in given if load is not None and not load.is_zero)
+    def loads(self) -> list[AppliedLoad]:
+        """Return the work of the problem's non-zero loads, forces first; dead ones keep their direction in the frame.
+
+        Raises:
+            InputError: the structure lacks what one of them works on.
+        """
+        given = sorted(named(self.problem.loads).items(), key=lambda item: is_moment(item[0]))
+        return [work for name, load in given if not load.is_zero for work in self.applied(name, load)]
+
+    def applied(self, name: str, load: AnyLoad) -> list[AppliedLoad]:
+        """Return the work of one load."""
+        dead, measure, q = load.kind == "dead", self._measure(name), self.k.q
+        if is_moment(name):
+            return self.moment(name, self.amplitude(name, load, self.turns_in), measure, dead)
+        f = self.amplitude(name, load, self.dimension)
+        vector = ufl.as_vector([f[i] if i < self.dimension else 0 for i in range(3)])
+        force = self.spread(name, vector if dead else self.turned(q, vector))
+        return [AppliedLoad(name, force, self.position(q), measure, dead)]
+
+    def _measure(self, name: str) -> Any:
+        """Return what a load works on: the tip, a point, or the whole structure."""
+        if name.startswith("at."):
+            return self.points.measure(self.point_loads[int(name.split(".")[1])].x)
+        return self.tip if name.startswith("tip") else self.dx
 
     def spread(self, name: str, load: Any) -> Any:
         """Return the density of a load on its measure: the load itself at a point and where it is a density already."""
         return load
 
-    def amplitude(self, name: str, load: Load, size: int) -> Any:
-        """Return the amplitude of a load in the forms, its first `size` components: a constant, or a field over it."""
-        span = load.span
-        if span is None:
-            return self.add_load(name, size, partial(_first, load, size))
-        if span.shapes is None:
-            field, at = SpanField.of_place(self, span, size, load.constant)
+    def amplitude(self, name: str, load: AnyLoad, size: int) -> Any:
+        """Return a load in the forms, its first `size` components, and remember its amplitude."""
+        made: Amplitude
+        at: Callable[[float], Array] = load.at
+        if isinstance(load, PlaceLoad):
+            made, at = SpanField.of_place(self, load, size)
+        elif load.is_uniform:
+            made, at = Amplitude(self.constant(np.zeros(size))), lambda t: first(load.at(t), size)
         else:
-            field, at = SpanField.of_shapes(self, tuple(span.shapes), size), load.at
-        self.load_constants[name] = (field, at)
-        return field.vector
-
-    def add_load(self, name: str, size: int, at: Callable[[float], Array]) -> fem.Constant:
-        """Return the amplitude constant (size,) of a load and remember at(t), its value at time t (s)."""
-        constant = self.constant(np.zeros(size))
-        self.load_constants[name] = (Components(constant), at)
-        return constant
+            made = SpanField.of_shapes(self, load, size)
+        self.load_constants[name] = (made, at)
+        return made.vector
 
     def update_loads(self, turn: Array | None = None) -> None:
         """Make the fields of loads over the span of the amplitudes that have been set.
@@ -118,7 +238,3 @@ class LoadsOfStructure:
         loads = named(self.problem.loads)
         for name, (amplitude, _) in self.load_constants.items():
             amplitude.update(turn if loads[name].kind == "dead" else None)
-
-    def cells_of(self, region: str) -> npt.NDArray[np.int32]:
-        """Return the local cells of a region of the mesh; a structure without regions is not asked."""
-        raise NotImplementedError

@@ -11,7 +11,6 @@ import ufl
 from mpi4py import MPI
 
 from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
-from rotfem.mechanics.loads import Load
 from rotfem.mechanics.problem import Problem
 from rotfem.structures.beam import Beam
 from rotfem.structures.structure import Array
@@ -29,7 +28,7 @@ class PlanarBeam(Beam):
     planar = True
     turns_of: ClassVar = {3: 2}
     components = ("u1", "u2", "alpha")
-    dimension = 2
+    dimension, turns_in = 2, 1
     #: Conjugates of the tip's components: inputs of the state-space model.
     tip_inputs = ("tip_force_1", "tip_force_2", "tip_moment")
     #: Mode families: the components whose kinetic energy counts, and the one whose nodes are counted.
@@ -109,14 +108,6 @@ class PlanarBeam(Beam):
                 out.append(Body(self.triad(q)[1], inertia, at, False, "tip_mass"))
         return out
 
-    def loads(self) -> list[AppliedLoad]:
-        """Return the problem's non-zero loads; dead ones keep their direction in the frame, followers turn with t_i."""
-        out = self.forces()
-        for name, moment, measure in self.moments():
-            m = self.add_load(name, 1, partial(_about_3, moment))
-            out.append(AppliedLoad(name, m[0], self.k.q[2], measure))
-        return out
-
-
-def _about_3(moment: Load, t: float) -> Array:
-    return np.ravel(moment.at(t))[-1:]
+    def moment(self, name: str, m: Any, measure: Any, dead: bool) -> list[AppliedLoad]:
+        """Return the work of a moment about axis 3, on alpha: it is the same whether dead or follower."""
+        return [AppliedLoad(name, m[0], self.k.q[2], measure)]

@@ -20,6 +20,7 @@ from scipy.spatial import Delaunay
 
 from rotfem.errors import InputError
 from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
+from rotfem.mechanics.loads import AnyLoad
 from rotfem.mechanics.mindlin import PlateGradients, director, triad
 from rotfem.mechanics.problem import Problem
 from rotfem.structures.datum import DirectorTurns
@@ -220,27 +221,24 @@ class Plate(Structure):
 
     # --- loads ------------------------------------------------------------------------------------------------------
 
-    def loads(self) -> list[AppliedLoad]:
-        """Return the problem's non-zero loads: tip force and moment are spread over the edge "tip".
+    def applied(self, name: str, load: AnyLoad) -> list[AppliedLoad]:
+        """Return the work of one load: tip force and moment are spread over the edge "tip".
 
         Raises:
             InputError: there is no such edge for them.
         """
-        loads = self.problem.loads
-        for name in ("tip_force", "tip_moment"):
-            load = getattr(loads, name)
-            if load is not None and not load.is_zero and not self._has_tip:
-                raise InputError(
-                    f"loads.{name}",
-                    None,
-                    'needs a physical curve "tip" in the mesh, which it works on',
-                )
-        moment, out = loads.tip_moment, self.forces()
-        out += pressure(self)
-        if moment is not None and not moment.is_zero:
-            m = self.add_load("tip_moment", 3, moment.at)
-            out += TipEdge(self).moment(m, moment.kind == "dead", self.director(self.k.q))
-        return out
+        if name.startswith("tip") and not self._has_tip:
+            why = 'needs a physical curve "tip" in the mesh, which it works on'
+            raise InputError(f"loads.{name}", None, why)
+        return pressure(self, load) if name == "pressure" else super().applied(name, load)
+
+    def moment(self, name: str, m: Any, measure: Any, dead: bool) -> list[AppliedLoad]:
+        """Return the work of the moment of the tip."""
+        return TipEdge(self).moment(m, dead, self.director(self.k.q))
+
+    def place(self, point: Array) -> tuple[float, float]:
+        """Return (x, y) of a point (3,) of the mesh, m."""
+        return float(point[0]), float(point[1])
 
     def cells_of(self, region: str) -> npt.NDArray[np.int32]:
         """Return the local cells of a region of the mesh."""

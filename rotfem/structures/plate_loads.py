@@ -10,6 +10,7 @@ from dolfinx import fem
 
 from rotfem.errors import InputError
 from rotfem.mechanics.bodies import AppliedLoad, Kinematics
+from rotfem.mechanics.loads import AnyLoad
 from rotfem.mechanics.mindlin import PlateGradients
 from rotfem.numerics import forms
 from rotfem.structures.points import Points
@@ -34,11 +35,9 @@ def plate_points(plate: Structure) -> Points:
     raise InputError(f"loads.at.{applied.index(missing)}.x", list(missing), why)
 
 
-def pressure(plate: Structure) -> list[AppliedLoad]:
+def pressure(plate: Structure, load: AnyLoad) -> list[AppliedLoad]:
     """Return the pressure p on the surface: p a_3 if dead, p r,1 × r,2 per undeformed area if follower."""
-    load, r = getattr(plate.problem.loads, "pressure", None), PlateGradients(plate.k.q).dr
-    if load is None or load.is_zero:
-        return []
+    r = PlateGradients(plate.k.q).dr
     p, dead = plate.amplitude("pressure", load, 1)[0], load.kind == "dead"
     normal = ufl.as_vector((0, 0, 1)) if dead else ufl.cross(r[:, 0], r[:, 1])
     return [AppliedLoad("pressure", p * normal, plate.position(plate.k.q), plate.dx, dead)]

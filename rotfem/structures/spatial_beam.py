@@ -15,7 +15,6 @@ a reference line in space turns it by two.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -25,7 +24,6 @@ from mpi4py import MPI
 
 from rotfem.errors import InputError
 from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
-from rotfem.mechanics.loads import Load
 from rotfem.mechanics.problem import Problem
 from rotfem.structures.beam import Beam
 from rotfem.structures.curved_axis import curved_axis
@@ -35,10 +33,6 @@ from rotfem.structures.spatial_section import SectionForms, euler_tensor
 from rotfem.structures.structure import Array
 from rotfem.structures.swept_axis import swept_axis
 from rotfem.structures.turning_bodies import AppliedMoment, Director, OffsetMass, SectionTurn, rotation_part
-
-
-def _moment(load: Load, t: float) -> Array:
-    return np.ravel(load.at(t))
 
 
 class SpatialBeam(Beam):
@@ -271,16 +265,13 @@ class SpatialBeam(Beam):
             out.append(self._director(tuple(axis), density, at, "tip_mass"))
         return out
 
-    def loads(self) -> list[AppliedLoad]:
-        """Return the problem's non-zero loads; dead ones keep their direction in the frame, followers turn with Λ."""
-        out, theta = self.forces(), self._turn.theta
+    def moment(self, name: str, m: Any, measure: Any, dead: bool) -> list[AppliedLoad]:
+        """Return the work of a moment on the turns of the sections; a follower turns with Λ."""
+        theta = self._turn.theta
         if self.turns is not None and self.turns.before is not None:
             theta = theta + rotation_part(self.turns.before)
-        for name, moment, measure in self.moments():
-            m, dead = self.add_load(name, 3, partial(_moment, moment)), moment.kind == "dead"
-            M = m if dead else self.turned(self.k.q, m)
-            out.append(AppliedMoment(name, M, theta, measure, dead, section=self._turn))
-        return out
+        M = m if dead else self.turned(self.k.q, m)
+        return [AppliedMoment(name, M, theta, measure, dead, section=self._turn)]
 
     def check_range(self, q: Array, time: float | None = None) -> None:
         """Refuse a state in which some section has turned by more than a turn, where that is not counted from a datum.

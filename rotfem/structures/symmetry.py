@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.mechanics.effects import Effect
-from rotfem.mechanics.loads import Load, is_moment, named
+from rotfem.mechanics.loads import AnyLoad, is_moment, named
 from rotfem.mechanics.problem import Problem
 from rotfem.structures import STRUCTURES
 
@@ -85,7 +85,7 @@ def directions(problem: Problem) -> tuple[Array, Array]:
     return polar, axial
 
 
-def _of_load(load: Load) -> Array:
+def _of_load(load: AnyLoad) -> Array:
     """Return the largest size of each component of a load over all times, shape (3,); infinite where it is unknown."""
     values = np.zeros(3) if load.is_zero else load.sizes()
     if values is None:

@@ -83,7 +83,6 @@ def test_a_bare_function_is_of_time_or_of_place_and_time() -> None:
     both = scene({"distributed": lambda x, t: (0, x * t)}).loads.distributed
     assert both is not None
     assert both.place_function is not None
-    assert not both.constant
 
 
 def test_tables_from_files(tmp_path: Any) -> None:

@@ -11,11 +11,9 @@ from rotfem import SceneError
 from rotfem.analysis.looks import look_at
 from rotfem.commands.problem import Problem
 from rotfem.errors import InputError
-from rotfem.mechanics.composed_loads import ComposedLoad, Part
 from rotfem.mechanics.courses import Course
+from rotfem.mechanics.loads import ConstantLoad, Load, Loads, Shapes, Term, pitched
 from rotfem.mechanics.pitch import Pitch, differentiated, tabulated_pitch, turn_about
-from rotfem.mechanics.pitched_loads import PitchedLoad
-from rotfem.mechanics.span import Shapes
 from rotfem.scene import Scene
 
 SECTION = {"EA": 1e8, "GA2": 1e8, "GA3": 1e8, "GJ": 1e5, "EI2": 1e4, "EI3": 5e4, "mass_per_length": 1.2}
@@ -130,12 +128,14 @@ def test_dead_loads_keep_their_direction_in_the_hub() -> None:
     """Amplitudes times shapes are Rᵀ f at every place, of the load itself as of one over the span."""
     axis = np.array([0.6, 0.0, 0.8])
     pitch = Pitch(lambda t: 0.2 + t, lambda t: 1.0, lambda t: 0.0, axis, np.zeros(3), start=0.2)
-    shapes = Shapes(np.array([0.0, 4.0]), np.array([[[1.0, 2.0, 3.0], [-1.0, 0.5, 0.0]]]))
-    spread = PitchedLoad(ComposedLoad("dead", (Part.table([[0, 1.0], [2, 3.0]], shapes),)), pitch)
+    shapes = Shapes.along_span([[0.0, 1.0, 2.0, 3.0], [4.0, -1.0, 0.5, 0.0]])
+    given = Load("dead", (Term.table([[0, 1.0], [2, 3.0]], shapes),))
+    loads = pitched(Loads(distributed=given, tip_force=ConstantLoad((1.0, 2.0, 3.0))), pitch)
+    spread, same = loads.distributed, loads.tip_force
+    assert isinstance(spread, Load)
+    assert isinstance(same, Load)
     x, t = np.array([1.0, 3.0]), 0.7
-    assert spread.span is not None
-    fields = np.concatenate([s.along(x, x) for s in spread.span.shapes or ()])
+    fields = np.concatenate([term.shapes.along(x, x) for term in spread.terms])
     exact = (1 + t) * shapes.along(x, x)[0] @ turn_about(axis, t)
     np.testing.assert_allclose(np.tensordot(spread.at(t), fields, 1), exact, rtol=1e-14)
-    same = PitchedLoad(ComposedLoad("dead", (Part(Shapes(None, shapes.values[:, :1])),)), pitch)
-    np.testing.assert_allclose(same.at(t), shapes.values[0, 0] @ turn_about(axis, t), rtol=1e-14)
+    np.testing.assert_allclose(same.at(t), [1.0, 2.0, 3.0] @ turn_about(axis, t), rtol=1e-14)

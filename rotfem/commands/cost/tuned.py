@@ -16,7 +16,17 @@ from rotfem.scene import Scene
 from rotfem.scene.beam_files import is_path
 
 #: Keys whose value, where it is a string, is the path of a file, whatever it ends with.
-FILE_KEYS = {"table", "base_acceleration", "tip_force", "tip_moment", "distributed", "mesh", "from", "file"}
+FILE_KEYS = {
+    "table",
+    "base_acceleration",
+    "tip_force",
+    "tip_moment",
+    "distributed",
+    "distributed_moment",
+    "mesh",
+    "from",
+    "file",
+}
 
 
 def tuned(scene: Scene, setting: Setting) -> Scene:
