@@ -115,16 +115,15 @@ def swept_loads(scene: Scene, motion: Motion) -> Loads:
         InputError: there is no harmonic load, or one that changes with time in another way.
     """
     made = loads_of(scene, motion)
+    changing = {name: load for name, load in named(made).items() if not load.constant}
+    if not any(term.phase is not None for load in changing.values() for term in getattr(load, "terms", ())):
+        why = "a frequency response needs a harmonic load, such as loads.tip_force.harmonic = "
+        raise InputError("loads", None, why + "{ amplitude = [0, 1], frequency = 1 }; its frequency is swept")
     swept: dict[str, AnyLoad] = {}
-    for name, load in named(made).items():
-        if load.constant:
-            continue
+    for name, load in changing.items():
         if isinstance(load, PlaceLoad) or any(t.amplitudes is not None and t.phase is None for t in load.terms):
             raise InputError(f"loads.{name}", None, "must be constant or harmonic in a frequency response")
         swept[name] = replace(load, terms=tuple(map(_swept, load.terms)))
-    if not swept:
-        why = "a frequency response needs a harmonic load, such as loads.tip_force.harmonic = "
-        raise InputError("loads", None, why + "{ amplitude = [0, 1], frequency = 1 }; its frequency is swept")
     return replaced(made, swept)
 
 

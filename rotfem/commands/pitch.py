@@ -8,7 +8,10 @@ import numpy as np
 
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.pitch import Pitch, Scalar, constant_pitch, differentiated, harmonic_pitch, tabulated_pitch
-from rotfem.scene import Scene
+from rotfem.scene import Scene, Time
+
+#: Steps in which differences of a user's function have one step of their own, and parts of a history of adaptive steps.
+CELL, CELLS = 16, 64
 
 
 def with_pitch(scene: Scene, motion: Motion) -> Motion:
@@ -28,11 +31,18 @@ def with_pitch(scene: Scene, motion: Motion) -> Motion:
         parts.append(tabulated_pitch(given.table))
         knots = tuple(sorted({*knots, *(row[0] for row in given.table)}))
     if given.function is not None:
-        parts.append(differentiated(given.at))
+        parts.append(differentiated(given.at, given.rate_at if given.rate is not None else None, cell_of(scene.time)))
     angle, rate, acceleration = (_sum([part[i] for part in parts]) for i in range(3))
     axis, root = np.array(structure.root_axis), np.array(structure.root_position)
     known = given.function is None and not given.harmonic
     return motion.pitched(Pitch(angle, rate, acceleration, axis, root, knots, known, start=angle(0.0)))
+
+
+def cell_of(time: Time | None) -> float | None:
+    """Return the length of time (s) in which differences of a user's function have one step; None without [time]."""
+    if time is None:
+        return None
+    return CELL * time.step if time.step else time.end / CELLS
 
 
 def _turn(harmonic: Any, motion: Motion) -> tuple[Scalar, Scalar, Scalar]:

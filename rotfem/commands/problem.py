@@ -16,7 +16,7 @@ from rotfem.analysis.time_loop import March, Steps
 from rotfem.commands.loads import checked, loads_of
 from rotfem.commands.mode_tables import mode_tables
 from rotfem.commands.moment import Moment, first_shape
-from rotfem.commands.pitch import with_pitch
+from rotfem.commands.pitch import cell_of, with_pitch
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import InputError, SceneError, input_of
 from rotfem.mechanics.effects import Work
@@ -233,6 +233,8 @@ def motion_of(scene: Scene) -> Motion:
         "is_accelerated": m.is_accelerated,
         "base_knots": None if base is None else base.knots,
     }
+    if m.type == "callable":
+        more["cell"] = cell_of(scene.time)
     motion: Motion = _MOTIONS[m.type](m, {"axis": m.axis, **more})
     return motion if base is None or base.constant else motion.with_changing_base()
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.mechanics.differentiation import Derivative
 from rotfem.mechanics.free_hub import FreeHub
 from rotfem.mechanics.pitch import Pitch, turn_about
 
@@ -120,23 +121,25 @@ class Motion:
         angle: Scalar | None = None,
         axis: npt.ArrayLike = (0, 0, 1),
         breakpoints: Sequence[float] | None = None,
+        cell: float | None = None,
         **more: Any,
     ) -> Motion:
         """Return rotation at the speed that a function of time gives; see `from_callable`.
 
         Args:
             speed: t (s) ↦ Omega (rad/s).
-            rate: t (s) ↦ dOmega/dt (rad/s²); differences of the speed if None.
+            rate: t (s) ↦ dOmega/dt (rad/s²); differences of the speed if None, whose step follows the function.
             angle: t (s) ↦ psi (rad); a quadrature of the speed if None.
             axis: direction of the angular velocity.
             breakpoints: times (s) between which the function is smooth, which steps then land on; where None, it is
                 looked at for them before a march.
+            cell: length of time (s) in which these differences have one step, as some steps of a march.
             more: further attributes of the motion.
         """
         points = None if breakpoints is None else tuple(sorted(float(t) for t in breakpoints))
         known = points or ()
         state: dict[str, Any] = {"smooth": False, "breakpoints": points, "knots": known, "sharp": known}
-        return cls(*from_callable(speed, rate, angle, known), about(axis), **(state | more))
+        return cls(*from_callable(speed, rate, angle, known, cell), about(axis), **(state | more))
 
     @classmethod
     def free(cls, hub: FreeHub, axis: npt.ArrayLike = (0, 0, 1), **more: Any) -> Motion:
@@ -246,25 +249,18 @@ def tabulated(table: npt.ArrayLike, kind: str) -> tuple[Scalar, Scalar, Scalar]:
 
 
 def from_callable(
-    speed: Scalar, rate: Scalar | None, angle: Scalar | None, breakpoints: Sequence[float] = ()
+    speed: Scalar,
+    rate: Scalar | None,
+    angle: Scalar | None,
+    breakpoints: Sequence[float] = (),
+    cell: float | None = None,
 ) -> tuple[Scalar, Scalar, Scalar]:
     """Return (Omega, dOmega/dt, psi) for any function Omega(t); what is not given is computed from it.
 
-    The missing rate is a fourth-order difference, central but where a breakpoint is near, which it does not reach over;
-    the missing angle is an adaptive quadrature that goes on from the last time asked for.
+    The missing rate is of differences whose step follows the function (`rotfem.mechanics.differentiation`), and which
+    reach neither over a breakpoint nor before t = 0; the missing angle is an adaptive quadrature that goes on from the
+    last time asked for.
     """
-    pieces = np.array([-np.inf, *breakpoints, np.inf])
-
-    def difference(t: float) -> float:
-        i = int(np.searchsorted(pieces, t, side="right"))
-        first, last = pieces[i - 1], pieces[min(i, len(pieces) - 1)]
-        h = min(1e-3, (last - first) / 8)
-        if first <= t - 2 * h and t + 2 * h < last:
-            return float((8 * (speed(t + h) - speed(t - h)) - (speed(t + 2 * h) - speed(t - 2 * h))) / (12 * h))
-        h = h if t + 4 * h < last else -h  # forwards from a breakpoint, backwards to the next
-        values = [speed(t + k * h) for k in range(5)]
-        return float(np.dot((-25, 48, -36, 16, -3), values) / (12 * h))
-
     from scipy import integrate  # only a callable needs it, and it is slow to load
 
     last = [0.0, 0.0]
@@ -275,4 +271,4 @@ def from_callable(
         last[0] = t
         return last[1]
 
-    return (lambda t: float(speed(t)), rate or difference, angle or quadrature)
+    return (lambda t: float(speed(t)), rate or Derivative(speed, 1, cell, (0.0, *breakpoints)), angle or quadrature)

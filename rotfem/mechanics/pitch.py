@@ -24,6 +24,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.mechanics.differentiation import Derivative
+
 Scalar = Callable[[float], float]
 Array = npt.NDArray[np.float64]
 
@@ -169,23 +171,16 @@ def tabulated_pitch(rows: npt.ArrayLike) -> Course:
     )
 
 
-#: Distance of the points of differences, s.
-DIFFERENCE = 2e-4
+def differentiated(angle: Scalar, rate: Scalar | None = None, cell: float | None = None) -> Course:
+    """Return (θ, θ̇, θ̈) of a function of time: differences whose step follows it, not before t = 0.
 
-
-def differentiated(angle: Scalar) -> Course:
-    """Return (θ, θ̇, θ̈) of a function of time, its rates as central differences of fourth order."""
-    h = DIFFERENCE
-
-    def around(t: float) -> list[float]:
-        middle = angle(t)  # of which the others are counted, so that what does not change has no rates
-        return [angle(t + k * h) - middle for k in (-2, -1, 1, 2)]
-
-    return (
-        angle,
-        lambda t: float(np.dot((1, -8, 8, -1), around(t)) / (12 * h)),
-        lambda t: float(np.dot((-1, 16, 16, -1), around(t)) / (12 * h * h)),
-    )
+    Args:
+        angle: t (s) ↦ θ, rad.
+        rate: t (s) ↦ θ̇ (rad/s); differences of the angle if None.
+        cell: length of time (s) in which differences have one step (`rotfem.mechanics.differentiation`).
+    """
+    first = rate or Derivative(angle, 1, cell, (0.0,))
+    return angle, first, Derivative(angle, 2, cell, (0.0,)) if rate is None else Derivative(rate, 1, cell, (0.0,))
 
 
 def harmonic_pitch(amplitude: float, phase: float, turn: Course) -> Course:

@@ -44,12 +44,14 @@ class PitchAngle(SceneModel):
         value: a constant angle (rad), or None.
         table: rows (t, angle) in s and rad, at rest before the first and after the last; or None.
         function: Python function t (s) ↦ angle (rad), or None.
+        rate: Python function t (s) ↦ rate of the function's angle (rad/s), or None: differences, whose step follows it.
         harmonic: added to these.
     """
 
     value: Number | None = None
     table: Annotated[Matrix, PlainValidator(_as_rows)] | None = None
     function: Annotated[Callable[[float], float], PlainValidator(_as_function)] | None = None
+    rate: Annotated[Callable[[float], float], PlainValidator(_as_function)] | None = None
     harmonic: tuple[HarmonicAngle, ...] = ()
 
     @property
@@ -69,19 +71,11 @@ class PitchAngle(SceneModel):
         Raises:
             InputError: it raises, or returns anything but a finite number.
         """
-        assert self.function is not None
-        where = f"the function of time, at {t:g},"
-        try:
-            given: Any = self.function(t)
-        except Exception as error:
-            raise InputError(KEY, None, f"{where} raised {type(error).__name__}: {error}") from error
-        try:
-            angle = float(given)
-        except (TypeError, ValueError) as error:
-            raise InputError(KEY, None, f"{where} must return a number (rad): {error}") from error
-        if not math.isfinite(angle):
-            raise InputError(KEY, None, f"{where} returned {angle}; must return a finite number (rad)")
-        return angle
+        return _number(self.function, t, KEY, "rad")
+
+    def rate_at(self, t: float) -> float:
+        """Return what the function of the rate returns at a time (s), rad/s, as `at` does."""
+        return _number(self.rate, t, f"{KEY}.rate", "rad/s")
 
     @model_validator(mode="before")
     @classmethod
@@ -102,4 +96,22 @@ class PitchAngle(SceneModel):
         if len(given) > 1 or not (given or self.harmonic):
             why = "give exactly one of value, table and function; harmonic may stand beside"
             raise problem("", ", ".join(given) or None, why)
+        if self.rate is not None and self.function is None:
+            raise problem("rate", None, "is that of a function; tables and harmonics have their own")
         return self
+
+
+def _number(function: Any, t: float, key: str, unit: str) -> float:
+    """Return what a function returns at a time (s), or raise an InputError that names the key."""
+    where = f"the function of time, at {t:g},"
+    try:
+        given: Any = function(t)
+    except Exception as error:
+        raise InputError(key, None, f"{where} raised {type(error).__name__}: {error}") from error
+    try:
+        number = float(given)
+    except (TypeError, ValueError) as error:
+        raise InputError(key, None, f"{where} must return a number ({unit}): {error}") from error
+    if not math.isfinite(number):
+        raise InputError(key, None, f"{where} returned {number}; must return a finite number ({unit})")
+    return number

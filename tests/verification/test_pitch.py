@@ -286,3 +286,16 @@ def test_hinges_that_do_not_pitch(theory: str, gravity: float, tolerance: float)
     exact = hinged_rigid_blade(found["t"], lambda t: amplitude * (1 - np.cos(3 * t)), gravity, 4.0)
     for name, values in zip(("tip_theta2", "tip_theta3"), exact, strict=True):
         np.testing.assert_allclose(found[name], values, rtol=0.0, atol=tolerance * np.abs(exact).max(), err_msg=name)
+
+
+@pytest.mark.parametrize("hertz", [500.0, 2000.0])
+def test_a_quick_function_is_its_harmonic(hertz: float) -> None:
+    """The accelerations of a ripple come from its values as from its formula; 1e-6 is of the digits of the angle."""
+    omega, found = 2 * np.pi * hertz, []
+    ripple = {"amplitude": 1e-3, "frequency": omega, "phase": -np.pi / 2}
+    blade = {"length": 10.0, "section": SOFT | {"rotary_inertia2": 0.1, "rotary_inertia3": 0.1}}
+    for pitch in ({"harmonic": ripple}, lambda t: 1e-3 * np.sin(omega * t)):
+        done = run(blade, pitch, "linear", time={"end": 0.005, "step": 2e-5}, output={"error": False})
+        found.append(done.history["tip_theta1"])
+    assert np.max(np.abs(found[0])) > 1e-3
+    assert np.max(np.abs(found[1] - found[0])) < 1e-6 * np.max(np.abs(found[0]))
