@@ -19,9 +19,8 @@ from typing import Any
 
 import rotfem
 from rotfem.commands.cost.bench import Bench
-from rotfem.commands.cost.front import describe, setting_of
 from rotfem.commands.cost.reference import distance
-from rotfem.commands.cost.result import CostResult
+from rotfem.commands.cost.result import CostResult, describe, setting_of
 from rotfem.commands.cost.settings import Setting, scaled
 from rotfem.scene import Scene, load_scene
 

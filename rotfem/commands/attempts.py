@@ -4,7 +4,7 @@ The time of a march goes with its work,
 
     steps · (stages + 1) · nodes^p,
 
-p = 1 along a beam and 1.4 over a plate (`rotfem.commands.cost.prediction`).
+p = 1 along a beam and 1.5 over a plate.
 """
 
 from __future__ import annotations
@@ -13,9 +13,11 @@ from dataclasses import dataclass
 from math import prod
 
 from rotfem.analysis.schemes import Scheme
-from rotfem.commands.cost.prediction import TIME_EXPONENT
 from rotfem.selection.accuracy import Settings
 from rotfem.selection.steps_ahead import BESIDE
+
+#: Exponents over the number of unknowns by the dimension of the mesh: a band, and nested dissection of a plane graph.
+TIME_EXPONENT = {1: 1.0, 2: 1.5}
 
 
 @dataclass

@@ -10,14 +10,27 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
-from rotfem.commands.cost.chain import Chain
-from rotfem.commands.cost.front import Row, pareto, recommend
+from rotfem import registry
+from rotfem.commands.cost.budget import Budget
+from rotfem.commands.cost.laboratory import Prediction
 from rotfem.commands.cost.plot import ERRORS
 from rotfem.commands.cost.record import Measurement, Record, fingerprint
-from rotfem.commands.cost.reference import Samples, combined, distance, limit, observed_order
-from rotfem.commands.cost.refinement import Plan, Refinement, finer_meshes
-from rotfem.commands.cost.settings import OUTPUTS, Setting, check_choice, grid, ladder, own_setting
+from rotfem.commands.cost.reference import Array, Move, Refinement, Samples, beside, distance
+from rotfem.commands.cost.result import Row, pareto, recommend
+from rotfem.commands.cost.settings import (
+    HIGHEST_DEGREE,
+    OUTPUTS,
+    Setting,
+    check_choice,
+    count,
+    grid,
+    ladder,
+    own_setting,
+    remeshed,
+    restepped,
+)
 from rotfem.commands.cost.tuned import write_tuned
 from rotfem.errors import SceneError
 from rotfem.scene import Scene, load_scene
@@ -37,183 +50,114 @@ def wave(h: float, order: float, noise: float = 0.0) -> Samples:
     return Samples((np.sin(TIMES) + error + noise * np.cos(999 * TIMES))[:, None], TIMES)
 
 
-@pytest.mark.parametrize("order", [2.0, 3.0, 6.0])
-def test_limit_finds_order_and_bounds_its_own_error(order: float) -> None:
-    levels = [wave(h, order) for h in (0.1, 0.05, 0.025)]
-    found = limit(levels, each=False)
-    assert found.order == pytest.approx(order, abs=0.1)
-    exact = Samples(np.sin(TIMES)[:, None], TIMES)
-    true = distance(found.samples, exact, each=False)
-    assert true < 0.2 * distance(levels[2], exact, each=False)
-    assert true <= found.uncertainty < distance(levels[0], exact, each=False)
-    assert found.error == pytest.approx(distance(levels[2], exact, each=False), rel=0.2)
+def mesh_part(elements: int) -> Array:
+    """Return an error of order 6 in the size of elements."""
+    return elements**-6.0 * np.cos(3 * TIMES)[:, None]
 
 
-@pytest.mark.parametrize("sizes", [(0.1, 0.06, 0.03), (0.1, 0.05, 0.03), (0.2, 0.05, 0.025)])
-def test_limit_of_levels_that_are_not_halved(sizes: tuple[float, float, float]) -> None:
-    """As with plates whose numbers of elements are odd, and where a level is missing."""
-    found = limit([wave(h, 2.0) for h in sizes], each=False, ratios=(sizes[0] / sizes[1], sizes[1] / sizes[2]))
-    assert found.order == pytest.approx(2.0, abs=0.1)
-    exact = Samples(np.sin(TIMES)[:, None], TIMES)
-    assert distance(found.samples, exact, each=False) <= found.uncertainty < distance(wave(sizes[2], 2.0), exact, False)
-
-
-def test_limit_without_an_order_is_the_finest_level() -> None:
-    levels = [wave(0.0, 2.0, noise) for noise in (1e-12, -2e-12, 3e-12)]
-    found = limit(levels, each=False)
-    assert found.order is None
-    np.testing.assert_array_equal(found.samples.values, levels[2].values)
-    assert found.uncertainty == pytest.approx(distance(levels[1], levels[2], each=False))
-    assert observed_order(levels[0], levels[0], levels[0], each=False) is None
-    assert limit(levels[:1], each=False).uncertainty == np.inf
-
-
-def test_levels_that_agree_by_chance_are_not_extrapolated_beyond_the_order_of_the_method() -> None:
-    """The differences shrink by 64 where the method says 4: a third of the last one is what may be missing."""
-    levels = [Samples(np.full((1, 1), v), np.empty(0)) for v in (1.0 + 64e-3, 1.0, 1.0 - 1e-3)]
-    found = limit(levels, each=False, highest=2.0)
-    assert found.order == pytest.approx(6.0, abs=0.1)
-    assert found.error == pytest.approx(1e-3 / 3, rel=1e-2)
-
-
-def test_reference_counts_the_mesh_and_the_product_of_both_errors() -> None:
-    """Of u(t; h, m) = w(t; h) + m c(t), refined in h for m = 1 and in m for h = 0.1, the limit is w(t; 0)."""
-    time = limit([wave(h, 2.0) for h in (0.1, 0.05, 0.025)], each=False)
-    change = np.cos(TIMES)[:, None]
-    coarse = wave(0.1, 2.0)
-    meshes = [Samples(coarse.values + 1e-3 * (m - 1.0) * change, TIMES) for m in (1.0, 0.25, 0.0625)]
-    space = limit(meshes, each=False)
-    found = combined(time, coarse, space, 0.02, each=False)
-    np.testing.assert_allclose(found.samples.values, time.samples.values - 1e-3 * change, atol=1e-9)
-    assert found.parts["mixed"] == pytest.approx(0.02 * 1e-3, rel=1e-2)
-    assert found.uncertainty == pytest.approx(sum(found.parts.values()))
-
-
-def measured(setting: Setting) -> Measurement:
-    """Return a wave with an error of the order of the setting's scheme, which takes as long as there are steps."""
+def computed(setting: Setting) -> Samples:
+    """Return a wave with the errors of a step (order 2), of a mesh, and of their product."""
     assert setting.step is not None
     assert isinstance(setting.elements, int)
-    order = {"generalised_alpha": 2.0, "newmark": 2.0, "esdirk4": 4.0}[setting.scheme or ""]
-    samples = wave(setting.step, order)
-    samples.values += setting.elements**-6.0 * np.cos(3 * TIMES)[:, None]
-    wall = {"esdirk4": 5.0}.get(setting.scheme or "", 1.0) / setting.step
-    return Measurement(
-        samples=samples, wall=[wall], cpu=[wall], dofs=3 * setting.elements, steps=round(2 / setting.step)
+    samples = wave(setting.step, 2.0)
+    return Samples(samples.values * (1.0 + mesh_part(setting.elements)) + mesh_part(setting.elements), TIMES)
+
+
+MOVES: dict[str, Move] = {"time": lambda s: restepped(s, 0.5, 0.02), "mesh": lambda s: remeshed(s, 2.0)}
+COARSE = Setting("reissner", 2, 3, "newmark", 0.08)
+EXACT = Samples(np.sin(TIMES)[:, None], TIMES)
+
+
+@pytest.mark.parametrize("goal", [1e-2, 1e-4, 1e-6])
+def test_reference_is_as_near_to_the_truth_as_it_claims(goal: float) -> None:
+    """The combination cancels both leading errors: it is better than the last difference by the next order."""
+    found = Refinement(computed, COARSE, MOVES, each=False).reference(goal)
+    assert found is not None
+    assert distance(found.samples, EXACT, each=False) < found.uncertainty <= goal
+    assert set(found.parts) == {"time", "mesh"}
+
+
+def test_the_larger_difference_is_refined() -> None:
+    refinement = Refinement(computed, COARSE, MOVES, each=False)
+    found = refinement.reference(1e-4)
+    assert found is not None
+    for name in ("time", "mesh"):
+        assert found.parts[name] == refinement.differences[name][-1][1]
+    levels = zip(
+        refinement.differences["time"], refinement.differences["mesh"], refinement.differences["mesh"][1:], strict=False
     )
+    for (_, time), (before, space), (after, _) in levels:
+        assert (after.elements != before.elements) == (space > time)
 
 
-def test_reference_is_refined_with_the_scheme_that_gets_there_first() -> None:
-    own = Setting("reissner", 8, 3, "generalised_alpha", 0.02)
-    plan = Plan(own, each=False, first_step=0.08, interval=0.02, schemes=("newmark", "esdirk4"))
-    asked: list[Setting] = []
-
-    def get(setting: Setting, share: float) -> Measurement:
-        asked.append(setting)
-        return measured(setting)
-
-    goal = 1e-9
-    found = Refinement(plan, get).reference("reissner", goal, 0.5, plan.schemes)
+def test_order_is_that_of_the_steps() -> None:
+    found = Refinement(computed, replace(COARSE, elements=64), MOVES, each=False).reference(1e-5)
     assert found is not None
-    exact = Samples(np.sin(TIMES)[:, None], TIMES)
-    assert distance(found.samples, exact, each=False) <= found.uncertainty
-    assert found.parts["time"] <= goal
-    assert found.order == pytest.approx(4.0, abs=0.3)
-    shortest = {s: min(x.step or 1.0 for x in asked if x.scheme == s) for s in ("generalised_alpha", "esdirk4")}
-    assert shortest["esdirk4"] < shortest["generalised_alpha"]
-
-
-def test_schemes_that_may_need_forms_wait_for_one_that_gets_there_without() -> None:
-    """Where compiling takes long, one of higher order starts; the lower ones do where none is more exact."""
-    own = Setting("reissner", 8, 3, "generalised_alpha", 0.02)
-    plan = Plan(own, each=False, first_step=0.08, interval=0.02, schemes=("newmark", "esdirk4"), warming=lambda: 1e9)
-    asked: set[str | None] = set()
-
-    def get(setting: Setting, share: float) -> Measurement:
-        asked.add(setting.scheme)
-        return measured(setting)
-
-    assert Refinement(plan, get).reference("reissner", 1e-6, 0.5, plan.schemes) is not None
-    assert asked == {"generalised_alpha", "esdirk4"}
-
-
-def test_meshes_are_refined_again_in_steps_that_resolve_what_they_move() -> None:
-    """A finer mesh moves something in steps below 0.03 s that longer ones damp: 4⁻⁶ in four elements."""
-    own = Setting("reissner", 8, 3, "newmark", 0.02)
-    plan = Plan(own, each=False, first_step=0.32, interval=0.32, schemes=("esdirk4",))
-
-    def get(setting: Setting, share: float) -> Measurement:
-        found = measured(setting)
-        assert isinstance(setting.elements, int)
-        if (setting.step or 0.0) < 0.03:
-            found.samples.values += 50 * setting.elements**-6.0 * np.sin(7 * TIMES)[:, None]
-        return found
-
-    found = Refinement(plan, get).reference("reissner", 1e-5, 0.5, plan.schemes)
-    assert found is not None
-    exact = Samples(np.sin(TIMES)[:, None], TIMES)
-    assert distance(found.samples, exact, each=False) <= found.uncertainty < 1e-4
-
-
-def test_steps_of_a_large_mesh_that_would_take_too_long_are_refined_on_a_coarser_one() -> None:
-    """The budget takes 200 cells at most: the mesh of 800 is never asked for but with a part of the share."""
-    own = Setting("reissner", (40, 20), 2, "newmark", 0.02)
-    plan = Plan(own, each=False, first_step=0.08, interval=0.02)
-    shares: dict[Any, list[float]] = {}
-
-    def get(setting: Setting, share: float) -> Measurement | None:
-        shares.setdefault(setting.elements, []).append(share)
-        assert isinstance(setting.elements, tuple)
-        there = measured(replace(setting, elements=setting.elements[0]))
-        return there if setting.elements[0] <= 20 else None
-
-    found = Refinement(plan, get).reference("reissner", 1e-4, 0.4)
-    assert found is not None
-    exact = Samples(np.sin(TIMES)[:, None], TIMES)
-    assert distance(found.samples, exact, each=False) <= found.uncertainty < 1e-3
-    assert next(iter(shares)) == (10, 5)  # by which the time of others is known
-    assert shares[40, 20][0] < 0.4 == shares[10, 5][0]
-
-
-def test_what_a_chain_would_take_goes_with_its_order() -> None:
-    """Errors of order 2 that take twice as long when halved: two levels to a tenth of what is uncertain."""
-    levels = (Setting("reissner", 8, 3, "newmark", 0.08 / 2**i) for i in range(9))
-    chain = Chain(levels, each=False)
-    assert chain.to_take(1e-3) == np.inf
-    for _ in range(4):
-        chain.extend(lambda setting, share: measured(setting), 1.0)
-    uncertain, last = chain.limit().uncertainty, chain.costs[-1]
-    assert chain.to_take(uncertain) == 0.0
-    assert chain.to_take(uncertain / 10) == pytest.approx(last * (2 + 4), rel=1e-6)
-    chain.costs[-1], chain.doubt = 1e200 * last, np.inf  # whatever that is, it is no time
-    assert chain.to_take(1e-3) == np.inf
-    chain.doubt = 0.0
-    assert chain.to_take(uncertain / 1e3) == np.inf
+    assert found.order == pytest.approx(2.0, abs=0.1)
 
 
 def test_reference_says_what_the_budget_leaves_uncertain() -> None:
-    plan = Plan(Setting("reissner", 8, 3, "newmark", 0.02), each=False, first_step=0.08, interval=0.02)
-    found = Refinement(plan, lambda s, share: measured(s) if s.elements in (2, 4, 8) else None)
-    there = found.reference("reissner", 1e-9, 0.5)
+    found = Refinement(lambda s: computed(s) if s.elements in (2, 4) else None, COARSE, MOVES, each=False)
+    there = found.reference(1e-9)
     assert there is not None
-    assert 1e-9 < there.parts["mesh"] < 1e-6  # 8⁻⁶ is 4e-6
-    refused = Refinement(plan, lambda s, share: None)
-    assert refused.reference("reissner", 1e-6, 0.5) is None
-    assert "budget" in refused.reasons["reissner"]
+    assert there.uncertainty > 1e-4
+    assert distance(there.samples, EXACT, each=False) <= there.uncertainty
+    assert Refinement(lambda s: None, COARSE, MOVES, each=False).reference(1e-6) is None
 
 
-@pytest.mark.parametrize(
-    ("elements", "there"),
-    [
-        (8, [2, 4, 8, 16]),
-        (10, [5, 10, 20, 40]),
-        ((6, 1), [(6, 1), (12, 2), (24, 4), (48, 8)]),
-        ((8, 3), [(4, 2), (8, 3), (16, 6), (32, 12)]),
-        ((10, 8), [(3, 2), (5, 4), (10, 8), (20, 16)]),
-    ],
-)
-def test_meshes_of_a_chain_are_halved(elements: Any, there: list[Any]) -> None:
-    """Exactly where it is cheap to refine on; of plates to the next larger numbers, so that there are coarser ones."""
-    assert [s.elements for s in finer_meshes(Setting("reissner", elements, 2))][:4] == there
+def test_a_theory_beside_another_is_off_by_the_product_of_two_errors() -> None:
+    known = Refinement(computed, COARSE, MOVES, each=False).reference(1e-6)
+    assert known is not None
+    change = 0.01 * np.cos(TIMES)[:, None]
+    here = computed(COARSE)
+    there = Samples(here.values + change, TIMES)
+    found = beside(known, there, here, each=False)
+    np.testing.assert_allclose(found.samples.values, known.samples.values + change, atol=1e-12)
+    assert found.parts["theory"] == pytest.approx(
+        distance(there, here, each=False) * distance(here, known.samples, each=False)
+    )
+    assert found.uncertainty > known.uncertainty
+
+
+def test_finer_and_coarser_settings() -> None:
+    plate = Setting("reissner", (8, 3), 2)
+    assert remeshed(plate, 2.0) == replace(plate, elements=(16, 6))
+    assert remeshed(replace(plate, elements=(1, 1)), 0.5) is None
+    file = replace(plate, elements=None)
+    assert remeshed(file, 2.0) == replace(file, degree=3)
+    assert remeshed(replace(file, degree=HIGHEST_DEGREE), 2.0) is None
+    assert restepped(COARSE, 0.125, 0.02) == replace(COARSE, step=0.01, every=2)
+    assert restepped(plate, 0.5, 0.0) is None
+
+
+def measured(setting: Setting, cpu: float, steps: int = 100) -> Measurement:
+    """Return a measurement without an output."""
+    return Measurement(cpu=[cpu], wall=[cpu], setup_cpu=[0.0], memory=1e6, dofs=3 * count(setting), steps=steps)
+
+
+def test_time_is_predicted_by_steps_stages_and_unknowns() -> None:
+    prediction = Prediction(plate=False, end=8.0)
+    assert prediction.of(COARSE)["cpu"] is None
+    prediction.learn(COARSE, measured(COARSE, 1.0))
+    assert prediction.of(COARSE)["cpu"] == 1.0
+    assert prediction.of(replace(COARSE, step=0.02))["cpu"] == pytest.approx(4.0)
+    stages = registry.schemes["esdirk4"].stages
+    assert prediction.of(replace(COARSE, scheme="esdirk4"))["cpu"] == pytest.approx(stages)
+    assert prediction.of(replace(COARSE, elements=4))["cpu"] == pytest.approx(13 / 7)  # nodes of degree 3
+    wide = Setting("reissner", (8, 8), 2)
+    plates = Prediction(plate=True, end=0.0)
+    plates.learn(wide, measured(wide, 1.0, steps=0))
+    assert plates.of(replace(wide, elements=(16, 16)))["cpu"] == pytest.approx((33 / 17) ** 3)  # n^(3/2), n nodes
+
+
+def test_a_budget_lets_nothing_take_more_than_half_of_what_is_left() -> None:
+    budget = Budget(100.0, MPI.COMM_SELF)
+    assert budget.allows(COARSE, {"cpu": None, "memory": None})
+    assert budget.allows(COARSE, {"cpu": 49.0, "memory": 1.0})
+    assert not budget.allows(COARSE, {"cpu": 51.0, "memory": 1.0})
+    assert not budget.allows(COARSE, {"cpu": 1.0, "memory": 1e18})
+    (refused,) = budget.refused
+    assert "would take about 51 s" in refused["why"]
 
 
 def test_samples_at_other_times_are_interpolated() -> None:
@@ -230,7 +174,7 @@ def test_eigenvalues_are_each_relative_to_itself() -> None:
     truth, off = Samples(np.array([[1.0, 0.0], [100.0, 0.0]]), none), Samples(np.array([[1.1, 0], [100.5, 0]]), none)
     assert distance(off, truth, each=True) == pytest.approx(0.1)
     assert distance(off, truth, each=False) == pytest.approx(0.005)
-    assert np.isnan(distance(Samples(np.ones((1, 2)), none), truth, each=True))
+    assert distance(Samples(np.ones((1, 2)), none), truth, each=True) == np.inf
 
 
 def rows(number: int) -> list[Row]:

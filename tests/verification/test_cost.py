@@ -13,12 +13,11 @@ import pytest
 
 import rotfem
 from rotfem.commands.cost.bench import Bench
-from rotfem.commands.cost.exploration import RECORD
-from rotfem.commands.cost.front import setting_of
 from rotfem.commands.cost.record import Measurement
 from rotfem.commands.cost.reference import Samples, distance
-from rotfem.commands.cost.result import CostResult
+from rotfem.commands.cost.result import CostResult, setting_of
 from rotfem.commands.cost.settings import Setting
+from rotfem.commands.cost.study import RECORD
 
 from .conftest import SPIN_UP, reference_file
 
@@ -58,7 +57,8 @@ def test_reference_is_as_near_to_the_truth_as_it_claims(spin_up: CostResult, the
     samples = Samples(r.samples.values[np.searchsorted(r.samples.times, times - 1e-6)], times)
     off = distance(samples, Samples(tip, times), each=False)
     assert 0.0 < off <= r.uncertainty < 1e-4
-    assert r.order == pytest.approx(2.0, abs=0.05)  # of generalised-α
+    if theory == "reissner":  # which was refined; the other is known from it
+        assert r.order == pytest.approx(2.0, abs=0.05)  # of generalised-α
 
 
 def test_error_of_a_point_is_its_true_error(spin_up: CostResult) -> None:
@@ -122,7 +122,7 @@ def test_frequencies_converge_with_twice_the_degree() -> None:
 def test_steady_state() -> None:
     """The stretched rod: u₁(L) = sin(kL)/(k cos kL) − L with k = Ω √(A_ρ/EA)."""
     scene = copy.deepcopy(SPIN_UP) | {"motion": {"type": "constant", "speed": 100.0}}
-    result = rotfem.cost(scene, theories=["reissner"], elements=[2, 4], degrees=[1, 2], repeat=1)
+    result = rotfem.cost(scene, theories=["reissner"], elements=[2, 4], degrees=[1, 2], repeat=1, accuracy=1e-8)
     k = 100.0 * np.sqrt(1.2 / 2.8e7)
     exact = np.sin(10 * k) / (k * np.cos(10 * k)) - 10
     assert result.summary["output"] == "tip"
@@ -202,7 +202,7 @@ def test_adaptive_scene_is_studied_over_tolerances_too() -> None:
     result = rotfem.cost(scene, quick=True, theories=["reissner"], elements=[4], repeat=1, accuracy=1e-3)
     error = {row["tolerance"]: row["error"] for row in result.rows if row["tolerance"] is not None}
     assert sorted(error)[-3:] == pytest.approx([1e-3, 1e-2, 1e-1])
-    assert error[1e-3] < min(error[t] for t in error if t > 5e-3)
+    assert max(error.values()) <= 1e-3  # all of them take the longest steps that rows allow
     assert any(row["step"] is not None for row in result.rows)
 
 

@@ -11,8 +11,7 @@ from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady
 from rotfem.commands.campbell import Diagram
-from rotfem.commands.cost.budget import cpu_time
-from rotfem.commands.cost.memory import PeakMemory
+from rotfem.commands.cost.budget import PeakMemory, cpu_time
 from rotfem.commands.cost.record import Measurement
 from rotfem.commands.cost.reference import Samples
 from rotfem.commands.cost.settings import Setting, sweep_speeds
@@ -44,14 +43,14 @@ class Bench:
         comm: MPI communicator.
 
     Attributes:
-        compiling, warming: CPU time (s) of all runs that warmed up, and of the longest one.
+        compiling: CPU time (s) of all runs that warmed up.
         memory: at the height.
     """
 
     def __init__(self, scene: Scene, output: str, comm: MPI.Comm = MPI.COMM_WORLD):
         self.scene, self.output, self.comm = scene, output, comm
         self._warm: set[tuple[str, int, str | None]] = set()
-        self.compiling = self.warming = 0.0
+        self.compiling = 0.0
         self.memory = PeakMemory()
 
     def measure(
@@ -97,8 +96,7 @@ class Bench:
         else:
             self._start(short)(lambda share: None)
         self._warm.add(key)
-        took = cpu_time() - started
-        self.compiling, self.warming = self.compiling + took, max(self.warming, took)
+        self.compiling += cpu_time() - started
 
     def _once(self, variant: Scene, out: Measurement, limit: float) -> None:
         self.memory.restart()

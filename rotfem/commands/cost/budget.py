@@ -1,9 +1,12 @@
-"""What a study may take: time in all, memory of one computation; what is refused is told. No dolfinx in it."""
+"""What a study may take, time in all and memory of one computation, and what one takes. No dolfinx in it."""
 
 from __future__ import annotations
 
+import ctypes
+import gc
 import os
 import re
+import resource
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +16,7 @@ from typing import Any
 from mpi4py import MPI
 
 from rotfem.commands.cost.settings import Setting
+from rotfem.commands.signals import held_back
 from rotfem.errors import SceneError
 
 #: Time of a study (s) where nothing is said.
@@ -88,18 +92,19 @@ class Budget:
         """Return the time left, s."""
         return float(self.comm.bcast(self.seconds - (cpu_time() - self.started)))
 
-    def allows(self, setting: Setting, predicted: Mapping[str, float | None], share: float) -> bool:
+    def allows(self, setting: Setting, predicted: Mapping[str, float | None]) -> bool:
         """Return whether a setting may be computed, and keep what is refused.
+
+        None may take more than half of the time left, so that there is always as much for what follows from it.
 
         Args:
             setting: what is to be computed.
             predicted: its `cpu` time (s) and `memory` (bytes), None where nothing is known of them.
-            share: of the time left that it may take.
         """
         left, time, memory = self.left(), predicted["cpu"], predicted["memory"]
         if memory is not None and memory > self.memory:
             why = f"would need about {memory / 1e9:.2g} GB of {self.memory / 1e9:.2g} GB allowed"
-        elif left <= 0.0 or (time is not None and time > share * left):
+        elif left <= 0.0 or (time is not None and time > left / 2):
             known = "" if time is None else f"would take about {time:.2g} s, "
             why = f"{known}{max(left, 0.0):.2g} s of the budget are left"
         else:
@@ -112,3 +117,53 @@ class Budget:
     def summary(self) -> dict[str, Any]:
         """Return what a summary says of it."""
         return {"seconds": self.seconds, "used": self.seconds - self.left(), "refused": self.refused}
+
+
+#: Where Linux says what a process has in memory, now and at most, and where the latter is set back by writing 5.
+STATUS, RESET = Path("/proc/self/status"), Path("/proc/self/clear_refs")
+
+
+def release() -> None:
+    """Give back what is no longer used: the last system is large and full of cycles."""
+    with held_back():  # what a signal raises is lost in the finalisers that a collection runs
+        gc.collect()
+    trim = getattr(
+        ctypes.CDLL(None), "malloc_trim", None
+    )  # of glibc: it keeps what was freed, and the next one uses it
+    if trim is not None:
+        trim(0)
+
+
+class PeakMemory:
+    """The height of the memory of this process since `restart`, above what it had at first.
+
+    Where the system cannot set its mark back, the height is that since the process began.
+    """
+
+    def __init__(self) -> None:
+        release()
+        self.base = _status("VmRSS") or 0.0
+
+    def restart(self) -> None:
+        """Begin anew."""
+        release()
+        try:
+            RESET.write_text("5", encoding="ascii")
+        except OSError:
+            return
+
+    def height(self) -> float:
+        """Return bytes."""
+        height = _status("VmHWM")
+        if height is None:
+            height = 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        return max(height - self.base, 0.0)
+
+
+def _status(name: str) -> float | None:
+    """Return a number of bytes that Linux keeps of this process, None elsewhere."""
+    try:
+        lines = STATUS.read_text(encoding="ascii").splitlines()
+        return 1024.0 * float(next(line for line in lines if line.startswith(f"{name}:")).split()[1])
+    except (OSError, StopIteration, ValueError, IndexError):
+        return None

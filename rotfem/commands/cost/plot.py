@@ -1,4 +1,4 @@
-"""The work–precision figure; imports only results."""
+"""The figures of a work–precision study: error over time, and time and memory over size; imports only results."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
-from rotfem.commands.cost.front import judged, mesh_name
-from rotfem.commands.cost.result import CostResult
+from rotfem.commands.cost.result import CostResult, judged, mesh_name
 
 #: A marker a scheme, or, where there are none, a degree.
 MARKERS = "osD^Pv*X<>"
@@ -137,3 +136,32 @@ def _legend(result: CostResult, colours: dict[str, str], markers: dict[str, str]
         handles.append(Line2D([], [], color="black", marker="o", mfc="none", ms=11, ls="none", label=text))
     handles.append(Line2D([], [], color="0.85", lw=6, label=f"uncertainty {summary['uncertainty'] or 0:.0e}"))
     return handles
+
+
+def scaling_figure(result: CostResult) -> Figure:
+    """Return time and memory over the number of unknowns: measured, and what is predicted for larger systems."""
+    figure = Figure(figsize=(9, 4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    marching = any(row["scheme"] is not None for row in result.rows)
+    _growth(left, result, "time", 1.0)
+    _growth(right, result, "memory", 1e6)
+    left.set_ylabel("CPU time of a step (s)" if marching else "CPU time with set-up (s)")
+    right.set_ylabel("memory at the height (MB)")
+    right.legend(fontsize="small")
+    return figure
+
+
+def _growth(axis: Any, result: CostResult, name: str, unit: float) -> None:
+    """Draw a column of the table of sizes over the unknowns."""
+    rows = result.summary["scaling"]
+    for i, theory in enumerate(dict.fromkeys(row["theory"] for row in rows)):
+        mine = [row for row in rows if row["theory"] == theory]
+        known = [row for row in mine if not row["predicted"]]
+        ahead = [known[-1], *(row for row in mine if row["predicted"])]
+        for part, style in ((ahead, "o--"), (known, "o-")):
+            x, y = [row["dofs"] for row in part], [row[name] / unit for row in part]
+            axis.plot(x, y, style, color=f"C{i}", mfc="none" if part is ahead else None, ms=4)
+        axis.plot([], [], "o-", color=f"C{i}", ms=4, label=theory)
+    axis.plot([], [], "o--", color="0.3", mfc="none", ms=4, label="predicted")
+    axis.set(xscale="log", yscale="log", xlabel="unknowns")
+    axis.grid(True, which="both", lw=0.3, alpha=0.5)

@@ -1,29 +1,37 @@
-"""Self-refinement: observed orders, extrapolated references and how far they can be trusted; errors against them."""
+"""References by refinement: the output that ever finer settings tend to, and by how much their last ones differ.
+
+With u(h, n) the output for a step h and a mesh n, the two differences of a level are
+
+    d_t = |u(h/2, n) − u(h, n)|,   d_x = |u(h, 2n) − u(h, n)|.
+
+The larger one is refined until d_t + d_x is small enough. The reference is the combination
+
+    u(h/2, n) + u(h, 2n) − u(h, n),
+
+in which the errors of step and mesh cancel to leading order (combination technique, Griebel, Schneider & Zenger 1992),
+and d_t + d_x of the last level is what it is known to. No order is assumed, none is extrapolated. No dolfinx in it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from math import log2
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
-from scipy.optimize import brentq
+
+from rotfem.commands.cost.settings import Setting
 
 Array = npt.NDArray[np.float64]
 
-#: Observed orders below this are noise, or of levels not yet fine enough: nothing is extrapolated.
-LEAST_ORDER = 1.0
-
-#: Part of what an extrapolation of order 3/2 adds that is uncertain, however well levels agree; steeper, it is less.
-DOUBT = 0.2
-
-#: Ratios of the sizes of three levels that are halved, and the largest order that is looked for where they are not.
-HALVED, STEEPEST = (2.0, 2.0), 30.0
-
-#: Samples closer than this part of the interval are taken to be at the same time.
+#: Samples closer than this part of the interval are taken to be at the same time: round-off of n steps of h.
 SAME_TIME = 1e-9
+
+#: A number that nothing is: what an output that vanishes is divided by.
+TINY = 1e-300
 
 
 @dataclass
@@ -50,203 +58,156 @@ class Samples:
 
 
 @dataclass
-class Limit:
-    """What a chain of refinements tends to.
-
-    Attributes:
-        samples: its values.
-        uncertainty: relative, in the norm that errors are measured in; infinite where there is one level only.
-        order: observed order of the refinement; None where it was not sensible and the finest level is taken as it is.
-        error: about that of the finest level, relative.
-    """
-
-    samples: Samples
-    uncertainty: float
-    order: float | None
-    error: float
-
-
-@dataclass
 class Reference:
     """The converged output of one theory.
 
     Attributes:
         samples: its values.
-        uncertainty: relative, in the norm that errors are measured in.
-        order: observed order of the refinement; None where it was not sensible and the finest level is taken as it is.
-        parts: uncertainty by what was refined, `time` and `mesh`, and of their product, `mixed`.
+        parts: differences of the last level, `time` and `mesh`, relative; of a theory compared with the richest at one
+            setting also `theory`, the product of their difference and that setting's error.
+        order: log₂ of the ratio of the last two differences in time, in a steady state of the mesh; None of one level.
+        setting: the finest one that all parts were refined from.
     """
 
     samples: Samples
-    uncertainty: float
-    order: float | None
     parts: dict[str, float]
+    order: float | None
+    setting: Setting
 
-
-def distance(a: Samples, b: Samples, each: bool, scale: float | None = None) -> float:
-    """Return the largest difference between the rows of a and b, relative.
-
-    Args:
-        a: what is judged; compared at its own times where b has them, interpolated by a cubic spline otherwise.
-        b: what it is judged by.
-        each: relative to each row of b (eigenvalues) instead of to the largest row (histories).
-        scale: what the difference is relative to (m), instead of the largest row of b.
-    """
-    x, y = aligned(a, b)
-    if x.shape != y.shape:
-        return float("nan")
-    difference = np.linalg.norm(x - y, axis=1)
-    if each:
-        return float(np.max(difference / np.maximum(np.linalg.norm(y, axis=1), 1e-300), initial=0.0))
-    return float(np.max(difference, initial=0.0) / (size(b) if scale is None else scale))
+    @property
+    def uncertainty(self) -> float:
+        """How far it may be off, relative, in the norm that errors are measured in."""
+        return sum(self.parts.values())
 
 
 def size(samples: Samples) -> float:
     """Return the largest norm of a row."""
-    return float(np.max(np.linalg.norm(samples.values, axis=1), initial=0.0)) or 1e-300
+    return float(np.max(np.linalg.norm(samples.values, axis=1), initial=0.0)) or TINY
 
 
-def aligned(a: Samples, b: Samples) -> tuple[Array, Array]:
-    """Return the values of a and b at common times: those of a where b has them, of the one with fewer otherwise."""
+def aligned(a: Samples, b: Samples) -> tuple[Array, Array, Array]:
+    """Return common times and the values of a and b there: those of a where b has them, else of the one with fewer.
+
+    The one with more rows is interpolated by a cubic spline.
+    """
     if a.times.size == 0 or b.times.size == 0:
-        return a.values, b.values
+        return a.times, a.values, b.values
     close = SAME_TIME * float(b.times[-1])
     nearest = np.clip(np.searchsorted(b.times, a.times - close), 0, len(b.times) - 1)
     if np.all(np.abs(b.times[nearest] - a.times) <= close):
-        return a.values, b.values[nearest]
-    if len(a.times) < len(b.times):
-        inside = a.times <= b.times[-1] + close
-        return a.values[inside], CubicSpline(b.times, b.values)(a.times[inside])
-    inside = b.times <= a.times[-1] + close
-    return CubicSpline(a.times, a.values)(b.times[inside]), b.values[inside]
+        return a.times, a.values, b.values[nearest]
+    few, many = (a, b) if len(a.times) < len(b.times) else (b, a)
+    inside = few.times <= many.times[-1] + close
+    times, values, spline = few.times[inside], few.values[inside], CubicSpline(many.times, many.values)
+    return (times, values, spline(times)) if few is a else (times, spline(times), values)
 
 
-def observed_order(
-    coarse: Samples, middle: Samples, fine: Samples, each: bool, ratios: tuple[float, float] = HALVED
-) -> float | None:
-    """Return p = log₂(|u_h − u_{h/2}| / |u_{h/2} − u_{h/4}|), None where the differences do not shrink as they should.
-
-    Roache 1998, "Verification and Validation in Computational Science and Engineering", sec. 5.10. Sizes with other
-    ratios r and s solve (r^p − 1) s^p / (s^p − 1) = |u_h − u_{h/r}| / |u_{h/r} − u_{h/rs}| for p.
-    """
-    first, second = distance(coarse, middle, each), distance(middle, fine, each)
-    if not (np.isfinite(first) and np.isfinite(second)) or second <= 0.0 or first <= 0.0:
-        return None
-    r, s = ratios
-
-    def excess(p: float) -> float:
-        return float((r**p - 1.0) * s**p / (s**p - 1.0) - first / second)
-
-    if excess(LEAST_ORDER) > 0.0:
-        return None
-    return float(np.log(first / second) / np.log(s)) if r == s else float(_root(excess))
-
-
-def _root(excess: Callable[[float], float]) -> float:
-    """Return where a function that increases with the order is zero, at most STEEPEST."""
-    return STEEPEST if excess(STEEPEST) <= 0.0 else float(brentq(excess, LEAST_ORDER, STEEPEST))
-
-
-def extrapolated(coarse: Samples, fine: Samples, order: float, ratio: float = 2.0) -> Samples:
-    """Return Richardson's u_{h/r} + (u_{h/r} − u_h) / (r^p − 1), at the times of the fine one."""
-    rough, good = aligned(coarse, fine)
-    return shifted(fine, Samples((good - rough) / (ratio**order - 1.0), coarse.times))
-
-
-def shifted(samples: Samples, change: Samples) -> Samples:
-    """Return samples with a change added, which is interpolated where it is known at fewer times."""
-    values = change.values
-    if len(values) != len(samples.values):
-        values = CubicSpline(change.times, values)(samples.times)
-    return Samples(samples.values + values, samples.times)
-
-
-def limit(
-    levels: Sequence[Samples], each: bool, highest: float = np.inf, ratios: tuple[float, float] = HALVED
-) -> Limit:
-    """Return what levels of refinement tend to, each with half the size of the one before; the last three count.
-
-    Where the differences shrink with an order p, the two finest levels are extrapolated; the uncertainty is the
-    difference to what the two before give, at most the last difference, which is all there is to come where differences
-    halve, and at least a part of what was added. Otherwise it is the finest level, and the larger of the differences
-    between levels. A degree raised by one may stand for half the size: only the ratio of
-    the differences counts.
+def distance(a: Samples, b: Samples, each: bool, scale: float | None = None) -> float:
+    """Return the largest difference between the rows of a and b, relative; infinite where they cannot be compared.
 
     Args:
-        levels: the output for h, h/2, h/4, …
-        each: see `distance`.
-        highest: order of the method: levels that differ less than it says do so by chance.
-        ratios: of the sizes of the last three levels, where they are not halved.
+        a: what is judged.
+        b: what it is judged by.
+        each: relative to each row of b (eigenvalues) instead of to the largest row (histories).
+        scale: what the difference is relative to (m), instead of the largest row of b.
     """
-    fine = levels[-1]
-    if len(levels) == 1:
-        return Limit(fine, np.inf, None, np.inf)
-    last = _known(distance(levels[-2], fine, each))
-    if len(levels) == 2:
-        return Limit(fine, last, None, last)
-    order = observed_order(levels[-3], levels[-2], fine, each, ratios)
-    if order is None:
-        worst = max(_known(distance(levels[-3], levels[-2], each)), last)
-        return Limit(fine, worst, None, worst)
-    p = min(order, highest)
-    best = extrapolated(levels[-2], fine, p, ratios[1])
-    added = distance(fine, best, each)
-    unlike = min(distance(extrapolated(levels[-3], levels[-2], p, ratios[0]), best, each), last)
-    uncertain = max(unlike, DOUBT * added / (p - 0.5))
-    return Limit(best, uncertain, order, added)
+    _, x, y = aligned(a, b)
+    if x.shape != y.shape or not (np.all(np.isfinite(x)) and np.all(np.isfinite(y))):
+        return float("inf")
+    difference = np.linalg.norm(x - y, axis=1)
+    if each:
+        return float(np.max(difference / np.maximum(np.linalg.norm(y, axis=1), TINY), initial=0.0))
+    return float(np.max(difference, initial=0.0) / (size(b) if scale is None else scale))
 
 
-def neighbour(known: Reference, there: Samples, here: Samples, error: float) -> Reference:
+def moved(samples: Samples, to: Samples, of: Samples) -> Samples:
+    """Return samples + (to − of), at the times of the samples."""
+    times, end, start = aligned(to, of)
+    change = end - start
+    if len(change) != len(samples.values):
+        change = CubicSpline(times, change)(samples.times)
+    return Samples(samples.values + change, samples.times)
+
+
+#: Returns the output of a setting; None where it failed or the budget refuses it.
+Get = Callable[[Setting], Samples | None]
+
+#: Returns the next finer setting in one direction; None where there is none.
+Move = Callable[[Setting], Setting | None]
+
+
+@dataclass
+class Refinement:
+    """Refines steps and mesh from one setting on.
+
+    Args:
+        get: computes a setting.
+        base: the coarsest setting.
+        moves: "time" and "mesh" ↦ the next finer setting.
+        each: see `distance`.
+
+    Attributes:
+        differences: "time" and "mesh" ↦ (setting, difference to the next finer one), coarse to fine.
+    """
+
+    get: Get
+    base: Setting
+    moves: Mapping[str, Move]
+    each: bool
+    differences: dict[str, list[tuple[Setting, float]]] = field(default_factory=dict)
+
+    def reference(self, goal: float) -> Reference | None:
+        """Return what the settings tend to, known to a goal, or as well as can be had; None where nothing could be.
+
+        Args:
+            goal: relative difference of the last level that ends the refinement.
+        """
+        samples = self.get(self.base)
+        found: Reference | None = None
+        while samples is not None:
+            finer = {name: self._finer(name, samples) for name in self.moves}
+            parts = {name: self.differences[name][-1][1] for name in self.moves if self.differences.get(name)}
+            if len(parts) < len(self.moves):
+                return found  # one direction is not known at all
+            worst = max(parts, key=lambda name: parts[name])
+            best = samples
+            for step in finer.values():
+                best = best if step is None else moved(best, step[1], samples)
+            found = Reference(best, parts, self._order("time" if "time" in parts else "mesh"), self.base)
+            ahead = finer[worst]
+            if sum(parts.values()) <= goal or ahead is None:
+                return found
+            self.base, samples = ahead
+        return found
+
+    def _finer(self, name: str, samples: Samples) -> tuple[Setting, Samples] | None:
+        """Return the next finer setting in one direction with its output, and keep the difference."""
+        following = self.moves[name](self.base)
+        output = None if following is None else self.get(following)
+        if following is None or output is None:
+            return None
+        self.differences.setdefault(name, []).append((self.base, distance(samples, output, self.each)))
+        return following, output
+
+    def _order(self, name: str) -> float | None:
+        """Return log₂ of the ratio of the last two differences in a direction; None where they do not shrink."""
+        if len(self.differences[name]) < 2:
+            return None
+        before, last = (d for _, d in self.differences[name][-2:])
+        return log2(before / last) if before > last > 0.0 else None
+
+
+def beside(known: Reference, there: Samples, here: Samples, each: bool) -> Reference:
     """Return the reference of a theory from that of another, and the outputs of both for one setting.
 
-    The errors of the setting are nearly the same in both, and leave the difference with a part of it uncertain.
+    The errors of the setting are nearly the same in both: their difference is off by the product of it with the error.
 
     Args:
         known: the other's.
         there: output of the theory.
         here: output of the other.
-        error: about that of the setting, relative.
-    """
-    a, b = aligned(there, here)
-    times = there.times if len(a) == len(there.times) else here.times
-    apart = distance(there, here, each=False)
-    parts = {**known.parts, "theory": apart * min(error, 1.0)}
-    return Reference(shifted(known.samples, Samples(a - b, times)), sum(parts.values()), None, parts)
-
-
-def _known(value: float) -> float:
-    """Return a distance, infinite where the samples cannot be compared."""
-    return value if np.isfinite(value) else np.inf
-
-
-def unlike(one: tuple[Samples, Samples], other: tuple[Samples, Samples], each: bool) -> float:
-    """Return the distance of two changes (from, to), relative to what one of them is a change to."""
-    changes = []
-    for before, after in (one, other):
-        fine, coarse = aligned(after, before)
-        changes.append(Samples(fine - coarse, min(before.times, after.times, key=len)))
-    a, b = aligned(*changes)
-    difference = np.linalg.norm(a - b, axis=1)
-    sizes = np.linalg.norm(one[1].values, axis=1) if each else size(one[1])
-    return float(np.max(difference / np.maximum(sizes, 1e-300), initial=0.0))
-
-
-def combined(time: Limit, base: Samples, mesh: Limit, mesh_step: float, each: bool, mixed: float = 0.0) -> Reference:
-    """Return the reference of a history refined in time on one mesh, and in space at one step.
-
-    What the refinement in space changes at that step is added to the limit in time. Both errors together change each
-    other: the product of their sizes is counted as uncertain.
-
-    Args:
-        time: limit of the steps on one mesh.
-        base: the output on that mesh at the step with which meshes are refined.
-        mesh: limit of the meshes at that step.
-        mesh_step: about the error of that step.
         each: see `distance`.
-        mixed: what both errors make of each other at least, where it was looked at.
     """
-    fine, coarse = aligned(mesh.samples, base)
-    change = Samples(fine - coarse, mesh.samples.times)
-    mixed = max(mixed, distance(base, mesh.samples, each) * min(mesh_step, 1.0))
-    parts = {"time": time.uncertainty, "mesh": mesh.uncertainty, "mixed": mixed}
-    return Reference(shifted(time.samples, change), sum(parts.values()), time.order, parts)
+    error, apart = distance(here, known.samples, each), distance(there, here, each)
+    parts = {**known.parts, "theory": apart * min(error, 1.0)}
+    return Reference(moved(known.samples, there, here), parts, None, known.setting)

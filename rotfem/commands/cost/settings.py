@@ -1,9 +1,10 @@
-"""The settings a work–precision study tries, and the finer ones its references come from. No dolfinx in it."""
+"""The settings a work–precision study tries, and the next finer or coarser one of each. No dolfinx in it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from math import prod
 from typing import Any
 
 from rotfem import registry
@@ -69,10 +70,11 @@ class Setting:
         if self.scheme is None or scene.time is None:
             return out
         out |= {"time.step": self.step, "time.tolerance": self.tolerance, "time.output_every": self.every}
+        out["time.scheme"] = self.scheme  # said or not: the default of fixed and of adaptive steps is not the same
         if self.tolerance is None:
             out |= {"time.max_step": None, "time.min_step": None}
         if self.scheme != scene.time.scheme:
-            out |= {"time.scheme": self.scheme, "time.spectral_radius": None, "time.beta": None, "time.gamma": None}
+            out |= {"time.spectral_radius": None, "time.beta": None, "time.gamma": None}
         return out
 
 
@@ -86,6 +88,43 @@ def scaled(elements: Elements, factor: float) -> Elements:
     if isinstance(elements, tuple):
         return max(1, round(elements[0] * factor)), max(1, round(elements[1] * factor))
     return None if elements is None else max(1, round(elements * factor))
+
+
+def remeshed(setting: Setting, factor: float) -> Setting | None:
+    """Return a setting with a number of elements times a factor; of a mesh file with a degree more or less.
+
+    None where there is none.
+    """
+    if setting.elements is None:
+        degree = setting.degree + (1 if factor > 1.0 else -1)
+        return replace(setting, degree=degree) if 1 <= degree <= HIGHEST_DEGREE else None
+    other = replace(setting, elements=scaled(setting.elements, factor))
+    return None if other == setting else other
+
+
+def restepped(setting: Setting, factor: float, interval: float) -> Setting | None:
+    """Return a setting with its step, or tolerance, times a factor; None where there is neither.
+
+    Args:
+        setting: of a history, or not.
+        factor: of the step.
+        interval: between rows of the history, s.
+    """
+    if setting.step is not None:
+        step = factor * setting.step
+        return replace(setting, step=step, every=samples_every(interval, step))
+    return None if setting.tolerance is None else replace(setting, tolerance=factor * setting.tolerance)
+
+
+def count(setting: Setting) -> int:
+    """Return the number of nodes of a mesh, that of a mesh file in units of its own."""
+    counts = setting.elements if isinstance(setting.elements, tuple) else (setting.elements or 1,)
+    return prod(n * setting.degree + 1 for n in counts)
+
+
+def scheme_of(setting: Setting) -> Any:
+    """Return the class of a setting's scheme, which has `order` and `stages`; None outside a history."""
+    return None if setting.scheme is None else registry.schemes[setting.scheme]
 
 
 def own_setting(scene: Scene) -> Setting:
@@ -192,11 +231,6 @@ def sweep_speeds(scene: Scene) -> list[float]:
     if not top > 0.0:
         raise SceneError(scene.file, "cost --of", "campbell", "the scene has no speed to go up to")
     return [top * i / (SPEEDS - 1) for i in range(SPEEDS)]
-
-
-def estimating_schemes(names: Sequence[str] | None = None) -> list[str]:
-    """Return the schemes, of these or of all, whose steps can be adaptive."""
-    return [name for name in names or registry.schemes.names if estimates_error(registry.schemes[name])]
 
 
 def samples_every(interval: float, step: float) -> int:
