@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from rotfem.commands.cost.laboratory import Laboratory
 from rotfem.commands.cost.record import Measurement
 from rotfem.commands.cost.reference import Reference, distance, size
 from rotfem.commands.cost.settings import Setting
@@ -50,7 +49,7 @@ class Done(Protocol):
     scene: Scene
     output: str
     each: bool
-    laboratory: Laboratory
+    laboratory: Any
     references: References
     failures: dict[str, str]
     outlook: dict[str, Any] | None
