@@ -11,7 +11,7 @@ import numpy.typing as npt
 from rotfem.analysis.alpha_family import GeneralisedAlpha
 from rotfem.analysis.error_measure import ErrorMeasure
 from rotfem.analysis.fixed_steps import Steps, fixed_steps
-from rotfem.analysis.itinerary import LEAST, Itinerary
+from rotfem.analysis.itinerary import LEAST, Itinerary, Leg
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stepper import Stepper, seen
 from rotfem.errors import ComputationError
@@ -109,8 +109,8 @@ class AdaptiveSteps:
             factor = min(factor, max(SAFETY * allowed / h, SHRINK))
             if h >= wanted or factor < 1.0:
                 wanted = min(self.longest, h if KEEP[0] <= factor <= KEEP[1] else h * factor)
-            if stepper.watch is not None and not drifts:
-                stepper.watch(start, new)
+            if stepper.watch is not None:
+                stepper.watch(start, new, Leg(stop, h, lands, averaged, drifts, plain=False))
             following = self._next(new.t, wanted)[1] if new.t < self.end else h
             if not drifts and following != h:
                 new = stepper.scheme.resized(new, start, following)

@@ -10,6 +10,7 @@ would throw the quintic far off: it gives way to the cubic's, and where it is be
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -41,21 +42,16 @@ class RowTimes:
         self._next, self._last = 1 + passed, int(np.ceil(end / interval - CLOSE))
         self._reached: list[State] = []
 
-    def __call__(self, old: State, new: State) -> None:
+    def __call__(self, old: State, new: State, leg: Any) -> None:
         """Find the rows in a step from an old to a new state."""
         if self.further is not None:
-            self.further(old, new)
+            self.further(old, new, leg)
         close, times = CLOSE * self.interval, []
         while self._next <= self._last and (t := min(self._next * self.interval, self.end)) <= new.t + close:
             times.append(t)
             self._next += 1
         ends = [new] if times and times[-1] > new.t - close else []
         self._reached += between(old, new, times[: len(times) - len(ends)], self.order) + ends
-
-    def landed(self) -> None:
-        """Pass on that what is prescribed is not smooth where the last step has ended."""
-        if self.further is not None:
-            self.further.landed()
 
     def taken(self) -> list[State]:
         """Return the states of the rows since the last call."""

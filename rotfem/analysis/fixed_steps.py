@@ -52,8 +52,8 @@ def fixed_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[State]
     wanted = None if steps.parts is None else set(np.cumsum(steps.parts).tolist())
     after: Leg | None
     number, after = next(legs, (0, None))
-    if after is not None and after.averaged and reached == 0.0:
-        state = stepper.restart(state, View(1), View(window=(0.0, after.length)))
+    if after is not None and reached == 0.0:
+        state = started(stepper, state, after)
     while after is not None:
         now, leg = number, after
         number, after = next(legs, (0, None))
@@ -73,13 +73,18 @@ def grid(steps: Steps) -> tuple[Array, float]:
     return np.append(np.concatenate(cut), steps.end), steps.step
 
 
+def started(stepper: Stepper, state: State, first: Leg) -> State:
+    """Return the state at t = 0 as the first leg starts from it."""
+    return stepper.restart(state, View(1), View(window=(0.0, first.length))) if first.averaged else state
+
+
 def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State:
     """Return the state at the end of a leg, as the one after it starts from it.
 
     Raises:
         ComputationError: the step failed, however short.
     """
-    old: State | None = None
+    old, before = None, state
     if leg.drifts:
         state = stepper.drift(state, leg.length, leg.end)
         if leg.averaged:
@@ -89,18 +94,16 @@ def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State
         window = (leg.length, after.length if after is not None and joined else 0.0) if leg.averaged else None
         with seen(stepper.system, View(-1 if leg.lands else 0, window)):
             old, state = state, stepper.advance(state, leg.length, leg.end)
-        if stepper.watch is not None:
-            stepper.watch(old, state)
-            if leg.averaged:  # hats make up the impulse of straight lines between the ends of legs, of no other ones
-                stepper.watch.landed()
+    if stepper.watch is not None:
+        stepper.watch(before, state, leg)
     if after is None:
         return state
     if old is not None and not after.drifts and after.length != leg.length:
         state = stepper.scheme.resized(state, old, after.length)
     if leg.lands or ((leg.averaged or after.averaged) and not leg.joins(after)):
-        before = View(-1 if leg.lands else 0, (leg.length, 0.0) if leg.averaged else None)
+        finish = View(-1 if leg.lands else 0, (leg.length, 0.0) if leg.averaged else None)
         ahead = View(1 if leg.lands else 0, (0.0, after.length) if after.averaged else None)
-        state = stepper.restart(state, before, ahead)
+        state = stepper.restart(state, finish, ahead)
     if old is not None and not (after.drifts or leg.averaged or after.averaged) and bends(stepper.scheme, leg, after):
         state = bent(stepper, state, leg.length, after.length)
     return state

@@ -59,6 +59,10 @@ class Leg:
     whole: bool = True
     plain: bool = True
 
+    def doubles(self, after: Leg) -> bool:
+        """Return whether this leg and the one after it may be taken as one: nothing prescribed is between them."""
+        return not (self.lands or self.averaged or self.drifts or after.averaged or after.drifts)
+
     def joins(self, after: Leg) -> bool:
         """Return whether this leg and the one after it see one average at the instant between them."""
         return self.averaged and after.averaged and not (self.lands or self.drifts or after.drifts)

@@ -267,8 +267,5 @@ class Scheme(ABC):
 class Watch(Protocol):
     """Who is told of the steps of a march."""
 
-    def __call__(self, old: State, new: State) -> None:
-        """Take note of a step from an old to a new state."""
-
-    def landed(self) -> None:
-        """Take note that what is prescribed is not smooth where the last step has ended."""
+    def __call__(self, old: State, new: State, leg: Any) -> None:
+        """Take note of a step from an old to a new state, over a leg of the time grid (see `itinerary.Leg`)."""

@@ -86,8 +86,6 @@ class Stepper(StageSolver):
             after: how the next one does.
         """
         s, t = self.system, state.t
-        if self.watch is not None:
-            self.watch.landed()
         s.count_rotations_from(state.datum)
         with seen(s, before):
             old = s.driven(t)

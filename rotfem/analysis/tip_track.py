@@ -29,19 +29,14 @@ class TipTrack:
         self._times: list[float] = []
         self._tips: list[Array] = []
 
-    def __call__(self, old: State, new: State) -> None:
+    def __call__(self, old: State, new: State, leg: Any) -> None:
         """Take note of a step from an old to a new state."""
         for state in (new,) if self._times else (old, new):
             self._times.append(state.t)
             if self._has_tip:
                 self._tips.append(state.q[self._moves])
         if self.further is not None:
-            self.further(old, new)
-
-    def landed(self) -> None:
-        """Pass on that what is prescribed is not smooth where the last step has ended."""
-        if self.further is not None:
-            self.further.landed()
+            self.further(old, new, leg)
 
     def path(self) -> tuple[Array, Array]:
         """Return the times (n,), s, and the displacements of the tip (n, components), m; the same on all processes."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from rotfem.analysis.error_estimate import WORDS
 from rotfem.commands.ahead import ADAPTIVE
 from rotfem.errors import ComputationError, SceneError
 from rotfem.mechanics.theories import theories
+from rotfem.refinement.estimate import WORDS
 from rotfem.results.result import Result
 from rotfem.scene import Scene
 from rotfem.selection.accuracy import AIM, SHARES, Settings, part, shares

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.error_estimate import WORDS
 from rotfem.analysis.reduced.manifold import Manifold
 from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.reduced.struck import struck
 from rotfem.analysis.reduced.tips import tips_of
 from rotfem.analysis.schemes import Scheme
 from rotfem.numerics.newton import SMALLEST
+from rotfem.refinement.estimate import WORDS
 from rotfem.results.run import RunResult
 from rotfem.selection.accuracy import AIM, Elements, Settings, finer, finest, part, shares
 from rotfem.selection.effects_ahead import effects_ahead

@@ -18,8 +18,8 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
 from rotfem.commands.accuracy import changes_of, refuse, settings_of
+from rotfem.commands.error_report import error_of_modes
 from rotfem.commands.finite import check_rows
-from rotfem.commands.known_error import error_of_modes
 from rotfem.commands.loads import held
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows, rough
 from rotfem.commands.modes import analysis_of, hints_of, theory_error

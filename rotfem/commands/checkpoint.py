@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotfem.analysis import error_memory
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stepper import Stepper
 from rotfem.errors import SceneError
@@ -28,6 +27,7 @@ from rotfem.version import versions
 
 if TYPE_CHECKING:
     from rotfem.commands.simulation import Simulation
+    from rotfem.refinement.companion import Companion
 
 #: Positions of nodes that differ by this part of the structure's size are those of another mesh.
 MOVED = 1e-9
@@ -90,6 +90,43 @@ def check_end(path: Path, tree: Tree, end: float) -> None:
         raise SceneError("command line", "--resume", path, f"is of t = {tree['t']:g} s, after time.end = {end:g} s")
 
 
+class Packing:
+    """Trees with arrays over a mesh, in an order that any number of processes knows.
+
+    Args:
+        numbering: of the mesh.
+    """
+
+    def __init__(self, numbering: Numbering):
+        self.numbering = numbering
+
+    def packed(self, value: Any) -> Any:
+        """Return a tree with the arrays over the mesh in the common order; all processes come here together."""
+        if isinstance(value, np.ndarray) and value.ndim and (kind := self.numbering.kind(value)):
+            return {"kind": kind, "values": self.numbering.gather(value, kind)}
+        if isinstance(value, dict):
+            return {"kind": "dict", "values": {k: self.packed(v) for k, v in value.items()}}
+        if isinstance(value, list | tuple):
+            return type(value)(self.packed(v) for v in value)
+        if is_dataclass(value) and not isinstance(value, type):
+            values = {f.name: self.packed(getattr(value, f.name)) for f in fields(value)}
+            return {"kind": f"{type(value).__module__}:{type(value).__qualname__}", "values": values}
+        return value
+
+    def unpacked(self, value: Any) -> Any:
+        """Return a tree with the arrays of this process."""
+        if isinstance(value, list | tuple):
+            return type(value)(self.unpacked(v) for v in value)
+        if not isinstance(value, dict):
+            return value
+        kind, values = value["kind"], value["values"]
+        if kind == "dict":
+            return {k: self.unpacked(v) for k, v in values.items()}
+        if ":" in kind:
+            return record_of(kind)(**{k: self.unpacked(v) for k, v in values.items()})
+        return self.numbering.local(values, kind)
+
+
 class Memory:
     """What one run knows.
 
@@ -100,6 +137,7 @@ class Memory:
     def __init__(self, run: Simulation):
         self.run = run
         self.numbering = Numbering(run.system.V)
+        self.packing = Packing(self.numbering)
 
     def taken(self, state: State, mine: Tree) -> Tree:
         """Return what the run knows at a state, on rank 0 in the common order of nodes.
@@ -116,20 +154,20 @@ class Memory:
             "positions": self.numbering.positions,
             "t": state.t,
             "given": state.given,
-            "state": self._packed({k: v for k, v in vars(state).items() if k not in ("given", "inner")}),
-            "factored": self._packed(run.system.held.factored),
+            "state": self.packing.packed({k: v for k, v in vars(state).items() if k not in ("given", "inner")}),
+            "factored": self.packing.packed(run.system.held.factored),
             "stepper": plain(run.stepper),
             "learnt": {name: plain(part) for name, part in learning(run.stepper).items()},
             "run": {name: getattr(run, name) for name in CHANGING},
-            "seen": self._packed({"farthest": run.farthest.seen, "stability": run.stability}),
-            "watch": None if run.watch is None else self._packed(error_memory.kept(run.watch, state)),
+            "seen": self.packing.packed({"farthest": run.farthest.seen, "stability": run.stability}),
+            "companions": self._of_companions(),
             "elapsed": run.elapsed + perf_counter() - run.started,
             "factorisations": run.system.factorisations,
             "columns": list(run.record.history.columns),
             "rows": np.array(run.record.history.rows()).reshape(len(run.record.history), -1),
             "stations": None if run.record.stations is None else run.record.stations.kept_arrays(),
             "resultants": None if run.record.resultants is None else run.record.resultants.kept_arrays(),
-            "snapshots": None if snapshots is None else self._packed(vars(snapshots)),
+            "snapshots": None if snapshots is None else self.packing.packed(vars(snapshots)),
             "choice": None if run.choice is None else vars(run.choice),
             "settings": None if run.settings is None else vars(run.settings),
         }
@@ -145,20 +183,16 @@ class Memory:
         self._check_mesh(path, tree["positions"])
         if list(run.record.history.columns) != tree["columns"] or set(plain(stepper)) != set(tree["stepper"]):
             raise SceneError("command line", "--resume", path, "was written by another rotfem; start the run anew")
-        state, system = State(**self._unpacked(tree["state"]), given=tree["given"]), run.system.held
-        system.count_rotations_from(state.datum)
-        system.refactor(self._unpacked(tree["factored"]))
-        system.count_rotations_from(state.datum)
-        run.system.set_time(state.t)
+        state, system = State(**self.packing.unpacked(tree["state"]), given=tree["given"]), run.system.held
+        restored(run.system, self.packing.unpacked(tree["factored"]), state)
         system.factored_before = tree["factorisations"] - system.factorisations
         for target, values in ((stepper, tree["stepper"]), (run, tree["run"])):
             vars(target).update(values)
         for name, part in learning(stepper).items():
             vars(part).update(tree["learnt"][name])
-        seen = self._unpacked(tree["seen"])
+        seen = self.packing.unpacked(tree["seen"])
         run.farthest.seen, run.stability = seen["farthest"], seen["stability"]
-        if run.watch is not None:
-            error_memory.put_back(run.watch, self._unpacked(tree["watch"]), state)
+        self._put_back_companions(tree["companions"])
         for row in tree["rows"]:
             run.record.history.append(row)
         if run.record.stations is not None:
@@ -166,9 +200,43 @@ class Memory:
         if run.record.resultants is not None:
             run.record.resultants.put_back(tree["resultants"])
         if run.record.snapshots is not None:
-            vars(run.record.snapshots).update(self._unpacked(tree["snapshots"]))
+            vars(run.record.snapshots).update(self.packing.unpacked(tree["snapshots"]))
         run.elapsed = tree["elapsed"]
         return state
+
+    def _companions(self) -> list[tuple[Companion, Packing]]:
+        """Return the companions of the march, each with what packs arrays over its own mesh."""
+        if self.run.companions is None:
+            return []
+        return [(c, Packing(Numbering(c.system.V))) for c in self.run.companions.companions]
+
+    def _of_companions(self) -> list[Tree]:
+        """Return what the companions know: steps that wait are of the run's mesh, the state of their own."""
+        return [
+            {
+                "state": own.packed(companion.state and companion.state.changed(given=None, inner=())),
+                "given": companion.state and companion.state.given,
+                "waiting": self.packing.packed(companion.waiting),
+                "last": own.packed(companion.stepper.last),
+                "factored": own.packed(companion.system.held.factored),
+                "known": plain(companion),
+                "newton": plain(companion.stepper.newton),
+                "stepper": plain(companion.stepper),
+            }
+            for companion, own in self._companions()
+        ]
+
+    def _put_back_companions(self, trees: list[Tree]) -> None:
+        for (companion, own), tree in zip(self._companions(), trees, strict=True):
+            companion.state, companion.waiting = own.unpacked(tree["state"]), self.packing.unpacked(tree["waiting"])
+            if companion.state is not None:
+                companion.state.given = tree["given"]
+            vars(companion).update(tree["known"])
+            vars(companion.stepper).update(tree["stepper"])
+            vars(companion.stepper.newton).update(tree["newton"])
+            companion.stepper.last = own.unpacked(tree["last"])
+            if companion.state is not None:
+                restored(companion.system, own.unpacked(tree["factored"]), companion.state)
 
     def _check_mesh(self, path: Path, there: Any) -> None:
         here = self.numbering.comm.bcast(self.numbering.positions)
@@ -176,30 +244,13 @@ class Memory:
         if there.shape != here.shape or np.max(np.abs(there - here)) > MOVED * size:
             raise SceneError("command line", "--resume", path, "is of another mesh")
 
-    def _packed(self, value: Any) -> Any:
-        """Return a tree with the arrays over the mesh in the common order; all processes come here together."""
-        if isinstance(value, np.ndarray) and value.ndim and (kind := self.numbering.kind(value)):
-            return {"kind": kind, "values": self.numbering.gather(value, kind)}
-        if isinstance(value, dict):
-            return {"kind": "dict", "values": {k: self._packed(v) for k, v in value.items()}}
-        if isinstance(value, list | tuple):
-            return type(value)(self._packed(v) for v in value)
-        if is_dataclass(value) and not isinstance(value, type):
-            values = {f.name: self._packed(getattr(value, f.name)) for f in fields(value)}
-            return {"kind": f"{type(value).__module__}:{type(value).__qualname__}", "values": values}
-        return value
 
-    def _unpacked(self, value: Any) -> Any:
-        if isinstance(value, list | tuple):
-            return type(value)(self._unpacked(v) for v in value)
-        if not isinstance(value, dict):
-            return value
-        kind, values = value["kind"], value["values"]
-        if kind == "dict":
-            return {k: self._unpacked(v) for k, v in values.items()}
-        if ":" in kind:
-            return record_of(kind)(**{k: self._unpacked(v) for k, v in values.items()})
-        return self.numbering.local(values, kind)
+def restored(system: Any, factored: Any, state: State) -> None:
+    """Make the factor that a system kept at a state anew, from what is known of it."""
+    system.held.count_rotations_from(state.datum)
+    system.held.refactor(factored)
+    system.held.count_rotations_from(state.datum)
+    system.set_time(state.t)
 
 
 def record_of(name: str) -> Any:

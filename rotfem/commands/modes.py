@@ -23,8 +23,8 @@ from rotfem.analysis.participation import participation as masses_of
 from rotfem.analysis.stability import Stability, stability_of_pencil
 from rotfem.analysis.theory_error import TheoryCheck, TheoryError
 from rotfem.commands.accuracy import changes_of, refuse, settings_of
+from rotfem.commands.error_report import error_of_modes
 from rotfem.commands.finite import check_rows
-from rotfem.commands.known_error import error_of_modes
 from rotfem.commands.loads import held
 from rotfem.commands.mode_tables import advice, mode_tables
 from rotfem.commands.pace import Pace

@@ -6,7 +6,7 @@ from math import nan
 from pathlib import Path
 from typing import Any
 
-from rotfem.analysis.error_estimate import error_line
+from rotfem.refinement.estimate import error_line
 from rotfem.results.units import ShownUnits, in_unit
 
 

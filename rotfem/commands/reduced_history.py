@@ -16,6 +16,7 @@ from rotfem.analysis.reduced.root_forces import root_forces
 from rotfem.analysis.schemes import State
 from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
+from rotfem.scene import Scene
 from rotfem.structures.paraview import MOST
 from rotfem.structures.root_reaction import along_axis
 
@@ -51,8 +52,7 @@ def by_reduced_model(run: Simulation, start: Array | None, progress: Progress) -
 
 def _recorded(run: Simulation, start: Array | None) -> bool:
     """Record the history of a reduced model; return whether one serves."""
-    asked = run.scene.model.reduced
-    accuracy = ACCURACY if asked is True else float(asked)
+    accuracy = accuracy_of(run.scene)
     run.keeper.start(run)
     with run.keeper.interrupts():
         response = reduced_response(run.system, times_of(run.scene.time), start, accuracy)
@@ -78,6 +78,12 @@ def _recorded(run: Simulation, start: Array | None) -> bool:
             f"allows ({accuracy:.2g})"
         )
     return True
+
+
+def accuracy_of(scene: Scene) -> float:
+    """Return the accuracy that the reduced model of a scene is to have."""
+    asked = scene.model.reduced
+    return ACCURACY if asked is True else float(asked)
 
 
 def times_of(time: Any) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from time import perf_counter
 from typing import Any
 
@@ -13,8 +14,6 @@ from mpi4py import MPI
 from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.dense_output import RowTimes
 from rotfem.analysis.equilibrium import steady_state
-from rotfem.analysis.error_estimate import ErrorEstimate
-from rotfem.analysis.error_watch import ErrorWatch
 from rotfem.analysis.farthest_state import Farthest
 from rotfem.analysis.lost_digits import said_of
 from rotfem.analysis.reduced.foreshortened import Foreshortened
@@ -26,10 +25,10 @@ from rotfem.analysis.theory_error import TheoryError
 from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
 from rotfem.analysis.tip_track import TipTrack
 from rotfem.commands import energy_growth
+from rotfem.commands.error_report import error_of_run, warnings_of_run
 from rotfem.commands.first_state import first_state
 from rotfem.commands.interrupts import Interrupted
 from rotfem.commands.keeper import Keeper
-from rotfem.commands.known_error import error_of_run, warnings_of_run
 from rotfem.commands.loads import held
 from rotfem.commands.other_models import diverged
 from rotfem.commands.problem import scheme_of
@@ -41,6 +40,8 @@ from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.newton import Newton
+from rotfem.refinement.discretisation import HistoryErrors
+from rotfem.refinement.estimate import ErrorEstimate
 from rotfem.results.run import RunResult
 from rotfem.scene import Scene, Time
 from rotfem.selection.accuracy import Settings
@@ -96,7 +97,7 @@ class Simulation:
         self.stability: Stability | None = None
         self.farthest = Farthest(self.system)
         self.theory_error: TheoryError | None = None
-        self.watch: ErrorWatch | None = None
+        self.companions: HistoryErrors | None = None
         self.track: TipTrack | None = None
         self.rows: RowTimes | None = None
         self.last: State | None = None
@@ -159,9 +160,16 @@ class Simulation:
         march = March(self.system, scheme, steps, newton, start, rates)
         self.stepper = march.stepper
         if self.scene.output.error:
-            self.watch = self.stepper.watch = ErrorWatch(self.system, time.end, scheme)
+            self.companions = HistoryErrors(
+                self.problem,
+                self.system,
+                scheme,
+                newton,
+                lambda s: (start, rates) if self.keeper.goes_on else self.start_of(s, (start, rates)),
+            )
+            self.stepper.watch = self.companions
         if self.settings is not None:
-            self.track = self.stepper.watch = TipTrack(self.system, self.watch)
+            self.track = self.stepper.watch = TipTrack(self.system, self.companions)
         march.reached = self.keeper.start(self)
         if time.output_step is not None:
             passed = max(len(self.record.history) - 1, 0)
@@ -172,6 +180,22 @@ class Simulation:
             first = 0 if march.reached is None else self.steps + 1
             for self.steps, state in enumerate(march, first):
                 self._stepped(state, time, progress)
+
+    def start_of(
+        self, system: Any, own: tuple[Array | None, Array | None] | None = None
+    ) -> tuple[Array | None, Array | None]:
+        """Return the shape and the velocities at t = 0 on the mesh of a companion's system.
+
+        Args:
+            system: of the companion.
+            own: of this run, for a companion on the same mesh.
+        """
+        if own is not None and system.V.dofmap.index_map.size_global == self.system.V.dofmap.index_map.size_global:
+            return own
+        mesh = system.model.problem.mesh
+        there = copy(self)
+        there.problem, there.system, there.warnings = self.problem.replace(mesh=mesh), system, []
+        return first_state(there)
 
     def look(self, state: State) -> None:
         """See that a state of a linear theory that no step has led to is in the range of the theory."""

@@ -1,39 +1,22 @@
-"""What steps and mesh of a case put its outputs off, told as every run tells it.
-
-A march on the case's own mesh with its own steps is watched (`rotfem.analysis.error_watch`). Where there are very many
-steps it takes longer ones, and the error is scaled by the order of the scheme. What the mesh puts a history off two
-reduced models tell where they serve (`rotfem.selection.history_on_meshes`), else the same march. Where the mesh makes
-that dear, the coarse model marches, and what its mesh puts off is scaled (`rotfem.selection.mesh_share`), which also
-tells the modes.
-"""
+"""The errors of a case's outputs by its steps and its mesh, estimated as a run does it (`rotfem.refinement`)."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from math import ceil
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from rotfem.analysis.error_watch import ErrorWatch, TipErrors
-from rotfem.analysis.schemes import State
-from rotfem.analysis.time_loop import March, Steps
+from rotfem.analysis.schemes import Array
+from rotfem.analysis.time_loop import March
+from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
+from rotfem.refinement.coarser import on_other_mesh
+from rotfem.refinement.discretisation import HistoryErrors, error_by_cells, error_of_shape
 from rotfem.selection.candidate import Candidate
 from rotfem.selection.coarse_model import Trial
-from rotfem.selection.distance import HISTORY, MODES, STEADY
-from rotfem.selection.history_on_meshes import error_of_history
-from rotfem.selection.mesh_share import error_of_modes, share_of_mesh
-
-#: Steps of a march at most, beyond which one stands for several, and corrections of an equilibrium.
-MOST_STEPS, CORRECTIONS = 800, 20
-
-#: Most steps (or corrections) times unknowns of what is computed on the mesh of the case.
-AFFORDABLE = 1e6
-
-#: Error of the steps from which that of the mesh is asked of finer ones, what theirs may be, and most of them for one.
-HIDING, SEEING, MOST_FINER = 2e-2, 4e-3, 5
+from rotfem.selection.distance import HISTORY, MODES, STEADY, modes_change
 
 
 @dataclass(frozen=True)
@@ -41,8 +24,8 @@ class Discretisation:
     """Relative errors of the outputs of a case; outputs of which nothing is known are not there.
 
     Attributes:
-        steps: output ↦ what the steps put it off.
-        mesh: output ↦ what the mesh puts it off.
+        steps: output ↦ its error by the steps.
+        mesh: output ↦ its error by the mesh.
         sizes: output ↦ largest displacement of the tip over the length.
     """
 
@@ -52,7 +35,7 @@ class Discretisation:
 
 
 def discretisation(trial: Trial, theory: str, without: Collection[str] = ()) -> Discretisation:
-    """Return what steps and mesh put the outputs off.
+    """Return the errors of the outputs by steps and mesh.
 
     Args:
         trial: the case that is tried out.
@@ -60,95 +43,61 @@ def discretisation(trial: Trial, theory: str, without: Collection[str] = ()) -> 
         without: effects that it does not have.
     """
     out = Discretisation()
-    try:
-        own = trial.poorest_on(trial.full.problem.mesh)
-    except (ComputationError, InputError, np.linalg.LinAlgError):
-        return out
-    for name in (HISTORY, STEADY):
+    effects = tuple(name for name in trial.effects if name not in without)
+    problem = trial.full.problem.replace(theory=trial.theories[theory], effects=effects)
+    for name, compute in ((HISTORY, _of_history), (STEADY, _of_steady), (MODES, _of_modes)):
         if name not in trial.wanted:
             continue
-        unknowns = len(own.system.held.zeros())
-        number = CORRECTIONS if name == STEADY else min(_number(trial), MOST_STEPS)
-        near = number * unknowns <= AFFORDABLE
-        candidate = (
-            trial.on_mesh(trial.full.problem.mesh, theory, without) if near else trial.candidate(theory, without)
-        )
-        errors = _resting(candidate) if name == STEADY else _marched(trial, candidate, theory)
-        if errors is None or not errors.scale > 0.0:
+        try:
+            compute(trial, theory, problem, out)
+        except (ComputationError, InputError, np.linalg.LinAlgError):
             continue
-        out.sizes[name] = errors.scale / candidate.system.structure.length
-        if name == HISTORY and errors.time is not None:
-            out.steps[name] = errors.time[0] / errors.scale
-            known = None if without else error_of_history(trial, theory)
-            if known is not None:
-                out.mesh[name] = known
-                continue
-            errors = _in_finer_steps(trial, candidate, theory, out.steps[name]) or errors
-        share = 1.0 if near else share_of_mesh(own.switched(), trial.poorest)
-        if share is not None:
-            out.mesh[name] = min(1.0, share * (errors.shape + errors.space[0] / errors.scale))
-    if MODES in trial.wanted:
-        with suppress(ComputationError):
-            out.mesh[MODES] = error_of_modes(trial, own)
     return out
 
 
-def _number(trial: Trial) -> int:
-    """Return the number of steps of a case; that of a march at most where they are adaptive."""
-    steps = trial.full.steps
-    assert steps is not None
-    return MOST_STEPS if steps.step is None else ceil(steps.end / steps.step - 1e-9)
+def _on(trial: Trial, problem: Any, system: Any) -> Candidate:
+    case = trial.full.replace(problem=problem.replace(mesh=system.model.problem.mesh))
+    return Candidate(case, system, frozenset())
 
 
-def _in_finer_steps(trial: Trial, candidate: Candidate, theory: str, off: float) -> TipErrors | None:
-    """Return the errors of a history whose steps are off by so much, in shorter ones; None where they do not help.
-
-    What long steps damp out or never excite the mesh cannot be seen to put off.
-    """
+def _of_history(trial: Trial, theory: str, problem: Any, out: Discretisation) -> None:
     steps, scheme = trial.full.steps, trial.full.scheme
     assert steps is not None
     assert scheme is not None
-    if steps.step is None or off <= HIDING:
-        return None
-    finer = min(MOST_FINER, ceil((off / SEEING) ** (1 / scheme.order)))
-    if finer * _number(trial) * len(candidate.system.held.zeros()) > AFFORDABLE:
-        return None
-    found = _marched(trial, candidate, theory, finer)
-    return found if found is not None and found.scale > 0.0 else None
+
+    def start(system: Any) -> tuple[Array | None, Array | None]:
+        return trial.start(_on(trial, problem, system), theory)
+
+    system, newton = compile_system(problem, trial.comm), trial.full.newton()
+    march = March(system, scheme, steps, newton, *start(system))
+    watch = march.stepper.watch = HistoryErrors(problem, system, scheme, newton, start)
+    candidate, scale = _on(trial, problem, system), 0.0
+    for state in march:
+        if system.linear and not system.size(state.q) <= 1.0:
+            return
+        scale = max(scale, float(np.linalg.norm(candidate.tip(state.q))))
+    found = watch.errors(scale)
+    if found["time"] is not None:
+        out.steps[HISTORY] = found["time"]
+    if found["space"] is not None:
+        out.mesh[HISTORY] = found["space"]
+    out.sizes[HISTORY] = scale / system.structure.length
 
 
-def _marched(trial: Trial, candidate: Candidate, theory: str, finer: int = 1) -> TipErrors | None:
-    """Return the errors of a history, in so many steps for one; None where it fails."""
-    steps, scheme = trial.full.steps, trial.full.scheme
-    assert steps is not None
-    assert scheme is not None
-    thinned = ceil(_number(trial) / MOST_STEPS) / finer
-    longer: Steps = steps if steps.step is None else replace(steps, step=thinned * steps.step)
-    system = candidate.switched()
-
-    def march() -> TipErrors | None:
-        states = March(system, scheme, longer, trial.case.newton(foreseeing=True), *trial.start(candidate, theory))
-        watch = states.stepper.watch = ErrorWatch(system, longer.end, scheme)
-        last = None
-        for last in states:
-            if system.linear and not system.size(last.q) <= 1.0:
-                return None
-        return watch.errors(last)
-
-    try:
-        errors = candidate.plainly(march)
-    except ComputationError:
-        return None
-    if errors is None or errors.time is None:
-        return errors
-    return replace(errors, time=(errors.time[0] / thinned**scheme.order, errors.time[1]))
+def _of_steady(trial: Trial, theory: str, problem: Any, out: Discretisation) -> None:
+    system = compile_system(problem, trial.comm, moving=False)
+    candidate = _on(trial, problem, system)
+    q = candidate.equilibrium()
+    error = error_of_shape(problem, system, q, lambda other: _on(trial, problem, other).equilibrium())
+    if error is not None:
+        out.mesh[STEADY] = error
+    out.sizes[STEADY] = float(np.linalg.norm(candidate.tip(q))) / system.structure.length
 
 
-def _resting(candidate: Candidate) -> TipErrors | None:
-    """Return the errors of a steady state; None where there is none."""
-    try:
-        q = candidate.equilibrium()
-        zero = np.zeros_like(q)
-        return ErrorWatch(candidate.system).errors(State(0.0, q, zero, zero, datum=candidate.system.datum))
-    except ComputationError:
-        return None
+def _of_modes(trial: Trial, theory: str, problem: Any, out: Discretisation) -> None:
+    system = compile_system(problem, trial.comm, moving=False)
+    other = on_other_mesh(problem, system, moving=False)
+    if other is not None:
+        there, halved = other
+        values = [_on(trial, problem, s).eigenvalues(trial.speeds) for s in (system, there)]
+        out.mesh[MODES] = error_by_cells(modes_change(*values), halved)

@@ -25,6 +25,7 @@ ORDER = (
     "structures",
     "equations",
     "analysis",
+    "refinement",
     "selection",
     "commands",
 )

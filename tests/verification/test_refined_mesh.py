@@ -11,9 +11,6 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 import rotfem
-from rotfem.analysis.reduced_tangents import Tangents
-from rotfem.analysis.refined_mesh import RefinedMesh
-from rotfem.analysis.schemes import State
 from rotfem.equations.finer import FinerEquations
 from rotfem.mechanics.loads import PointLoads
 from rotfem.numerics.refinement import Refinement, refinement
@@ -122,42 +119,3 @@ def test_points_inside_of_parts_of_cells(cell: str) -> None:
         np.testing.assert_allclose(g, f, atol=1e-12 * np.abs(f).max())
         masses.append(here)
     assert np.linalg.norm(masses[1]) > 1.1 * np.linalg.norm(masses[0])  # the points are felt
-
-
-@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
-def test_frequencies_tell_the_error_of_the_mesh(theory: str) -> None:
-    """(ω − ω_fine)/ω of the lowest bending modes is that between modes of 3 and of 6 elements of degree 2, at rest.
-
-    In the Krylov space of the tip the third mode is found to a few per cent of its error; 5 % are allowed.
-    """
-    system = beam(3, theory, 2).system()
-    rest = State.at_rest(system, system.zeros())
-    shapes = Tangents(system, rest).shapes()
-    errors = RefinedMesh(system).of_frequencies(shapes)
-    assert errors is not None
-    omega = []
-    for n in (3, 6):
-        rows = beam(n, theory, 2, 0.0).modes(count=4).rows
-        omega.append([row["frequency"] for row in rows if row["label"].startswith("lag")][:3])
-    coarse, finer = np.array(omega)
-    np.testing.assert_allclose(errors[:3], (coarse - finer) / coarse, rtol=0.05, atol=1e-7)
-
-
-def test_plate_is_refined_too() -> None:
-    """A tip load on 2 × 1 cells: the error told is what 4 × 2 cells make of it, within a tenth (their own error)."""
-
-    def deflection(elements: list[int], error: bool) -> tuple[float, dict[str, Any]]:
-        run = rotfem.run(
-            {
-                "structure": {"type": "plate", **PLATE},
-                "motion": {"type": "constant", "speed": 0.0},
-                "loads": {"tip_force": [0.0, 0.0, 5.0]},
-                "model": {"theory": "linear"},
-                "mesh": {"elements": elements},
-                "output": {"error": error},
-            }
-        )
-        return float(run.tip["u3"][-1]), run.summary
-
-    (coarse, summary), (finer, _) = deflection([2, 1], True), deflection([4, 2], False)
-    assert summary["error"]["space"] == pytest.approx(abs(coarse - finer) / abs(coarse), rel=0.1)

@@ -1,0 +1,136 @@
+"""What the commands report of the error of their results: its contributions, and when they are worth a warning."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rotfem.analysis.equilibrium import steady_state
+from rotfem.analysis.reduced.response import reduced_response
+from rotfem.analysis.reduced.tips import largest as largest_of
+from rotfem.analysis.theory_error import TheoryError
+from rotfem.commands.reduced_history import accuracy_of
+from rotfem.errors import ComputationError
+from rotfem.numerics.newton import Newton
+from rotfem.refinement.coarser import on_other_mesh
+from rotfem.refinement.discretisation import error_by_cells, error_of_shape
+from rotfem.refinement.estimate import ErrorEstimate, percent
+from rotfem.scene import Scene
+from rotfem.selection.model_choice import Choice
+
+if TYPE_CHECKING:
+    from rotfem.commands.simulation import Simulation
+
+#: Contribution to an error below which no warning is given, and the part of it that advised steps aim at.
+WANTED, AIM = 0.01, 0.5
+
+#: Part of the sum from which a contribution is named.
+NAMED = 0.1
+
+
+def error_of_run(run: Simulation) -> ErrorEstimate | None:
+    """Return the error of a run so far, relative to the largest displacement of its tip.
+
+    None where it is not wanted, or nothing was computed.
+    """
+    if not run.scene.output.error or not len(run.record.history):
+        return None
+    scale = largest(run.record.history.arrays())
+    shares: dict[str, float | None] = {"time": None, "space": None}
+    found: dict[str, Any] = {"scale": scale}
+    if run.reduced is not None:
+        shares = {"time": run.reduced.time_error + run.reduced.projection_error, "space": _of_reduced(run, scale)}
+    elif run.scene.time is None:
+        assert run.last is not None
+        shares = {"time": 0.0, "space": error_of_shape(run.problem, run.system, run.last.q, lambda s: _resting(run, s))}
+    elif run.companions is not None:
+        shares = run.companions.errors(scale)
+        found["time_at"] = run.companions.steps.difference[1]
+    return ErrorEstimate({**shares, "model": model_share(run.theory_error, run.choice)}, found)
+
+
+def largest(history: Mapping[str, Any]) -> float:
+    """Return the largest displacement of the tip over a history, m."""
+    tip = np.array([values for name, values in history.items() if name.startswith("tip_u")])
+    return float(np.linalg.norm(tip, axis=0).max())
+
+
+def _resting(run: Simulation, system: Any) -> Any:
+    """Return the equilibrium of a run on another mesh."""
+    solver = run.scene.solver
+    return steady_state(system, run.problem.motion.speed(0.0), Newton.of(solver), past_limits=solver.past_limits)
+
+
+def _of_reduced(run: Simulation, scale: float) -> float | None:
+    """Return the error of a reduced answer by the mesh: its difference to a reduced answer on another one."""
+    own, other = run.reduced, on_other_mesh(run.problem, run.system)
+    if own is None or other is None or not scale > 0.0:
+        return None
+    system, halved = other
+    try:
+        start, _ = run.start_of(system)
+        there = reduced_response(system, own.times, start, accuracy_of(run.scene))
+    except ComputationError:
+        return None
+    return error_by_cells(largest_of(own.model, there.tips - own.tips) / scale, halved)
+
+
+def model_share(theory: TheoryError | None, choice: Choice | None) -> float | None:
+    """Return the error by the theory and the effects that a choice has left out; None where it is unknown."""
+    own = None if theory is None else theory.estimate
+    if choice is None or choice.full:
+        return own
+    return max(own or 0.0, choice.estimated_error)
+
+
+def error_of_modes(rows: Iterable[Mapping[str, Any]], theory: TheoryError) -> ErrorEstimate:
+    """Return the largest relative error of the frequencies of rows."""
+    flexible = [row for row in rows if row.get("stability") != "neutral"]
+    space, bound = (max((row[key] for row in flexible), default=0.0) for key in ("mesh_error", "error_bound"))
+    return ErrorEstimate({"space": float(space), "model": theory.estimate, "round_off": float(bound)})
+
+
+def warnings_of_run(run: Simulation, error: ErrorEstimate) -> list[str]:
+    """Return what is to be said of the error of a run; nothing where that is small, asked for, or said already."""
+    scene = run.scene
+    tolerance = None if scene.time is None else scene.time.tolerance
+    if scene.accuracy is not None:  # what asked for it says what was reached
+        return []
+    unknown = [word for name, word in (("time", "steps"), ("space", "mesh")) if error.shares[name] is None]
+    said = [f"the error by the {' and the '.join(unknown)} is unknown: {_why_unknown(run)}"] if unknown else []
+    if not error.exceeds(max(WANTED, scene.model.tolerance or 0.0, tolerance or 0.0)):
+        return said
+    steps, mesh, model = (error.shares[name] or 0.0 for name in ("time", "space", "model"))
+    if steps + mesh <= WANTED and run.theory_error is not None and run.theory_error.warning():
+        return said
+    cures = []
+    if steps >= WANTED / 2 and run.stepper is not None:
+        cures.append(finer_steps(scene, run.stepper, steps))
+    if mesh >= WANTED / 2:
+        cures.append("a higher mesh.degree" if scene.structure.mesh_file else "more mesh.elements")
+    if model >= WANTED / 2:
+        cures.append("a richer theory")
+    shares = {"steps": steps, "mesh": mesh, "model": model}
+    named = [f"{percent(share)} by the {n}" for n, share in shares.items() if share > NAMED * sum(shares.values())]
+    off = f"the tip may be off by {percent(error.total)} of its largest displacement (estimated: {', '.join(named)})"
+    return [f"{off}: {', '.join(cures)}" if cures else off, *said]
+
+
+def _why_unknown(run: Simulation) -> str:
+    if run.companions is None:
+        return "there is no other mesh to compare with"
+    if run.companions.steps.sound:
+        return "what is prescribed leaves no room for steps of twice the length"
+    return "steps of twice the length fail, so that these are hardly short enough"
+
+
+def finer_steps(scene: Scene, stepper: Any, share: float) -> str:
+    """Return which steps would have a contribution that is not noticed."""
+    time = scene.time
+    assert time is not None
+    factor = min(1.0, AIM * WANTED / share)
+    if time.tolerance is not None:
+        return f"time.tolerance = {time.tolerance * factor:.1g}"
+    return f"time.step = {time.step * factor ** (1 / stepper.scheme.order):.1g} or shorter"

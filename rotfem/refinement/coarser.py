@@ -1,0 +1,58 @@
+"""The same problem on half the cells, or where these are fixed on finer ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+from rotfem.equations.compiled import compile_system
+from rotfem.errors import InputError
+from rotfem.mechanics.problem import Problem
+
+
+def by_itself(problem: Problem) -> Problem:
+    """Return a problem for a system beside another one's: without its outputs, with a hub that nobody else reads."""
+    hub = problem.motion.hub
+    if hub is None:
+        return problem.replace(outputs={})
+    own = replace(hub, torque=replace(hub.torque))  # a controller reads the state of one system
+    return problem.replace(outputs={}, motion=replace(problem.motion, hub=own))
+
+
+def on_other_mesh(problem: Problem, system: Any, moving: bool = True) -> tuple[Any, bool] | None:
+    """Return a system of a problem on half the cells, and True; on a finer mesh, and False.
+
+    Where the nodes that a section, a mass or a load asks for fix the cells they are halved in length, and those of a
+    mesh file have one degree more. None where there is no other mesh at all.
+
+    Args:
+        problem: what is computed.
+        system: the problem's system on its own mesh.
+        moving: whether the other one will be stepped in time.
+    """
+    problem = by_itself(problem)
+    nodes = system.V.dofmap.index_map.size_global
+    cells = system.structure.mesh.topology.index_map(system.structure.mesh.topology.dim).size_global
+    for mesh in _meshes(problem, cells):
+        try:
+            other = compile_system(problem.replace(mesh=mesh), system.comm, moving)
+        except InputError:
+            continue
+        if (number := other.V.dofmap.index_map.size_global) != nodes:
+            return other, number < nodes
+    return None
+
+
+def _meshes(problem: Problem, cells: int) -> Iterator[Any]:
+    mesh = problem.mesh
+    if problem.structure.mesh_file is not None:
+        yield mesh.model_copy(update={"degree": mesh.degree + 1})
+        return
+    n = mesh.elements
+    if isinstance(n, tuple):
+        yield mesh.model_copy(update={"elements": tuple((k + 1) // 2 for k in n)})
+        yield mesh.model_copy(update={"elements": tuple(2 * k for k in n)})
+    else:
+        yield mesh.model_copy(update={"elements": (n + 1) // 2})
+        yield mesh.model_copy(update={"elements": 2 * cells})

@@ -1,0 +1,232 @@
+"""Companions of a march: the same problem in steps of twice the length, or on a coarser mesh, in lockstep with it.
+
+A companion is one more march on a system of its own. It takes two steps of the march that it follows as one, wherever
+nothing prescribed lies between them, or on a coarser mesh the same ones; so it meets the same instants. Its first guess
+of a step is the motion that it follows plus the difference so far: mostly one Newton iteration is left to do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from rotfem.analysis.dense_output import between
+from rotfem.analysis.fixed_steps import started, travel
+from rotfem.analysis.itinerary import Leg
+from rotfem.analysis.roots import check_root
+from rotfem.analysis.schemes import Array, Scheme, Stage, State
+from rotfem.analysis.stepper import Stepper
+from rotfem.errors import ComputationError
+from rotfem.numerics.newton import Newton
+from rotfem.refinement.carrier import carrier
+
+#: Part of the difference to which a companion is solved: an estimate has two digits.
+DIGITS = 1e-2
+
+
+@dataclass
+class Followed:
+    """Steps of the march that is followed, which a companion takes as one.
+
+    Attributes:
+        leg: from the start of the first to the end of the last.
+        steps: their states at start and end.
+    """
+
+    leg: Leg
+    steps: tuple[tuple[State, State], ...]
+
+    @property
+    def doubled(self) -> bool:
+        """Whether there are two."""
+        return len(self.steps) > 1
+
+    def and_then(self, other: Followed) -> Followed:
+        """Return both as one."""
+        a, b = self.leg, other.leg
+        leg = replace(b, length=a.length + b.length, plain=a.plain and b.plain)
+        return Followed(leg, self.steps + other.steps)
+
+    def at(self, t: float, order: int) -> Array:
+        """Return q at a time (s)."""
+        old, new = next((pair for pair in self.steps if t <= pair[1].t), self.steps[-1])
+        return old.q if t <= old.t else new.q if t >= new.t else between(old, new, [t], order)[0].q
+
+
+def moved(state: State) -> State:
+    """Return a copy of a state that knows its motion alone."""
+    return state.changed(memory=None, given=None, inner=())
+
+
+class FollowingStepper(Stepper):
+    """Stepper whose first guess is a motion that it follows plus the difference so far.
+
+    Attributes:
+        followed: over the next step; None where there is no such guess.
+        last: start of the last step, s, and the difference there; None where it is not known.
+        carried: makes q of the motion that is followed one on its own mesh; None where nothing does.
+    """
+
+    def __init__(self, system: Any, scheme: Scheme, newton: Newton, carried: Callable[[Array], Array] | None):
+        super().__init__(system, scheme, newton)
+        self.followed: Followed | None = None
+        self.carried = carried
+        self._before: tuple[float, Array] | None = None
+        self.last: tuple[float, Array] | None = None
+
+    def solve(self, stage: Stage, state: State) -> None:
+        """Solve a stage by Newton's method alone: what cannot be solved so is not known."""
+        self._iterate(stage, state)
+        if self.newton.strayed:
+            check_root(self.system, stage, state)
+
+    def _feeds(self, new: State, state: State) -> bool:
+        return False
+
+    def predicted(self, stage: Stage, state: State) -> Array:
+        """Return q followed, plus the difference at the start of the step, growing as over the step before."""
+        if self.followed is None or self.carried is None:
+            return super().predicted(stage, state)
+        difference = self._difference(state)
+        guess = self.carried(self.followed.at(stage.t, self.scheme.order)) + difference
+        if self._before is not None:
+            t, before = self._before
+            guess += (stage.t - state.t) / (state.t - t) * (difference - before)
+        return guess
+
+    def follow(self, step: Followed, state: State) -> None:
+        """Take a step as the one that is followed from a state."""
+        same = all(s.datum is state.datum for pair in step.steps for s in pair)
+        self._before, self.followed = self.last if same else None, step if same else None
+        self.last = (state.t, self._difference(state)) if same else None
+
+    def _difference(self, state: State) -> Array:
+        assert self.followed is not None
+        assert self.carried is not None
+        return np.asarray(state.q - self.carried(self.followed.at(state.t, self.scheme.order)))
+
+
+class Companion:
+    """A march that follows another one; a watch of the steps of that.
+
+    Args:
+        system: its own, of the same problem as that of the march that is followed.
+        followed: the system of that march.
+        scheme: of both.
+        newton: iteration control of the march that is followed.
+        doubles: whether it takes two steps as one.
+        further: companions that follow this one.
+
+    Attributes:
+        state: reached; None before `begin`.
+        difference: largest distance of the two tips so far, m, and when, s.
+        doubled: time gone in doubled steps, s.
+        sound: whether all its steps could be solved.
+    """
+
+    def __init__(
+        self,
+        system: Any,
+        followed: Any,
+        scheme: Scheme,
+        newton: Newton,
+        doubles: bool = True,
+        further: Sequence[Companion] = (),
+    ):
+        self.system, self.followed, self.doubles = system, followed, doubles
+        self.tolerance = newton.tolerance
+        system.plain = True
+        own = Newton(newton.tolerance, newton.max_iterations, foreseeing=True)
+        self.stepper = FollowingStepper(system, scheme, own, carrier(followed, system))
+        self.further, self.stepper.watch = further, self._passed_on
+        self.state: State | None = None
+        self.difference, self.doubled, self.sound = (0.0, 0.0), 0.0, True
+        self._moves = [i for i, name in enumerate(system.structure.components) if name.startswith("u")]
+        #: Steps taken note of: those that may be doubled with the next, and those whose way on is not known yet.
+        self.waiting: list[Followed | None] = [None, None]
+
+    def begin(self, q: Array | None, v: Array | None = None) -> None:
+        """Start at t = 0 from a shape in the turning frame and velocities relative to it, local dof arrays.
+
+        It is undeformed without a shape, at rest without velocities.
+
+        Raises:
+            ComputationError: there are no accelerations.
+        """
+        start, rates = self.system.start(self.system.held.zeros() if q is None else q.copy())
+        if v is not None:
+            rates[: len(v)] += v
+        self.state = self.stepper.start(0.0, start, rates)
+
+    def __call__(self, old: State, new: State, leg: Leg) -> None:
+        """Take note of a step of the march that is followed, and take all those whose way on is known by it."""
+        if not self.sound:
+            return
+        step, (single, _) = Followed(leg, ((moved(old), moved(new)),)), self.waiting
+        if single is not None:
+            self.waiting[0] = None
+            if single.leg.doubles(leg):
+                self._is_known(single.and_then(step))
+                return
+            self._is_known(single)
+        if self.doubles and leg.doubles(leg):
+            self.waiting[0] = step
+        else:
+            self._is_known(step)
+
+    def finish(self) -> None:
+        """Take the last steps."""
+        single, _ = self.waiting
+        if single is not None:
+            self._is_known(single)
+        if (last := self.waiting[1]) is not None:
+            self._take(last, None)
+        self.waiting = [None, None]
+        for companion in self.further:
+            companion.finish()
+
+    def _passed_on(self, old: State, new: State, leg: Leg) -> None:
+        for companion in self.further:
+            companion(old, new, leg)
+
+    def _is_known(self, step: Followed) -> None:
+        """Take the step before one, now that it is known which leg goes on from there."""
+        last, self.waiting[1] = self.waiting[1], step
+        if last is not None:
+            self._take(last, step.leg)
+
+    def _take(self, step: Followed, after: Leg | None) -> None:
+        """Take a step, from which the next leg goes on."""
+        if not self.sound or self.state is None:
+            self.sound = False
+            return
+        stepper, start = self.stepper, self.state
+        if not self.system.solved_at_once and stepper.carried is not None:
+            stepper.follow(step, start)
+        try:
+            if start.t == 0.0:
+                start = started(stepper, start, step.leg)
+            with np.errstate(all="ignore"):
+                self.state = travel(stepper, start, step.leg, after)
+        except ComputationError:
+            self.sound = False
+            return
+        self.doubled += step.leg.length if step.doubled else 0.0
+        self._compare(step.steps[-1][1])
+
+    def _compare(self, there: State) -> None:
+        """Take note of the distance of the tips."""
+        assert self.state is not None
+        self.followed.count_rotations_from(there.datum)
+        self.system.count_rotations_from(self.state.datum)
+        off = self.system.tip(self.state.q, there.t) - self.followed.tip(there.q, there.t)
+        size = float(np.linalg.norm(off[self._moves]))
+        self.sound = bool(np.isfinite(size))
+        if size > self.difference[0]:
+            self.difference = size, there.t
+        sizes = [c.difference[0] for c in (self, *self.further)]
+        part = DIGITS * min(sizes) / self.system.structure.length
+        self.stepper.newton.tolerance = max(self.tolerance, part)

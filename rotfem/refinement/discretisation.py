@@ -1,0 +1,171 @@
+"""The errors of a history and of a steady state by steps and mesh, as differences of two computed answers.
+
+Let u_h be the tip's displacement in steps of length h of a scheme of order p. In the asymptotic range
+
+    |u_h − u| = |u_h − u_2h| / (2^p − 1)
+
+(Richardson's extrapolation; Hairer, Nørsett & Wanner 1993, section II.4), and likewise in the size of the cells. The
+order of a scheme above 2 may be reduced by stiff components (Hairer & Wanner 1996, section IV.15), so that it is
+observed, 2^p = |u_2h − u_4h| / |u_h − u_2h|. Elements converge at least with order 2. Beyond ASYMPTOTIC, or where no
+order is known, the error is said to be the difference itself. What cannot be computed is unknown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from rotfem.analysis.itinerary import Leg
+from rotfem.analysis.schemes import Array, Scheme, State
+from rotfem.equations.compiled import compile_system
+from rotfem.errors import ComputationError
+from rotfem.mechanics.problem import Problem
+from rotfem.numerics.newton import Newton
+from rotfem.refinement.coarser import by_itself, on_other_mesh
+from rotfem.refinement.companion import Companion
+
+#: Relative difference of two answers up to which their order is believed.
+ASYMPTOTIC = 0.05
+
+#: Order of a scheme up to which it is that of all motions, and lowest order of elements.
+CERTAIN, OF_ELEMENTS = 2, 2
+
+#: Part of a history that must have been gone in doubled steps for their difference to stand for the whole.
+MOST_OF_IT = 0.5
+
+#: Shape and velocities at t = 0 of a system, local dof arrays; None where it is undeformed, or at rest.
+Start = Callable[[Any], tuple[Array | None, Array | None]]
+
+
+def error_of(difference: float, order: float) -> float:
+    """Return the error of the finer of two answers whose step or cell sizes are 1 and 2.
+
+    Args:
+        difference: relative.
+        order: of convergence; 0 where none is known.
+    """
+    if difference > ASYMPTOTIC or order < 1.0:
+        return difference
+    return float(difference / (2.0**order - 1.0))
+
+
+def error_by_cells(difference: float, halved: bool) -> float:
+    """Return the error of an answer by its mesh.
+
+    Args:
+        difference: to an answer on another mesh, relative.
+        halved: whether that has half the cells; otherwise it is the finer one of the two.
+    """
+    coarser = error_of(difference, OF_ELEMENTS)
+    return coarser if halved else difference + coarser
+
+
+class HistoryErrors:
+    """The errors of a march by its companions; a watch of its steps.
+
+    Args:
+        problem: what is computed.
+        system: its system, which marches.
+        scheme: of its steps.
+        newton: its iteration control.
+        start: what it starts from.
+
+    Attributes:
+        steps: companion in steps of twice the length; followed by the two others.
+        mesh: companion in the same long steps on another mesh, and whether that has half the cells; None without one.
+        order: companion in steps of four times the length; None where the order is certain.
+    """
+
+    def __init__(self, problem: Problem, system: Any, scheme: Scheme, newton: Newton, start: Start):
+        self.scheme = scheme
+
+        def twice() -> Any:
+            return compile_system(by_itself(problem), system.comm)
+
+        same, other = twice(), on_other_mesh(problem, system)
+        self.mesh: tuple[Companion, bool] | None = None
+        self.order: Companion | None = None
+        if other is not None:
+            self.mesh = Companion(other[0], same, scheme, newton, doubles=False), other[1]
+        if scheme.order > CERTAIN:
+            self.order = Companion(twice(), same, scheme, newton)
+        further = [*(() if self.mesh is None else self.mesh[:1]), *(() if self.order is None else (self.order,))]
+        self.steps = Companion(same, system, scheme, newton, further=further)
+        for companion in self.companions:
+            try:
+                companion.begin(*start(companion.system))
+            except ComputationError:
+                companion.sound = False
+
+    @property
+    def companions(self) -> list[Companion]:
+        """All of them, each after the one that it follows."""
+        return [self.steps, *self.steps.further]
+
+    def __call__(self, old: State, new: State, leg: Leg) -> None:
+        """Take note of a step of the march."""
+        self.steps(old, new, leg)
+
+    def errors(self, scale: float) -> dict[str, float | None]:
+        """Return the errors by the steps, `time`, and by the mesh, `space`, at the end of the march; None is unknown.
+
+        Args:
+            scale: largest displacement of the tip, m.
+        """
+        self.steps.finish()
+        return {"time": self._of_steps(scale), "space": self._of_mesh(scale)}
+
+    def _of_steps(self, scale: float) -> float | None:
+        state, steps = self.steps.state, self.steps
+        if not steps.sound or state is None or not steps.doubled > MOST_OF_IT * state.t:
+            return None
+        whole = steps.difference[0] * max(1.0, state.t / steps.doubled)  # as if all of it had been doubled
+        return error_of(_relative(whole, scale), self._observed())
+
+    def _observed(self) -> float:
+        """Return the order of the scheme, as far as it is certain or observed; 0 where it is not."""
+        if self.order is None:
+            return float(self.scheme.order)
+        finer, coarser = self.steps.difference[0], self.order.difference[0]
+        if not self.order.sound or not coarser > finer > 0.0:
+            return 0.0
+        return float(min(self.scheme.order, np.log2(coarser / finer)))
+
+    def _of_mesh(self, scale: float) -> float | None:
+        if self.mesh is None or not self.steps.sound or not self.mesh[0].sound:
+            return None
+        companion, halved = self.mesh
+        return error_by_cells(_relative(companion.difference[0], scale), halved)
+
+
+def error_of_shape(problem: Problem, system: Any, q: Array, solve: Callable[[Any], Array]) -> float | None:
+    """Return the relative error of an equilibrium's tip by the mesh; None where it is not known.
+
+    Args:
+        problem: what is computed.
+        system: its system, its rotations counted as in q.
+        q: the equilibrium, a local dof array.
+        solve: returns the equilibrium of another system.
+    """
+    tip = _moves(system, q)
+    other = on_other_mesh(problem, system, moving=False)
+    if other is None:
+        return None
+    coarse, halved = other
+    try:
+        difference = float(np.linalg.norm(_moves(coarse, solve(coarse)) - tip))
+    except ComputationError:
+        return None
+    return error_by_cells(_relative(difference, float(np.linalg.norm(tip))), halved)
+
+
+def _moves(system: Any, q: Array) -> Array:
+    """Return the displacement of the tip, m."""
+    moves = [i for i, name in enumerate(system.structure.components) if name.startswith("u")]
+    return np.asarray(system.tip(q, 0.0)[moves])
+
+
+def _relative(size: float, scale: float) -> float:
+    return size / scale if scale > 0.0 else 0.0
