@@ -65,6 +65,8 @@ class FinerEquations:
         """Take the state, and all fields, that are set in the system; where it is not stressed, without its stress."""
         self._matrices = {kind: A for kind, A in self._matrices.items() if kind == "M"}
         for f, g in self._functions.items():
+            if hasattr(f, "on_mesh"):
+                continue
             g.x.array[:] = self._refined.carried(f.function_space, f.x.array, g.function_space)
         if stressed and self.system.linear and self.system.prestressed:
             self._prestress()

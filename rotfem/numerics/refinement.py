@@ -171,10 +171,16 @@ class Refinement:
         return parent, np.stack(weights_in_parts(_base(space)))[part, number]
 
     def function(self, f: fem.Function) -> fem.Function:
-        """Return a function on the refined mesh with the values of one on the coarse mesh."""
+        """Return a function on the refined mesh with the values of one on the coarse mesh.
+
+        One with `on_mesh`, which sets it on any mesh, is set anew.
+        """
         space = f.function_space
         to = self.V if space == self._coarse else fem.functionspace(self.mesh, space.ufl_element())
         out = fem.Function(to)
+        if hasattr(f, "on_mesh"):
+            f.on_mesh(out)
+            return out
         out.x.array[:] = self.carried(space, f.x.array, to)
         return out
 

@@ -68,7 +68,7 @@ def advise(
         return []
     end = None if scene.time is None else scene.time.end
     speed = scene.motion.top_speed(end) if speed is None else abs(speed)
-    out = [*scene.hints, *_rows(scene)]
+    out = [*scene.hints, *_nodes(scene)]
     if command == "run":
         out += _step(scene, speed)
     if command != "run" or scene.modes.model_fields_set:
@@ -132,14 +132,14 @@ def _elements(scene: Scene, speed: float) -> list[str]:
     ]
 
 
-def _rows(scene: Scene) -> list[str]:
-    """Return a hint where tables over the span have more rows than the mesh has elements: it gets one for each."""
-    rows, elements = len(scene.structure.knots), getattr(scene.mesh, "elements", None)
-    if not isinstance(elements, int) or rows < elements:
+def _nodes(scene: Scene) -> list[str]:
+    """Return a hint where masses and kinks, which are nodes, ask for more elements than the mesh has."""
+    places, elements = len(scene.structure.nodes), getattr(scene.mesh, "elements", None)
+    if not isinstance(elements, int) or places < elements:
         return []
     return [
-        f"tables over the span have rows at {rows} places between the ends, all of which are nodes: there are "
-        f"{rows + 1} elements, not mesh.elements = {elements}"
+        f"masses and kinks at {places} places between the ends are nodes: there are {places + 1} elements, not "
+        f"mesh.elements = {elements}"
     ]
 
 

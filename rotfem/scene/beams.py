@@ -89,7 +89,12 @@ class PlanarBeamStructure(Held):
     @property
     def knots(self) -> tuple[float, ...]:
         """Places (m) of the rows of tapers between the ends, and of masses."""
-        return apart({*self.section.breakpoints, *(body.x for body in self.masses)}, self.length)
+        return apart({*self.section.breakpoints, *self.nodes}, self.length)
+
+    @property
+    def nodes(self) -> tuple[float, ...]:
+        """Places (m) of masses."""
+        return apart([body.x for body in self.masses], self.length)
 
     @property
     def release_limit(self) -> float:
@@ -178,11 +183,17 @@ class SpatialBeamStructure(Held):
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Places (m) of all rows of tables over the span, increasing; a mesh should have a node at each."""
-        places = {*self.section.breakpoints, *(body.x for body in self.masses)}
+        """Places (m) of all rows of tables over the span, and of masses, increasing."""
+        places = {*self.section.breakpoints, *self.nodes}
         places |= {x for x, _ in self.pretwist[1:-1]} if isinstance(self.pretwist, tuple) else set()
         line = self.reference_line
         return apart(places | set(line.knots if line is not None else ()), self.length)
+
+    @property
+    def nodes(self) -> tuple[float, ...]:
+        """Places (m) of masses, of kinks of the line, and of the ends of arcs."""
+        line = self.reference_line
+        return apart((*(body.x for body in self.masses), *(line.kinks if line is not None else ())), self.length)
 
     @property
     def tip_inertia_matrix(self) -> Array:

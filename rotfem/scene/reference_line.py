@@ -156,6 +156,11 @@ class SweptLine:
         """Arc lengths of all rows between the ends (m)."""
         return tuple(sorted({x for x, _ in self.rows[1:-1]}))
 
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """The same: curvature jumps there."""
+        return self.knots
+
     def at(self, x: npt.ArrayLike, near: npt.ArrayLike | None = None) -> tuple[Array, Array]:
         """Return (position in m, unit tangent), each (n, 3), at arc lengths x (n,) (see `ReferenceLine.at`).
 

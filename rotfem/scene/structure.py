@@ -59,7 +59,12 @@ class StructureTable(SceneModel):
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Places (m) along a beam, increasing, at which tables have rows: nodes of its mesh."""
+        """Places (m) along a beam, increasing, at which tables have rows or something stands."""
+        return ()
+
+    @property
+    def nodes(self) -> tuple[float, ...]:
+        """Those of them, increasing, that its mesh must have nodes at: masses, and kinks of its axis."""
         return ()
 
     @property

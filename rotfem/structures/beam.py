@@ -19,6 +19,7 @@ from rotfem.structures.memory import check_memory
 from rotfem.structures.meshes.line import END, apart, beam_nodes
 from rotfem.structures.mode_names import in_phase, sign_changes
 from rotfem.structures.points import Points
+from rotfem.structures.section_fields import SectionField, Valid, not_negative
 from rotfem.structures.structure import Array, Structure
 from rotfem.structures.tip_values import TipValues
 
@@ -38,7 +39,8 @@ class Beam(Structure):
     Args:
         problem: what is to be computed; its structure is a beam.
         comm: communicator the mesh is distributed over.
-        knots: places along the beam that must be nodes, m.
+        rows: places of rows of tables along the beam, m; they are nodes where there are elements enough.
+        nodes: places that must be nodes, m.
     """
 
     prestressing: ClassVar[tuple[str, ...]] = ("axial",)
@@ -46,36 +48,39 @@ class Beam(Structure):
     #: Family ↦ the components whose kinetic energy counts, and the one whose nodes are counted.
     families: ClassVar[dict[str, tuple[tuple[int, ...], int]]]
 
-    def __init__(self, problem: Problem, comm: MPI.Comm, knots: tuple[float, ...]):
+    def __init__(self, problem: Problem, comm: MPI.Comm, rows: tuple[float, ...], nodes: tuple[float, ...]):
         super().__init__(problem, comm)
         grid, s = problem.mesh, self.data
         root = getattr(s, "root_position", (s.hub_radius, 0.0, 0.0))
         self.length, self.hub_radius, self._section = s.length, root[0], s.section
         check_memory("mesh.elements", grid.elements, grid.elements * grid.degree + 1, self.size, 1, comm)
         #: Places along the beam where section, axis, loads or forces may change at once, m.
-        self.knots = apart((*knots, *stations(problem.loads)), self.length)
-        nodes = beam_nodes(self.length, grid.elements, self.knots)
-        interval = mesh.create_interval(comm, len(nodes) - 1, [0.0, 1.0])  # which dolfinx refuses below 2e-16 m
+        places = (*nodes, *stations(problem.loads))
+        self.knots = apart((*rows, *places), self.length)
+        #: Whether every row is a node; otherwise properties are projected (`rotfem.structures.section_fields`).
+        self.follows_rows = len(self.knots) < grid.elements
+        ends = beam_nodes(self.length, grid.elements, self.knots if self.follows_rows else apart(places, self.length))
+        interval = mesh.create_interval(comm, len(ends) - 1, [0.0, 1.0])  # which dolfinx refuses below 2e-16 m
         x = interval.geometry.x
-        x[:, 0] = np.interp(x[:, 0], np.linspace(0.0, 1.0, len(nodes)), nodes)
-        k = grid.degree
+        x[:, 0] = np.interp(x[:, 0], np.linspace(0.0, 1.0, len(ends)), ends)
+        k = self.degree = grid.degree
         self.discretise(interval, k)
         reduced = 2 * k - 2 if grid.integration == "reduced" else 2 * k
         self.masses = getattr(self.data, "masses", ())
-        places = [*(point.x for point in self.point_loads), *((body.x,) for body in self.masses)]
-        self.points = Points(self.mesh, places)
+        points = [*(point.x for point in self.point_loads), *((body.x,) for body in self.masses)]
+        self.points = Points(self.mesh, points)
         dx = ufl.Measure("dx", self.mesh, subdomain_data=self.points.subdomains)
         self.dx_elastic, self.dx = (dx(metadata={"quadrature_degree": degree}) for degree in (reduced, 2 * k))
         near = self.length * END
-        ends = [
+        facets = [
             mesh.locate_entities_boundary(self.mesh, 0, lambda p, x=x: np.abs(p[0] - x) < near)
             for x in (self.length, 0.0)
         ]
-        places, order = np.unique(np.concatenate(ends), return_index=True)
-        tags = np.repeat(np.array([1, 2], dtype=np.int32), [len(end) for end in ends])[order]
-        at = mesh.meshtags(self.mesh, 0, places, tags)
+        both, order = np.unique(np.concatenate(facets), return_index=True)
+        tags = np.repeat(np.array([1, 2], dtype=np.int32), [len(facet) for facet in facets])[order]
+        at = mesh.meshtags(self.mesh, 0, both, tags)
         self.tip, self.root = (ufl.ds(tag, domain=self.mesh, subdomain_data=at) for tag in (1, 2))
-        self.clamped = fem.locate_dofs_topological(self.V, 0, ends[1])
+        self.clamped = fem.locate_dofs_topological(self.V, 0, facets[1])
         self.tip_values = TipValues(self.V, np.array([self.length, 0.0, 0.0]))
 
     @property
@@ -132,20 +137,24 @@ class Beam(Structure):
         """Return the strains, each with its stiffness, that make the stored energy of the strains of a section."""
         raise NotImplementedError
 
-    def profile(self, name: str, at: Callable[[Array], Array]) -> Any:
+    def profile(self, name: str, at: Callable[[Array], Array], valid: Valid | None = not_negative) -> Any:
         """Return at(X) as a constant where the section is uniform, else as a field."""
         if self._section.uniform:
             return self.constant(at(np.zeros(1))[0])
-        f = fem.Function(fem.functionspace(self.mesh, ("DG", TAPER_DEGREE)), name=name)
-        f.interpolate(lambda x: at(x[0]))
-        return f
+        return self.field(name, lambda x, _: at(x), TAPER_DEGREE, valid=valid)
 
-    def linear_field(self, name: str, at: Callable[[Array], Array], size: int) -> fem.Function:
-        """Return the field of vectors at(X), (n, size), that is linear in each element, as a table between its rows."""
-        space = fem.functionspace(self.mesh, element("DG", self.mesh.basix_cell(), 1, shape=(size,)))
-        f = fem.Function(space, name=name)
-        f.interpolate(lambda x: at(x[0]).T)
-        return f
+    def linear_field(self, name: str, at: Callable[[Array], Array], size: int, valid: Valid | None = None) -> Any:
+        """Return the field of at(X), (n, size), that is linear between rows; of values (n,) where the size is 0."""
+        return self.field(name, lambda x, _: at(x), 1 if self.follows_rows else self.degree, size, valid)
+
+    def field(
+        self, name: str, at: Callable[[Array, Array], Any], degree: int, size: int = 0, valid: Valid | None = None
+    ) -> fem.Function:
+        """Return a discontinuous field of a degree (see `SectionField`), with so many components, a scalar for 0."""
+        cell = self.mesh.basix_cell()
+        space = fem.functionspace(self.mesh, element("DG", cell, degree, shape=(size,) if size else ()))
+        rows = np.array(() if self.follows_rows else self.knots)
+        return SectionField(at, rows, min(self.degree, degree), valid)(fem.Function(space, name=name))
 
     # --- values -------------------------------------------------------------------------------------------------
 

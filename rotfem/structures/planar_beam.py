@@ -36,7 +36,7 @@ class PlanarBeam(Beam):
 
     def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):
         s = problem.structure
-        super().__init__(problem, comm, s.knots)
+        super().__init__(problem, comm, s.knots, s.nodes)
         for name in s.section.at(np.zeros(1)):
             self.section[name] = self.profile(name, partial(self._property, name))
         self.scalar("hub_radius", self.hub_radius)

@@ -19,7 +19,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import ufl
-from dolfinx import fem
 from mpi4py import MPI
 
 from rotfem.errors import InputError
@@ -67,7 +66,7 @@ class SpatialBeam(Beam):
             raise InputError("structure.root.pitch", None, "changes with time: the motion of the problem must have it")
         #: Pitch at t = 0; that of later times is in the motion of the frame.
         self._first_pitch = s.root.pitch.constant if pitch is None else pitch.start
-        super().__init__(problem, comm, s.knots)
+        super().__init__(problem, comm, s.knots, s.nodes)
         self._turn = SectionTurn(rotation_part(self.k.q), exact=not problem.theory.linear)
         self._forms = SectionForms(self, s.section)
         if s.hub_offset is None:
@@ -128,9 +127,9 @@ class SpatialBeam(Beam):
             self._axis = along * e_1 + across * e_2
             e_1, e_2 = ufl.cos(chi) * e_1 + ufl.sin(chi) * e_2, ufl.cos(chi) * e_2 - ufl.sin(chi) * e_1
         if isinstance(twist, tuple) and any(angle != 0.0 for _, angle in twist):
-            angle = fem.Function(fem.functionspace(self.mesh, ("Lagrange", 1)), name="pretwist")
-            angle.interpolate(lambda x: np.interp(x[0], *np.array(twist).T))  # exact: the knots are nodes
-            self.section["pretwist"] = angle
+            angle = self.section["pretwist"] = self.linear_field(
+                "pretwist", lambda x: np.interp(x, *np.array(twist).T), 0
+            )
             self._pretwist = angle.dx(0)
         elif isinstance(twist, float) and twist != 0.0:
             angle = self.scalar("pretwist", twist)

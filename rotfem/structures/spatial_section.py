@@ -17,6 +17,7 @@ import ufl
 
 from rotfem.mechanics.bodies import Gain, Strain
 from rotfem.structures.beam import Beam
+from rotfem.structures.section_fields import positive_matrices
 from rotfem.structures.structure import Array
 from rotfem.structures.trapeze import radius_of, stretch_by_twist
 
@@ -100,7 +101,7 @@ class SectionForms:
         self.mass_center = (0, *self._center("mass_center"))
         self._turned = None
         if data.principal_angle is not None:
-            angle = beam.section["principal_angle"] = beam.profile("principal_angle", data.angle_at)
+            angle = beam.section["principal_angle"] = beam.profile("principal_angle", data.angle_at, None)
             self._turned = ufl.cos(angle), ufl.sin(angle)
         self.directors = [
             ((0, *self._principal(1, 0)), beam.section["rotary_inertia3"]),
@@ -134,7 +135,8 @@ class SectionForms:
         entries: dict[tuple[int, int], Any] = {}
         if name in self._data.tapers:
             rows, columns = np.triu_indices(6)
-            f = beam.linear_field(name, lambda x: self._data.at(x)[name][:, rows, columns], len(upper))
+            valid = positive_matrices(definite=name == "stiffness")
+            f = beam.linear_field(name, lambda x: self._data.at(x)[name][:, rows, columns], len(upper), valid)
             beam.section[name] = f
             entries = {ij: f[n] for n, ij in enumerate(upper)}
         else:

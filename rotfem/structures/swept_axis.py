@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import ufl
 from dolfinx import fem
 
@@ -26,10 +25,7 @@ def swept_axis(beam: Beam, sweep: Any, line: Any) -> tuple[Any, Any, Any]:
         chi = beam.scalar("sweep", sweep)
         X = ufl.SpatialCoordinate(beam.mesh)[0]
         return chi, X * ufl.cos(chi), X * ufl.sin(chi)
-    angle = fem.Function(fem.functionspace(beam.mesh, ("DG", 1)), name="sweep")
-    cells, x = angle.function_space.dofmap.list, angle.function_space.tabulate_dof_coordinates()[:, 0]
-    near = np.repeat(x[cells].mean(axis=1), cells.shape[1])
-    angle.x.array[cells.ravel()] = line.angles(x[cells].ravel(), near)[0]
+    angle = beam.field("sweep", lambda x, near: line.angles(x, near)[0], 1)
     position = fem.functionspace(beam.mesh, ("Lagrange", AXIS_DEGREE))
     along, across = fem.Function(position, name="along"), fem.Function(position, name="across")
     along.interpolate(lambda p: line.at(p[0])[0][:, 0])

@@ -1,0 +1,110 @@
+"""Properties along a beam as fields on its elements, which need not have a node at every row of their tables.
+
+A property c is what its table says at the nodes of a field where no row lies inside an element. In an element with rows
+inside it is the projection P c on polynomials of degree k, that of the unknowns:
+
+    ∫ P c p dx = ∫ c p dx  for all p of degree k,
+
+with integrals from row to row. Forms hold ∫ c f dx, f made of shape functions, and ∫ P c f dx differs from that by
+∫ (c − P c)(f − P f) dx. Masses, first moments and dead loads are exact; what is stored and what moves is so to the
+order of the elements themselves. Legendre's polynomial of degree k vanishes at the k Gauss points of the reduced rule,
+so that this rule sees the projection on degree k − 1, which is that of strains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+from numpy.polynomial import legendre
+
+from rotfem.structures.meshes.line import END
+
+Array = npt.NDArray[np.float64]
+
+#: Whether values (n, …) at points of an element can be those of a property.
+Valid = Callable[[Array], bool]
+
+#: Gauss points from row to row; exact for the fourth degree of a taper times the fifth of polynomials.
+POINTS = 5
+
+#: Least eigenvalue of a semidefinite matrix with ones on its diagonal, to round-off.
+SEMIDEFINITE = 1e-12
+
+
+@dataclass(frozen=True)
+class SectionField:
+    """Sets a discontinuous field on any mesh of one beam.
+
+    Attributes:
+        at: (x, near), (n,) in m ↦ values (n,) or (n, components); near are on the side of x that counts at a jump.
+        rows: places of the rows (m), increasing.
+        degree: k, of the unknowns.
+        valid: what a projection must be where the table is. Where it is not, as where stiffness falls by orders of
+            magnitude within an element, the mean takes its place. None: anything is valid.
+    """
+
+    at: Callable[[Array, Array], Any]
+    rows: Array
+    degree: int
+    valid: Valid | None = None
+
+    def __call__(self, f: fem.Function) -> fem.Function:
+        """Set the field, and return it; on other meshes it is set anew, not interpolated."""
+        space = f.function_space
+        dofmap, x = space.dofmap.list, space.tabulate_dof_coordinates()[:, 0]
+        values = f.x.array.reshape(len(x), -1)
+        middle = np.empty_like(x)
+        middle[dofmap] = x[dofmap].mean(axis=1)[:, None]
+        values[:] = np.asarray(self.at(x, middle)).reshape(len(x), -1)
+        ends = np.sort(space.mesh.geometry.x[space.mesh.geometry.dofmap, 0], axis=1)
+        near = END * float(ends.max())
+        first, last = (np.searchsorted(self.rows, end) for end in (ends[:, 0] + near, ends[:, 1] - near))
+        for cell in np.flatnonzero(last > first):
+            inner, dofs = self.rows[first[cell] : last[cell]], dofmap[cell]
+            values[dofs] = self._projected(ends[cell], inner, x[dofs])
+        f.on_mesh = self  # which a refined mesh asks for
+        return f
+
+    def _projected(self, ends: Array, inner: Array, x: Array) -> Array:
+        """Return the projection at places x (n,) of the element between two ends with rows inside."""
+        (a, b), (xi, w) = ends, legendre.leggauss(POINTS)
+        cuts = np.array([a, *inner, b])
+        half = np.diff(cuts)[:, None] / 2
+        places = (cuts[:-1, None] + half * (1.0 + xi)).ravel()
+        samples = np.asarray(self.at(places, np.full_like(places, (a + b) / 2))).reshape(len(places), -1)
+        n = np.arange(self.degree + 1)
+        basis = legendre.legvander(2.0 * (places - a) / (b - a) - 1.0, self.degree)
+        c = (2.0 * n[:, None] + 1.0) / (b - a) * (basis.T @ ((half * w).ravel()[:, None] * samples))
+        if self.valid is not None and self.valid(samples):
+            points = np.concatenate([legendre.leggauss(self.degree + i)[0] for i in (0, 1)])
+            if not self.valid(legendre.legvander(points, self.degree) @ c):
+                c[1:] = 0.0
+        return np.asarray(legendre.legvander(2.0 * (x - a) / (b - a) - 1.0, self.degree) @ c)
+
+
+def not_negative(values: Array) -> bool:
+    """Return whether no value is negative."""
+    return bool(np.all(values >= 0.0))
+
+
+def positive_matrices(definite: bool) -> Valid:
+    """Return whether upper triangles (n, 21) are those of positive (semi)definite 6×6 matrices.
+
+    They are judged with ones on the diagonal of their mean, as entries have different units.
+    """
+    rows, columns = np.triu_indices(6)
+
+    def valid(values: Array) -> bool:
+        M = np.zeros((len(values), 6, 6))
+        M[:, rows, columns] = M[:, columns, rows] = values
+        diagonal = np.abs(np.einsum("nii->i", M)) / len(M)
+        scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+        least = np.linalg.eigvalsh(M / np.outer(scale, scale))[:, 0]
+        return bool(np.all(least > 0.0 if definite else least > -SEMIDEFINITE))
+
+    return valid

@@ -1,0 +1,137 @@
+"""Tables with more rows than the mesh has elements: projected properties, and what they make of mass and frequencies.
+
+Only definitions and limits are asserted: the projection's orthogonality, its conservation of mass and first moment,
+and that frequencies go to those of the mesh that follows all rows.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from dolfinx import fem
+from mpi4py import MPI
+from numpy.polynomial import legendre
+
+import rotfem
+from rotfem.commands.problem import Problem
+from rotfem.scene import Scene
+from rotfem.structures import build
+from rotfem.structures.section_fields import not_negative, positive_matrices
+from tests.beams import STRUCTURE
+
+LENGTH, ROWS = 10.0, 41
+X = np.linspace(0.0, LENGTH, ROWS) + np.sin(np.arange(ROWS) * np.pi / (ROWS - 1)) * np.sin(7.0 * np.arange(ROWS)) * 0.05
+
+
+def rough(mean: float) -> list[list[float]]:
+    """Return rows of a property that falls along the span and changes by a fifth from row to row."""
+    return [[x, mean * (1.0 - 0.06 * x) * (1.0 + 0.2 * np.sin(37.0 * i))] for i, x in enumerate(X.tolist())]
+
+
+def scene(elements: int, section: dict[str, Any] | None = None, **more: Any) -> Scene:
+    given = STRUCTURE["section"]
+    rows = section or {key: rough(given[key]) for key in ("EA", "EI", "mass_per_length")}
+    return Scene.from_dict(
+        {
+            "structure": {**STRUCTURE, "length": LENGTH, "section": {**given, **rows}},
+            "motion": {"type": "constant", "speed": 3.0},
+            "model": {"theory": "consistent_linear"},
+            "mesh": {"elements": elements},
+            "modes": {"count": 3},
+            **more,
+        }
+    )
+
+
+def frequencies(elements: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest frequencies (rad/s), and what is said of their error by the mesh."""
+    rows = rotfem.modes(scene(elements), hint=None).rows[:3]
+    return np.array([row["frequency"] for row in rows]), np.array([row["mesh_error"] for row in rows])
+
+
+def beam(case: Scene) -> Any:
+    return build(Problem.of(case), MPI.COMM_SELF)
+
+
+def polynomials(f: fem.Function) -> list[tuple[float, float, np.ndarray]]:
+    """Return ends of the elements and Legendre coefficients of a scalar discontinuous field on each."""
+    space, found = f.function_space, []
+    x = space.tabulate_dof_coordinates()[:, 0]
+    for dofs in space.dofmap.list:
+        a, b = x[dofs].min(), x[dofs].max()
+        xi = 2.0 * (x[dofs] - a) / (b - a) - 1.0
+        found.append((a, b, np.linalg.solve(legendre.legvander(xi, len(dofs) - 1), f.x.array[dofs])))
+    return found
+
+
+def moments(rows: np.ndarray, a: float, b: float, most: int) -> np.ndarray:
+    """Return ∫ c P_n dx, n ≤ most, of a table on [a, b] by a rule of Gauss from row to row."""
+    xi, w = legendre.leggauss(8)
+    cuts = np.array([a, *(x for x in rows[:, 0] if a < x < b), b])
+    half = np.diff(cuts)[:, None] / 2
+    x = (cuts[:-1, None] + half * (1.0 + xi)).ravel()
+    values = np.interp(x, *rows.T) * (half * w).ravel()
+    return legendre.legvander(2.0 * (x - a) / (b - a) - 1.0, most).T @ values
+
+
+def test_the_mesh_is_as_asked_and_properties_are_projected() -> None:
+    """∫ P c p = ∫ c p for all p of degree 3, to round-off, in every element."""
+    coarse = beam(scene(5))
+    assert coarse.mesh.topology.index_map(1).size_global == 5
+    rows = np.array(rough(STRUCTURE["section"]["EI"]))
+    for a, b, c in polynomials(coarse.section["EI"]):
+        n = np.arange(4)
+        np.testing.assert_allclose(c[:4] * (b - a) / (2 * n + 1), moments(rows, a, b, 3), rtol=1e-11, atol=1e-9)
+        np.testing.assert_allclose(c[4:], 0.0, atol=1e-9 * rows[0, 1])
+
+
+def test_rows_are_nodes_where_there_are_elements_enough() -> None:
+    fine = beam(scene(ROWS - 1))
+    np.testing.assert_allclose(np.unique(fine.mesh.geometry.x[:, 0]), X, atol=1e-12)
+    f = fine.section["EI"]
+    x = f.function_space.tabulate_dof_coordinates()[:, 0]
+    np.testing.assert_array_equal(f.x.array, np.interp(x, *np.array(rough(STRUCTURE["section"]["EI"])).T))
+
+
+def test_mass_and_first_moment_are_those_of_the_table() -> None:
+    rows = np.array(rough(STRUCTURE["section"]["mass_per_length"]))
+    mass, about_middle = moments(rows, 0.0, LENGTH, 1)
+    found = rotfem.check(scene(3))
+    assert found.mass == pytest.approx(mass, rel=1e-12)
+    assert found.center_of_mass[0] == pytest.approx(LENGTH / 2 * (1 + about_middle / mass), rel=1e-12)
+
+
+def test_frequencies_go_to_those_of_the_mesh_that_follows_all_rows() -> None:
+    """By 4 and more for twice the elements; and what is said of the error holds what projection does."""
+    exact, _ = frequencies(2 * (ROWS - 1))
+    off, said = zip(
+        *((np.abs(found / exact - 1.0), error) for found, error in map(frequencies, (5, 10, 20))), strict=True
+    )
+    for coarse, fine in pairwise(off):
+        assert np.max(fine) < np.max(coarse) / 4.0
+    for true, error in zip(off, said, strict=True):
+        assert 0.3 < np.max(error) / np.max(true) < 3.0
+    assert np.max(np.abs(frequencies(ROWS - 1)[0] / exact - 1.0)) < 1e-6
+
+
+def test_a_property_that_falls_by_orders_within_an_element_stays_positive() -> None:
+    """EI falls by 1e6 over 0.02 m: the projection would be negative, so its mean is taken, which is exact for ∫ EI."""
+    rows = [[0.0, 1e6], [3.0, 1e6], [3.02, 1.0], [5.0, 1.0], [7.0, 1.0], [LENGTH, 1.0]]
+    for a, b, c in polynomials(beam(scene(2, {"EI": rows})).section["EI"]):
+        assert not_negative(legendre.legval(np.linspace(-1.0, 1.0, 50), c))
+        assert c[0] * (b - a) == pytest.approx(moments(np.array(rows), a, b, 0)[0], rel=1e-12)
+
+
+def test_definite_matrices_are_told_from_others_whatever_their_units() -> None:
+    upper = np.triu_indices(6)
+    scale = np.outer(*2 * [[1e9, 1e8, 1e8, 1e3, 1e3, 1e3]])
+    K = (np.eye(6) + 0.5 * (np.eye(6, k=1) + np.eye(6, k=-1))) * scale
+    half = np.ones((6, 6)) * scale
+    definite, semidefinite = positive_matrices(True), positive_matrices(False)
+    assert definite(K[upper][None])
+    assert semidefinite(half[upper][None])
+    assert not definite((half - 1e-3 * np.diag(np.diag(half)))[upper][None])
+    assert not semidefinite((half - 1e-3 * np.diag(np.diag(half)))[upper][None])
