@@ -77,7 +77,9 @@ def test_bmodes(tmp_path: Path) -> None:
     main = read(tmp_path, "main.bmi", **STIFF)
     of_pybmodes = mains.bmodes_main().replace("BModes v1.03 Main", "Main")
     assert blade(tmp_path, of_pybmodes, "other.bmi", **STIFF) == main
-    assert main.length == decks.LENGTH
+    assert (main.length, main.tip_mass) == (decks.LENGTH, 0.0)
+    heavy = mains.bmodes_main().replace("0.        tip_mass", "25.        tip_mass")
+    assert blade(tmp_path, heavy, "heavy.bmi", **STIFF).tip_mass == 25.0
     assert main.precone == pytest.approx(np.radians(3.0))
     # hub_rad is measured along the coned axis
     assert main.root_position == pytest.approx((1.5 * np.cos(main.precone), 0.0, 1.5 * np.sin(main.precone)))
@@ -221,13 +223,6 @@ BAD: list[tuple[str, str, dict[str, Any], tuple[str, str], str]] = [
         r"inertia_matrix\.mass\[0\] is -300; must be greater than 0",
     ),
     ("windio_2", "blade.yaml", {}, ("K44: ", "K55: "), "has no K44"),
-    (
-        "windio_2",
-        "blade.yaml",
-        {},
-        ("# no masses", "point_mass: {grid: [0.0, 1.0], mass: [1.0, 0.0]}"),
-        "is not read; take",
-    ),
     ("windio_2", "blade.yaml", {"structure_hub_offset": [1.0, 0.0, 0.0]}, ("", ""), "hub_offset: given twice"),
 ]
 
@@ -291,6 +286,10 @@ def test_windio_2(tmp_path: Path) -> None:
     assert beam.precone == pytest.approx(np.radians(4.0))
     np.testing.assert_allclose(np.array(beam.line)[:, 2], [0.0, 0.0, 1.0, 3.0])
     assert "hub_radius" not in beam.model_fields_set
+    heavy = decks.windio_2().replace("# no masses", "point_mass: {grid: [0.0, 0.4, 1.0], mass: [0.0, 120.0, 5.0]}")
+    (tmp_path / "heavy.yaml").write_text(heavy)
+    beam = read(tmp_path, "heavy.yaml")
+    assert [(body.x, body.mass) for body in beam.masses] == [(pytest.approx(8.0), 120.0), (beam.length, 5.0)]
 
 
 def test_an_anchor_may_be_named_again(tmp_path: Path) -> None:

@@ -191,7 +191,7 @@ def test_bad_primary_files_of_beamdyn(tmp_path: Path, text: str, message: str) -
     [
         (("v1.03", "v9.00"), r"line 1: the version of BModes' main file is 9\.00"),
         (("0.        bl_thp", "2.        bl_thp"), r"line 8, column 1: bl_thp = 2 is not known; only 0"),
-        (("0.        tip_mass", "5.        tip_mass"), "line 10, column 1: tip_mass is not read"),
+        (("0.        ixx_tip", "5.        ixx_tip"), "line 12, column 1: ixx_tip is not read"),
         (("1.5       hub_rad", "30       hub_rad"), "line 6, column 1: hub_rad = 30 must be"),
         (("sec_props_file", "properties"), "no line with a value of sec_props_file"),
         (("'blade.dat'", "'none.dat'"), 'there is no file "none.dat" beside it'),

@@ -46,7 +46,7 @@ FACTORS = {
 
 #: Values of the main file that are known, and no others: what else there is would be left out unsaid.
 ONLY = {"beam_type": 1.0, "hub_conn": 1.0, "bl_thp": 0.0, "id_mat": 1.0}
-NO_TIP = ("tip_mass", "ixx_tip", "iyy_tip", "izz_tip", "ixy_tip", "izx_tip", "iyz_tip")
+NO_TIP = ("cm_loc", "ixx_tip", "iyy_tip", "izz_tip", "ixy_tip", "izx_tip", "iyz_tip")
 
 SHEAR = ("GA2", "GA3")
 
@@ -72,7 +72,7 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
             deck.fail(f"{name} = {found:g} is not known; only {value:g}", deck.named(name)[0], 1)
     for name in NO_TIP:
         if deck.number(name) != 0.0:
-            reason = f"{name} is not read; set it to 0 and give tip_mass, tip_offset and tip_inertia in the scene"
+            reason = f"{name} is not read; set it to 0 and give tip_offset and tip_inertia in the scene"
             deck.fail(reason, deck.named(name)[0], 1)
     radius, hub = deck.number("radius"), deck.number("hub_rad")
     if not 0.0 <= hub < radius:
@@ -82,7 +82,8 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
     factors = {column: deck.number(factor) for factor, column in FACTORS.items()}
     properties = deck.file("sec_props_file")
     keys = _keys(properties, asked, radius - hub, factors)
-    return {"length": radius - hub, **coned_root(hub, float(np.radians(deck.number("precone")))), **keys}
+    place = coned_root(hub, float(np.radians(deck.number("precone"))))
+    return {"length": radius - hub, **place, "tip_mass": deck.number("tip_mass"), **keys}
 
 
 def _keys(deck: Deck, asked: Asked, length: float, factors: dict[str, float]) -> dict[str, Any]:

@@ -74,12 +74,19 @@ def _blade_1(tree: YamlNode) -> dict[str, Any]:
 def _blade_2(blade: YamlNode) -> dict[str, Any]:
     """Return line, pretwist and section of a file of version 2."""
     properties = blade["structure.elastic_properties"]
-    if (point_mass := properties.get("point_mass")) is not None and np.any(point_mass["mass"].numbers() != 0.0):
-        point_mass.fail("is not read; take it out and give structure.masses in the scene")
     line, length, pretwist = _axis(blade["reference_axis"], blade["outer_shape.twist"], degrees=True)
     section = {"stiffness": _stiffness(properties["stiffness_matrix"], length)}
     section["mass"] = _mass(properties["inertia_matrix"], length)
-    return {"line": line, "pretwist": pretwist, "section": section}
+    return {"line": line, "pretwist": pretwist, "section": section, **_point_masses(properties, length)}
+
+
+def _point_masses(properties: YamlNode, length: float) -> dict[str, Any]:
+    """Return the masses along the blade, as flanges."""
+    if (table := properties.get("point_mass")) is None:
+        return {}
+    mass = table["mass"].numbers()
+    places = table["grid"].grid(len(mass)) * length
+    return {"masses": [{"x": float(x), "mass": float(m)} for x, m in zip(places, mass, strict=True) if m != 0.0]}
 
 
 def _axis(axis: YamlNode, twist: YamlNode, degrees: bool) -> tuple[list[Any], float, list[list[Any]]]:
