@@ -25,7 +25,7 @@ CAPABILITIES = {
     "error, accuracy, explain, cost": """
         refinement selection commands.cost commands.explain commands.accuracy commands.ahead
         commands.attempts commands.known_error commands.pace commands.pursuit commands.root_accuracy
-        analysis.error_ analysis.farthest_state analysis.frequency_error analysis.lost_digits
+        analysis.error_ analysis.frequency_error
         analysis.mesh_estimate analysis.mesh_force analysis.reduced_tangents analysis.refined_mesh
         analysis.ritz_vectors analysis.shape_error analysis.theory_error analysis.tip_track
         analysis.turning_view equations.finer numerics.extended_cells numerics.refinement

@@ -14,14 +14,12 @@ from mpi4py import MPI
 from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.dense_output import RowTimes
 from rotfem.analysis.equilibrium import steady_state
-from rotfem.analysis.farthest_state import Farthest
-from rotfem.analysis.lost_digits import said_of
 from rotfem.analysis.reduced.foreshortened import Foreshortened
 from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability, stability_of
 from rotfem.analysis.stepper import Stepper
-from rotfem.analysis.theory_error import TheoryError
+from rotfem.analysis.theory_error import Farthest, TheoryError, said_of
 from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
 from rotfem.analysis.tip_track import TipTrack
 from rotfem.commands import energy_growth
@@ -269,7 +267,11 @@ class Simulation:
                 f"the speed is above {self.critical:.6g} rad/s, where the {self.problem.theory.name} stiffness is no "
                 f"longer definite, since t = {self._critical_since:.4g} s"
             )
-        self.theory_error = self.farthest.error() if self.foreshortened is None else self.foreshortened.theory_error()
+        if self.foreshortened is not None:
+            self.theory_error = self.foreshortened.theory_error()
+        elif len(self.record.history):
+            names = self.system.structure.components
+            self.theory_error = self.farthest.error(np.array([np.max(np.abs(history[f"tip_{n}"])) for n in names]))
         if self.theory_error is not None and (said := self.theory_error.warning()):
             self.warnings.append(said)
         if said := said_of(self.farthest.lost_digits() or 0.0):

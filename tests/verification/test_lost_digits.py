@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from rotfem import Problem, RunResult, run
-from rotfem.analysis.lost_digits import lost_digits
+from rotfem.analysis.theory_error import lost_digits
 
 #: Tip deflection that is asked for, over the length.
 SMALL = 1e-3

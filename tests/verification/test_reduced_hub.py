@@ -37,7 +37,7 @@ def test_motion_on_a_free_hub_is_that_of_the_full_march(coupled: bool) -> None:
     scene = SCENE | {"motion": SCENE["motion"] | {"coupled": coupled}}
     full = run(scene).history
     reduced = run(scene | {"model": SCENE["model"] | {"reduced": 1e-5}})
-    assert reduced.summary["warnings"] == []
+    assert all(line.startswith("small components") for line in reduced.summary["warnings"])  # tip_u1 of a linear theory
     assert list(reduced.history) == list(full)
     tolerances = {
         "psi": 1e-6,
