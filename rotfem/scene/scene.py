@@ -44,7 +44,7 @@ from rotfem.scene.problems import scene_error
 from rotfem.scene.reading import noted_files
 from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh, Solver
 from rotfem.scene.stepping import Time
-from rotfem.scene.toml import apply_overrides, read_toml, set_key, to_builtin
+from rotfem.scene.toml import apply_overrides, check_depth, read_toml, set_key, to_builtin
 from rotfem.scene.units import in_si
 from rotfem.scene.values import Bounds, SceneModel
 
@@ -116,10 +116,12 @@ class Scene(SceneModel):
         Raises:
             SceneError: anything in it is not valid.
         """
+        check_depth(name, data)
         return cls._validate(to_builtin(data), name, name, str(directory))
 
     @classmethod
     def _validate(cls, tables: dict[str, Any], name: str, file: str, directory: str) -> Self:
+        check_depth(file, tables)
         tables, hints = in_si(tables, file), list[str]()
         context = {"directory": directory, "limits": limits_of(tables), "accuracy": tables.get("accuracy")}
         try:
@@ -170,6 +172,7 @@ class Scene(SceneModel):
         Raises:
             SceneError: the result is not valid.
         """
+        check_depth(self._file, changes)
         tables = self._tables
         for key, value in changes.items():
             tables = set_key(self._file, tables, key, to_builtin(value))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,12 @@ from rotfem.scene.reading import Unreadable, read_bytes
 
 #: Bytes of a scene file, at most.
 LARGEST_SCENE = 50_000_000
+
+#: Tables and lists within each other, at most; the deepest that a scene has is six: rows with a matrix in a table.
+DEEPEST = 30
+
+#: Types of values that nothing is nested in.
+PLAIN = frozenset((bool, int, float, str))
 
 _KEY = re.compile(r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
 
@@ -34,7 +40,9 @@ def read_toml(path: Path) -> dict[str, Any]:
         reason = f"not valid TOML: byte {error.start} is not UTF-8 text"
     except tomllib.TOMLDecodeError as error:
         reason = f"not valid TOML: {printable(str(error))}"
-    except (RecursionError, ValueError) as error:  # nesting without end; an integer of thousands of digits
+    except RecursionError:
+        reason = f"tables or lists are nested more than {DEEPEST} deep"
+    except ValueError as error:  # an integer of thousands of digits
         reason = f"cannot be read: {printable(str(error))}"
     raise SceneError(str(path), allowed=reason) from None
 
@@ -83,6 +91,27 @@ def set_key(file: str, data: dict[str, Any], key: str, value: Any) -> dict[str, 
     else:
         table[last] = value
     return result
+
+
+def check_depth(file: str, data: Any) -> None:
+    """Refuse tables and lists that are nested deeper than a scene can be.
+
+    Raises:
+        SceneError: they are; names the key they are in.
+    """
+    for key, value in data.items():
+        level, depth = [value], 0
+        while level := [entry for one in level for entry in _entries(one) if type(entry) not in PLAIN]:
+            depth += 1
+            if depth > DEEPEST:
+                raise SceneError(file, str(key), allowed=f"is nested more than {DEEPEST} deep")
+
+
+def _entries(value: Any) -> Iterable[Any]:
+    """Return what is in a table or list; nothing of anything else."""
+    if isinstance(value, list | tuple):
+        return value
+    return value.values() if isinstance(value, Mapping) else ()
 
 
 def encodable(text: str) -> str:

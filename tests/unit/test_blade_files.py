@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 import rotfem
 from rotfem.scene import Scene
+from rotfem.scene.blades.windio import MOST_YAML
 from tests import blade_decks as decks
 from tests import blade_main_decks as mains
 from tests.blade_scenes import RIGID, STIFF, blade, read
@@ -290,6 +292,24 @@ def test_windio_2(tmp_path: Path) -> None:
     (tmp_path / "heavy.yaml").write_text(heavy)
     beam = read(tmp_path, "heavy.yaml")
     assert [(body.x, body.mass) for body in beam.masses] == [(pytest.approx(8.0), 120.0), (beam.length, 5.0)]
+
+
+@pytest.mark.parametrize("fast", [True, False])
+def test_yaml_is_read_alike_with_libyaml_and_without(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fast: bool
+) -> None:
+    """What takes longer than ten seconds is refused, without it sooner."""
+    if fast and not yaml.__with_libyaml__:
+        pytest.skip("PyYAML has no libyaml here")
+    monkeypatch.setattr(yaml, "__with_libyaml__", fast)
+    (tmp_path / "blade.yaml").write_text(decks.windio().replace("name: small", "name: &axis small\nother: *axis"))
+    assert read(tmp_path, "blade.yaml").length == pytest.approx(decks.LENGTH, rel=1e-12)
+    (tmp_path / "blade.yaml").write_text(decks.windio().replace("[", "[[", 1))
+    with pytest.raises(rotfem.SceneError, match=r"line \d+.*not valid YAML"):
+        read(tmp_path, "blade.yaml")
+    (tmp_path / "blade.yaml").write_text(decks.windio() + "#" * MOST_YAML[fast])
+    with pytest.raises(rotfem.SceneError, match=f"of YAML at most {MOST_YAML[fast]} are read"):
+        read(tmp_path, "blade.yaml")
 
 
 def test_an_anchor_may_be_named_again(tmp_path: Path) -> None:

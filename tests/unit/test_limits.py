@@ -15,6 +15,7 @@ import rotfem
 from rotfem.errors import InputError, Problem, SceneError, printable, show
 from rotfem.scene import Scene, load_scene
 from rotfem.scene.reading import Unreadable, read_bytes
+from rotfem.scene.toml import DEEPEST
 from rotfem.structures.memory import check_memory
 
 SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6e-4}
@@ -156,6 +157,29 @@ def test_no_message_shows_the_content_of_another_file(tmp_path: Path, content: s
         load_scene(tmp_path / "beam.toml")
     assert content.strip().splitlines()[0] not in str(caught.value)
     assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[{}]\n".format(".".join("a" * 5000)),
+        ".".join("a" * 5000) + " = 1\n",
+        "a = " + "[" * 40 + "]" * 40,
+        "a = " + "[" * 5000,
+    ],
+)
+def test_what_is_nested_without_end_is_refused_in_words(tmp_path: Path, text: str) -> None:
+    (tmp_path / "beam.toml").write_text(text)
+    with pytest.raises(SceneError, match=f"nested more than {DEEPEST} deep"):
+        load_scene(tmp_path / "beam.toml")
+
+
+def test_tables_of_a_script_are_not_nested_without_end_either() -> None:
+    nested: dict[str, Any] = {}
+    for _ in range(5000):
+        nested = {"a": nested}
+    with pytest.raises(SceneError, match=f"structure: is nested more than {DEEPEST} deep"):
+        Scene.from_dict({"structure": nested})
 
 
 def test_values_are_shown_briefly_and_in_one_line() -> None:
