@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 
 from tests import blade_decks as decks
+from tests import blade_main_decks as mains
+from tests.blade_scenes import RIGID
 
 SCENE = """\
 [structure]
@@ -40,6 +42,15 @@ def test_import_and_check(rotfem: Callable[..., Any], folder: Path) -> None:
     assert {path.name for path in (folder / "out").iterdir()} >= {"check.csv", "check.png", "summary.json"}
 
 
+def test_import_says_what_it_leaves_out(rotfem: Callable[..., Any], folder: Path) -> None:
+    (folder / "blade.dat").write_text(decks.elastodyn())
+    (folder / "main.dat").write_text(mains.elastodyn_main() + "12.0 RotSpeed - (rpm)\n")
+    given = [part for key in RIGID for part in ("--set", f"structure.section.{key}=1e12")]
+    done = rotfem("import", "main.dat", "-o", "blade.toml", *given)
+    assert done.status == 0
+    assert done.err == ("hint: main.dat: left out: RotSpeed = 12 rpm = 1.25664 rad/s; motion.speed is the key for it\n")
+
+
 def test_check_of_a_beam_as_json(rotfem: Callable[..., Any]) -> None:
     done = rotfem("check", "beam.toml", "--json", "--no-plots")
     assert json.loads(done.out)["mass"] == pytest.approx(4.0, rel=1e-12)
@@ -52,7 +63,7 @@ def test_check_of_a_beam_as_json(rotfem: Callable[..., Any]) -> None:
         (("beam.toml", "-o", "x.toml"), "does not say which format it has"),
         (("Blade.dat", "-o", "x.toml"), "structure.section: must have EA, GA2, GA3, GJ"),
         (("Blade.dat", "-o", "x.toml", "--format", "hawk2"), 'did you mean "hawc2"'),
-        (("Blade.dat", "-o", "none/x.toml"), "there is no folder"),
+        (("Blade.st", "-o", "none/x.toml"), "there is no folder"),
         (("Blade.dat", "-o", "x.toml", "--set", "structure"), "must have the form"),
     ],
 )
@@ -60,6 +71,7 @@ def test_what_cannot_be_imported(
     rotfem: Callable[..., Any], folder: Path, arguments: tuple[str, ...], message: str
 ) -> None:
     (folder / "Blade.dat").write_text(decks.elastodyn())
+    (folder / "Blade.st").write_text(decks.hawc2(False))
     done = rotfem("import", *arguments)
     assert done.status == 2
     assert message in done.err

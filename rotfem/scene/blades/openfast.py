@@ -90,7 +90,7 @@ def _is_main(deck: Deck) -> bool:
 def _elastodyn(deck: Deck, asked: Asked) -> dict[str, Any]:
     """Return section, pretwist and damping; of a main file length, root and tip mass too."""
     if not _is_main(deck):
-        return _blade(deck, asked, asked.length(deck, "BlFract is a part of TipRad − HubRad of ElastoDyn's main file"))
+        return _blade(deck, asked)
     length, place = deck.number("TipRad") - deck.number("HubRad"), _root(deck, asked)
     blade = deck.file("BldFile1" if deck.has("BldFile1") else "BldFile(1)")
     return {"length": length, **place, "tip_mass": _tip_mass(deck), **_blade(blade, asked, length)}
@@ -118,8 +118,8 @@ def _root(deck: Deck, asked: Asked) -> dict[str, Any]:
     return keys if pitch == 0.0 else keys | {"root": {"pitch": -float(np.radians(pitch))}}
 
 
-def _blade(deck: Deck, asked: Asked, length: float) -> dict[str, Any]:
-    """Return section, pretwist and damping of a blade file; other stiffness is the scene's."""
+def _blade(deck: Deck, asked: Asked, length: float | None = None) -> dict[str, Any]:
+    """Return section, pretwist and damping of a blade file; the scene has other stiffness, and a length (m) of None."""
     count = deck.count("NBlInpSt", 2)
     factors = {name: deck.number(name) for name in ("AdjBlMs", "AdjFlSt", "AdjEdSt")}
     head = deck.find("BlFract BMassDen")
@@ -128,6 +128,8 @@ def _blade(deck: Deck, asked: Asked, length: float) -> dict[str, Any]:
     taken = {key: table[name] for name, key in TAKEN.items() if name in table and np.all(table[name] > 0.0)}
     without = [key for key in ("EA", "GA2", "GA3", "GJ") if key not in taken]
     asked.needs(deck, tuple(without), "blades of ElastoDyn do not stretch, shear or twist")
+    if length is None:
+        length = asked.length(deck, "BlFract is a part of TipRad − HubRad of ElastoDyn's main file")
     if left := [name for name in LEFT_OUT if name in table and np.any(table[name] != 0.0)]:
         asked.leaves_out(deck, f"{', '.join(left)}, without which ElastoDyn computes")
     section = {
