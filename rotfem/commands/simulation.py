@@ -106,9 +106,10 @@ class Simulation:
     def _of_active_unknowns(self, problem: Problem) -> Problem:
         """Return the problem of a history without the unknowns that symmetry keeps at zero."""
         model, initial = self.scene.model, self.scene.initial
-        if self.scene.time is None or model.all_unknowns or model.reduced or initial.moves:
+        undisturbed = not initial.moves and initial.tip_displacement is None
+        if self.scene.time is None or model.all_unknowns or model.reduced or not undisturbed:
             return problem
-        return problem.replace(inactive=inactive_unknowns(problem, initial.tip_displacement is not None))
+        return problem.replace(inactive=inactive_unknowns(problem))
 
     def run(self, progress: Progress | None = None) -> RunResult:
         """Return the result of the scene (see `rotfem.run`).

@@ -27,13 +27,13 @@ from rotfem.structures import STRUCTURES
 Array = npt.NDArray[np.float64]
 
 
-def inactive_unknowns(problem: Problem, released: bool = False) -> tuple[str, ...]:
+def inactive_unknowns(problem: Problem) -> tuple[str, ...]:
     """Return the names of the unknowns that stay zero at all times of a history; empty where none is known to.
+
+    The history starts undeformed, or in balance with what acts at t = 0.
 
     Args:
         problem: what is to be computed, all unknowns in it.
-        released: whether it starts from the static shape under a force in direction 2, else undeformed or in balance
-            with what acts at t = 0.
     """
     structure: Any = STRUCTURES[problem.structure.type]
     if not _is_built_in(problem) or problem.frame != "rotating" or problem.motion.pitch is not None:
@@ -41,8 +41,6 @@ def inactive_unknowns(problem: Problem, released: bool = False) -> tuple[str, ..
     if problem.structure.damping.has_modal:  # the modes at rest that have the ratios are those of all unknowns
         return ()
     polar, axial = directions(problem)
-    if released:
-        polar = polar | np.array([False, True, False])
     for normal, within in structure.planes.items():
         if not structure.is_symmetric(problem.structure, normal):
             continue
