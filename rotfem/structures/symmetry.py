@@ -75,10 +75,10 @@ def directions(problem: Problem) -> tuple[Array, Array]:
     """
     motion, loads = problem.motion, problem.loads
     moved = motion.is_spinning or motion.hub is not None
-    polar = (_of_base(motion) > 0.0) | (np.array((*loads.gravity, 0.0, 0.0)[:3]) != 0.0)
+    polar = (_of_base(motion) != 0.0) | (np.array((*loads.gravity, 0.0, 0.0)[:3]) != 0.0)
     axial = (np.asarray(motion.axis) != 0.0) & moved
     for name, load in named(loads).items():
-        which = _of_load(load) > 0.0
+        which = _of_load(load) != 0.0
         polar, axial = (polar, axial | which) if is_moment(name) else (polar | which, axial)
     return polar, axial
 

@@ -63,11 +63,24 @@ def spun(axis: list[float], speed: float = 2.0) -> dict[str, Any]:
 
 TORQUE = {"type": "torque", "hub_inertia": 20.0, "pulses": [[0.0, 0.1, 100.0]]}
 STILL = {"type": "constant", "speed": 0.0}
+SWEPT = BEAM | {"sweep": [[0.0, 0.1], [10.0, 0.3]], "tip_mass": 1.0, "tip_offset": [0.1, 0.2, 0.0]}
+CONED = BEAM | {
+    "precone": 0.1,
+    "section": BEAM["section"] | {"mass_center": [0.0, 0.1], "tension_center": [0.0, 0.05]},
+}
 WITHIN_PLANE = {"u3", "theta1", "theta2"}
 LEFT_OUT = {
     "in the plane of rotation": (BEAM, "reissner", spun([0, 0, 1]), {"loads": {"tip_force": WITHIN}}, WITHIN_PLANE),
     "across it": (BEAM, "von_karman", spun([0, 1, 0]), {"loads": {"tip_force": ACROSS}}, {"u2", "theta1", "theta3"}),
     "prestressed": (BEAM, "consistent_linear", spun([0, 0, -1]), {}, WITHIN_PLANE),
+    "swept, with a body on an arm": (
+        SWEPT,
+        "consistent_linear",
+        spun([0, 0, 1]),
+        {"loads": {"tip_force": WITHIN}},
+        WITHIN_PLANE,
+    ),
+    "coned, with centres of its own": (CONED, "consistent_linear", spun([0, 1, 0]), {}, {"u2", "theta1", "theta3"}),
     "adaptive steps and stations": (
         BEAM,
         "reissner",
@@ -97,7 +110,13 @@ LEFT_OUT = {
 
 
 #: Of the beams one in every run: each has forms of its own, with all unknowns and without some.
-SELDOM = ("across it", "prestressed", "free hub, adaptive steps", "sprung about another axis")
+SELDOM = (
+    "across it",
+    "prestressed",
+    "coned, with centres of its own",
+    "free hub, adaptive steps",
+    "sprung about another axis",
+)
 
 
 @pytest.mark.parametrize("case", [pytest.param(c, marks=pytest.mark.nightly) if c in SELDOM else c for c in LEFT_OUT])
@@ -123,9 +142,17 @@ def test_the_motion_is_that_with_all_unknowns(case: str) -> None:
 COUPLED = np.diag([2.8e7, 1e7, 1e7, 1e4, 1.4e4, 2e4])
 COUPLED[3, 5] = COUPLED[5, 3] = 1e-3 * 1e4
 MASS = np.diag([1.2, 1.2, 1.2, 1.5e-3, 6e-4, 9e-4])
+LINED = {key: value for key, value in BEAM.items() if key != "length"} | {"line": [[0, 0, 0], [5, 0, 0], [10, 0, 1]]}
 STIRRED = {
     "an axis beside the normal": (BEAM, {"motion": spun([0, 0.01, 1])}),
     "a load across": (BEAM, {"loads": {"tip_force": ACROSS}}),
+    "a moment about an axis in the plane": (BEAM, {"loads": {"tip_moment": [0.0, 1.0, 0.0]}}),
+    "a moment per length about one": (BEAM, {"loads": {"distributed_moment": [1.0, 0.0, 0.0]}}),
+    "sweep out of the plane": (BEAM | {"sweep": 0.1}, {"motion": spun([0, 1, 0])}),
+    "precone out of the plane": (BEAM | {"precone": 0.1}, {}),
+    "a pitched root": (BEAM | {"root": {"pitch": 0.1}}, {}),
+    "a line out of the plane": (LINED, {}),
+    "damping by mode": (BEAM | {"damping": {"modal": 0.01}}, {}),
     "gravity across": (BEAM, {"loads": {"gravity": [0.0, 0.0, -9.81]}}),
     "pretwist": (BEAM | {"pretwist": 0.01}, {}),
     "a tip body beside the plane": (BEAM | {"tip_mass": 1.0, "tip_offset": [0.0, 0.0, 1e-3]}, {}),
@@ -137,6 +164,13 @@ STIRRED = {
 def found(data: dict[str, Any]) -> set[str]:
     """Return the unknowns of a scene that are known to stay zero."""
     return set(inactive_unknowns(Problem.of(as_scene(data))))
+
+
+def test_curved_and_coned_beams_keep_to_the_plane_that_holds_them() -> None:
+    """A swept beam to that of its spin, a coned one to the other, with arms and centres in the plane too."""
+    assert found(scene(SWEPT, "reissner", spun([0, 0, 1]))) == WITHIN_PLANE
+    assert found(scene(CONED, "reissner", spun([0, 1, 0]))) == {"u2", "theta1", "theta3"}
+    assert not found(scene(CONED, "reissner", spun([0, 0, 1])))
 
 
 def test_a_pressure_lets_a_plate_bend_alone() -> None:
