@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,9 @@ class StageSolver:
     def __init__(self, system: Any, newton: Newton):
         self.system, self.newton = system, newton
         self._held: Shifts | None = None
+        #: Matrices, and the stage that they are about.
         self._linearised: Any = None
+        self._about: Stage | None = None
         #: Whether Newton's way is a long one, so that tangents that know where it came from are worth compiling.
         self._far = False
         #: Whether a step was hard to solve, and whether the scheme keeps the balance of energy by itself.
@@ -69,7 +72,23 @@ class StageSolver:
             return known if known is not None and known.serves and known.datum is self.system.datum else None
         self.imbalance(stage)
         self._linearised = self.system.linearised()
+        self._about = replace(stage, q=stage.q.copy(), v=stage.v.copy(), a=stage.a.copy())
         return self._linearised
+
+    @property
+    def matrices(self) -> dict[str, Any] | None:
+        """What makes the matrices at hand again: time, q, v, a and datum that they are about, and if they serve."""
+        if self._about is None:
+            return None
+        known, about = self._linearised, self._about
+        at = {"t": about.t, "q": about.q, "v": about.v, "a": about.a}
+        return {**at, "datum": known.datum, "serves": known.serves}
+
+    def make_matrices(self, known: dict[str, Any] | None) -> None:
+        """Make matrices again from what is known of them (see `matrices`); nothing from None."""
+        if known is not None:
+            self.system.count_rotations_from(known["datum"])
+            self.linearised(Stage(known["t"], known["q"], known["v"], known["a"], 0.0, 0.0)).serves = known["serves"]
 
     def solve(self, stage: Stage, state: State) -> None:
         """Solve a stage of a step from a state, with the factor of an earlier one if that serves."""

@@ -35,6 +35,9 @@ MOVED = 1e-9
 #: What of a simulation changes while it runs, besides what its parts know themselves.
 CHANGING = ("steps", "warnings", "resumed", "_critical_since", "_exceeded")
 
+#: Attributes that are made anew from what is known of them.
+REMADE = ("_linearised", "_about")
+
 Tree = dict[str, Any]
 
 
@@ -156,8 +159,7 @@ class Memory:
             "given": state.given,
             "state": self.packing.packed({k: v for k, v in vars(state).items() if k not in ("given", "inner")}),
             "factored": self.packing.packed(run.system.held.factored),
-            "stepper": plain(run.stepper),
-            "learnt": {name: plain(part) for name, part in learning(run.stepper).items()},
+            "stepper": of_stepper(run.stepper, self.packing),
             "run": {name: getattr(run, name) for name in CHANGING},
             "seen": self.packing.packed({"farthest": run.farthest.seen, "stability": run.stability}),
             "companions": self._of_companions(),
@@ -181,15 +183,13 @@ class Memory:
         run, stepper = self.run, self.run.stepper
         assert stepper is not None
         self._check_mesh(path, tree["positions"])
-        if list(run.record.history.columns) != tree["columns"] or set(plain(stepper)) != set(tree["stepper"]):
+        if list(run.record.history.columns) != tree["columns"] or set(plain(stepper)) != set(tree["stepper"]["own"]):
             raise SceneError("command line", "--resume", path, "was written by another rotfem; start the run anew")
         state, system = State(**self.packing.unpacked(tree["state"]), given=tree["given"]), run.system.held
         restored(run.system, self.packing.unpacked(tree["factored"]), state)
         system.factored_before = tree["factorisations"] - system.factorisations
-        for target, values in ((stepper, tree["stepper"]), (run, tree["run"])):
-            vars(target).update(values)
-        for name, part in learning(stepper).items():
-            vars(part).update(tree["learnt"][name])
+        vars(run).update(tree["run"])
+        put_back_stepper(stepper, self.packing, tree["stepper"], state)
         seen = self.packing.unpacked(tree["seen"])
         run.farthest.seen, run.stability = seen["farthest"], seen["stability"]
         self._put_back_companions(tree["companions"])
@@ -220,8 +220,7 @@ class Memory:
                 "last": own.packed(companion.stepper.last),
                 "factored": own.packed(companion.system.held.factored),
                 "known": plain(companion),
-                "newton": plain(companion.stepper.newton),
-                "stepper": plain(companion.stepper),
+                "stepper": of_stepper(companion.stepper, own),
             }
             for companion, own in self._companions()
         ]
@@ -232,11 +231,10 @@ class Memory:
             if companion.state is not None:
                 companion.state.given = tree["given"]
             vars(companion).update(tree["known"])
-            vars(companion.stepper).update(tree["stepper"])
-            vars(companion.stepper.newton).update(tree["newton"])
             companion.stepper.last = own.unpacked(tree["last"])
             if companion.state is not None:
                 restored(companion.system, own.unpacked(tree["factored"]), companion.state)
+                put_back_stepper(companion.stepper, own, tree["stepper"], companion.state)
 
     def _check_mesh(self, path: Path, there: Any) -> None:
         here = self.numbering.comm.bcast(self.numbering.positions)
@@ -263,8 +261,23 @@ def record_of(name: str) -> Any:
 
 
 def learning(stepper: Stepper) -> dict[str, Any]:
-    """Return the parts of a stepper that learn from its steps, by name."""
-    return {"newton": stepper.newton, "patience": stepper.patience, "trust": stepper.trust}
+    """Return a stepper and its parts that learn from its steps, by name."""
+    return {"own": stepper, "newton": stepper.newton, "patience": stepper.patience, "trust": stepper.trust}
+
+
+def of_stepper(stepper: Stepper, packing: Packing) -> Tree:
+    """Return what a stepper has learnt, and what its matrices are about."""
+    learnt = {name: plain(part) for name, part in learning(stepper).items()}
+    return {**learnt, "matrices": packing.packed(stepper.matrices)}
+
+
+def put_back_stepper(stepper: Stepper, packing: Packing, tree: Tree, state: State) -> None:
+    """Make a stepper know what it had learnt at a state."""
+    stepper.make_matrices(packing.unpacked(tree["matrices"]))
+    stepper.system.held.count_rotations_from(state.datum)
+    stepper.system.set_time(state.t)
+    for name, part in learning(stepper).items():
+        vars(part).update(tree[name])
 
 
 def plain(thing: Any) -> Tree:
@@ -277,4 +290,4 @@ def plain(thing: Any) -> Tree:
             return all(map(is_plain, value.values()))
         return value is None or isinstance(value, bool | int | float | str | np.generic)
 
-    return {name: value for name, value in vars(thing).items() if is_plain(value)}
+    return {name: value for name, value in vars(thing).items() if name not in REMADE and is_plain(value)}
