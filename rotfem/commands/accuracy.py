@@ -1,23 +1,27 @@
-"""What a scene says of a wanted accuracy: the settings to begin with, their keys, and whether and how it is met."""
+"""An accuracy that a scene asks for: the setting to begin with, its keys, and what is said of how it was met."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable
+from time import perf_counter
+from typing import Any, TypeVar
 
-from rotfem.commands.ahead import ADAPTIVE
+from rotfem.commands.interrupts import together
 from rotfem.errors import ComputationError, SceneError
 from rotfem.mechanics.theories import theories
 from rotfem.refinement.estimate import WORDS
+from rotfem.refinement.refine import COARSE, SAFETY, Clock, Refinement, Setting, contribution, is_within, refine
 from rotfem.results.result import Result
 from rotfem.scene import Scene
-from rotfem.selection.accuracy import AIM, SHARES, Settings, part, shares
 
-#: Error that a reduced model may add to that of its theory, as a part of the accuracy.
-PROJECTED = 0.15
+R = TypeVar("R", bound=Result)
 
-#: Rows of a history that does not say it.
-ROWS = 1000
+#: What `accuracy_of` calls the moment at the root.
+ROOT_MOMENT = "root_moment"
+
+#: Rows of a history that does not say it, and scheme of its adaptive steps.
+ROWS, ADAPTIVE = 1000, "esdirk4"
 
 #: Nodes along a structure to start from, and for every mode that is wanted; along the longer edge of a plate, whose
 #: cells along the other are no fewer than FEWEST if the scene has as many.
@@ -25,11 +29,11 @@ NODES, NODES_A_MODE, NODES_OF_PLATES, FEWEST = 30, 4, 24, 3
 
 
 class Missed(ComputationError):
-    """No settings were found that meet the accuracy."""
+    """No setting was found that meets the accuracy."""
 
 
-def settings_of(scene: Scene, modes: int = 0) -> Settings:
-    """Return the settings that a scene is first computed with.
+def first_setting(scene: Scene, modes: int = 0) -> Setting:
+    """Return the setting that a scene is first computed with.
 
     Args:
         scene: with an accuracy.
@@ -42,12 +46,16 @@ def settings_of(scene: Scene, modes: int = 0) -> Settings:
             elements = mesh.elements if time is None else coarsened(mesh.elements, mesh.degree)
         else:
             elements = -(-nodes // mesh.degree)
-    return Settings(
+    assert scene.accuracy is not None
+    tolerance = scene.accuracy / SAFETY
+    if scene.accuracy_budget is not None:
+        tolerance = max(tolerance, COARSE)
+    return Setting(
         models=models_of(scene, moving=time is not None),
         elements=elements,
         degree=mesh.degree,
         scheme=None if time is None else ADAPTIVE,
-        tolerance=None if time is None else AIM * SHARES["time"] * (scene.accuracy or 0.0),
+        tolerance=None if time is None else tolerance,
     )
 
 
@@ -62,17 +70,17 @@ def models_of(scene: Scene, moving: bool) -> tuple[dict[str, Any], ...]:
     """Return the keys of [model] of the models that a scene may be computed with, from the cheapest on.
 
     The theory that a scene names is the richest of them. A history of small motions is cheapest by a reduced linear
-    model; steady states and modes cost little by any theory.
+    model; steady states and modes cost little by any theory, and moments at the root are those of the theory itself.
     """
     kind, own = scene.structure.type, scene.model.theory
     full = {"theory": own, "reduced": False, "foreshortening": False}
-    if not moving:
+    if not moving or scene.accuracy_of == ROOT_MOMENT:
         return (full,)
     named = {theory.name: theory for theory in theories() if theory.holds_for(kind)}
     linear = own if named[own].linear else next((n for n in named[own].poorer if named[n].prestress), None)
     assert scene.accuracy is not None
     gives_back = linear is not None and bool(named[linear].prestress)
-    quick = {"theory": linear, "reduced": PROJECTED * scene.accuracy, "foreshortening": gives_back}
+    quick = {"theory": linear, "reduced": scene.accuracy / (4 * SAFETY), "foreshortening": gives_back}
     return (quick, full) if linear and allows(scene, quick) else (full,)
 
 
@@ -102,18 +110,11 @@ def refuse(scene: Scene, wanted: tuple[str, ...], command: str) -> None:
         raise SceneError(scene.file, "accuracy_of", scene.accuracy_of, reason)
 
 
-def known(error: dict[str, Any]) -> bool:
-    """Return whether all parts of an error were found."""
-    return all(error.get(name, 0.0) is not None for name in SHARES)
-
-
-def changes_of(scene: Scene, settings: Settings) -> dict[str, Any]:
-    """Return the keys ↦ values that make a scene one with these settings; None removes what it says."""
-    out: dict[str, Any] = settings.changes()
+def changes_of(scene: Scene, setting: Setting) -> dict[str, Any]:
+    """Return the keys ↦ values that make a scene one with this setting; None removes what it says."""
+    out: dict[str, Any] = setting.changes()
     time = scene.time
-    if "increment_tolerance" in scene.solver.model_fields_set:  # what the user has set stays
-        out.pop("solver.increment_tolerance", None)
-    if settings.moving and time is not None:
+    if setting.moving and time is not None:
         out |= {f"time.{name}": None for name in time.parameters}
         out |= {"time.output_every": None, "time.output_step": time.output_step or time.end / ROWS}
         if time.output_step is None and time.step is not None:
@@ -121,51 +122,92 @@ def changes_of(scene: Scene, settings: Settings) -> dict[str, Any]:
     return out
 
 
-def is_met(scene: Scene, error: dict[str, Any]) -> bool:
-    """Return whether an error is known and within the accuracy of a scene."""
+def to_accuracy(scene: Scene, first: Setting, compute: Callable[[Setting], R], clock: Clock) -> R:
+    """Return the first result whose error is within the accuracy of a scene.
+
+    Args:
+        scene: with an accuracy.
+        first: setting to begin with.
+        compute: setting ↦ its result, with an `error` in its summary.
+        clock: of all of them.
+
+    Raises:
+        Missed: none was found; its attribute `result` holds the best that was reached.
+        ComputationError: nothing was reached.
+        KeyboardInterrupt: its attribute `result` holds the best that was reached, if anything was.
+    """
+    started, found = perf_counter(), Refinement[R]()
     assert scene.accuracy is not None
-    return known(error) and bool(error["total"] <= scene.accuracy)
+
+    def answer(setting: Setting) -> tuple[R, dict[str, Any]]:
+        done = compute(setting)
+        return done, done.summary["error"]
+
+    try:
+        refine(first, answer, scene.accuracy, clock, found)
+    except KeyboardInterrupt as stop:
+        if found.best is not None and together(clock.comm, stop):
+            described(scene, found, clock, started).summary["status"] = "interrupted"
+            vars(stop)["result"] = found.best.result
+        raise
+    done = described(scene, found, clock, started)
+    if not is_within(done.summary["error"], scene.accuracy):
+        raise missed(scene, done, found.failure)
+    return done
 
 
-def told(scene: Scene, settings: Settings, error: dict[str, Any], tried: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return what a summary says of how an accuracy was pursued."""
-    accuracy = scene.accuracy
+def described(scene: Scene, found: Refinement[R], clock: Clock, started: float) -> R:
+    """Return the best result, with what its summary says of how it was found."""
+    best, accuracy = found.best, scene.accuracy
+    assert best is not None
     assert accuracy is not None
-    return {
+    summary = best.result.summary
+    summary["scene"] = scene.digest()
+    summary["accuracy"] = {
         "asked": accuracy,
-        "of": scene.accuracy_of or ("tip" if "time" in error else "frequencies"),
-        "met": is_met(scene, error),
-        "estimated": error["total"],
-        "allowed": shares(error, accuracy, settings.plate),
-        "chosen": settings.summary(),
-        "attempts": tried,
+        "of": scene.accuracy_of or ("tip" if "time" in best.error else "frequencies"),
+        "met": is_within(best.error, accuracy),
+        "estimated": best.error["total"],
+        "chosen": best.setting.summary(),
+        "attempts": found.tried,
     }
+    if clock.budget is not None:
+        summary["accuracy"]["budget"] = clock.summary()
+    timings = summary["timings"]
+    timings["choice"] = max(0.0, perf_counter() - started - timings["total"])
+    timings["total"] += timings["choice"]
+    return best.result
 
 
-def missed(scene: Scene, done: Result, why: str = "", advice: str | None = None) -> Missed:
+def missed(scene: Scene, done: Result, failure: ComputationError | None) -> Missed:
     """Return the error that says what was reached instead of an accuracy.
 
     Args:
         scene: with an accuracy.
         done: the best result, whose summary says that it has failed from now on.
-        why: what ends the message, on attempts that would have been better.
-        advice: what to try; None for what the largest part of the error calls for.
+        failure: of a further answer, where one failed or was too dear.
     """
     error = done.summary["error"]
-    worst = max(WORDS, key=lambda name: part(error, name))
-    by_worst = {
+    worst = max(WORDS, key=lambda name: contribution(error, name))
+    advice = {
         "time": "a looser accuracy, or fixed steps without one",
         "space": "a looser accuracy" + (", or a finer mesh file" if scene.structure.mesh_file is not None else ""),
         "model": f"a looser accuracy, or a richer model.theory than {scene.model.theory}",
         "round_off": "a looser accuracy, or a section of less different stiffnesses",
     }[worst]
-    if error["total"] is None:
-        unknown = ", ".join(WORDS[name] for name in WORDS if error.get(name, 0.0) is None)
-        reached = f"the error of what was reached is not known ({unknown})"
+    unknown = [WORDS[name] for name in WORDS if error.get(name, 0.0) is None]
+    if unknown or error["total"] is None:
+        reached = f"the error of what was reached is not known ({', '.join(unknown)})"
     else:
-        reached = f"{error['total']:.2g} was reached, most of it ({WORDS[worst]}) {part(error, worst):.2g}"
-    failure = Missed(f"an accuracy of {scene.accuracy:g} was not met: {reached}{why}", advice=advice or by_worst)
+        share = contribution(error, worst)
+        reached = f"an error of {error['total']:.2g} was reached, most of it ({WORDS[worst]}) {share:.2g}, where an "
+        reached += f"estimate of {(scene.accuracy or 0.0) / SAFETY:.2g} is wanted"
+    why = "" if failure is None else f", and a further attempt failed: {failure.what}"
+    out = Missed(
+        f"an accuracy of {scene.accuracy:g} was not met: {reached}{why}",
+        advice=(failure.advice if failure is not None else None) or advice,
+    )
     done.summary["status"] = "failed"
-    done.summary["failure"] = {"what": failure.what, "time": None, "advice": failure.advice}
-    vars(failure)["result"] = done
-    return failure
+    done.summary["failure"] = {"what": out.what, "time": None, "advice": out.advice}
+    vars(out)["result"] = done
+    return out

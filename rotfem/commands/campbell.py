@@ -17,25 +17,23 @@ from rotfem.analysis.equilibrium import check_steady
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
-from rotfem.commands.accuracy import changes_of, refuse, settings_of
+from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy
 from rotfem.commands.error_report import error_of_modes
 from rotfem.commands.finite import check_rows
 from rotfem.commands.loads import held
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows, rough
 from rotfem.commands.modes import analysis_of, hints_of, theory_error
-from rotfem.commands.pace import Pace
 from rotfem.commands.problem import Problem, case_of
-from rotfem.commands.pursuit import pursue
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import SceneError, input_of
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Problem as ProblemData
+from rotfem.refinement.refine import Clock, Setting
 from rotfem.results import CampbellResult
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.limits import Limits
 from rotfem.scene.values import LARGEST
-from rotfem.selection.accuracy import Settings
 from rotfem.selection.distance import MODES
 from rotfem.selection.model_choice import choose
 from rotfem.units import split_unit
@@ -108,8 +106,8 @@ def campbell(
     text = speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds)
     values = parse_speeds(text, scene.limits)
 
-    def attempt(settings: Settings | None = None) -> CampbellResult:
-        started, variant = perf_counter(), scene if settings is None else scene.replace(changes_of(scene, settings))
+    def attempt(setting: Setting | None = None) -> CampbellResult:
+        started, variant = perf_counter(), scene if setting is None else scene.replace(changes_of(scene, setting))
         sweep = Diagram(variant, Problem.of(variant, terms=terms), values, comm, hint)
         return sweep.result(orders, progress or (lambda share: None), started)
 
@@ -118,7 +116,7 @@ def campbell(
         if scene.accuracy is None:
             return attempt()
         refuse(scene, ("frequencies",), "campbell")
-        return pursue(scene, settings_of(scene, scene.modes.count), attempt, Pace(scene.accuracy_budget, comm))
+        return to_accuracy(scene, first_setting(scene, scene.modes.count), attempt, Clock(scene.accuracy_budget, comm))
 
 
 class Diagram:

@@ -171,7 +171,7 @@ class Memory:
             "resultants": None if run.record.resultants is None else run.record.resultants.kept_arrays(),
             "snapshots": None if snapshots is None else self.packing.packed(vars(snapshots)),
             "choice": None if run.choice is None else vars(run.choice),
-            "settings": None if run.settings is None else vars(run.settings),
+            "settings": None if run.setting is None else vars(run.setting),
         }
 
     def put_back(self, path: Path, tree: Tree) -> State:

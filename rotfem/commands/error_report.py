@@ -16,6 +16,7 @@ from rotfem.errors import ComputationError
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.discretisation import error_by_cells, error_of_shape
+from rotfem.refinement.distance import COLUMNS, OUTPUTS, largest
 from rotfem.refinement.estimate import ErrorEstimate, percent
 from rotfem.scene import Scene
 from rotfem.selection.model_choice import Choice
@@ -31,30 +32,33 @@ NAMED = 0.1
 
 
 def error_of_run(run: Simulation) -> ErrorEstimate | None:
-    """Return the error of a run so far, relative to the largest displacement of its tip.
+    """Return the error of a run so far, relative to the largest displacement of its tip, or what `accuracy_of` names.
 
     None where it is not wanted, or nothing was computed.
     """
-    if not run.scene.output.error or not len(run.record.history):
+    wanted = run.scene.output.error or run.setting is not None
+    if not wanted or not len(run.record.history):
         return None
-    scale = largest(run.record.history.arrays())
+    of = output_of(run.scene)
+    columns = [values for name, values in run.record.history.arrays().items() if name.startswith(COLUMNS[of])]
+    scale = largest(np.column_stack(columns))
     shares: dict[str, float | None] = {"time": None, "space": None}
     found: dict[str, Any] = {"scale": scale}
     if run.reduced is not None:
         shares = {"time": run.reduced.time_error + run.reduced.projection_error, "space": _of_reduced(run, scale)}
     elif run.scene.time is None:
         assert run.last is not None
-        shares = {"time": 0.0, "space": error_of_shape(run.problem, run.system, run.last.q, lambda s: _resting(run, s))}
+        space = error_of_shape(run.problem, run.system, run.last.q, lambda s: _resting(run, s), OUTPUTS[of])
+        shares = {"time": 0.0, "space": space}
     elif run.companions is not None:
         shares = run.companions.errors(scale)
         found["time_at"] = run.companions.steps.difference[1]
     return ErrorEstimate({**shares, "model": model_share(run.theory_error, run.choice)}, found)
 
 
-def largest(history: Mapping[str, Any]) -> float:
-    """Return the largest displacement of the tip over a history, m."""
-    tip = np.array([values for name, values in history.items() if name.startswith("tip_u")])
-    return float(np.linalg.norm(tip, axis=0).max())
+def output_of(scene: Scene) -> str:
+    """Return the name of the output whose error a run of a scene estimates."""
+    return scene.accuracy_of if scene.accuracy_of in OUTPUTS else "tip"
 
 
 def _resting(run: Simulation, system: Any) -> Any:

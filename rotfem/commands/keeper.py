@@ -136,13 +136,13 @@ class Keeper:
 
         return Choice(**self._tree["choice"])
 
-    def settings(self) -> Any:
-        """Return the settings of the run that goes on, which an accuracy has led to; None where none has."""
+    def setting(self) -> Any:
+        """Return the setting of the run that goes on, which an accuracy has led to; None where none has."""
         if self._tree is None or self._tree["settings"] is None:
             return None
-        from rotfem.selection.accuracy import Settings
+        from rotfem.refinement.refine import Setting
 
-        return Settings(**self._tree["settings"])
+        return Setting(**self._tree["settings"])
 
     def interrupts(self) -> Interrupts:
         """Return the context in which a march is interrupted between steps, where that is needed."""

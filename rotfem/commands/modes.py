@@ -22,24 +22,22 @@ from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.participation import participation as masses_of
 from rotfem.analysis.stability import Stability, stability_of_pencil
 from rotfem.analysis.theory_error import TheoryCheck, TheoryError
-from rotfem.commands.accuracy import changes_of, refuse, settings_of
+from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy
 from rotfem.commands.error_report import error_of_modes
 from rotfem.commands.finite import check_rows
 from rotfem.commands.loads import held
 from rotfem.commands.mode_tables import advice, mode_tables
-from rotfem.commands.pace import Pace
 from rotfem.commands.problem import Problem, case_of
-from rotfem.commands.pursuit import pursue
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import ComputationError, SceneError, input_of
 from rotfem.listeners import Hint, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
+from rotfem.refinement.refine import Clock, Setting
 from rotfem.results import ModesResult
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.advice import advise
-from rotfem.selection.accuracy import Settings
 from rotfem.selection.distance import MODES
 from rotfem.selection.model_choice import choose
 from rotfem.structures.paraview import writer
@@ -79,8 +77,8 @@ def modes(
     if blade_tables and scene.structure.type == "plate":
         raise SceneError(scene.file, "structure.type", "plate", "mode polynomials and tables are those of beams")
 
-    def attempt(settings: Settings | None = None) -> ModesResult:
-        started, variant = perf_counter(), scene if settings is None else scene.replace(changes_of(scene, settings))
+    def attempt(setting: Setting | None = None) -> ModesResult:
+        started, variant = perf_counter(), scene if setting is None else scene.replace(changes_of(scene, setting))
         found = _modes(variant, Problem.of(variant, terms=terms), comm, sensitivities, (hint, started))
         found.blade_tables = blade_tables
         if participation:
@@ -92,7 +90,7 @@ def modes(
         if scene.accuracy is None:
             return attempt()
         refuse(scene, ("frequencies",), "modes")
-        return pursue(scene, settings_of(scene, scene.modes.count), attempt, Pace(scene.accuracy_budget, comm))
+        return to_accuracy(scene, first_setting(scene, scene.modes.count), attempt, Clock(scene.accuracy_budget, comm))
 
 
 def _modes(

@@ -58,7 +58,7 @@ def _recorded(run: Simulation, start: Array | None) -> bool:
         response = reduced_response(run.system, times_of(run.scene.time), start, accuracy)
         run.response = response
         if response.projection_error > accuracy:
-            if run.settings is not None:  # a full system of this theory costs as much as one of a richer theory
+            if run.setting is not None:  # a full system of this theory costs as much as one of a richer theory
                 raise ComputationError(
                     f"the reduced model of {response.model.size} vectors is off by {response.projection_error:.2g}"
                 )

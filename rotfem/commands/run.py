@@ -10,23 +10,19 @@ import numpy as np
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady
-from rotfem.commands.accuracy import changes_of, refuse, settings_of
-from rotfem.commands.ahead import Ahead
+from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy
 from rotfem.commands.keeper import Interval, Keeper
-from rotfem.commands.pace import Pace
 from rotfem.commands.problem import Problem, case_of
-from rotfem.commands.pursuit import pursue
 from rotfem.commands.result_folder import ResultFolder
-from rotfem.commands.root_accuracy import ROOT_MOMENT, first_settings, judged
 from rotfem.commands.simulation import Simulation
-from rotfem.errors import ComputationError, InputError, input_of
+from rotfem.errors import ComputationError, input_of
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.outputs import Functional
+from rotfem.refinement.refine import Clock, Setting
 from rotfem.results.run import RunResult
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.advice import advise
-from rotfem.selection.accuracy import Settings
 from rotfem.selection.distance import HISTORY, STEADY
 from rotfem.selection.model_choice import RangeExceeded, choose
 
@@ -116,7 +112,7 @@ def run_to_accuracy(
     terms: Mapping[str, Work] | None,
     outputs: Mapping[str, Functional] | None,
 ) -> RunResult:
-    """Return the result that meets the accuracy of a scene (see `rotfem.commands.pursuit`).
+    """Return the result that meets the accuracy of a scene (see `rotfem.refinement.refine`).
 
     Raises:
         Missed: it was not met.
@@ -124,35 +120,15 @@ def run_to_accuracy(
     """
     refuse(scene, ("tip", ROOT_MOMENT), "run")
     progress, hint = listeners
-    assert scene.accuracy is not None
-    ahead = Ahead(scene.accuracy)
-    pace = Pace(scene.accuracy_budget, keeper.comm, hint, 0.0 if scene.time is None else scene.time.end)
+    clock = Clock(scene.accuracy_budget, keeper.comm, hint)
 
-    def attempt(settings: Settings) -> RunResult:
-        variant = scene.replace(changes_of(scene, settings))
-        problem = Problem.of(variant, terms=terms, outputs=outputs)
-        try:
-            simulation = Simulation(variant, problem, keeper.comm, keeper=keeper)
-        except InputError as error:
-            if problem.theory.name == scene.model.theory:
-                raise
-            raise ComputationError(str(error)) from None  # a poorer theory that the scene does not name
-        simulation.settings, simulation.pace = settings, pace
-        try:
-            return simulation.run(progress)
-        finally:
-            ahead.look(simulation)
+    def compute(setting: Setting) -> RunResult:
+        variant = scene.replace(changes_of(scene, setting))
+        simulation = Simulation(variant, Problem.of(variant, terms=terms, outputs=outputs), keeper.comm, keeper=keeper)
+        simulation.setting, simulation.clock = setting, clock
+        return simulation.run(progress)
 
-    def aside(settings: Settings) -> RunResult:
-        variant = scene.replace(changes_of(scene, settings))
-        simulation = Simulation(variant, Problem.of(variant, terms=terms, outputs=outputs), keeper.comm)
-        simulation.pace = pace.beside
-        return simulation.run()
-
-    if scene.accuracy_of == ROOT_MOMENT:
-        first = keeper.settings() or first_settings(scene)
-        return pursue(scene, first, lambda settings: judged(settings, attempt, aside, keeper.comm), pace)
-    return pursue(scene, keeper.settings() or settings_of(scene), attempt, pace, ahead)
+    return to_accuracy(scene, keeper.setting() or first_setting(scene), compute, clock)
 
 
 def run_chosen(

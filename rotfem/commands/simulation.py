@@ -21,9 +21,8 @@ from rotfem.analysis.stability import Stability, stability_of
 from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.theory_error import Farthest, TheoryError, said_of
 from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
-from rotfem.analysis.tip_track import TipTrack
 from rotfem.commands import energy_growth
-from rotfem.commands.error_report import error_of_run, warnings_of_run
+from rotfem.commands.error_report import error_of_run, output_of, warnings_of_run
 from rotfem.commands.first_state import first_state
 from rotfem.commands.interrupts import Interrupted
 from rotfem.commands.keeper import Keeper
@@ -39,10 +38,11 @@ from rotfem.listeners import Progress
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.discretisation import HistoryErrors
+from rotfem.refinement.distance import OUTPUTS
 from rotfem.refinement.estimate import ErrorEstimate
+from rotfem.refinement.refine import Setting
 from rotfem.results.run import RunResult
 from rotfem.scene import Scene, Time
-from rotfem.selection.accuracy import Settings
 from rotfem.selection.model_choice import Choice, RangeExceeded
 from rotfem.structures.symmetry import inactive_unknowns
 
@@ -71,8 +71,8 @@ class Simulation:
         self.started = perf_counter()
         self.keeper = keeper or Keeper(comm)
         self.scene, self.comm, self.choice = scene, comm, choice
-        self.settings: Settings | None = None
-        self.pace: Callable[[int, float], None] | None = None
+        self.setting: Setting | None = None
+        self.clock: Callable[[int, float], None] | None = None
         self.warnings: list[str] = [] if choice is None else choice.upgrade_warnings()
         self.advice: list[str] = []
         if scene.time is None and problem.frame == "inertial":
@@ -96,7 +96,6 @@ class Simulation:
         self.farthest = Farthest(self.system)
         self.theory_error: TheoryError | None = None
         self.companions: HistoryErrors | None = None
-        self.track: TipTrack | None = None
         self.rows: RowTimes | None = None
         self.last: State | None = None
         self.error: ErrorEstimate | None = None
@@ -158,17 +157,16 @@ class Simulation:
             return
         march = March(self.system, scheme, steps, newton, start, rates)
         self.stepper = march.stepper
-        if self.scene.output.error:
+        if self.scene.output.error or self.setting is not None:
             self.companions = HistoryErrors(
                 self.problem,
                 self.system,
                 scheme,
                 newton,
                 lambda s: (start, rates) if self.keeper.goes_on else self.start_of(s, (start, rates)),
+                OUTPUTS[output_of(self.scene)],
             )
             self.stepper.watch = self.companions
-        if self.settings is not None:
-            self.track = self.stepper.watch = TipTrack(self.system, self.companions)
         march.reached = self.keeper.start(self)
         if time.output_step is not None:
             passed = max(len(self.record.history) - 1, 0)
@@ -216,8 +214,8 @@ class Simulation:
             progress(row.t / time.end)
         self.last = state
         self.keeper.stepped(self, state)
-        if self.pace is not None:
-            self.pace(self.steps, state.t / time.end)
+        if self.clock is not None:
+            self.clock(self.steps, state.t / time.end)
 
     # --- what is watched ---------------------------------------------------------------------------------------------
 

@@ -22,6 +22,7 @@ from rotfem.analysis.stepper import Stepper
 from rotfem.errors import ComputationError
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.carrier import carrier
+from rotfem.refinement.distance import Output, tip
 
 #: Part of the difference to which a companion is solved: an estimate has two digits.
 DIGITS = 1e-2
@@ -119,10 +120,11 @@ class Companion:
         newton: iteration control of the march that is followed.
         doubles: whether it takes two steps as one.
         further: companions that follow this one.
+        output: that the two are compared by.
 
     Attributes:
         state: reached; None before `begin`.
-        difference: largest distance of the two tips so far, m, and when, s.
+        difference: largest distance of the two outputs so far, and when, s.
         doubled: time gone in doubled steps, s.
         sound: whether all its steps could be solved.
     """
@@ -135,8 +137,9 @@ class Companion:
         newton: Newton,
         doubles: bool = True,
         further: Sequence[Companion] = (),
+        output: Output = tip,
     ):
-        self.system, self.followed, self.doubles = system, followed, doubles
+        self.system, self.followed, self.doubles, self.output = system, followed, doubles, output
         self.tolerance = newton.tolerance
         system.plain = True
         own = Newton(newton.tolerance, newton.max_iterations, foreseeing=True)
@@ -144,7 +147,6 @@ class Companion:
         self.further, self.stepper.watch = further, self._passed_on
         self.state: State | None = None
         self.difference, self.doubled, self.sound = (0.0, 0.0), 0.0, True
-        self._moves = [i for i, name in enumerate(system.structure.components) if name.startswith("u")]
         #: Steps taken note of: those that may be doubled with the next, and those whose way on is not known yet.
         self.waiting: list[Followed | None] = [None, None]
 
@@ -218,15 +220,12 @@ class Companion:
         self._compare(step.steps[-1][1])
 
     def _compare(self, there: State) -> None:
-        """Take note of the distance of the tips."""
+        """Take note of the distance of the outputs; that of tips says how well the next step is to be solved."""
         assert self.state is not None
-        self.followed.count_rotations_from(there.datum)
-        self.system.count_rotations_from(self.state.datum)
-        off = self.system.tip(self.state.q, there.t) - self.followed.tip(there.q, there.t)
-        size = float(np.linalg.norm(off[self._moves]))
+        size = float(np.linalg.norm(self.output(self.system, self.state) - self.output(self.followed, there)))
         self.sound = bool(np.isfinite(size))
         if size > self.difference[0]:
             self.difference = size, there.t
-        sizes = [c.difference[0] for c in (self, *self.further)]
+        sizes = [c.difference[0] for c in (self, *self.further)] if self.output is tip else [0.0]
         part = DIGITS * min(sizes) / self.system.structure.length
         self.stepper.newton.tolerance = max(self.tolerance, part)

@@ -25,6 +25,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import by_itself, on_other_mesh
 from rotfem.refinement.companion import Companion
+from rotfem.refinement.distance import Output, tip
 
 #: Relative difference of two answers up to which their order is believed.
 ASYMPTOTIC = 0.05
@@ -71,6 +72,7 @@ class HistoryErrors:
         scheme: of its steps.
         newton: its iteration control.
         start: what it starts from.
+        output: whose errors these are.
 
     Attributes:
         steps: companion in steps of twice the length; followed by the two others.
@@ -78,7 +80,9 @@ class HistoryErrors:
         order: companion in steps of four times the length; None where the order is certain.
     """
 
-    def __init__(self, problem: Problem, system: Any, scheme: Scheme, newton: Newton, start: Start):
+    def __init__(
+        self, problem: Problem, system: Any, scheme: Scheme, newton: Newton, start: Start, output: Output = tip
+    ):
         self.scheme = scheme
 
         def twice() -> Any:
@@ -88,11 +92,11 @@ class HistoryErrors:
         self.mesh: tuple[Companion, bool] | None = None
         self.order: Companion | None = None
         if other is not None:
-            self.mesh = Companion(other[0], same, scheme, newton, doubles=False), other[1]
+            self.mesh = Companion(other[0], same, scheme, newton, doubles=False, output=output), other[1]
         if scheme.order > CERTAIN:
-            self.order = Companion(twice(), same, scheme, newton)
+            self.order = Companion(twice(), same, scheme, newton, output=output)
         further = [*(() if self.mesh is None else self.mesh[:1]), *(() if self.order is None else (self.order,))]
-        self.steps = Companion(same, system, scheme, newton, further=further)
+        self.steps = Companion(same, system, scheme, newton, further=further, output=output)
         for companion in self.companions:
             try:
                 companion.begin(*start(companion.system))
@@ -112,7 +116,7 @@ class HistoryErrors:
         """Return the errors by the steps, `time`, and by the mesh, `space`, at the end of the march; None is unknown.
 
         Args:
-            scale: largest displacement of the tip, m.
+            scale: largest value of the output.
         """
         self.steps.finish()
         return {"time": self._of_steps(scale), "space": self._of_mesh(scale)}
@@ -140,31 +144,28 @@ class HistoryErrors:
         return error_by_cells(_relative(companion.difference[0], scale), halved)
 
 
-def error_of_shape(problem: Problem, system: Any, q: Array, solve: Callable[[Any], Array]) -> float | None:
-    """Return the relative error of an equilibrium's tip by the mesh; None where it is not known.
+def error_of_shape(
+    problem: Problem, system: Any, q: Array, solve: Callable[[Any], Array], output: Output = tip
+) -> float | None:
+    """Return the relative error of an equilibrium's output by the mesh; None where it is not known.
 
     Args:
         problem: what is computed.
         system: its system, its rotations counted as in q.
         q: the equilibrium, a local dof array.
         solve: returns the equilibrium of another system.
+        output: of a state.
     """
-    tip = _moves(system, q)
+    here = output(system, State.at_rest(system, *system.start(q.copy())))
     other = on_other_mesh(problem, system, moving=False)
     if other is None:
         return None
     coarse, halved = other
     try:
-        difference = float(np.linalg.norm(_moves(coarse, solve(coarse)) - tip))
+        there = output(coarse, State.at_rest(coarse, *coarse.start(solve(coarse))))
     except ComputationError:
         return None
-    return error_by_cells(_relative(difference, float(np.linalg.norm(tip))), halved)
-
-
-def _moves(system: Any, q: Array) -> Array:
-    """Return the displacement of the tip, m."""
-    moves = [i for i, name in enumerate(system.structure.components) if name.startswith("u")]
-    return np.asarray(system.tip(q, 0.0)[moves])
+    return error_by_cells(_relative(float(np.linalg.norm(there - here)), float(np.linalg.norm(here))), halved)
 
 
 def _relative(size: float, scale: float) -> float:

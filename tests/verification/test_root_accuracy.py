@@ -35,7 +35,7 @@ def test_the_truth_is_as_near_as_was_asked(scene: dict[str, Any], accuracy: floa
     told = result.summary["accuracy"]
     assert told["of"] == "root_moment"
     assert told["met"]
-    assert off < 2.0 * told["estimated"]
+    assert off < 3.0 * told["estimated"]  # rows between steps are interpolated besides
 
 
 def test_modes_have_none() -> None:

@@ -1,0 +1,49 @@
+"""Outputs of answers, and how far two answers are apart in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from rotfem.analysis.schemes import Array, State
+
+#: An output of a state of a system.
+Output = Callable[[Any, State], Array]
+
+
+def tip(system: Any, state: State) -> Array:
+    """Return the displacement of the tip in the frame that turns with the hub, m."""
+    system.count_rotations_from(state.datum)
+    moves = [i for i, name in enumerate(system.structure.components) if name.startswith("u")]
+    return np.asarray(system.tip(state.q, state.t)[moves])
+
+
+def root_moment(system: Any, state: State) -> Array:
+    """Return the moment of the hub on the structure at its root, N·m."""
+    system.count_rotations_from(state.datum)
+    system.set_time(state.t)
+    system.set_state(state.q, state.v, state.a)
+    return np.array([value for name, value in system.root_reaction().items() if name.startswith("m")])
+
+
+#: Outputs by the names that `accuracy_of` has for them, and how their columns of a history begin.
+OUTPUTS: dict[str, Output] = {"tip": tip, "root_moment": root_moment}
+COLUMNS = {"tip": "tip_u", "root_moment": "root_m"}
+
+
+def distance(one: Array, other: Array) -> float:
+    """Return the largest distance of two histories of an output (n, components), relative to the largest of the first.
+
+    Infinite where the first is zero and the other is not.
+    """
+    size, off = largest(one), largest(other - one)
+    if size > 0.0:
+        return off / size
+    return 0.0 if off == 0.0 else np.inf
+
+
+def largest(values: Array) -> float:
+    """Return the largest Euclidean norm of an output over a history (n, components)."""
+    return float(np.linalg.norm(values, axis=-1).max(initial=0.0))

@@ -1,0 +1,337 @@
+"""Refinement to an accuracy: from a coarse answer on, every contribution to its error by its order.
+
+An answer knows its error as the difference of two computed ones (`rotfem.refinement.discretisation`). With e the
+contribution of steps or mesh and s what it may be, the next answer has
+
+    tolerance' = tolerance · s/e,    n' = n (e/s)^{1/(k + 1)},
+
+n the number of elements of degree k; a model whose own error is too large gives way to the next richer one. The loop
+ends with the first answer whose error is within the accuracy, or where nothing left to refine would help, or where the
+next answer would take more than what is left of a budget. What one took, and how its work grows, says what the next
+one takes.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from time import process_time
+from typing import Any, Generic, Self, TypeVar
+
+from mpi4py import MPI
+
+from rotfem.errors import ComputationError
+from rotfem.listeners import Hint
+
+R = TypeVar("R")
+
+#: Factor within which estimates of errors hold (theory.md, section 18): answers are accepted with it.
+SAFETY = 2.0
+
+#: Answers at most, and least growth of a number of elements: below, the next answer would be the same one.
+MOST, GROWTH = 8, 1.25
+
+#: Part of what a contribution may be that the next answer aims at.
+AIM = 0.5
+
+#: Tolerance to begin with under a budget, so that something is reached.
+COARSE = 1e-2
+
+#: Time (s) from which an answer is announced, and part of what is left of a budget that shows how long adaptive
+#: steps take.
+LONG, SHOWN = 5.0, 1 / 3
+
+Elements = int | tuple[int, int] | None
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How an answer is computed.
+
+    Attributes:
+        models: keys of [model] of the models there are, from the cheapest to the richest, that in use first.
+        elements: number of elements, (nx, ny) of a plate; None where a mesh file says it.
+        degree: their polynomial degree.
+        scheme: of the adaptive steps of a history; None without one.
+        tolerance: of these; None without.
+    """
+
+    models: tuple[Mapping[str, Any], ...]
+    elements: Elements
+    degree: int
+    scheme: str | None = None
+    tolerance: float | None = None
+
+    @property
+    def moving(self) -> bool:
+        """Whether it is that of a history."""
+        return self.scheme is not None
+
+    @property
+    def reduced(self) -> bool:
+        """Whether the model in use is a reduced one."""
+        return bool(self.models[0].get("reduced"))
+
+    def changes(self) -> dict[str, Any]:
+        """Return the scene's keys ↦ values of this setting; None removes what the scene says."""
+        out: dict[str, Any] = {f"model.{key}": value for key, value in self.models[0].items()}
+        out |= {"mesh.degree": self.degree}
+        if self.elements is not None:
+            out["mesh.elements"] = list(self.elements) if isinstance(self.elements, tuple) else self.elements
+        if self.moving:
+            out |= {"time.scheme": self.scheme, "time.tolerance": self.tolerance, "time.step": None}
+        return out
+
+    def summary(self) -> dict[str, Any]:
+        """Return the setting as far as it is in use."""
+        unused = {"models", "scheme", "tolerance"} if self.reduced else {"models"}
+        known = {key: value for key, value in asdict(self).items() if key not in unused and value is not None}
+        return {**{key: value for key, value in self.models[0].items() if value is not None}, **known}
+
+    def words(self) -> str:
+        """Return it in words."""
+        model = f"{self.models[0]['theory']}{', reduced' if self.reduced else ''}"
+        cells = "" if self.elements is None else f", {self.elements} elements".replace("(", "").replace(")", "")
+        steps = "" if self.tolerance is None or self.reduced else f", steps to {self.tolerance:.1g} by {self.scheme}"
+        return model + steps + cells
+
+    def richer(self) -> Self | None:
+        """Return this setting with the next richer model; None if this is the richest."""
+        return replace(self, models=self.models[1:]) if len(self.models) > 1 else None
+
+    def finer(self, error: Mapping[str, Any], accuracy: float) -> Self | None:
+        """Return the setting after one whose answer has missed an accuracy; None where nothing helps.
+
+        Args:
+            error: `time`, `space` and `model` of the answer, as far as it has them; None where unknown.
+            accuracy: wanted.
+        """
+        allowed, new = (accuracy - contribution(error, "round_off")) / SAFETY, self
+        if contribution(error, "model") > AIM * allowed:
+            richer = self.richer()
+            if richer is not None:
+                return richer
+            if contribution(error, "model") >= allowed:
+                return None
+        parts = max(1, ("time" in error) + ("space" in error))
+        each = (allowed - contribution(error, "model")) / parts  # steps and mesh have the rest in equal parts
+        if each <= 0.0:
+            return None
+        if self.tolerance is not None and (error.get("time", 0.0) is None or contribution(error, "time") > each):
+            known = contribution(error, "time")
+            new = replace(new, tolerance=self.tolerance * (AIM * each / known if known > 0.0 else AIM**2))
+        if (space := contribution(error, "space")) > each or error.get("space", 0.0) is None:
+            order = 2 * self.degree if "round_off" in error else self.degree + 1  # of frequencies, of displacements
+            growth = (space / (AIM * each)) ** (1 / order) if space > 0.0 else 2.0
+            if self.elements is None:
+                return None
+            new = replace(new, elements=grown(self.elements, max(growth, GROWTH)))
+        return self.richer() if new == self else new
+
+    def work(self) -> float:
+        """Return what the time of an answer grows with: steps of a fourth-order scheme times unknowns."""
+        cells = math.prod(self.elements) if isinstance(self.elements, tuple) else self.elements or 1
+        return float(cells * (self.tolerance or 1.0) ** -0.25)
+
+
+def contribution(error: Mapping[str, Any], name: str) -> float:
+    """Return a contribution to an error; 0 of one that is unknown or not there."""
+    value = error.get(name)
+    return 0.0 if value is None else float(value)
+
+
+def is_known(error: Mapping[str, Any]) -> bool:
+    """Return whether all contributions to an error are known."""
+    return all(error.get(name, 0.0) is not None for name in ("time", "space", "model"))
+
+
+def is_within(error: Mapping[str, Any], accuracy: float) -> bool:
+    """Return whether an error is known and within an accuracy: estimates with SAFETY, a bound of round-off as it is."""
+    if not is_known(error) or error["total"] is None:
+        return False
+    bound = contribution(error, "round_off")
+    return bool(SAFETY * (error["total"] - bound) + bound <= accuracy)
+
+
+def grown(elements: int | tuple[int, int], factor: float) -> int | tuple[int, int]:
+    """Return numbers of elements that have grown by a factor."""
+    if isinstance(elements, tuple):
+        return (math.ceil(elements[0] * factor), math.ceil(elements[1] * factor))
+    return math.ceil(elements * factor)
+
+
+# --- time ------------------------------------------------------------------------------------------------------------
+
+
+def cpu_time() -> float:
+    """Return the CPU time (s) of this process and of what it called, such as compilers."""
+    called = os.times()
+    return process_time() + called.children_user + called.children_system
+
+
+#: What to do where a budget is too small.
+TOO_LITTLE = "a looser accuracy, or a larger accuracy_budget"
+
+
+class TooDear(ComputationError):
+    """An answer would take more than what is left of the budget."""
+
+
+class Clock:
+    """CPU time of the answers of a refinement, and what may be left of it.
+
+    Args:
+        budget: all may take together, s; None where there is no limit.
+        comm: of the processes that compute them; rank 0 decides for all.
+        announce: takes a line on every answer that is long; None takes none.
+    """
+
+    def __init__(self, budget: float | None, comm: MPI.Comm, announce: Hint | None = None):
+        self.budget, self.comm, self._announce = budget, comm, announce or (lambda line: None)
+        self.wanted: float | None = None
+        self._started, self._began, self._next = cpu_time(), 0.0, 1
+
+    def used(self) -> float:
+        """Return what has been used so far, s."""
+        return float(self.comm.bcast(cpu_time() - self._started))
+
+    def begin(self, words: str, number: int, predicted: float | None) -> None:
+        """Take note that an answer begins.
+
+        Args:
+            words: its setting.
+            number: of it, from 1.
+            predicted: time that it will take, s; None where nothing is known.
+
+        Raises:
+            TooDear: that is more than what is left.
+        """
+        self._began, self._next = self.used(), 1
+        if self.budget is not None and predicted is not None and predicted > self.budget - self._began:
+            raise self._dear(predicted)
+        if predicted is not None and predicted > LONG:
+            self._announce(f"answer {number}: {words}: about {predicted:.2g} s")
+
+    def __call__(self, steps: int, done: float) -> None:
+        """Take note of a step of an answer, after which a part of it is done.
+
+        Raises:
+            TooDear: the rest would take more than what is left.
+        """
+        if self.budget is None or steps < self._next:
+            return
+        self._next = steps + max(1, steps // 8)
+        left, elapsed = self.budget - self._began, self.used() - self._began
+        if elapsed > left or (elapsed > SHOWN * left and elapsed > left * done):
+            raise self._dear(elapsed / done if done > 0.0 else None)
+
+    def _dear(self, predicted: float | None) -> TooDear:
+        self.wanted = predicted
+        would = "" if predicted is None else f"the next answer would take about {predicted:.2g} s, "
+        left = max(0.0, (self.budget or 0.0) - self._began)
+        return TooDear(f"{would}{left:.2g} s of accuracy_budget are left", advice=TOO_LITTLE)
+
+    def summary(self) -> dict[str, float | None]:
+        """Return what a summary has of a budget: `seconds`, `used` and `wanted`, of the answer that was too dear."""
+        return {"seconds": self.budget, "used": self.used(), "wanted": self.wanted}
+
+
+# --- the loop --------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Answer(Generic[R]):
+    """A computed answer.
+
+    Attributes:
+        setting: how it was computed.
+        error: `time`, `space`, `model`, … and `total`, relative.
+        seconds: CPU time that it took.
+        result: what was computed.
+    """
+
+    setting: Setting
+    error: Mapping[str, Any]
+    seconds: float
+    result: R
+
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """By what answers are better: those whose error is known come first, by their error."""
+        total = self.error["total"]
+        return (not is_known(self.error), math.inf if total is None else total)
+
+
+@dataclass
+class Refinement(Generic[R]):
+    """What a refinement has led to.
+
+    Attributes:
+        tried: settings and errors of all answers.
+        best: the best of them; None before the first.
+        failure: what ended it before its accuracy was met, where something failed or was too dear.
+    """
+
+    tried: list[dict[str, Any]] = field(default_factory=list)
+    best: Answer[R] | None = None
+    failure: ComputationError | None = None
+
+    def take(self, answer: Answer[R]) -> None:
+        """Take note of an answer."""
+        self.tried.append({**answer.setting.summary(), "error": answer.error["total"], "seconds": answer.seconds})
+        if self.best is None or answer.rank <= self.best.rank:
+            self.best = answer
+
+
+def refine(
+    first: Setting,
+    compute: Callable[[Setting], tuple[R, Mapping[str, Any]]],
+    accuracy: float,
+    clock: Clock,
+    found: Refinement[R] | None = None,
+) -> Refinement[R]:
+    """Return the answers up to the first whose error is within an accuracy, or as far as they go.
+
+    Args:
+        first: setting to begin with.
+        compute: setting ↦ result and its error.
+        accuracy: wanted.
+        clock: of all answers.
+        found: where they are noted, for whom an interrupt leaves them.
+
+    Raises:
+        ComputationError: no answer was found.
+    """
+    found = Refinement() if found is None else found
+    following: Setting | None = first
+    while following is not None and len(found.tried) < MOST:
+        setting, following, began = following, None, clock.used()
+        try:
+            clock.begin(setting.words(), len(found.tried) + 1, predicted(found, setting))
+            result, error = compute(setting)
+        except ComputationError as failure:
+            found.tried.append({**setting.summary(), "failed": failure.what, "seconds": clock.used() - began})
+            following = None if isinstance(failure, TooDear) else setting.richer()
+            if following is None:
+                if found.best is None or (found.best.setting.models != setting.models and not within_budget(failure)):
+                    raise
+                found.failure = failure
+            continue
+        found.take(Answer(setting, error, clock.used() - began, result))
+        if not is_within(error, accuracy):
+            following = clock.comm.bcast(setting.finer(error, accuracy))
+    return found
+
+
+def within_budget(failure: ComputationError) -> bool:
+    """Return whether something failed for want of time, so that what was reached before stands."""
+    return isinstance(failure, TooDear)
+
+
+def predicted(found: Refinement[Any], setting: Setting) -> float | None:
+    """Return the time (s) that an answer takes, from the last one of the same model; None where there is none."""
+    if found.best is None or found.best.setting.models != setting.models:
+        return None
+    return found.best.seconds * setting.work() / found.best.setting.work()

@@ -1,0 +1,200 @@
+"""What follows an answer that misses an accuracy, and what is left where there is no next one; nothing is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from rotfem.commands.accuracy import Missed, to_accuracy
+from rotfem.errors import ComputationError
+from rotfem.refinement.distance import distance
+from rotfem.refinement.refine import MOST, SAFETY, Clock, Refinement, Setting, TooDear, refine
+from rotfem.scene import Scene
+from tests.beams import STRUCTURE
+
+SCENE = Scene.from_dict(
+    {
+        **{"accuracy": 1e-3, "structure": STRUCTURE, "time": {"end": 1.0}},
+        "motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0},
+    }
+)
+LINEAR, FULL = ({"theory": name, "reduced": False} for name in ("consistent_linear", "reissner"))
+SETTING = Setting((FULL,), 6, 3, "esdirk4", 1e-2)
+
+
+def result(total: float | None, **parts: float | None) -> Any:
+    """Return something with the summary of a result that has such an error."""
+    error = {"time": total, "space": 0.0, "model": 0.0, **parts, "total": total}
+    return SimpleNamespace(summary={"status": "done", "error": error, "timings": {"total": 1.0}})
+
+
+def attempts(*outcomes: Any) -> tuple[list[Setting], Callable[[Setting], Any]]:
+    """Return settings that are asked for, which grow, and what gives these outcomes one after the other."""
+    asked: list[Setting] = []
+
+    def attempt(setting: Setting) -> Any:
+        asked.append(setting)
+        outcome = outcomes[len(asked) - 1]
+        if isinstance(outcome, BaseException):
+            raise outcome
+        return outcome
+
+    return asked, attempt
+
+
+def clock(budget: float | None = None) -> Clock:
+    return Clock(budget, MPI.COMM_SELF)
+
+
+def test_distance_is_a_distance() -> None:
+    """Zero of equal ones, relative to the first, infinite from nothing to something; the triangle inequality."""
+    rng = np.random.default_rng(1)
+    a, b, c = rng.normal(size=(3, 20, 2))
+    assert distance(a, a) == 0.0
+    assert distance(a, 3 * a) == pytest.approx(2.0)
+    assert distance(0 * a, a) == np.inf
+    scale = np.linalg.norm(a, axis=1).max()
+    assert distance(a, c) <= distance(a, b) + distance(b, c) * np.linalg.norm(b, axis=1).max() / scale
+
+
+@pytest.mark.parametrize(("order", "constant"), [(1.0, 3.0), (1.0, 300.0)])
+def test_promise(order: float, constant: float) -> None:
+    """Of answers whose error is c·tolerance + C·n^{-4}, estimated within SAFETY, the last one is within the accuracy.
+
+    However much the error is under-estimated, up to that factor.
+    """
+
+    def compute(setting: Setting) -> Any:
+        assert setting.tolerance is not None
+        assert isinstance(setting.elements, int)
+        time, space = constant * setting.tolerance**order, 50.0 * setting.elements**-4.0
+        return time + space, {k: v / SAFETY for k, v in {"time": time, "space": space, "total": time + space}.items()}
+
+    found = refine(SETTING, compute, 1e-4, clock())
+    assert found.best is not None
+    assert found.best.result <= 1e-4
+    assert len(found.tried) <= 4
+
+
+def test_the_largest_contribution_is_refined_by_its_order() -> None:
+    """Steps by their tolerance, elements of degree k by the power 1/(k + 1), a model by the next richer one."""
+    steps = SETTING.finer({"time": 0.1, "space": 0.0, "total": 0.1}, 1e-3)
+    assert steps is not None
+    assert steps.tolerance == pytest.approx(1e-2 * 0.25e-3 * 0.5 / 0.1)
+    assert steps.elements == 6
+    mesh = SETTING.finer({"time": 0.0, "space": 2e-3, "total": 2e-3}, 1e-3)
+    assert mesh is not None
+    assert mesh.elements == int(np.ceil(6 * 16 ** (1 / 4)))
+    assert mesh.tolerance == 1e-2
+    poor = Setting((LINEAR, FULL), 6, 3, "esdirk4", 1e-2)
+    assert poor.finer({"model": 0.5, "total": 0.5}, 1e-3) == SETTING
+    assert SETTING.finer({"model": 0.5, "total": 0.5}, 1e-3) is None
+    file = Setting((FULL,), None, 2, "esdirk4", 1e-2)
+    assert file.finer({"time": 0.0, "space": 0.1, "total": 0.1}, 1e-3) is None
+
+
+def test_the_first_that_meets_it_is_returned() -> None:
+    good = result(4e-4)
+    asked, attempt = attempts(result(1.6e-2), good)
+    assert to_accuracy(SCENE, SETTING, attempt, clock()) is good
+    assert asked[1].tolerance is not None
+    assert asked[1].tolerance < 1e-2
+    told = good.summary["accuracy"]
+    assert told["met"]
+    assert [tried["error"] for tried in told["attempts"]] == [1.6e-2, 4e-4]
+
+
+def test_a_failure_in_finer_steps_leaves_what_was_reached() -> None:
+    """The same model had answered, so what fails in shorter steps is no motion that ends; the failure is said."""
+    reached = result(2e-3)
+    with pytest.raises(Missed, match=r"0\.002 was reached, .* a further attempt failed: no convergence") as caught:
+        to_accuracy(SCENE, SETTING, attempts(reached, ComputationError("no convergence", advice="x"))[1], clock())
+    assert vars(caught.value)["result"] is reached
+    assert reached.summary["status"] == "failed"
+    assert reached.summary["failure"]["advice"] == caught.value.advice == "x"
+
+
+def test_a_failure_of_a_richer_model_stands() -> None:
+    """A poorer one may not feel what ends the motion."""
+    linear = Setting((LINEAR, FULL), 6, 3, "esdirk4", 1e-2)
+    asked, attempt = attempts(result(0.5, time=0.0, model=0.5), ComputationError("it buckles"))
+    with pytest.raises(ComputationError, match="it buckles") as caught:
+        to_accuracy(SCENE, linear, attempt, clock())
+    assert not isinstance(caught.value, Missed)
+    assert asked[1].models == (FULL,)
+
+
+def test_what_interrupts_an_answer_has_the_best_result_before() -> None:
+    """Whatever of the next answer is there: it is not whole. Before the first one there is nothing."""
+    reached, stop = result(2e-3), KeyboardInterrupt()
+    vars(stop)["result"] = result(None)
+    with pytest.raises(KeyboardInterrupt):
+        to_accuracy(SCENE, SETTING, attempts(reached, stop)[1], clock())
+    assert vars(stop)["result"] is reached
+    assert reached.summary["status"] == "interrupted"
+    assert not reached.summary["accuracy"]["met"]
+    first = KeyboardInterrupt()
+    with pytest.raises(KeyboardInterrupt):
+        to_accuracy(SCENE, SETTING, attempts(first)[1], clock())
+    assert not hasattr(first, "result")
+
+
+def test_what_is_too_dear_is_said_with_what_to_try(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first answer takes 10 s; the second would take more than what is left of 12 s, and is not begun."""
+    now = [0.0]
+    monkeypatch.setattr("rotfem.refinement.refine.cpu_time", lambda: now[0])
+    reached, budget = result(2e-3), clock(12.0)
+
+    def attempt(setting: Setting) -> Any:
+        now[0] += 10.0
+        return reached
+
+    with pytest.raises(Missed, match="accuracy_budget are left") as caught:
+        to_accuracy(SCENE, SETTING, attempt, budget)
+    assert "accuracy_budget" in caught.value.advice
+    assert reached.summary["accuracy"]["budget"]["wanted"] > 10.0
+    with pytest.raises(TooDear):  # nothing was reached
+        to_accuracy(SCENE, SETTING, attempts(TooDear("nothing is left"))[1], clock(60.0))
+
+
+def test_an_answer_that_is_too_dear_ends_while_it_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A third of what is left has shown that the rest would take three times that."""
+    now = [0.0]
+    monkeypatch.setattr("rotfem.refinement.refine.cpu_time", lambda: now[0])
+    budget = clock(30.0)
+    budget.begin("x", 1, None)
+
+    def march() -> None:
+        for steps in range(100):
+            now[0] += 1.0
+            budget(steps, steps / 100)
+
+    with pytest.raises(TooDear):
+        march()
+    assert now[0] < 20.0
+
+
+def test_answers_end() -> None:
+    """Each three quarters of the one before: never met."""
+    asked, attempt = attempts(*(result(0.75**i) for i in range(2 * MOST)))
+    with pytest.raises(Missed):
+        to_accuracy(SCENE, SETTING, attempt, clock())
+    assert len(asked) == MOST
+
+
+def test_an_unknown_error_is_said_to_be_unknown() -> None:
+    with pytest.raises(Missed, match=r"the error of what was reached is not known \(steps\)"):
+        to_accuracy(SCENE, SETTING, attempts(*[result(None)] * MOST)[1], clock())
+
+
+def test_the_best_is_the_one_that_is_known() -> None:
+    found: Refinement[str] = refine(
+        SETTING, attempts(("a", result(None).summary["error"]), ("b", result(1e-5).summary["error"]))[1], 1e-3, clock()
+    )
+    assert found.best is not None
+    assert found.best.result == "b"
