@@ -88,6 +88,24 @@ def test_bmodes(tmp_path: Path) -> None:
     assert main.section.central(0.0)["mass_per_length"] == pytest.approx(600.0)
 
 
+def test_columns_of_hawc2_are_interpolated_before_their_products(tmp_path: Path) -> None:
+    """Young's modulus and area are linear between rows, and so EA is not."""
+    head, last = decks.hawc2(False).rstrip("\n").rsplit("\n", 1)
+    columns = last.split()
+    columns[8] = f"{4.0 * float(columns[8]):.16e}"
+    section = blade(tmp_path, f"{head}\n{' '.join(columns)}\n", "blade.st").section
+    rows = np.array([head.rsplit("\n", 1)[1].split(), columns], dtype=float)
+
+    def products(x: float) -> dict[str, float]:
+        row = rows[0] + (rows[1] - rows[0]) * x / decks.LENGTH
+        return {"EA": row[8] * row[15], "EI2": row[8] * row[10], "rotary_inertia3": row[1] * row[5] ** 2}
+
+    for x in np.linspace(0.0, decks.LENGTH, 23):
+        for key, middle in products(decks.LENGTH / 2).items():
+            assert section.central(x)[key] == pytest.approx(products(x)[key], abs=1.2e-4 * middle)
+    assert 20 < len(section.EA) < 200
+
+
 # --- what is wrong is said, with its place --------------------------------------------------------------------------
 
 LENGTH = {"structure_length": decks.LENGTH}

@@ -63,6 +63,9 @@ POSITIVE = (
 #: one blade; r often counts along its straight axis, which is shorter than a prebent line.
 LONGER, SAID = 1e-2, 1e-6
 
+#: Part of its middle value by which a product of columns may be off between rows: a frequency goes with its root.
+PRODUCT = 1e-4
+
 #: Files within files, at most.
 DEEPEST = 8
 
@@ -186,14 +189,22 @@ def _parts(deck: Deck) -> dict[tuple[int, int], tuple[int, int]]:
 
 
 def _section(table: dict[str, Array]) -> dict[str, Any]:
-    """Return the section of columns; with centres as properties about them, which vary between rows as columns do."""
-    r = table["r"]
+    """Return the section of columns: with full matrices, or properties about centres, linear between rows."""
     if "K11" in table:
-        rows = [{name: float(values[i]) for name, values in table.items()} for i in range(len(r))]
+        rows = [{name: float(values[i]) for name, values in table.items()} for i in range(len(table["r"]))]
         matrices = {"stiffness": [_stiffness(row) for row in rows], "mass": [_mass(row) for row in rows]}
-        return {name: rows_over(r, np.array(found)) for name, found in matrices.items()}
+        return {name: rows_over(table["r"], np.array(found)) for name, found in matrices.items()}
+    table = _with_rows_between(table)
+    centres = {"mass_center": "cg", "shear_center": "sh", "tension_center": "e"}
+    points = {key: np.stack([table[f"x_{at}"], table[f"y_{at}"]], axis=-1) for key, at in centres.items()}
+    other = points | {"principal_angle": np.radians(table["pitch"])}
+    return {key: rows_over(table["r"], values) for key, values in (_products(table) | other).items()}
+
+
+def _products(table: dict[str, Array]) -> dict[str, Array]:
+    """Return the properties that are products of columns with centres."""
     m, E, GA = table["m"], table["E"], table["G"] * table["A"]
-    properties = {
+    return {
         "EA": E * table["A"],
         "GA2": table["k_x"] * GA,
         "GA3": table["k_y"] * GA,
@@ -203,11 +214,21 @@ def _section(table: dict[str, Array]) -> dict[str, Any]:
         "mass_per_length": m,
         "rotary_inertia2": m * table["ri_x"] ** 2,
         "rotary_inertia3": m * table["ri_y"] ** 2,
-        "principal_angle": np.radians(table["pitch"]),
     }
-    centres = {"mass_center": "cg", "shear_center": "sh", "tension_center": "e"}
-    points = {key: np.stack([table[f"x_{at}"], table[f"y_{at}"]], axis=-1) for key, at in centres.items()}
-    return {key: rows_over(r, values) for key, values in (properties | points).items()}
+
+
+def _with_rows_between(table: dict[str, Array]) -> dict[str, Array]:
+    """Return columns with so many rows between theirs that products which are linear there are right to PRODUCT.
+
+    Columns are linear between rows, so a product of two, linear between n parts, is off by 1/n² of what it is by one.
+    """
+    r = table["r"]
+    ends, middle = _products(table), _products({name: (c[1:] + c[:-1]) / 2 for name, c in table.items()})
+    off = np.max([np.abs((ends[key][1:] + ends[key][:-1]) / (2 * middle[key]) - 1.0) for key in ends], axis=0)
+    parts = np.maximum(1, np.ceil(np.sqrt(off / PRODUCT))).astype(int)
+    x = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(r[:-1], r[1:], parts, strict=True)]
+    places = np.append(np.concatenate(x), r[-1])
+    return {name: np.interp(places, r, column) for name, column in table.items()} | {"r": places}
 
 
 def _stiffness(row: dict[str, float]) -> Array:
