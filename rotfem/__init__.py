@@ -2,7 +2,8 @@
 
 One noun, the scene (`Scene`, `load_scene`), and verbs on it (`check`, `run`, `modes`, `campbell`, `response`,
 `explain`, `cost`); between scene and equations stands the `Problem`, which a script can build too. `register` adds a
-`Theory`, `Effect`, `Scheme`, `Shape` or `Output` of a user's own. What computes loads FEniCSx when first used.
+`Theory`, `Effect`, `Scheme`, `MotionLaw`, `DampingModel`, `StructureKind`, `Shape`, `Output` or
+`BladeFormat` of a user's own. What computes loads FEniCSx when first used.
 """
 
 from __future__ import annotations
@@ -29,8 +30,9 @@ if TYPE_CHECKING:
     from rotfem.commands.problem import Problem
     from rotfem.commands.response import response
     from rotfem.commands.run import run
-    from rotfem.mechanics.effects import Effect
+    from rotfem.mechanics.effects import DampingModel, Effect
     from rotfem.mechanics.free_hub import FreeHub, Torque
+    from rotfem.mechanics.laws import MotionLaw
     from rotfem.mechanics.loads import ConstantLoad, Loads
     from rotfem.mechanics.motion import Motion
     from rotfem.mechanics.outputs import Output
@@ -39,6 +41,9 @@ if TYPE_CHECKING:
     from rotfem.scene import BeamMesh, PlateMesh
     from rotfem.scene.beams import PlanarBeamStructure as PlanarBeam
     from rotfem.scene.beams import SpatialBeamStructure as SpatialBeam
+    from rotfem.scene.blades.deck import Deck
+    from rotfem.scene.blades.formats import Asked, BladeFormat
+    from rotfem.scene.kinds import StructureKind
     from rotfem.scene.plates import PlateStructure as Plate
     from rotfem.scene.section_shapes import Geometry, Shape
 
@@ -56,8 +61,9 @@ _HOMES = {
     "commands.problem": ("Problem",),
     "commands.response": ("response",),
     "commands.run": ("run",),
-    "mechanics.effects": ("Effect",),
+    "mechanics.effects": ("DampingModel", "Effect"),
     "mechanics.free_hub": ("FreeHub", "Torque"),
+    "mechanics.laws": ("MotionLaw",),
     "mechanics.loads": ("ConstantLoad", "Loads"),
     "mechanics.motion": ("Motion",),
     "mechanics.outputs": ("Output",),
@@ -65,6 +71,9 @@ _HOMES = {
     "commands.cost.result": ("CostResult",),
     "results": ("CampbellResult", "CheckResult", "ExplainResult", "ModesResult", "ResponseResult", "RunResult"),
     "scene": ("BeamMesh", "PlateMesh"),
+    "scene.blades.deck": ("Deck",),
+    "scene.blades.formats": ("Asked", "BladeFormat"),
+    "scene.kinds": ("StructureKind",),
     "scene.section_shapes": ("Geometry", "Shape"),
 }
 _LATER = {name: f"rotfem.{module}:{name}" for module, names in _HOMES.items() for name in names}
@@ -76,12 +85,16 @@ _LATER |= {
 
 __all__ = [
     "ESDIRK4",
+    "Asked",
     "BeamMesh",
+    "BladeFormat",
     "CampbellResult",
     "CheckResult",
     "ComputationError",
     "ConstantLoad",
     "CostResult",
+    "DampingModel",
+    "Deck",
     "Effect",
     "ExplainResult",
     "FreeHub",
@@ -91,6 +104,7 @@ __all__ = [
     "Loads",
     "ModesResult",
     "Motion",
+    "MotionLaw",
     "Newmark",
     "Output",
     "OutputError",
@@ -107,6 +121,7 @@ __all__ = [
     "SpatialBeam",
     "Stage",
     "State",
+    "StructureKind",
     "Theory",
     "Torque",
     "__version__",

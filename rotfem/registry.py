@@ -1,4 +1,4 @@
-"""The registries: theories, effects, schemes, section shapes, outputs and formats of blade files, by name.
+"""The registries: theories, effects, schemes, motions, damping, structures, section shapes, outputs and blade files.
 
 They are the only lists. What a scene may say, the ladder of theories, the reasons of `explain`, the energies and the
 hub's row follow from their entries. The package's own entries come into being when a registry is first asked for one; a
@@ -12,10 +12,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar, cast
 
 if TYPE_CHECKING:
-    from rotfem.mechanics.effects import Effect
+    from rotfem.mechanics.effects import DampingModel, Effect
     from rotfem.mechanics.outputs import Output
     from rotfem.mechanics.theories import Theory
     from rotfem.scene.blades.formats import BladeFormat
+    from rotfem.scene.kinds import StructureKind
     from rotfem.scene.section_shapes import Shape
 
 
@@ -106,10 +107,22 @@ blade_formats: Registry[BladeFormat] = Registry(
     "rotfem.scene.blades.hawc2",
     "rotfem.scene.blades.windio",
 )
+motion_laws: Registry[Any] = Registry("type of motion", "rotfem.scene.motion")
+damping_models: Registry[DampingModel] = Registry("damping model")
+structures: Registry[StructureKind] = Registry("structure", "rotfem.scene.kinds")
+
+ALL: tuple[Registry[Any], ...] = (
+    *(theories, effects, schemes, motion_laws, damping_models),
+    *(structures, shapes, outputs, blade_formats),
+)
 
 
 def register(entry: Entry | type[Entry]) -> None:
-    """Add a `Theory`, `Effect`, `Shape` or `Output`, or a class of `Scheme`: its name is then a valid value of a scene.
+    """Add an entry to the registry of its kind: its name is then a valid value of a scene.
+
+    Args:
+        entry: a `Theory`, `Effect`, `DampingModel`, `StructureKind`, `Shape`, `Output` or `BladeFormat`, or a class of
+            `Scheme` or `MotionLaw`.
 
     Raises:
         TypeError: it is none of these.
@@ -117,7 +130,7 @@ def register(entry: Entry | type[Entry]) -> None:
     """
     registry = getattr(entry, "registry", None)
     if not isinstance(registry, Registry):
-        raise TypeError(f"{entry!r} is no Theory, Effect, Scheme, Shape or Output, so it cannot be registered")
+        raise TypeError(f"{entry!r} is none of what can be registered: cannot be registered")
     registry.add(entry)
 
 

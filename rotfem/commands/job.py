@@ -17,6 +17,7 @@ from rotfem.commands.result_folder import ResultFolder, Writer
 from rotfem.commands.signals import held_back
 from rotfem.errors import ComputationError, InputError
 from rotfem.scene import Scene, load_scene
+from rotfem.scene.extensions import load
 from rotfem.version import __version__
 
 app = typer.Typer(
@@ -34,8 +35,16 @@ def _root(
     version: Annotated[
         bool, typer.Option("--version", help="print the version", callback=lambda wanted: _version(wanted))
     ] = False,
+    files: Annotated[
+        list[Path] | None,
+        typer.Option("--load", metavar="FILE", parser=as_path, help="Python file that registers what scenes name"),
+    ] = None,
 ) -> None:
     """Rotating beams and plates with FEniCSx."""
+    if files:
+        with Session(False, False, False):
+            for path in files:
+                load(str(path), path, "command line", "--load")
 
 
 def _version(wanted: bool) -> None:

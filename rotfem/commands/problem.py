@@ -233,10 +233,15 @@ def motion_of(scene: Scene) -> Motion:
         "is_accelerated": m.is_accelerated,
         "base_knots": None if base is None else base.knots,
     }
-    if m.type == "callable":
+    if m.type not in _MOTIONS or m.type == "callable":
         more["cell"] = cell_of(scene.time)
-    motion: Motion = _MOTIONS[m.type](m, {"axis": m.axis, **more})
+    motion: Motion = _MOTIONS.get(m.type, _by_law)(m, {"axis": m.axis, **more})
     return motion if base is None or base.constant else motion.with_changing_base()
+
+
+def _by_law(m: Any, more: dict[str, Any]) -> Motion:
+    law = m.law
+    return Motion.from_functions(law.speed, law.rate, law.angle, breakpoints=law.breakpoints, **more)
 
 
 def _torque(m: Any, more: dict[str, Any]) -> Motion:

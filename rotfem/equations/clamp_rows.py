@@ -37,7 +37,8 @@ class AtClamp:
         fixed[clamped] = True
         self._motions = self._moved(np.where(fixed, root.weights, 0.0))
         self._turns = self._moved(np.where(fixed, 0.0, root.weights))  # of its hinges
-        by_mass = model.mechanics.damping.mass is not None
+        damping = model.mechanics.damping
+        by_mass = damping.mass is not None or bool(damping.models)
         self._others = self._moved(np.where(fixed, 0.0, root.carried())) if by_mass else None
 
     def _moved(self, columns: Array) -> tuple[Any, Array]:

@@ -182,7 +182,8 @@ class Pieces:
     def _is_checked(self, name: str) -> bool:
         """Return whether a term is one of a user, or one of which no constants are declared."""
         effect = self.model.acting[name]
-        return effect.constants is None or callable(effect.work)
+        models = name == "damping" and bool(self.model.mechanics.damping.models)
+        return effect.constants is None or callable(effect.work) or models
 
     def _parts(self, kind: str) -> list[tuple[str, tuple[str, ...]]]:
         """Return the terms in one of the forms, each with the switches of the bodies it acts on there, none first."""

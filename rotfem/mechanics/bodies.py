@@ -156,10 +156,15 @@ class RootSpring:
 
 @dataclass(frozen=True)
 class Damping:
-    """Viscosity η (s) of the strains and mass-proportional rate a0 (1/s), constants or None."""
+    """Viscosity η (s) of the strains and mass-proportional rate a0 (1/s), constants or None.
+
+    Attributes:
+        models: registered damping model ↦ its coefficient, a constant.
+    """
 
     stiffness: Any = None
     mass: Any = None
+    models: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

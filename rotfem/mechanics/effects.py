@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from rotfem.mechanics.pitch import is_beside
-from rotfem.registry import Registry, register, resolved
+from rotfem.registry import Registry, damping_models, register, resolved
 from rotfem.registry import effects as registered
 
 #: (mechanics, variation) ↦ term of the residual, a UFL form (0 if there is none); see `rotfem.mechanics.work`.
@@ -66,6 +66,24 @@ class Effect:
         if self.work is None or (self.internal and not variation.within_frame):
             return 0
         return resolved(self.work)(mechanics, variation)
+
+
+@dataclass(frozen=True)
+class DampingModel:
+    """A damping of the structure itself; a scene gives its coefficient as a key of [structure.damping].
+
+    Attributes:
+        name: the key.
+        work: (mechanics, variation, coefficient) ↦ its term of the residual, + the work of the damping forces. They act
+            between parts of the structure and depend on rates relative to the frame; the coefficient is a constant.
+        what: what it is, and the unit of its coefficient.
+    """
+
+    registry: ClassVar[Registry[DampingModel]] = damping_models
+
+    name: str
+    work: Work
+    what: str = ""
 
 
 def effects() -> tuple[Effect, ...]:

@@ -22,6 +22,7 @@ from ufl import cross
 from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, RootSpring, Strain
 from rotfem.mechanics.frame import Frame
 from rotfem.mechanics.sums import added
+from rotfem.registry import damping_models, resolved
 
 
 @dataclass(frozen=True)
@@ -152,7 +153,8 @@ def internal(m: Mechanics, delta: Variation) -> Any:
 def damping(m: Mechanics, delta: Variation) -> Any:
     """Return the work of the Kelvin–Voigt stress C η Γ̇ and of Rayleigh damping, a0 M + a1 K.
 
-    The mass part acts on the velocity relative to the frame; the stiffness part a1 adds to η.
+    The mass part acts on the velocity relative to the frame; the stiffness part a1 adds to η. Registered models add
+    their own work.
     """
     work: list[Any] = []
     k, eta, a0 = m.k, m.damping.stiffness, m.damping.mass
@@ -160,6 +162,7 @@ def damping(m: Mechanics, delta: Variation) -> Any:
         work += [ufl.inner(eta * s.force(k.rate(s.value)), k.variation(s.value)) * s.measure for s in m.strains]
     if a0 is not None:
         work += [a0 * b.density * ufl.inner(b.rate(k), delta.of(b)) * b.measure for b in m.bodies]
+    work += [resolved(damping_models[name].work)(m, delta, c) for name, c in m.damping.models.items()]
     return added(work)
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Self, TypeAlias
 
 import numpy as np
-from pydantic import PlainValidator
+from pydantic import ConfigDict, PlainValidator, model_validator
 from pydantic_core import PydanticCustomError
 
+from rotfem.registry import damping_models
 from rotfem.scene.values import Bounds, NonNegative, SceneModel, as_vector, problem
 
 #: One ratio for the first modes, one for each in the order of frequency, or family ↦ such ratios.
@@ -48,16 +49,38 @@ class Damping(SceneModel):
         rayleigh: (a0, a1): mass-proportional (1/s) and stiffness-proportional (s) coefficient.
         modal: damping ratios of modes at rest: one for the first ten, one for each in the order of frequency, or by
             family. See `rotfem.equations.modal_damping`.
+
+    The coefficients of registered damping models are further keys.
     """
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, NonNegative]
 
     kelvin_voigt: NonNegative = 0.0
     rayleigh: Annotated[tuple[float, float], PlainValidator(_as_rayleigh)] = (0.0, 0.0)
     modal: Annotated[Ratios, PlainValidator(_as_modal)] = 0.0
 
+    @classmethod
+    def keys(cls) -> list[str]:
+        """Return the keys of the table and those of all registered models."""
+        return [*super().keys(), *damping_models.names]
+
+    @model_validator(mode="after")
+    def _check_models(self) -> Self:
+        for name in self.models:
+            if name not in damping_models:
+                raise problem(name, self.models[name], "is no registered damping model")
+        return self
+
+    @property
+    def models(self) -> dict[str, float]:
+        """Coefficients of registered models by name, those that are not zero."""
+        return {name: c for name, c in self.__pydantic_extra__.items() if c != 0.0}
+
     @property
     def is_zero(self) -> bool:
         """Whether there is no damping at all."""
-        return self.kelvin_voigt == 0.0 and self.rayleigh == (0.0, 0.0) and not self.has_modal
+        return self.kelvin_voigt == 0.0 and self.rayleigh == (0.0, 0.0) and not self.has_modal and not self.models
 
     @property
     def has_modal(self) -> bool:

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, PlainValidator, ValidationInfo, model_validator
+from pydantic import ConfigDict, Discriminator, Field, PlainValidator, Tag, ValidationInfo, model_validator
 
+from rotfem.errors import show
+from rotfem.registry import Registry, motion_laws, register
 from rotfem.scene.files import as_time_table
+from rotfem.scene.names import as_name
 from rotfem.scene.signals import Signal, arguments, as_function
+from rotfem.scene.stepping import parameters_of
 from rotfem.scene.values import Matrix, NonNegative, Number, Positive, SceneModel, Vector3, as_rows, as_vector3, problem
 
 
@@ -50,6 +55,8 @@ class Motion(SceneModel):
         axis: direction of the angular velocity in the frame, of any length.
         base_acceleration: absolute acceleration of the frame's origin in frame components (m/s²), or None.
     """
+
+    registry: ClassVar[Registry[Any]] = motion_laws
 
     axis: Annotated[Vector3, PlainValidator(_as_axis)] = (0.0, 0.0, 1.0)
     base_acceleration: Signal | None = None
@@ -102,6 +109,7 @@ class Swept:
 class ConstantMotion(Motion):
     """Steady rotation at the given speed (rad/s)."""
 
+    name: ClassVar[str] = "constant"
     type: Literal["constant"]
     speed: Number = Field(description="a number (rad/s)")
 
@@ -133,6 +141,7 @@ class SpinUpMotion(Motion):
         duration: T (s).
     """
 
+    name: ClassVar[str] = "spin_up"
     type: Literal["spin_up"]
     speed: Number = Field(description="a number (rad/s)")
     duration: Positive = Field(description="a number greater than 0 (s)")
@@ -161,6 +170,7 @@ class TableMotion(Motion):
         interpolation: "pchip", "cubic" or "linear".
     """
 
+    name: ClassVar[str] = "table"
     type: Literal["table"]
     table: Annotated[Matrix, PlainValidator(_as_speed_table)] = Field(
         description="a table [[t, speed], …] or the path of a CSV file"
@@ -196,6 +206,7 @@ class TorqueMotion(Motion):
         speed: initial speed of the hub (rad/s).
     """
 
+    name: ClassVar[str] = "torque"
     type: Literal["torque"]
     hub_inertia: Positive = Field(description="a number greater than 0 (kg·m²)")
     pulses: Annotated[Matrix, PlainValidator(_as_pulses)] | None = None
@@ -233,6 +244,7 @@ class CallableMotion(Motion):
         angle: t (s) ↦ ψ (rad), or None.
     """
 
+    name: ClassVar[str] = "callable"
     type: Literal["callable"]
     speed: Annotated[Callable[[float], float], PlainValidator(as_function)] = Field(
         description="a Python function of the time t (s)"
@@ -241,6 +253,77 @@ class CallableMotion(Motion):
     angle: Annotated[Callable[[float], float], PlainValidator(as_function)] | None = None
 
 
+class LawMotion(Motion):
+    """Rotation by a registered `MotionLaw`, whose parameters are keys of the table.
+
+    Attributes:
+        type: name of the law.
+    """
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Number]
+
+    type: str
+
+    @classmethod
+    def keys(cls) -> list[str]:
+        """Return the keys of the table and the parameters of all laws."""
+        laws = [law for law in motion_laws if law.name not in BUILT_IN]
+        return list(dict.fromkeys([*super().keys(), *(key for law in laws for key in parameters_of(law))]))
+
+    @property
+    def law(self) -> Any:
+        """The law with its parameters."""
+        return motion_laws[self.type](**self.__pydantic_extra__)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_law(cls, data: Any) -> Any:
+        """Add the parameters of the law that are not given; a slip in its name comes before all others."""
+        if not isinstance(data, Mapping):
+            return data
+        if data.get("type") is None:
+            raise problem("type", None, f"required key is missing; allowed: {', '.join(map(show, motion_laws.names))}")
+        name, defaults = as_name(data["type"], motion_laws, "type"), dict[str, Any]()
+        own = parameters_of(motion_laws[name])
+        for key, field in own.items():
+            if key in cls.model_fields:
+                raise problem("type", name, f"cannot have a parameter {key}, which is a key of [motion] already")
+            if field.default is not MISSING:
+                defaults[key] = field.default
+            elif key not in data:
+                raise problem(key, None, f'required key is missing; type = "{name}" needs it')
+        for key in data:
+            if key not in own and key not in cls.model_fields and key in list(cls.keys()):
+                raise problem(key, data[key], f'has no meaning with type = "{name}"')
+        return defaults | dict(data)
+
+    @model_validator(mode="after")
+    def _check_law(self) -> Self:
+        for key, allowed in motion_laws[self.type].check(dict(self.__pydantic_extra__)).items():
+            raise problem(key, self.__pydantic_extra__[key], allowed)
+        return self
+
+
+_TABLES = (ConstantMotion, SpinUpMotion, TableMotion, TorqueMotion, CallableMotion)
+for _table in _TABLES:
+    register(_table)
+
+#: Types of motion that have a table of their own.
+BUILT_IN = tuple(table.name for table in _TABLES)
+
+
+def _tag(value: Any) -> str:
+    kind = value.get("type") if isinstance(value, Mapping) else getattr(value, "type", None)
+    return kind if kind in BUILT_IN else "law"
+
+
 AnyMotion = Annotated[
-    ConstantMotion | SpinUpMotion | TableMotion | TorqueMotion | CallableMotion, Field(discriminator="type")
+    Annotated[ConstantMotion, Tag("constant")]
+    | Annotated[SpinUpMotion, Tag("spin_up")]
+    | Annotated[TableMotion, Tag("table")]
+    | Annotated[TorqueMotion, Tag("torque")]
+    | Annotated[CallableMotion, Tag("callable")]
+    | Annotated[LawMotion, Tag("law")],
+    Discriminator(_tag),
 ]

@@ -19,7 +19,7 @@ else:
 # Names that validation puts into the path of an error to say which kind of table it tried.
 _TAGS = {
     "structure": {"planar_beam", "spatial_beam", "plate"},
-    "motion": {"constant", "spin_up", "table", "torque", "callable"},
+    "motion": {"constant", "spin_up", "table", "torque", "callable", "law"},
     "mesh": {"beam", "plate"},
 }
 

@@ -36,6 +36,8 @@ from rotfem.scene.consistency import (
     check_theory,
 )
 from rotfem.scene.digest import abridged
+from rotfem.scene.extensions import Extensions, load_wanted
+from rotfem.scene.kinds import designed, is_design
 from rotfem.scene.limits import Limits, limits_of
 from rotfem.scene.loads import Loads, check_loads, doubtful_table
 from rotfem.scene.motion import AnyMotion, Swept
@@ -76,6 +78,7 @@ class Scene(SceneModel):
         solver: settings of Newton's method.
         output: what to compute beside what is always recorded.
         limits: how much may be asked for.
+        extensions: Python files that register what the scene names.
         accuracy: error that is wanted, relative to the largest displacement of the tip, or to each frequency; theory,
             effects, mesh, scheme and step follow from it. None where the scene says them itself.
         accuracy_of: what it is the accuracy of; None what a command computes first of all.
@@ -93,6 +96,7 @@ class Scene(SceneModel):
     solver: Solver = Solver()
     output: OutputTable = OutputTable()
     limits: Limits = Limits()
+    extensions: Extensions = Extensions()
     accuracy: Accuracy | None = None
     accuracy_of: Literal["tip", "root_moment", "frequencies"] | None = None
     accuracy_budget: Budget | None = None
@@ -122,15 +126,18 @@ class Scene(SceneModel):
     @classmethod
     def _validate(cls, tables: dict[str, Any], name: str, file: str, directory: str) -> Self:
         check_depth(file, tables)
-        tables, hints = in_si(tables, file), list[str]()
-        context = {"directory": directory, "limits": limits_of(tables), "accuracy": tables.get("accuracy")}
+        with noted_files() as extensions:
+            load_wanted(tables, file, directory)
+        whole, hints = in_si(designed(tables, file), file), list[str]()
+        tables = {**whole, "structure": tables["structure"]} if is_design(tables) else whole
+        context = {"directory": directory, "limits": limits_of(whole), "accuracy": whole.get("accuracy")}
         try:
             with noted_files() as files:
-                scene = cls.model_validate(tables, context={**context, "hints": hints})
+                scene = cls.model_validate(whole, context={**context, "hints": hints})
         except ValidationError as error:
             raise scene_error(file, error) from None
         scene._name, scene._file, scene._directory, scene._tables, scene._hints = name, file, directory, tables, hints
-        scene._inputs = tuple(files)
+        scene._inputs = (*extensions, *files)
         return scene
 
     @property
@@ -187,6 +194,8 @@ class Scene(SceneModel):
             del tables["output"]
         if self.limits == Limits():
             del tables["limits"]
+        if self.extensions == Extensions():
+            del tables["extensions"]
         if self.structure.mesh_file is not None:
             without = {"elements", "cell"} | ({"degree"} - self.mesh.model_fields_set)
             tables["mesh"] = {key: value for key, value in tables["mesh"].items() if key not in without}

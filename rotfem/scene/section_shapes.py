@@ -34,6 +34,9 @@ class Geometry:
         second_moment3: ∫ y² dA about axis 3 (m⁴), y along the width.
         torsion_constant: Saint-Venant's J (m⁴).
         shear_correction: Cowper's coefficient.
+        centroid: (y, z) of the centroid (m), which mass and tension centre are; None where the section axes meet. The
+            second moments are about axes through it.
+        shear_center: (y, z) of the shear centre (m); None where the section axes meet.
     """
 
     area: Array
@@ -41,6 +44,8 @@ class Geometry:
     second_moment3: Array
     torsion_constant: Array
     shear_correction: Array
+    centroid: tuple[Array, Array] | None = None
+    shear_center: tuple[Array, Array] | None = None
 
 
 @dataclass(frozen=True)

@@ -151,7 +151,20 @@ class SpatialSection(Section):
 
     def center(self, name: str, x: npt.ArrayLike) -> Array:
         """Return a centre, `mass_center`, `shear_center` or `tension_center`, at positions x (m): (…, 2) in m."""
-        return evaluate_table(getattr(self, name) or (0.0, 0.0), x)
+        of_shape = self._of_shape(name, np.asarray(x, dtype=np.float64))
+        return evaluate_table(getattr(self, name) or (0.0, 0.0), x) if of_shape is None else of_shape
+
+    def varies(self, name: str) -> bool:
+        """Return whether a centre changes along the beam: it is a table, or that of a shape that tapers."""
+        return name in self.tapers or (not self.uniform and self._of_shape(name, np.zeros(1)) is not None)
+
+    def _of_shape(self, name: str, x: Array) -> Array | None:
+        """Return the centre (…, 2) that the shape has; None where the section has another, or the shape has none."""
+        if getattr(self, name) is not None or self.shape is None:
+            return None
+        geometry = self._geometry(x)
+        found = geometry.shear_center if name == "shear_center" else geometry.centroid
+        return None if found is None else np.stack([np.broadcast_to(c, x.shape) for c in found], axis=-1)
 
     def angle_at(self, x: npt.ArrayLike) -> Array:
         """Return the principal angle (rad) at positions along the beam (m)."""

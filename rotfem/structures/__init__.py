@@ -2,22 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from mpi4py import MPI
 
 from rotfem.mechanics.problem import Problem
-from rotfem.structures.planar_beam import PlanarBeam
-from rotfem.structures.plate import Plate
-from rotfem.structures.spatial_beam import SpatialBeam
-from rotfem.structures.structure import Structure
-
-STRUCTURES: dict[str, Callable[..., Structure]] = {
-    "planar_beam": PlanarBeam,
-    "spatial_beam": SpatialBeam,
-    "plate": Plate,
-}
+from rotfem.registry import resolved, structures
 
 
 def build(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD) -> Any:
@@ -26,4 +16,4 @@ def build(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD) -> Any:
     Raises:
         InputError: a mesh or a section that cannot be computed with.
     """
-    return STRUCTURES[problem.structure.type](problem, comm)
+    return resolved(structures[problem.structure.type].discretised)(problem, comm)

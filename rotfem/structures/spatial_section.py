@@ -121,9 +121,9 @@ class SectionForms:
 
     def _center(self, name: str) -> tuple[Any, Any]:
         """Return the components (y, z) of a centre: fields of a table, else constants, or 0 where they vanish."""
-        if name not in self._data.tapers:
-            y, z = getattr(self._data, name) or (0.0, 0.0)
-            return self._point(name, (0.0, y, z))[1:]
+        if not self._data.varies(name):
+            y, z = self._data.center(name, 0.0)
+            return self._point(name, (0.0, float(y), float(z)))[1:]
         if name not in self._beam.section:
             self._beam.section[name] = self._beam.linear_field(name, partial(self._data.center, name), 2)
         f = self._beam.section[name]

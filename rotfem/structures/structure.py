@@ -219,10 +219,11 @@ class Structure(LoadsOfStructure):
     # --- damping ------------------------------------------------------------------------------------------------
 
     def damping(self) -> Damping:
-        """Return Kelvin–Voigt plus stiffness-proportional viscosity, and the mass-proportional rate."""
+        """Return Kelvin–Voigt plus stiffness-proportional viscosity, the mass-proportional rate, and further models."""
         d = self.data.damping
         eta, a0 = d.kelvin_voigt + d.rayleigh[1], d.rayleigh[0]
-        return Damping(self.constant(eta) if eta > 0 else None, self.constant(a0) if a0 > 0 else None)
+        further = {name: self.scalar(f"damping_{name}", c) for name, c in d.models.items()}
+        return Damping(self.constant(eta) if eta > 0 else None, self.constant(a0) if a0 > 0 else None, further)
 
     # --- values -------------------------------------------------------------------------------------------------
 

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from rotfem.mechanics.effects import Effect
 from rotfem.mechanics.loads import AnyLoad, is_moment, named
 from rotfem.mechanics.problem import Problem
-from rotfem.structures import STRUCTURES
+from rotfem.registry import resolved, structures
 
 Array = npt.NDArray[np.float64]
 
@@ -35,7 +35,7 @@ def inactive_unknowns(problem: Problem) -> tuple[str, ...]:
     Args:
         problem: what is to be computed, all unknowns in it.
     """
-    structure: Any = STRUCTURES[problem.structure.type]
+    structure: Any = resolved(structures[problem.structure.type].discretised)
     if not _is_built_in(problem) or problem.frame != "rotating" or problem.motion.pitch is not None:
         return ()
     if problem.structure.damping.has_modal:  # the modes at rest that have the ratios are those of all unknowns

@@ -1,0 +1,100 @@
+"""Files of a user that register theories, effects, motion laws, …: `rotfem --load FILE`, and [extensions] of a scene.
+
+Such a file is Python and is run as Python: a scene that loads one does whatever the file does.
+"""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from pathlib import Path
+from types import ModuleType
+from typing import Annotated, Any
+
+from pydantic import PlainValidator
+
+from rotfem import registry
+from rotfem.errors import SceneError
+from rotfem.scene.reading import Unreadable, read_bytes
+from rotfem.scene.values import SceneModel, problem
+
+#: Bytes of a file, at most.
+LARGEST = 10_000_000
+
+#: Resolved paths of the files that have been run.
+_LOADED: set[Path] = set()
+
+
+def _as_files(value: Any) -> tuple[str, ...]:
+    files = [value] if isinstance(value, str) else value
+    if not isinstance(files, list | tuple) or not all(isinstance(name, str) and name for name in files):
+        raise problem("", value, "must be the path of a Python file, or a list of them")
+    return tuple(files)
+
+
+class Extensions(SceneModel):
+    """The [extensions] table.
+
+    Attributes:
+        load: paths of Python files, from the folder of the scene, that are run before the scene is read.
+    """
+
+    load: Annotated[tuple[str, ...], PlainValidator(_as_files)] = ()
+
+
+def load_wanted(tables: dict[str, Any], file: str, directory: str) -> None:
+    """Run the files that the [extensions] table of a scene names; what is no list of names is left to its validation.
+
+    Raises:
+        SceneError: one cannot be read, or fails.
+    """
+    table = tables.get("extensions")
+    wanted = table.get("load") if isinstance(table, dict) else None
+    for name in [wanted] if isinstance(wanted, str) else wanted if isinstance(wanted, list | tuple) else []:
+        if isinstance(name, str) and name:
+            load(name, Path(directory) / name, file, "extensions.load")
+
+
+def load(name: str, path: Path, file: str, key: str) -> None:
+    """Run a Python file that registers something, unless it has been run.
+
+    What it has registered is taken back if it fails.
+
+    Args:
+        name: what the user calls the file.
+        path: where it is.
+        file: what the file is named in, for errors.
+        key: by what.
+
+    Raises:
+        SceneError: it cannot be read, or fails: what Python says, with the line.
+    """
+    try:
+        source = read_bytes(path, LARGEST)
+        path = path.resolve()
+    except (Unreadable, OSError) as error:
+        raise SceneError(file, key, name, getattr(error, "reason", None) or str(error)) from None
+    if path in _LOADED:
+        return
+    before = [(kind, kind.names) for kind in registry.ALL]
+    module = ModuleType(f"{path.stem} of {path.parent}")
+    module.__file__ = str(path)
+    sys.modules[module.__name__] = module  # where dataclasses look for what annotations mean
+    try:
+        exec(compile(source, str(path), "exec"), module.__dict__)
+    except (Exception, SystemExit) as error:
+        del sys.modules[module.__name__]
+        for kind, names in before:
+            for new in set(kind.names) - set(names):
+                kind.remove(new)
+        raise SceneError(file, key, name, f"failed: {_described(error, path)}") from None
+    _LOADED.add(path)
+
+
+def _described(error: BaseException, path: Path) -> str:
+    """Return the type and the words of an error, and the line of the file that it comes from."""
+    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+    line = error.lineno if isinstance(error, SyntaxError) else lines[-1] if lines else None
+    said = error.msg if isinstance(error, SyntaxError) else str(error)
+    where = "" if line is None else f"line {line}: "
+    return f"{where}{type(error).__name__}: {said}" if said else f"{where}{type(error).__name__}"
