@@ -22,7 +22,7 @@ import numpy.typing as npt
 from rotfem.mechanics.effects import Effect
 from rotfem.mechanics.loads import AnyLoad, is_moment, named
 from rotfem.mechanics.problem import Problem
-from rotfem.registry import resolved, structures
+from rotfem.registry import damping_models, resolved, structures
 
 Array = npt.NDArray[np.float64]
 
@@ -53,9 +53,11 @@ def inactive_unknowns(problem: Problem) -> tuple[str, ...]:
 
 
 def _is_built_in(problem: Problem) -> bool:
-    """Return whether theory, effects and outputs are the program's own, each of which keeps every symmetry."""
+    """Return whether all that the equations are made of is the program's own, which keeps every symmetry."""
+    theory, structure = problem.theory, problem.structure
     works = [Effect.registry[name].work for name in problem.effective_effects()]
-    named_in = (*works, *problem.theory.strains.values(), *problem.theory.prestress.values())
+    works += [damping_models[name].work for name in structure.damping.models]
+    named_in = (*works, structures[structure.type].discretised, *theory.strains.values(), *theory.prestress.values())
     ours = all(work is None or (isinstance(work, str) and work.startswith("rotfem.")) for work in named_in)
     return ours and not problem.terms and not problem.outputs
 

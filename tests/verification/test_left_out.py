@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import rotfem
 from rotfem import run
 from rotfem.commands.problem import Problem
+from rotfem.registry import damping_models
 from rotfem.scene import as_scene
 from rotfem.scene.beams import SpatialBeamStructure
 from rotfem.scene.plates import PlateStructure
@@ -194,9 +196,14 @@ def test_what_may_be_moved_stays_in(case: str) -> None:
 
 
 def test_what_a_script_adds_is_not_known_to_be_symmetric() -> None:
-    """A term of its own may push anywhere, an output may ask for any component."""
+    """A term or a damping model of its own may push anywhere, an output may ask for any component."""
     data = scene(BEAM, "reissner", spun([0, 0, 1]))
     assert found(data) == {"u3", "theta1", "theta2"}
+    rotfem.register(rotfem.DampingModel("sideways", lambda m, delta, c: 0))
+    try:
+        assert not found(scene(BEAM | {"damping": {"sideways": 1.0}}, "reissner", spun([0, 0, 1])))
+    finally:
+        damping_models.remove("sideways")
     for more in ({"terms": {"push": lambda m, v: 0}}, {"outputs": {"twist": lambda m: 0}}):
         assert inactive_unknowns(Problem.of(as_scene(data), **more)) == ()
 
