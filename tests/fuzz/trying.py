@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 
 import rotfem
 from rotfem.errors import InputError
+from tests.finite import check_finite
 
 #: Seconds of the processor that a validation and a computation of two elements may take.
 VALIDATION, COMPUTATION = 5, 60
@@ -44,18 +44,6 @@ def check_message(error: InputError) -> None:
     assert error.allowed
     assert all(line.isprintable() for line in lines)
     assert len(str(error)) < 20_000
-
-
-def check_finite(value: Any, where: str = "result") -> None:
-    """See that all numbers in nested tables and arrays are finite."""
-    if isinstance(value, Mapping):
-        for key, entry in value.items():
-            check_finite(entry, f"{where}.{key}")
-    elif isinstance(value, list | tuple):
-        for i, entry in enumerate(value):
-            check_finite(entry, f"{where}[{i}]")
-    elif isinstance(value, np.ndarray | float | complex):
-        assert np.all(np.isfinite(value)), f"{where} is not finite"
 
 
 def outcome(compute: Callable[[], Any]) -> str:

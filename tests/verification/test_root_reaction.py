@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
-import ufl
 
 import rotfem
-from rotfem.mechanics import work
-from rotfem.mechanics.sums import added
+from tests.balances import AXES, Rigid, balance
 from tests.beams import STRUCTURE
 
 RADIUS = 0.5
@@ -24,32 +21,10 @@ SCENE: dict[str, Any] = {
 }
 #: What acts on the beam from outside, beside its own inertia.
 ACTING = {"tip_force": {"value": [1.0, 3.0], "kind": "follower"}, "gravity": [0.0, -9.81, 0.0]}
-AXES = [ufl.as_vector([float(i == j) for j in range(3)]) for i in range(3)]
-
-
-class Rigid:
-    """The variation of a rigid motion of the displaced structure: δx = s + φ×(x − x_root)."""
-
-    def __init__(self, shift: Any = None, turn: Any = None):
-        none = ufl.as_vector([0.0, 0.0, 0.0])
-        self.turn = none if turn is None else turn
-        self.at_root = (none if shift is None else shift) - ufl.cross(self.turn, RADIUS * AXES[0])
-
-    def of(self, moving: Any) -> Any:
-        """Return δx of a body or a load; directors only turn."""
-        return moving.rigid_turn(self.turn) + (self.at_root if getattr(moving, "is_position", True) else 0 * AXES[0])
-
-
-def balance(delta: Rigid) -> Callable[[Any], Any]:
-    """Return the work of inertia, gravity and loads in a rigid motion: the rate of (angular) momentum less the rest."""
-    terms = (work.inertia, work.coriolis, work.centrifugal, work.euler, work.gravity, work.loads)
-    return lambda m: added(term(m, delta) for term in terms)
-
-
 BALANCES = {
     "root_f1": balance(Rigid(shift=AXES[0])),
     "root_f2": balance(Rigid(shift=AXES[1])),
-    "root_m3": balance(Rigid(turn=AXES[2])),
+    "root_m3": balance(Rigid(turn=AXES[2], root=RADIUS)),
 }
 
 

@@ -1,0 +1,86 @@
+"""Covering arrays: rows of choices in which every pair, or every triple, of choices occurs that can occur together."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from itertools import combinations, product
+
+#: Factor ↦ the level chosen.
+Row = dict[str, str]
+#: Factor ↦ some of its levels; of a conflict those that no row may have all at once.
+Levels = Mapping[str, Collection[str]]
+
+
+def met(conflict: Levels, row: Row) -> bool:
+    """Return whether a row, or what is chosen of it so far, has all of a conflict."""
+    return all(row.get(factor) in levels for factor, levels in conflict.items())
+
+
+def completed(chosen: Row, levels: Levels, conflicts: Sequence[Levels]) -> Row | None:
+    """Return a row without a conflict that has what is chosen, levels in front preferred; None where there is none."""
+    if any(met(conflict, chosen) for conflict in conflicts):
+        return None
+    open_factor = next((factor for factor in levels if factor not in chosen), None)
+    if open_factor is None:
+        return {factor: chosen[factor] for factor in levels}
+    tries = (completed({**chosen, open_factor: level}, levels, conflicts) for level in levels[open_factor])
+    return next((row for row in tries if row is not None), None)
+
+
+def covering(
+    strength: int, shuffled: Callable[[random.Random], Levels], active: Levels, conflicts: Sequence[Levels], seed: int
+) -> Iterator[tuple[Row, int]]:
+    """Yield rows until every set of so many choices that can occur has, with how many new ones each row has.
+
+    Greedily: of several random rows with one of the sets that are left, the one with most of them.
+
+    Args:
+        strength: choices in a set: 2 of pairs, 3 of triples.
+        shuffled: random numbers ↦ all levels in a random order, those to be preferred in front.
+        active: command ↦ factors that it makes use of; a set of choices counts only where all of its have a use.
+        conflicts: what no row may have.
+        seed: of the random numbers.
+    """
+    rng = random.Random(seed)
+    every = shuffled(rng)
+    choices = {factor: [(factor, level) for level in levels] for factor, levels in every.items()}
+    sets = [chosen for pools in combinations(choices.values(), strength) for chosen in product(*pools)]
+    rng.shuffle(sets)
+    left = set(sets)
+    for wanted in sets:
+        if wanted not in left:
+            continue
+        barred = [*conflicts, idle(wanted, active)]
+        rows = (completed(dict(wanted), shuffled(rng), barred) for _ in range(12))
+        found = [(row, left.intersection(sets_of(row, strength, active))) for row in rows if row is not None]
+        row, new = max(found, key=lambda pair: len(pair[1]), default=(None, {wanted}))
+        left -= new
+        if row is not None:
+            yield row, len(new)
+
+
+def sets_of(row: Row, strength: int, active: Levels) -> Iterator[tuple[tuple[str, str], ...]]:
+    """Return the sets of so many choices that a row has and makes use of."""
+    return combinations([(f, level) for f, level in row.items() if f in active[row["command"]]], strength)
+
+
+def idle(chosen: Sequence[tuple[str, str]], active: Levels) -> Levels:
+    """Return as a conflict the commands that make no use of all of these choices."""
+    return {"command": [c for c, used in active.items() if not {factor for factor, _ in chosen} <= {*used}]}
+
+
+def missing(
+    rows: Sequence[Row], strength: int, every: Levels, active: Levels, conflicts: Sequence[Levels]
+) -> list[str]:
+    """Return the sets of so many choices that could occur together and are in none of the rows."""
+    there = {frozenset(chosen) for row in rows for chosen in sets_of(row, strength, active)}
+    out = []
+    for factors in combinations(every, strength):
+        for levels in product(*(every[factor] for factor in factors)):
+            chosen = tuple(zip(factors, levels, strict=True))
+            if frozenset(chosen) in there:
+                continue
+            if completed(dict(chosen), every, [*conflicts, idle(chosen, active)]) is not None:
+                out.append(", ".join(f"{factor} = {level}" for factor, level in chosen))
+    return out

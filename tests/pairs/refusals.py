@@ -1,0 +1,143 @@
+"""What cannot meet: choices that are refused together, with what is said and where that is documented.
+
+Rows have none of these, so that no combination counts that was not computed; each is met by a scene of its own, which
+must be refused in these words.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tests.pairs.covering import Levels
+from tests.pairs.scenes import LEVELS
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """One documented refusal.
+
+    Attributes:
+        choices: factor ↦ levels that are refused when all factors have one of them.
+        says: regular expression of the error.
+        page: file that documents it, from the repository's folder.
+        text: words of that page.
+    """
+
+    choices: Levels
+    says: str
+    page: str
+    text: str
+
+
+def but(factor: str, *levels: str) -> tuple[str, ...]:
+    """Return all levels of a factor but these."""
+    return tuple(level for level in LEVELS[factor] if level not in levels)
+
+
+SCENE = "docs/scene.md"
+PLATES = ("plate", "mesh")
+FREE = ("torque", "controller")
+REFUSALS = (
+    Refusal(
+        {"structure": PLATES, "root": but("root", "clamped")},
+        r"structure\.root",
+        SCENE,
+        "`[structure.root]`, of beams.",
+    ),
+    Refusal(
+        {"structure": ("planar",), "root": ("pitch",)},
+        r"structure\.root\.pitch",
+        SCENE,
+        "spatial beam: turns the whole blade",
+    ),
+    Refusal(
+        {"structure": ("planar",), "loads": ("weight",)},
+        r"loads\.gravity.*third component must be 0",
+        SCENE,
+        "Moves in the plane (1, 2) of the frame",
+    ),
+    Refusal(
+        {"structure": ("planar", "spatial"), "loads": ("pressure",)},
+        r"loads\.pressure",
+        SCENE,
+        "of a plate: along direction 3 if dead",
+    ),
+    Refusal(
+        {"frame": ("inertial",), "structure": but("structure", "planar")},
+        r'model\.frame.*needs structure\.type = "planar_beam"',
+        SCENE,
+        'inertial: planar beam with `"reissner"`',
+    ),
+    Refusal(
+        {"frame": ("inertial",), "theory": but("theory", "reissner")},
+        r"model\.frame.*model\.theory = .*reissner",
+        SCENE,
+        'inertial: planar beam with `"reissner"`',
+    ),
+    Refusal(
+        {"frame": ("inertial",), "motion": FREE},
+        r'model\.frame.*is not available with motion\.type = "torque"',
+        SCENE,
+        "exact theory, whose speed is prescribed",
+    ),
+    Refusal(
+        {"frame": ("inertial",), "damping": ("modal",)},
+        r"structure\.damping\.modal",
+        SCENE,
+        'motions: it needs `frame = "rotating"`',
+    ),
+    Refusal(
+        {"root": ("pitch",), "motion": FREE},
+        r"structure\.root\.pitch.*needs a speed that is prescribed",
+        SCENE,
+        'A free hub (`type = "torque"`) needs a constant pitch',
+    ),
+    Refusal(
+        {"time": ("accuracy",), "frame": ("inertial",)},
+        r"model\.frame.*cannot be combined with accuracy",
+        SCENE,
+        "without damping by mode and without an `accuracy`",
+    ),
+    Refusal(
+        {"time": ("accuracy",), "output": ("error off",)},
+        r"output\.error.*cannot be combined with accuracy",
+        SCENE,
+        "an `accuracy` needs it",
+    ),
+    Refusal(
+        {"command": ("run",), "time": ("steady",), "motion": but("motion", "rest", "constant")},
+        r"time: missing; with motion\.type",
+        SCENE,
+        "Without it, a scene with constant motion asks for the steady state.",
+    ),
+    Refusal(
+        {"command": ("run",), "time": ("steady",), "checkpoint": ("resumed",)},
+        r"--(checkpoint|resume): needs a scene with \[time\]",
+        "docs/results.md",
+        "Checkpoints are of histories: a steady state has no steps.",
+    ),
+    Refusal(
+        {"command": ("run", "explain"), "time": ("steady",), "loads": ("gravity",), "motion": but("motion", "rest")},
+        r"loads\.gravity.*gravity across the spin axis turns",
+        "docs/theory.md",
+        "so a spinning beam under gravity has no steady state in the frame",
+    ),
+    Refusal(
+        {"command": ("modes", "response"), "loads": ("gravity",), "motion": but("motion", "rest")},
+        r"loads\.gravity.*gravity across the spin axis turns",
+        "docs/theory.md",
+        "so a spinning beam under gravity has no steady state in the frame",
+    ),
+    Refusal(
+        {"command": ("campbell",), "loads": ("gravity",)},
+        r"loads\.gravity.*gravity across the spin axis turns",
+        "docs/theory.md",
+        "so a spinning beam under gravity has no steady state in the frame",
+    ),
+    Refusal(
+        {"command": ("response",), "loads": but("loads", "harmonic")},
+        r"loads: a frequency response needs a harmonic load",
+        SCENE,
+        "`rotfem response` needs a harmonic load",
+    ),
+)
