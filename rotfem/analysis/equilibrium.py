@@ -158,14 +158,19 @@ def _at_limit(omega: float, path: LoadPath) -> ComputationError:
     )
 
 
+def gravity_turns(problem: Problem) -> bool:
+    """Return whether gravity has a component across the spin axis, which turns in the rotating frame."""
+    across = np.cross(problem.loads.gravity, problem.motion.axis)
+    return bool(np.any(across) and problem.motion.is_spinning and "gravity" in problem.effective_effects())
+
+
 def check_steady(problem: Problem) -> None:
     """Refuse what has no steady state in the rotating frame: gravity that turns with it.
 
     Raises:
         InputError: gravity has a component across the spin axis while the frame spins.
     """
-    across = np.cross(problem.loads.gravity, problem.motion.axis)
-    if problem.motion.is_spinning and np.any(np.abs(across) > 0) and "gravity" in problem.effective_effects():
+    if gravity_turns(problem):
         raise InputError(
             "loads.gravity",
             list(problem.loads.gravity),

@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady
 from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy
+from rotfem.commands.first_state import hints_of_start
 from rotfem.commands.keeper import Interval, Keeper
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.result_folder import ResultFolder
@@ -90,7 +91,7 @@ def simulate(
     keeper.open(scene, terms or {}, outputs or {})
     problem = Problem.of(scene, terms=terms, outputs=outputs)
     with input_of(scene.file):
-        if scene.time is None or scene.initial.state == "steady":
+        if scene.time is None:
             check_steady(problem)
         if scene.accuracy is not None:
             return run_to_accuracy(scene, keeper, (progress, hint), terms, outputs)
@@ -101,7 +102,9 @@ def simulate(
 
 def hinted(simulation: Simulation, hint: Hint | None) -> Simulation:
     """Return a simulation after its hints are told."""
-    simulation.advice = advise(simulation.scene, "run", hint, critical=simulation.critical)
+    simulation.advice = advise(
+        simulation.scene, "run", hint, critical=simulation.critical, also=hints_of_start(simulation)
+    )
     return simulation
 
 

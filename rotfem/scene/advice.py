@@ -6,6 +6,7 @@ said of them is rounded to what that is good for.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -53,7 +54,12 @@ def estimates(scene: Scene, speed: float, count: int) -> list[Estimate]:
 
 
 def advise(
-    scene: Scene, command: str, hint: Hint | None, speed: float | None = None, critical: float | None = None
+    scene: Scene,
+    command: str,
+    hint: Hint | None,
+    speed: float | None = None,
+    critical: float | None = None,
+    also: Sequence[str] = (),
 ) -> list[str]:
     """Return hints, one line each, for `run`, `modes` or `campbell`, and hand them on.
 
@@ -63,12 +69,13 @@ def advise(
         hint: called with every line; None asks for no advice.
         speed: the largest speed of the computation, rad/s; what the scene prescribes if None.
         critical: the speed at which the stiffness of a linear theory is singular, rad/s; None if there is none.
+        also: further hints, which the scene alone does not give.
     """
     if hint is None:
         return []
     end = None if scene.time is None else scene.time.end
     speed = scene.motion.top_speed(end) if speed is None else abs(speed)
-    out = [*scene.hints, *_nodes(scene)]
+    out = [*scene.hints, *also, *_nodes(scene)]
     if command == "run":
         out += _step(scene, speed)
     if command != "run" or scene.modes.model_fields_set:

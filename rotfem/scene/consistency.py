@@ -122,8 +122,6 @@ def check_initial(structure: AnyStructure, motion: Motion, initial: Initial) -> 
             reason = f"must be less than the length {limit:g} in size"
             raise problem("initial.tip_displacement", displacement, reason)
     _check_moving(structure, motion, initial)
-    if initial.state == "steady" and isinstance(motion, TorqueMotion):
-        raise problem("initial.state", initial.state, 'needs a speed that is prescribed, not motion.type = "torque"')
 
 
 def _check_moving(structure: AnyStructure, motion: Motion, initial: Initial) -> None:

@@ -95,7 +95,8 @@ class Initial(SceneModel):
 
     Attributes:
         tip_displacement: u₂ of the tip (m) of the static shape from which a planar beam is released, or None.
-        state: "undeformed", or "steady" to start from the equilibrium at the initial speed.
+        state: "steady", the equilibrium under the speed, loads and pitch of t = 0, or "undeformed"; a static shape
+            (`tip_displacement`) is no equilibrium of theirs.
         mode: number of a mode about that state which the motion starts in, or None.
         amplitude: largest displacement of the tip in it (m).
         phase: of the mode (rad): at 0 the tip is displaced, at π/2 it moves.
@@ -103,7 +104,7 @@ class Initial(SceneModel):
     """
 
     tip_displacement: Number | None = None
-    state: Literal["undeformed", "steady"] = "undeformed"
+    state: Literal["steady", "undeformed"] = "steady"
     mode: Count | None = None
     amplitude: Number | None = None
     phase: Number = 0.0
@@ -129,8 +130,10 @@ class Initial(SceneModel):
             raise problem("tip_displacement", self.tip_displacement, "cannot be combined with mode or velocity")
         if self.mode is not None and self.velocity is not None:
             raise problem("velocity", None, "cannot be combined with mode, which has velocities")
-        if self.state == "steady" and self.tip_displacement is not None:
-            raise problem("tip_displacement", self.tip_displacement, 'cannot be combined with state = "steady"')
+        if self.tip_displacement is not None:
+            if self.state == "steady" and "state" in self.model_fields_set:
+                raise problem("tip_displacement", self.tip_displacement, 'cannot be combined with state = "steady"')
+            vars(self)["state"] = "undeformed"
         return self
 
 

@@ -58,7 +58,7 @@ def test_limits_can_be_raised() -> None:
 def test_a_motion_is_stopped_at_the_limit_of_its_steps() -> None:
     """Fixed steps are known before; of adaptive ones the limit is met on the way, and what there is is kept."""
     tables = TABLES | {"mesh": {"elements": 1}, "model": {"theory": "linear"}}
-    tables |= {"time": {"end": 5.0, "tolerance": 1e-5}, "limits": {"steps": 20}}
+    tables |= {"time": {"end": 5.0, "tolerance": 1e-5}, "limits": {"steps": 20}, "initial": {"state": "undeformed"}}
     with pytest.raises(rotfem.ComputationError, match=r"more than limits.steps = 20") as caught:
         rotfem.run(tables)
     assert len(vars(caught.value)["result"].t) == 21

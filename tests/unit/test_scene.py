@@ -368,7 +368,6 @@ TIME = {"end": 1.0, "step": 0.1}
             "initial.tip_displacement",
             "cannot be combined",
         ),
-        ("planar", {"initial__state": "steady", "motion": TORQUE}, "initial.state", "speed that is prescribed"),
         ("planar", {"loads__gravity": [0, 0, -9.81]}, "loads.gravity", "third component"),
         ("planar", {"loads__gravity": 9.81}, "loads.gravity", "list of 2 or 3 numbers"),
         ("planar", {"loads__tip_force": [0, 0, 1]}, "loads.tip_force", "third component"),

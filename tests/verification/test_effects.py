@@ -155,6 +155,7 @@ def test_without_centrifugal_force_there_is_no_stretch(unit_beam: Any) -> None:
 def test_without_coriolis_force_axial_and_lateral_motion_are_apart(unit_beam: Any) -> None:
     """Released at constant speed the axial motion bends the beam through the Coriolis force only."""
     tables = {"motion": {"type": "constant", "speed": 2.0}, "time": {"end": 0.3, "step": 0.005}}
+    tables["initial"] = {"state": "undeformed"}
     with_it = tip(unit_beam({}, **tables))
     without = tip(unit_beam({"model.effects": ["centrifugal", "rotary_inertia"]}, **tables))
     assert np.max(np.abs(with_it["tip_u2"])) > 1e-5

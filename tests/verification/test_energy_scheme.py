@@ -132,6 +132,7 @@ def test_work_of_a_follower_is_all_that_is_given(theory: str) -> None:
         {
             **{k: v for k, v in released(theory, 200, 0.01).to_dict().items() if k not in ("initial", "name")},
             "loads": {"tip_force": follower},
+            "initial": {"state": "undeformed"},
         }
     )
     history = run(scene).history

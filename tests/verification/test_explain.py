@@ -263,6 +263,7 @@ def test_row_of_the_mesh_is_what_a_run_says_of_it(time: dict[str, Any]) -> None:
     """The trial has six of the ten elements, but the error is that of a march or a steady state on all ten."""
     motion = COARSE_STEPS["motion"] if time else {"type": "constant", "speed": 3.0}
     tables = {"structure": STRUCTURE, "motion": motion, "loads": {"tip_force": [0.0, 10.0]}, **time}
+    tables["initial"] = {"state": "undeformed"}
     scene = Scene.from_dict({**tables, "modes": {"count": 2}, "mesh": {"elements": 10, "degree": 2}})
     trial = Trial(case_of(scene))
     row = Estimates(trial, "reissner", trial.effects).discretisations()[-1]

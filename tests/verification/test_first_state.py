@@ -37,6 +37,45 @@ def test_a_mode_goes_on_as_itself(phase: float) -> None:
     np.testing.assert_allclose(found["tip_u2"], 0.01 * np.cos(omega * found["t"] + phase), rtol=0, atol=2e-5)
 
 
+def balanced(motion: Any, **more: Any) -> rotfem.RunResult:
+    """Return a short history that starts as the default is, or as it is told."""
+    return rotfem.run(scene(**{"initial": {}, "model": {"theory": "reissner"}, "motion": motion, **more}))
+
+
+def test_a_free_hub_starts_in_balance() -> None:
+    """A rigid rotation of the stretched beam solves the equations of hub and beam: nothing changes, to round-off."""
+    found = balanced({"type": "torque", "hub_inertia": 50.0, "speed": 3.0}).history
+    np.testing.assert_allclose(found["psi_dot"], 3.0, rtol=1e-10)
+    assert found["tip_u1"][0] == pytest.approx(1.2 * 9.0 * L**3 / 3 / 2.8e7, rel=1e-3)  # of a rod that hardly stretches
+    np.testing.assert_allclose(found["tip_u1"], found["tip_u1"][0], rtol=1e-8)
+
+
+def test_loads_over_time_and_gravity_are_frozen_at_the_start() -> None:
+    """The first state is the equilibrium of a scene that has the values of t = 0 for ever; a turning frame, too."""
+    table = {"tip_force": [[0.0, 0.0, 3.0], [1.0, 0.0, 0.0]]}
+    still = rotfem.run(scene({}, loads={"tip_force": [0.0, 3.0]}, model={"theory": "reissner"}) | {"time": None})
+    assert balanced(SPIN, loads=table).tip["u2"][0] == pytest.approx(still.tip["u2"][-1], rel=1e-9)
+    weight = {"distributed": [0.0, -1.2 * 9.81]}
+    hung = rotfem.run(scene({}, loads=weight, model={"theory": "reissner"}) | {"time": None})
+    gravity = balanced(SPIN, loads={"gravity": [0.0, -9.81]})
+    assert gravity.tip["u2"][0] == pytest.approx(hung.tip["u2"][-1], rel=1e-9)
+    assert np.ptp(gravity.tip["u2"]) > 0.1  # it turns from then on
+
+
+def test_what_starts_without_forces_starts_undeformed() -> None:
+    spin_up = balanced({"type": "spin_up", "speed": 6.0, "duration": 15.0})
+    assert all(values[0] == 0.0 for values in spin_up.tip.values())
+    assert "stability" not in spin_up.summary  # no equilibrium was computed
+
+
+def test_hints_say_what_rings_and_what_never_moves() -> None:
+    assert "nothing will move" in balanced(SPIN).summary["advice"][0]
+    rings = balanced(SPIN, initial={"state": "undeformed"})
+    assert "ringing" in rings.summary["advice"][0]
+    assert np.ptp(rings.tip["u1"]) > np.ptp(balanced(SPIN).tip["u1"]) + 1e-4
+    assert not balanced(SPIN, loads={"gravity": [0.0, -1.0]}).summary["advice"]
+
+
 def test_a_hinged_blade_that_is_pushed() -> None:
     """φ = (w/ω) sin ωt of the rigid blade, ω² = 3k/ρAL³, with velocities w x; it bends by k L/EI = 3e-4 beside."""
     stiff, k, w = {"EA": 1e10, "GA": 1e10, "EI": 1e7, "mass_per_length": 1.2}, 300.0, 0.01

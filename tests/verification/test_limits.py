@@ -360,7 +360,7 @@ def tips(scene: Scene) -> Array:
         {"loads": {"gravity": [0.3, -0.5]}},
         {"motion": SPIN | {"base_acceleration": [0.3, -0.5]}},
         {"loads": {"tip_force": [0.1, 0.2]}},
-        {"loads": {"distributed": {"value": [0.1, 0.2], "kind": "follower"}}},
+        {"loads": {"distributed": {"value": [0.1, 0.2], "kind": "follower"}}, "initial": {"state": "undeformed"}},
     ],
     ids=["gravity", "base", "dead", "follower"],
 )

@@ -386,6 +386,7 @@ def test_jacobi_integral(theory: str) -> None:
             motion={"type": "constant", "speed": 20.0, "axis": [0.2, 0.5, 1.0]},
             mesh__elements=[3, 2],
             loads__tip_force={"value": [0, 0, 200.0]},
+            initial={"state": "undeformed"},
             time={"end": 0.2, "step": step, "spectral_radius": 1.0},
         )
         h = rotfem.run(scene).history

@@ -44,6 +44,7 @@ def test_balance_of_momentum_and_its_moment(scheme: str, damping: str) -> None:
     # acts on its momentum from outside.
     time, digits = {"end": 1.6, "step": 0.02, "scheme": scheme}, DIGITS[scheme]
     scene = {**SCENE, "structure": {**BEAM, "damping": DAMPING[damping]}, "loads": ACTING, "time": time}
+    scene["initial"] = {"state": "undeformed"}
     result = rotfem.run(scene, outputs={f"b_{n}": b for n, b in BALANCES.items()})
     for name in BALANCES:
         root, whole = result.history[name], result.history[f"b_{name}"]

@@ -16,6 +16,7 @@ def test_what_steps_do_not_resolve_does_not_throw_rows_off() -> None:
     tables = {
         "structure": STRUCTURE,
         "motion": {"type": "constant", "speed": 5.0},
+        "initial": {"state": "undeformed"},
         "mesh": {"elements": 2},
         "model": {"theory": "consistent_linear"},
         "time": {"end": 2.0, "step": 0.2, "scheme": "esdirk4", "output_step": 0.02},

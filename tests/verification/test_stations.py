@@ -194,6 +194,7 @@ def test_damping_by_mode_is_a_stress(case: str) -> None:
         "mesh": {"elements": 16, "degree": 3},
         "model": {"theory": theory},
         "loads": {} if motion is HUB else {"tip_force": [0.0, 1.0, 0.0][: 2 + (structure is SPATIAL)]},
+        "initial": {"state": "undeformed"},
         "time": {"end": 0.5, "step": 0.005},
         "output": {"stations": [0.0, 10.0], "quantities": list(columns), "error": False},
     }

@@ -16,6 +16,9 @@ from rotfem.analysis.theory_error import TheoryError
 
 Array = npt.NDArray[np.float64]
 
+#: Part of the largest bending of a history up to which its start, that of a spinning structure, is bent by round-off.
+UNBENT = 1e-9
+
 
 def recover(response: Response) -> Foreshortened:
     """Return a response with its foreshortening and the answer to the forces of second order.
@@ -25,8 +28,9 @@ def recover(response: Response) -> Foreshortened:
     fall as those that are known. To it comes what the stretch may do that linear theories take for none, as far as it
     is not of a shape whose products are known.
     """
-    # a start that is displaced is one of a linear theory, which third order would displace further
-    manifold = Manifold(response, third=response.solution.hub is not None or not np.any(response.q[0]))
+    # a start that is bent is one of a linear theory, which third order would bend further
+    bent = np.abs(response.tips[:, 1:]).max(axis=1, initial=0.0)
+    manifold = Manifold(response, third=response.solution.hub is not None or bent[0] <= UNBENT * bent.max())
     path, answers = manifold.own
     kept = answers[0] if manifold.fourth is None else answers[-1]
     *_, before, last = (manifold.tip(response.q + answer) for answer in answers)

@@ -129,7 +129,7 @@ class Bench:
         variant.check_run()
         problem = Problem.of(variant)
         with input_of(variant.file):
-            if variant.time is None or variant.initial.state == "steady":
+            if variant.time is None:
                 check_steady(problem)
             simulation = Simulation(variant, problem, self.comm)
 
