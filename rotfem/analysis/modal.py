@@ -76,6 +76,7 @@ class ModalAnalysis:
     Attributes:
         free: whether the hub is free, so that its angle is one more unknown.
         past_limits: whether the path to an equilibrium is followed past maxima of the load.
+        estimates: whether the error by the mesh is wanted.
         notes: what there is to be said of these paths.
         mesh_by_shape: whether shapes alone told the last mesh errors, of plates, which may be far too small.
     """
@@ -98,6 +99,7 @@ class ModalAnalysis:
         self._unit: float | None = None
         self._kept = KeptDigits(self.system)
         self.past_limits, self.notes, self.mesh_by_shape = False, list[str](), False
+        self.estimates = True
         assembled = self.system.assembled
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
         self.seconds |= {"equilibrium": 0.0, "factor": 0.0, "eigen": 0.0}

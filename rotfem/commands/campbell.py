@@ -40,6 +40,9 @@ from rotfem.units import split_unit
 
 Array = npt.NDArray[Any]
 
+#: What a row of a diagram has of the row of its mode.
+KEPT = ("frequency", "frequency_hz", "damping", "growth", "residual", "error_bound", "mesh_error")
+
 
 def parse_speeds(text: str, limits: Limits | None = None) -> list[float]:
     """Return speeds (rad/s) from "first:last:number" or "s1,s2,…", with the unit of all of them at the end.
@@ -246,10 +249,7 @@ def node_rows(analysis: ModalAnalysis, node: Node, labels: list[str]) -> list[di
         if node.order[b] < 0:
             continue
         row = columns[node.order[b]]
-        kept = {
-            k: row[k]
-            for k in ("frequency", "frequency_hz", "damping", "growth", "residual", "error_bound", "mesh_error")
-        }
+        kept = {k: row[k] for k in KEPT if k in row}
         shares = {k: v for k, v in row.items() if k.startswith("share_") or k == "turning"}
         rows.append(
             {

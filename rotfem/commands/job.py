@@ -105,6 +105,9 @@ def job(
     as_json: Annotated[
         bool, typer.Option("--json", help="print the summary as JSON, and nothing else, on stdout")
     ] = False,
+    no_error: Annotated[
+        bool, typer.Option("--no-error", help="estimate no errors, as output.error = false does")
+    ] = False,
     no_plots: Annotated[bool, typer.Option("--no-plots", help="write no figures")] = False,
     no_advice: Annotated[bool, typer.Option("--no-advice", help="give no hints at the start")] = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
@@ -117,6 +120,8 @@ def job(
             from rotfem.commands.cost.budget import seconds_of
 
             wanted.append(f"accuracy_budget={seconds_of(budget, 'command line', '--budget')!r}")
+        if no_error:
+            wanted.append("output.error=false")
         loaded = load_scene(scene, [*(overrides or ()), *wanted])
         if lacking := missing():
             raise InputError("", None, lacking)
@@ -144,7 +149,9 @@ def command(
 
     def decorate(work: Callable[..., None]) -> Callable[..., None]:
         options_of_all = list(signature(job, eval_str=True).parameters.values())[1:]
-        shared = [p for p in options_of_all if computes or p.name not in ("no_advice", "accuracy", "budget")]
+        shared = [
+            p for p in options_of_all if computes or p.name not in ("no_advice", "no_error", "accuracy", "budget")
+        ]
         own = list(signature(work, eval_str=True).parameters.values())[1:]
 
         def call(**given: Any) -> None:

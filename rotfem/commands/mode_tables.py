@@ -67,7 +67,7 @@ def mode_tables(analysis: ModalAnalysis, speed: float, count: int, *, keep: bool
 def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any]]:
     """Return one row a mode: frequency (rad/s, Hz), damping ratio, growth (1/s), label, shares, errors."""
     shares, names, turning = analysis.shares(spinning), analysis.names(spinning), analysis.turning(spinning)
-    rows, pairs, mesh = [], spinning.pairs, analysis.mesh_errors(spinning)
+    rows, pairs, mesh = [], spinning.pairs, analysis.mesh_errors(spinning) if analysis.estimates else None
     for i, (lam, error, bound) in enumerate(zip(pairs.values, pairs.errors, pairs.bounds, strict=True)):
         size = abs(lam)
         rows.append(
@@ -83,7 +83,7 @@ def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any
                 **({"turning": turning[i]} if turning else {}),
                 "residual": float(error),
                 "error_bound": float(bound),
-                "mesh_error": mesh[i],
+                **({} if mesh is None else {"mesh_error": mesh[i]}),
             }
         )
     return rows
@@ -111,7 +111,7 @@ def doubtful(rows: list[dict[str, Any]]) -> list[str]:
 
 def coarse(rows: list[dict[str, Any]]) -> list[str]:
     """Return a warning if the mesh may have put frequencies off by more than RESOLVED of them."""
-    found = {row["label"]: row["mesh_error"] for row in rows if row["mesh_error"] > RESOLVED}
+    found = {row["label"]: row["mesh_error"] for row in rows if row.get("mesh_error", 0.0) > RESOLVED}
     if not found:
         return []
     listed = ", ".join(f"{label} by about {100 * error:.2g} %" for label, error in found.items())

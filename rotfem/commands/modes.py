@@ -183,7 +183,7 @@ def analysis_of(scene: Scene, problem: ProblemData, comm: MPI.Comm) -> ModalAnal
         InputError: more modes are asked for than there are unknowns, or a mesh that cannot be computed with.
     """
     analysis = ModalAnalysis(problem, scene.modes.about, Newton.of(scene.solver), comm)
-    analysis.past_limits = scene.solver.past_limits
+    analysis.past_limits, analysis.estimates = scene.solver.past_limits, scene.output.error
     if "count" in scene.modes.model_fields_set:  # what was not asked for is only an upper limit
         analysis.check_count(scene.modes.count)
     return analysis

@@ -34,7 +34,7 @@ class ModesResult(Result):
         rows: one dictionary a mode: `mode`, `label`, `frequency` (rad/s), `frequency_hz`, `damping` (ratio), `growth`
             (1/s), `stability`, `share_…` (of the kinetic energy), `residual` (backward error),
             `error_bound` (how far round-off can have moved the eigenvalue, relative to its size),
-            `mesh_error` (how far the mesh is estimated to have put the frequency off, relative).
+            `mesh_error` (how far the mesh is estimated to have put the frequency off, relative; with `output.error`).
         shapes: title ↦ columns along the structure: `x` (m), of a plate `y`, each component and its imaginary part,
             dimensionless: translations over the largest one of the mode, a vector at the phase where it is largest,
             rotations (rad) times `summary["shapes"]["length"]` (m, of the structure) over it. A mode whose kinetic

@@ -194,3 +194,24 @@ def test_bad_input_leaves_no_empty_folders(folder: Path, rotfem: Rotfem) -> None
     (folder / "kept" / "note").write_text("mine")
     assert rotfem(*bad, "-o", "kept/../kept/new").status == 2
     assert [path.name for path in (folder / "kept").iterdir()] == ["note"]
+
+
+def test_no_error_leaves_out_the_estimate_alone(folder: Path, rotfem: Rotfem) -> None:
+    """The same frequencies, digit by digit, and neither `mesh_error` nor `error`; as output.error = false does."""
+    plain, quick, same = (
+        rotfem(*command, "beam.toml", "--json", "--no-plots", "-o", out, *more)
+        for command, out, more in (
+            (("campbell", "--speeds", "0,2,4"), "plain", ()),
+            (("campbell", "--speeds", "0,2,4"), "quick", ("--no-error",)),
+            (("modes",), "same", ("--set", "output.error=false")),
+        )
+    )
+    assert {done.status for done in (plain, quick, same)} == {0}
+    tables = {out: (folder / out / "campbell.csv").read_text().splitlines() for out in ("plain", "quick")}
+    names = {out: lines[0].split(",") for out, lines in tables.items()}
+    assert set(names["plain"]) - set(names["quick"]) == {"mesh_error"}
+    columns = [[line.split(",")[names[out].index("frequency")] for line in lines] for out, lines in tables.items()]
+    assert columns[0] == columns[1]
+    assert "error" in json.loads(plain.out)
+    assert "error" not in json.loads(quick.out)
+    assert all("mesh_error" not in row for row in json.loads(same.out)["modes"])
