@@ -9,10 +9,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.load_steps import SOON
 from rotfem.analysis.modal import ModalAnalysis
-from rotfem.errors import InputError
+from rotfem.errors import ComputationError, InputError
+from rotfem.numerics.eigenproblem import Pencil
+from rotfem.numerics.linear import DirectSolver
+from rotfem.numerics.newton import REACH, Newton
+from rotfem.numerics.projection import summed
 
 Array = npt.NDArray[np.float64]
+
+#: Part of the kinetic energy of a mode from which what is in phase, or a quarter of a period behind, is a pattern that
+#: is prescribed. What is less follows the others, as the stretch that the Coriolis force makes of bending.
+PRESCRIBED = 1e-2
 
 #: Part of its largest displacement below which the tip does not take part in a mode.
 STILL = 1e-6
@@ -34,26 +43,36 @@ class FirstMotion:
     phase: float = 0.0
     velocity: Sequence[Sequence[float]] | None = None
 
-    def beside(self, q: Array | None, analysis: ModalAnalysis) -> tuple[Array | None, Array]:
+    def beside(self, q: Array | None, analysis: ModalAnalysis, newton: Newton) -> tuple[Array | None, Array]:
         """Return (q, q̇) at t = 0, local dof arrays, beside the state that the history starts from.
 
         Args:
             q: that state; None where it is undeformed.
-            analysis: of modes about it, or of nothing but its system where there are velocities.
+            analysis: of modes about it, by the equations of the history.
+            newton: iteration control.
 
         Raises:
             InputError: there is no such mode, or it does not move the tip.
-            ComputationError: no equilibrium, or eigenpairs not to be trusted.
+            ComputationError: no equilibrium, eigenpairs not to be trusted, or no motion of this amplitude.
         """
+        system = analysis.system.held
         if self.velocity is not None:
-            return q, of_velocities(analysis.system.held, self.velocity)
-        shape, rates = self.of_mode(analysis)
-        return (shape if q is None else q + shape), rates
+            return q, of_velocities(system, self.velocity)
+        course, patterns = self.of_mode(analysis)
+        state = system.zeros() if q is None else q
+        if system.linear:
+            return state + course[0], course[1]
+        try:
+            return in_mode(system, state, course, patterns, newton)
+        except ComputationError as error:
+            what = f"no motion in mode {self.mode} with an amplitude of {self.amplitude:g} m: {error.what}"
+            raise ComputationError(what, advice="a smaller initial.amplitude") from error
 
     def of_mode(self, analysis: ModalAnalysis) -> tuple[Array, Array]:
-        """Return displacements and velocities, Re(a x e^{iφ}) and Re(λ a x e^{iφ}), of the mode x.
+        """Return q and its three rates in the mode x, local dof arrays (4, n), and its patterns.
 
-        Its tip moves by one in the direction in which it moves most.
+        The tip moves by one in the direction in which it moves most; then the rates are Re(λᵏ a x e^{iφ}), and the
+        patterns are M Re x and M Im x, owned unknowns (k, m), those that have some of the kinetic energy.
 
         Raises:
             InputError: there is no such mode, or it does not move the tip.
@@ -66,15 +85,80 @@ class FirstMotion:
             raise InputError("initial.mode", number, f"there are {len(spinning.pairs.values)} modes")
         structure, value = system.structure, spinning.pairs.values[number - 1]
         x = analysis.right(spinning)[:, number - 1]
-        whole = np.zeros(len(system.zeros()), dtype=complex)
-        whole[: len(x)] = x
+        whole = everywhere(system, x.real) + 1j * everywhere(system, x.imag)
         moves = [i for i, name in enumerate(structure.unknowns) if name.startswith("u")]
         tip = (structure.tip_values(whole.real) + 1j * structure.tip_values(whole.imag))[moves]
         largest = tip[np.argmax(np.abs(tip))]
         if abs(largest) <= STILL * system.size(np.abs(whole)) * structure.length:
             raise InputError("initial.mode", number, "does not move the tip, which initial.amplitude is of")
-        turned = self.amplitude / largest * np.exp(1j * self.phase) * whole
-        return turned.real.copy(), (value * turned).real.copy()
+        factor = self.amplitude * np.exp(1j * self.phase)
+        course = np.array([(value**k * factor * whole / largest).real for k in range(4)])
+        shape, mass = (x / largest, analysis.mass_times(spinning)[:, number - 1] / largest)
+        energies = summed(system.comm, np.array([shape.real @ mass.real, shape.imag @ mass.imag]))
+        return course, np.array([mass.real, mass.imag])[energies > PRESCRIBED * energies.sum()]
+
+
+def everywhere(system: Any, x: Array) -> Array:
+    """Return owned unknowns with those of other processes that are seen here, a local dof array."""
+    system.q.x.array[: len(x)] = x
+    system.q.x.scatter_forward()
+    return np.array(system.q.x.array)
+
+
+def in_mode(system: Any, state: Array, course: Array, patterns: Array, newton: Newton) -> tuple[Array, Array]:
+    """Return (q, q̇) of the nonlinear motion that a mode is of, local dof arrays.
+
+    The linear shape q₁ alone lacks what bending does to the structure in second order: its foreshortening, which the
+    axial stiffness makes far more of than there is energy in the mode. Its part in the patterns b_i = M x_i is
+    prescribed, and all else balances the inertia of the mode (d'Alembert) and what force was left at the state q₀,
+
+        F(q, q̇₁, q̈₁) + Σ μ_i b_i = F(q₀, 0, 0),    b_i·(q − q₀ − q₁) = 0.
+
+    q̇ follows by differentiation. To first order q₁ and q̇₁ solve both, with μ = 0.
+
+    Args:
+        system: equations of motion, the hub held.
+        state: q₀, with rotations as the system counts them.
+        course: q₁ and its rates, (4, n).
+        patterns: b, owned unknowns (k, m).
+        newton: iteration control.
+
+    Raises:
+        ComputationError: it was not found.
+    """
+    shape, rate, acceleration, jerk = course
+    n, motion = patterns.shape[1], system.motion.at_speed(system.motion.speed(0.0))
+    system.set_time(0.0, motion)
+    system.set_state(state)
+    left, q = system.residual().array.copy(), state + shape
+    before, iterations = q.copy(), 0
+
+    def along(x: Array) -> Array:
+        return np.asarray(summed(system.comm, patterns @ x[:n]))
+
+    def constrained(A: Any, right: Array, part: Array) -> Array:
+        """Return x with A x + Σ μ b = right and b·x = part."""
+        y, *z = DirectSolver(A).solve_all(np.column_stack([right, *patterns])).T
+        mu = np.linalg.solve(np.array([along(column) for column in z]).T, along(y) - part)
+        return everywhere(system, y - mu @ np.array(z))
+
+    def increment() -> float:
+        nonlocal before, iterations
+        system.set_state(q, rate, acceleration)
+        right = system.residual().array - left
+        A = system.tangent(1.0, 0.0, 0.0, before if iterations >= SOON else None)[0]
+        dq = constrained(A, right, along(state + shape - q))
+        size, before, iterations = float(system.size(dq)), q.copy(), iterations + 1
+        q[:] += dq * min(1.0, REACH / size) if size > 0.0 else dq
+        return size
+
+    newton.solve(increment, lambda: float(system.size(q)))
+    system.set_state(q, rate, acceleration)
+    if system.model.inside_out():
+        raise ComputationError("Newton met a state that is turned inside out (an axial strain below −1)")
+    pencil = Pencil(*system.mass_damping_stiffness())
+    forces = pencil.apply(pencil.C, acceleration[:n, None]) + pencil.apply(pencil.M, jerk[:n, None])
+    return q, constrained(pencil.K, -np.real(forces[:, 0]), along(rate))
 
 
 def of_velocities(system: Any, rows: Any) -> Array:

@@ -47,10 +47,8 @@ def first_state(run: Simulation) -> tuple[Array | None, Array | None]:
     q, motion = _shape(run), first_motion(run.scene)
     if motion is None:
         return q, None
-    problem, system = run.problem, run.system if motion.mode is None else None
-    speed = problem.motion.speed(0.0)
-    turning = problem.spinning() if system is None and speed != 0.0 else problem
-    return motion.beside(q, ModalAnalysis(turning, run.scene.initial.state, comm=run.comm, system=system))
+    analysis = ModalAnalysis(run.problem, run.scene.initial.state, comm=run.comm, system=run.system)
+    return motion.beside(q, analysis, Newton.of(run.scene.solver))
 
 
 def _shape(run: Simulation) -> Array | None:

@@ -87,7 +87,7 @@ class Candidate:
         """
         system, state = self.switched(), "steady" if self.case.from_steady else "undeformed"
         modal = ModalAnalysis(system.model.problem, state, self.case.newton(), system.comm, system)
-        return self.plainly(lambda: first.beside(q, modal))
+        return self.plainly(lambda: first.beside(q, modal, self.case.newton()))
 
     def plainly(self, compute: Callable[[], T]) -> T:
         """Return what is computed with plain tangents, or where that fails with those that take longer to compile."""
