@@ -13,7 +13,6 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.branches import SPARE, Node, Sweep
-from rotfem.analysis.equilibrium import check_steady
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
@@ -114,7 +113,7 @@ def campbell(
         sweep = Diagram(variant, Problem.of(variant, terms=terms), values, comm, hint)
         return sweep.result(orders, progress or (lambda share: None), started)
 
-    scene.check_tables("what modes are about")
+    scene.check_tables("what modes are about" if scene.time is None else "")
     with input_of(scene.file):
         if scene.accuracy is None:
             return attempt()
@@ -135,9 +134,6 @@ class Diagram:
 
     def __init__(self, scene: Scene, problem: ProblemData, values: Sequence[float], comm: MPI.Comm, hint: Hint | None):
         self.scene, self.values, self.choice = scene, values, None
-        if scene.modes.about == "steady":
-            last = problem.motion.at_speed(values[-1])
-            check_steady(problem.replace(motion=last) if any(scene.loads.gravity) else problem)
         if scene.model.tolerance is not None:
             turning = problem.motion.at_speed(values[-1] or values[0])
             spinning = problem if problem.motion.is_spinning else problem.replace(motion=turning)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from rotfem.commands.loads import held
 from rotfem.commands.modes import modes
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.run import run
@@ -106,6 +107,8 @@ def doubts(scene: Scene, trial: Trial, estimates: Estimates) -> list[str]:
     out = [f"{name} of {estimates.theory} cannot be computed: {why}" for name, why in estimates.own.failed.items()]
     if trial.unknown:
         out.append(f"frequencies at rest cannot be computed, the estimates take the scene's steps: {trial.unknown}")
+    if MODES in trial.wanted:
+        out += [f"modes: {line}" for line in held(trial.case.problem)]
     if scene.frame == "inertial":
         out.append("estimates are of the rotating frame, where the same physics is a sum of effects")
     return out

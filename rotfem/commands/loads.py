@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.equilibrium import gravity_turns
 from rotfem.errors import InputError
 from rotfem.mechanics.courses import TINY
 from rotfem.mechanics.loads import WHOLE, AnyLoad, Load, Loads, PlaceLoad, PointLoads, Shapes, Term, named, replaced
@@ -89,17 +90,20 @@ def _probes(structure: Any) -> tuple[Any, ...]:
 
 
 def held(problem: Problem) -> list[str]:
-    """Return a warning where what is computed at one time, as modes are, takes pitch and loads for those of t = 0."""
+    """Return warnings where what is computed at one time, as modes are, has pitch, gravity and loads as at t = 0."""
     given = {name: load.unpitched or load for name, load in named(problem.loads).items()}
     names = [f"loads.{name}" for name, load in given.items() if not (load.constant or load.is_zero)]
     said = [f"{', '.join(names)} {'change' if len(names) > 1 else 'changes'} with time: taken as at t = 0"]
-    return [*held_pitch(problem), *(said if names else [])]
+    return [*held_in_frame(problem), *(said if names else [])]
 
 
-def held_pitch(problem: Problem) -> list[str]:
-    """Return the same of the pitch."""
-    pitches = problem.motion.pitch is not None
-    return ["structure.root.pitch changes with time: taken as at t = 0"] if pitches else []
+def held_in_frame(problem: Problem) -> list[str]:
+    """Return the same of pitch and gravity."""
+    found = {
+        "structure.root.pitch changes with time": problem.motion.pitch is not None,
+        "loads.gravity turns in the rotating frame": gravity_turns(problem),
+    }
+    return [f"{what}: taken as at t = 0" for what, there in found.items() if there]
 
 
 #: Times at which swept loads are without what is harmonic, with its part in phase, and with that ahead by a quarter.

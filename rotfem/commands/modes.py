@@ -16,7 +16,6 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.critical_speed import critical_speed
-from rotfem.analysis.equilibrium import check_steady
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.mode_checks import self_checks
 from rotfem.analysis.participation import participation as masses_of
@@ -70,7 +69,7 @@ def modes(
         terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form (see `rotfem.Effect`).
 
     Raises:
-        SceneError: the scene is not valid, or has no steady state.
+        SceneError: the scene is not valid.
         ComputationError: no equilibrium, or eigenpairs that fail the check of their backward error.
     """
     scene = as_scene(scene)
@@ -85,7 +84,7 @@ def modes(
             add_participation(found)
         return found
 
-    scene.check_tables("what modes are about")
+    scene.check_tables("what modes are about" if scene.time is None else "")
     with input_of(scene.file):
         if scene.accuracy is None:
             return attempt()
@@ -97,8 +96,6 @@ def _modes(
     scene: Scene, problem: ProblemData, comm: MPI.Comm, sensitivities: bool, around: tuple[Hint | None, float]
 ) -> ModesResult:
     (hint, started), choice = around, None
-    if scene.modes.about == "steady":
-        check_steady(problem)
     if scene.model.tolerance is not None:
         choice = choose(case_of(scene).replace(problem=problem), (MODES,), comm=comm)
         problem = choice.applied(problem)

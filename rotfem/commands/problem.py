@@ -159,8 +159,6 @@ class Problem(ProblemData):
             raise InputError("modes.about", about, 'must be "steady" or "undeformed"')
         speed = self.motion.final_speed(0.0) if speed is None else speed
         problem = self.spinning() if speed != 0.0 else self
-        if about == "steady":
-            check_steady(problem)
         analysis = ModalAnalysis(problem, about, comm=comm)
         analysis.check_count(count)
         found = mode_tables(analysis, speed, count)

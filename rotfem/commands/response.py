@@ -15,12 +15,12 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.equilibrium import check_steady, steady_state
+from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.frequency_response import FrequencyResponse
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.response_outputs import HubOutput, RootOfFreeHub, RootOutput, StationOutput, TipOutput
 from rotfem.analysis.stability import stability_of_pencil
-from rotfem.commands.loads import SWEPT, held_pitch, swept_loads
+from rotfem.commands.loads import SWEPT, held_in_frame, swept_loads
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
 from rotfem.commands.modes import analysis_of, theory_error
 from rotfem.commands.problem import Problem
@@ -66,8 +66,6 @@ def response(
     """
     scene, started = as_scene(scene), perf_counter()
     with input_of(scene.file):
-        if scene.modes.about == "steady":
-            check_steady(Problem.of(scene))
         problem = Problem.of(scene)
         problem = problem.replace(loads=swept_loads(scene, problem.motion))
         analysis = analysis_of(scene, problem, comm)
@@ -170,7 +168,7 @@ def result_of(
     modes = mode_rows(analysis, spinning)
     stability, theory = stability_of_pencil(spinning.pencil, spinning.clamped), theory_error(analysis, spinning)
     warnings = [
-        *held_pitch(analysis.problem),
+        *held_in_frame(analysis.problem),
         *analysis.notes,
         *advice(analysis, spinning.speed),
         *instabilities(modes),

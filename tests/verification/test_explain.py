@@ -461,10 +461,12 @@ def test_groups_of_the_spin_up() -> None:
     assert more["hub_ratio"] == 0.2
 
 
-def test_a_scene_without_any_output_is_refused() -> None:
-    """Gravity turns in the rotating frame, and there is no [time]."""
-    with pytest.raises(SceneError, match="loads.gravity"):
-        rotfem.explain(scene(ALL, {"time": None, "motion": {"type": "constant", "speed": 1.0}}))
+def test_gravity_that_turns_leaves_the_modes() -> None:
+    """There is no steady state, and without [time] no history: modes are about the equilibrium with gravity frozen."""
+    changes = {"time": None, "motion": {"type": "constant", "speed": 1.0}, "loads": {"gravity": [0.0, -1.0]}}
+    found = rotfem.explain(scene(ALL, changes)).summary
+    assert found["outputs"] == ["modes"]
+    assert any("gravity turns in the rotating frame: taken as at t = 0" in line for line in found["warnings"])
 
 
 # --- choice ---------------------------------------------------------------------------------------------------------

@@ -90,6 +90,25 @@ def test_loads_over_time_and_gravity_are_frozen_at_the_start() -> None:
     assert np.ptp(gravity.tip["u2"]) > 0.1  # it turns from then on
 
 
+def test_modes_are_about_what_a_history_starts_with() -> None:
+    """Gravity across the axis and loads over time are dead loads of t = 0: the same modes at the same equilibrium."""
+    tables = scene({}, model={"theory": "reissner"})
+    over_time = {"gravity": [0.0, -9.81], "distributed": [[0.0, 0.0, 20.0], [1.0, 0.0, 0.0]]}
+    turning, frozen = tables | {"loads": over_time}, tables | {"loads": {"distributed": [0.0, 20.0 - 1.2 * 9.81]}}
+    found = rotfem.modes(turning)
+    np.testing.assert_allclose(found.frequencies, rotfem.modes(frozen).frequencies, rtol=1e-8)
+    said = " ".join(found.summary["warnings"])
+    assert "loads.distributed changes with time: taken as at t = 0" in said
+    assert "loads.gravity turns in the rotating frame: taken as at t = 0" in said
+    diagram = rotfem.campbell(turning, [0.0, 3.0])
+    np.testing.assert_allclose(diagram.frequencies[-1], found.frequencies, rtol=1e-8)
+
+
+def test_a_steady_state_refuses_gravity_that_turns() -> None:
+    with pytest.raises(rotfem.SceneError, match="loads.gravity"):
+        rotfem.run(scene({}, loads={"gravity": [0.0, -9.81]}) | {"time": None})
+
+
 def test_what_starts_without_forces_starts_undeformed() -> None:
     spin_up = balanced({"type": "spin_up", "speed": 6.0, "duration": 15.0})
     assert all(values[0] == 0.0 for values in spin_up.tip.values())

@@ -448,11 +448,6 @@ def test_speed_of_the_modes(hub_beam: Any) -> None:
     np.testing.assert_allclose(first, 3.03628366179, rtol=1e-6)  # iccia_frequencies.csv
 
 
-def test_turning_gravity_is_refused(unit_beam: Any) -> None:
-    with pytest.raises(SceneError, match="loads.gravity"):
-        modes(unit_beam({"motion.speed": 1.0}, loads={"gravity": [0.0, -9.81, 0.0]}))
-
-
 def test_free_hub(unit_beam: Any, tmp_path: Path) -> None:
     """Its rigid-body mode is the first row and has no shape; what is not there for a free hub is refused."""
     torque = {"type": "torque", "hub_inertia": 1.0, "pulses": [[0.0, 0.1, 1.0]]}

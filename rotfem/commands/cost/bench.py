@@ -146,8 +146,6 @@ class Bench:
     def _modal(self, variant: Scene) -> Go:
         problem = Problem.of(variant)
         with input_of(variant.file):
-            if variant.modes.about == "steady":
-                check_steady(problem)
             analysis = analysis_of(variant, problem, self.comm)
         V, speed = analysis.system.V, problem.motion.final_speed(variant.time.end if variant.time is not None else 0.0)
 
