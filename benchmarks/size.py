@@ -79,6 +79,7 @@ def module_in(name: str) -> str | None:
     return ".".join(parts)
 
 
+@cache
 def names_of(module: str, everywhere: bool = True) -> dict[str, str]:
     """Return local name ↦ full name of what a module imports, for type checkers too.
 
@@ -99,6 +100,7 @@ def names_of(module: str, everywhere: bool = True) -> dict[str, str]:
     return found
 
 
+@cache
 def imported(module: str, everywhere: bool = True) -> set[str]:
     """Return the modules of the program that a module imports."""
     found = {module_in(name) for name in names_of(module, everywhere).values()}

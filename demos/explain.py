@@ -14,7 +14,7 @@ from pathlib import Path
 from _demo import FIRST_RANK, command_line, report, save, say
 
 import rotfem
-from rotfem.results.plots_explain import explain_figure
+from rotfem.results.plots import explain_figure
 
 SCENE = Path(__file__).with_name("explain.toml")
 

@@ -11,8 +11,7 @@ from rotfem.analysis.patience import Patience
 from rotfem.analysis.roots import came_true, check_root, turned_with_clamp
 from rotfem.analysis.schemes import Array, Shifts, Stage, State
 from rotfem.errors import ComputationError
-from rotfem.numerics.newton import REACH, Newton
-from rotfem.numerics.old_factor import OldFactor
+from rotfem.numerics.newton import REACH, Newton, OldFactor
 
 #: Iterations with an old factor after which the next step gets a new one, of a linear and of a nonlinear system.
 LONG, NONLINEAR = 5, 8

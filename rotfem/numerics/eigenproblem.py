@@ -19,11 +19,37 @@ from rotfem.numerics.asymmetry import asymmetries
 from rotfem.numerics.balance import balanced, least_frequency, power_of_two
 from rotfem.numerics.bounds import RoundOff
 from rotfem.numerics.damped import MORE, damped_pairs, heavily_damped
-from rotfem.numerics.left_vectors import matched, mirror_error, mirrored
 from rotfem.numerics.linear import transposed, use_direct_solver
 from rotfem.numerics.low_rank import sparse_part
 
 Array = npt.NDArray[Any]
+
+
+def mirrored(values: Array, right: Array) -> Array:
+    """Return the left vectors of a conservative pencil, y^H (λ² M + λ C + K) = 0: y(λ) = x(−λ̄).
+
+    Two pairs of one pencil are bi-orthogonal, y_i^H [(λ_i + λ_j) M + C] x_j = 0 for λ_i ≠ λ_j. That follows from the
+    two linearised problems (Tisseur & Meerbergen 2001, sections 3.4 and 3.6).
+    """
+    return _pick(right, values, -values.conj())
+
+
+def matched(values: Array, others: Array, vectors: Array) -> Array:
+    """Return the left vectors from the right ones of the transposed pencil: y(λ) = conj of its vector at λ."""
+    return _pick(vectors, others, values).conj()
+
+
+def mirror_error(values: Array) -> float:
+    """Return the largest relative distance of −λ̄ from the spectrum, over the inner half of the computed λ."""
+    inner = values[(np.abs(values) <= np.median(np.abs(values))) & (values != 0.0)]  # 0 mirrors itself
+    distance = np.abs(values[None, :] + inner.conj()[:, None]).min(axis=1)
+    return float(np.max(distance / np.abs(inner), initial=0.0))
+
+
+def _pick(vectors: Array, values: Array, wanted: Array) -> Array:
+    index = np.array([int(np.argmin(np.abs(values - w))) for w in wanted], dtype=int)
+    return vectors[:, index]
+
 
 #: Largest accepted backward error of an eigenpair; one above it is an error, not a row.
 BACKWARD_TOLERANCE = 1e-8

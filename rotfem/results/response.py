@@ -69,9 +69,9 @@ class ResponseResult(Result):
 
     def drawings(self) -> dict[str, Callable[[], Figure]]:
         """Return response.png: amplitudes and phases over frequency."""
-        from rotfem.results import plots_response
+        from rotfem.results.plots import response_figure
 
-        return {"response.png": partial(plots_response.response_figure, self)}
+        return {"response.png": partial(response_figure, self)}
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return one row a frequency, indexed by `frequency` (rad/s), as in response.csv.

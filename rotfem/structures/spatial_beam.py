@@ -25,12 +25,11 @@ from rotfem.errors import InputError
 from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
 from rotfem.mechanics.problem import Problem
 from rotfem.structures.beam import Beam
-from rotfem.structures.curved_axis import curved_axis
+from rotfem.structures.curved_axis import curved_axis, swept_axis
 from rotfem.structures.datum import SectionTurns
 from rotfem.structures.moderate_turns import check_sections
 from rotfem.structures.spatial_section import SectionForms, euler_tensor
 from rotfem.structures.structure import Array
-from rotfem.structures.swept_axis import swept_axis
 from rotfem.structures.turning_bodies import AppliedMoment, Director, OffsetMass, SectionTurn, rotation_part
 
 

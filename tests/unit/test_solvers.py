@@ -11,11 +11,10 @@ from petsc4py import PETSc
 from rotfem.errors import ComputationError
 from rotfem.numerics import linear
 from rotfem.numerics.asymmetry import is_symmetric
-from rotfem.numerics.left_vectors import mirror_error
+from rotfem.numerics.eigenproblem import mirror_error
 from rotfem.numerics.linear import DirectSolver, NearbySolver, SingularSolver, combine, is_regular
 from rotfem.numerics.low_rank import LowRank, PlusLowRank
-from rotfem.numerics.newton import Newton
-from rotfem.numerics.old_factor import OldFactor
+from rotfem.numerics.newton import Newton, OldFactor
 from rotfem.numerics.projection import times
 
 
