@@ -174,8 +174,14 @@ class Load:
 
     @cached_property
     def stations(self) -> tuple[float, ...]:
-        """Places along the span (m) at which it has kinks or jumps, which are nodes of the mesh."""
+        """Places along the span (m) at which it has kinks or jumps."""
         return tuple(sorted({float(x) for term in self.terms if term.shapes.x is not None for x in term.shapes.x}))
+
+    @cached_property
+    def jumps(self) -> tuple[float, ...]:
+        """Those of them (m) at which it may jump: stations that stand twice, and ends, beyond which it is nothing."""
+        tables = [term.shapes.x for term in self.terms if term.shapes.x is not None]
+        return tuple(sorted({float(v) for x in tables for v in (x[0], *x[1:][np.diff(x) == 0.0], x[-1])}))
 
     def many(self, t: Array) -> Array:
         """Return the components of a uniform load, else all amplitudes, at times (n,), shape (n, components)."""
@@ -226,6 +232,7 @@ class PlaceLoad:
     unpitched: PlaceLoad | None = None
     is_zero = is_uniform = linear = False
     stations: tuple[float, ...] = ()
+    jumps: tuple[float, ...] = ()
 
     def on(self, places: tuple[Any, ...], t: float) -> Array:
         """Return the components at places, one after the other."""
@@ -299,7 +306,12 @@ def named(loads: Loads) -> dict[str, AnyLoad]:
 
 def stations(loads: Loads) -> set[float]:
     """Return the places along the structure (m) at which loads have kinks or jumps, or work at a point."""
-    return {x for load in named(loads).values() for x in load.stations} | {p.x[0] for p in loads.at if len(p.x) == 1}
+    return {x for load in named(loads).values() for x in load.stations} | jumps(loads)
+
+
+def jumps(loads: Loads) -> set[float]:
+    """Return those of them at which loads jump or work at a point."""
+    return {x for load in named(loads).values() for x in load.jumps} | {p.x[0] for p in loads.at if len(p.x) == 1}
 
 
 def is_moment(name: str) -> bool:

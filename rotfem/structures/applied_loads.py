@@ -8,6 +8,7 @@ each cell; of a function of place the values at the nodes of the mesh.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,9 +17,10 @@ import ufl
 from dolfinx import fem
 
 from rotfem.mechanics.bodies import AppliedLoad, Kinematics
-from rotfem.mechanics.loads import AnyLoad, Load, PlaceLoad, PointLoads, is_moment, named
+from rotfem.mechanics.loads import AnyLoad, Load, PlaceLoad, PointLoads, Shapes, is_moment, named
 from rotfem.mechanics.problem import Problem
 from rotfem.structures.points import Points
+from rotfem.structures.section_fields import SectionField
 
 Array = npt.NDArray[np.float64]
 
@@ -78,19 +80,18 @@ class SpanField(Amplitude):
     @classmethod
     def of_shapes(cls, structure: Any, load: Load, n: int) -> SpanField:
         """Return the field of the shapes of a load, with n components."""
-        f = fem.Function(_space(structure, "DG", 1, n))  # the stations are nodes of the mesh
-        cells = f.function_space.dofmap.list
-        x = f.function_space.tabulate_dof_coordinates()[:, 0]
-        middles = np.empty(len(x))
-        middles[cells] = x[cells].mean(axis=1)[:, None]
-        parts = []
+        rows = structure.inner_rows
+        degree = structure.V.element.basix_element.degree if len(rows) else 1
+        f = fem.Function(_space(structure, "DG", degree, n))
+        cells, parts = f.function_space.dofmap.list, []
         for shapes in (term.shapes for term in load.terms):
-            values = first(shapes.along(x, middles), n)
+            at = partial(_columns, shapes, n)
+            values = SectionField(at, rows, degree).values(f.function_space).reshape(cells.size, -1, n)
             if shapes.region:
-                there = np.zeros(len(x), dtype=bool)
+                there = np.zeros(len(values), dtype=bool)
                 there[cells[structure.cells_of(shapes.region)].ravel()] = True
-                values = np.where(there[:, None], values, 0.0)
-            parts.append(values.reshape(len(values), -1))
+                values[~there] = 0.0
+            parts.append(np.moveaxis(values, 1, 0).reshape(values.shape[1], -1))
         basis = np.concatenate(parts)
         return cls(f, basis, None, len(basis))
 
@@ -126,6 +127,11 @@ class SpanField(Amplitude):
         if turn is not None and n > 1:
             dofs = (dofs.reshape(-1, n) @ turn[:n, :n].T).ravel()
         self._function.x.array[:] = dofs
+
+
+def _columns(shapes: Shapes, n: int, x: Array, near: Array) -> Array:
+    """Return the first n components of all shapes at places (m), (places, shapes, n)."""
+    return np.moveaxis(first(shapes.along(x, near), n), 0, 1)
 
 
 def first(values: Array, n: int) -> Array:

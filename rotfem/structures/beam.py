@@ -12,7 +12,7 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 from rotfem.mechanics.bodies import RootSpring, Strain
-from rotfem.mechanics.loads import stations
+from rotfem.mechanics.loads import jumps, stations
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.forms import quadrature_points
 from rotfem.structures.memory import check_memory
@@ -55,11 +55,11 @@ class Beam(Structure):
         self.length, self.hub_radius, self._section = s.length, root[0], s.section
         check_memory("mesh.elements", grid.elements, grid.elements * grid.degree + 1, self.size, 1, comm)
         #: Places along the beam where section, axis, loads or forces may change at once, m.
-        places = (*nodes, *stations(problem.loads))
-        self.knots = apart((*rows, *places), self.length)
-        #: Whether every row is a node; otherwise properties are projected (`rotfem.structures.section_fields`).
-        self.follows_rows = len(self.knots) < grid.elements
-        ends = beam_nodes(self.length, grid.elements, self.knots if self.follows_rows else apart(places, self.length))
+        places = apart((*nodes, *jumps(problem.loads)), self.length)
+        self.knots = apart((*rows, *places, *stations(problem.loads)), self.length)
+        if len(self.knots) >= grid.elements:  # properties and loads are projected (`rotfem.structures.section_fields`)
+            self.inner_rows = np.array([x for x in self.knots if x not in places])
+        ends = beam_nodes(self.length, grid.elements, places if len(self.inner_rows) else self.knots)
         interval = mesh.create_interval(comm, len(ends) - 1, [0.0, 1.0])  # which dolfinx refuses below 2e-16 m
         x = interval.geometry.x
         x[:, 0] = np.interp(x[:, 0], np.linspace(0.0, 1.0, len(ends)), ends)
@@ -145,7 +145,7 @@ class Beam(Structure):
 
     def linear_field(self, name: str, at: Callable[[Array], Array], size: int, valid: Valid | None = None) -> Any:
         """Return the field of at(X), (n, size), that is linear between rows; of values (n,) where the size is 0."""
-        return self.field(name, lambda x, _: at(x), 1 if self.follows_rows else self.degree, size, valid)
+        return self.field(name, lambda x, _: at(x), self.degree if len(self.inner_rows) else 1, size, valid)
 
     def field(
         self, name: str, at: Callable[[Array, Array], Any], degree: int, size: int = 0, valid: Valid | None = None
@@ -153,8 +153,7 @@ class Beam(Structure):
         """Return a discontinuous field of a degree (see `SectionField`), with so many components, a scalar for 0."""
         cell = self.mesh.basix_cell()
         space = fem.functionspace(self.mesh, element("DG", cell, degree, shape=(size,) if size else ()))
-        rows = np.array(() if self.follows_rows else self.knots)
-        return SectionField(at, rows, min(self.degree, degree), valid)(fem.Function(space, name=name))
+        return SectionField(at, self.inner_rows, min(self.degree, degree), valid)(fem.Function(space, name=name))
 
     # --- values -------------------------------------------------------------------------------------------------
 

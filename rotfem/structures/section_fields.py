@@ -55,20 +55,23 @@ class SectionField:
 
     def __call__(self, f: fem.Function) -> fem.Function:
         """Set the field, and return it; on other meshes it is set anew, not interpolated."""
-        space = f.function_space
+        f.x.array[:] = self.values(f.function_space).ravel()
+        f.on_mesh = self  # which a refined mesh asks for
+        return f
+
+    def values(self, space: fem.FunctionSpace) -> Array:
+        """Return the values at the nodes of a discontinuous space, (nodes, components)."""
         dofmap, x = space.dofmap.list, space.tabulate_dof_coordinates()[:, 0]
-        values = f.x.array.reshape(len(x), -1)
         middle = np.empty_like(x)
         middle[dofmap] = x[dofmap].mean(axis=1)[:, None]
-        values[:] = np.asarray(self.at(x, middle)).reshape(len(x), -1)
+        values = np.array(self.at(x, middle), dtype=np.float64).reshape(len(x), -1)
         ends = np.sort(space.mesh.geometry.x[space.mesh.geometry.dofmap, 0], axis=1)
         near = END * float(ends.max())
         first, last = (np.searchsorted(self.rows, end) for end in (ends[:, 0] + near, ends[:, 1] - near))
         for cell in np.flatnonzero(last > first):
             inner, dofs = self.rows[first[cell] : last[cell]], dofmap[cell]
             values[dofs] = self._projected(ends[cell], inner, x[dofs])
-        f.on_mesh = self  # which a refined mesh asks for
-        return f
+        return values
 
     def _projected(self, ends: Array, inner: Array, x: Array) -> Array:
         """Return the projection at places x (n,) of the element between two ends with rows inside."""

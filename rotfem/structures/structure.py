@@ -44,6 +44,8 @@ class Structure(LoadsOfStructure):
 
     type: ClassVar[str]
     planar: ClassVar[bool] = False
+    #: Places along it (m) of rows of tables that are no nodes.
+    inner_rows: Array = np.empty(0)
     #: Names of the unknowns.
     components: ClassVar[tuple[str, ...]]
     #: Normal of a plane that it may be symmetric about, 0 to 2 ↦ the components of motions in that plane.

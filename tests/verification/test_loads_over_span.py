@@ -32,6 +32,20 @@ def test_triangle_at_rest(theory: str) -> None:
     assert computed({"distributed": {"over_span": TRIANGLE}}, theory).tip["u2"][0] == pytest.approx(exact, rel=1e-9)
 
 
+def test_more_stations_than_elements() -> None:
+    """u₂(L) = ∫ q (x² (3L − x)/6EI + x/GA) dx: the work of dead loads is exact however few elements there are."""
+    x = np.linspace(0.0, L, 41)
+    q = Q * (1.0 + x / L + np.sin(7.0 * np.arange(41)))
+    points, w = np.polynomial.legendre.leggauss(3)
+    at = ((x[:-1] + x[1:]) / 2)[:, None] + np.diff(x)[:, None] / 2 * points
+    influence = at**2 * (3 * L - at) / (6 * EI) + at / GA
+    exact = np.sum(np.diff(x)[:, None] / 2 * w * np.interp(at, x, q) * influence)
+    rows = [[a, 0.0, b] for a, b in zip(x.tolist(), q.tolist(), strict=True)]
+    few = computed({"distributed": {"over_span": rows}}, "linear", mesh={"elements": 3})
+    assert few.summary["dofs"] == 3 * 10
+    assert few.tip["u2"][0] == pytest.approx(exact, rel=1e-9)
+
+
 def test_triangle_spinning() -> None:
     """The equations of the consistent linear theory (docs/theory.md, the second-order family), solved to 1e-10.
 
