@@ -23,7 +23,7 @@ from tests.pairs.scenes import ACTIVE, LEVELS, as_toml, shuffled, tables_of
 #: What no row has: what is refused, and what is known to fail.
 CONFLICTS: list[Levels] = [*(refusal.choices for refusal in REFUSALS), *(failure.choices for failure in KNOWN)]
 #: Seconds that rows of two processes may take each, compilation included, before one of them is taken to hang.
-PATIENCE = 60.0
+PATIENCE = 180.0
 #: Error of an answer on two processes: of sums in another order and Newton's last increment, of adaptive steps, which
 #: may be others then, and of what is computed to an accuracy.
 DIGITS = {"tolerance": 1e-3, "accuracy": 0.8}
