@@ -117,19 +117,7 @@ REFUSALS = (
         "Checkpoints are of histories: a steady state has no steps.",
     ),
     Refusal(
-        {"command": ("run", "explain"), "time": ("steady",), "loads": ("gravity",), "motion": but("motion", "rest")},
-        r"loads\.gravity.*gravity across the spin axis turns",
-        "docs/theory.md",
-        "so a spinning beam under gravity has no steady state in the frame",
-    ),
-    Refusal(
-        {"command": ("modes", "response"), "loads": ("gravity",), "motion": but("motion", "rest")},
-        r"loads\.gravity.*gravity across the spin axis turns",
-        "docs/theory.md",
-        "so a spinning beam under gravity has no steady state in the frame",
-    ),
-    Refusal(
-        {"command": ("campbell",), "loads": ("gravity",)},
+        {"command": ("run",), "time": ("steady",), "loads": ("gravity",), "motion": but("motion", "rest")},
         r"loads\.gravity.*gravity across the spin axis turns",
         "docs/theory.md",
         "so a spinning beam under gravity has no steady state in the frame",
