@@ -34,7 +34,7 @@ CAPABILITIES = {
     "time integration": """
         analysis.time analysis.adaptive analysis.alpha_family analysis.dense_output
         analysis.end_acceleration analysis.energy_conserving analysis.esdirk analysis.first_motion
-        analysis.fixed_steps analysis.itinerary analysis.kinks analysis.looks analysis.patience
+        analysis.fixed_steps analysis.patience analysis.time_grid
         analysis.radau analysis.roots analysis.schemes analysis.stage_solver analysis.stepper
         analysis.turning mechanics.courses
     """,

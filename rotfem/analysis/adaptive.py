@@ -11,9 +11,9 @@ import numpy.typing as npt
 from rotfem.analysis.alpha_family import GeneralisedAlpha
 from rotfem.analysis.error_measure import ErrorMeasure
 from rotfem.analysis.fixed_steps import Steps, fixed_steps
-from rotfem.analysis.itinerary import LEAST, Itinerary, Leg
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stepper import Stepper, seen
+from rotfem.analysis.time_grid import LEAST, Leg, TimeGrid
 from rotfem.errors import ComputationError
 from rotfem.mechanics.courses import SAME, View
 
@@ -42,8 +42,15 @@ BENT = 0.1
 #: Error, as a part of what is allowed, of a step that could not be solved, and halvings of one that is short already.
 FAILED, HALVINGS = 100.0, 5
 
-#: Steps, with those taken back, after which a march is given up.
-MOST_STEPS = 500_000
+#: Steps, with those taken back, after which a march is given up; steps over which its pace is measured, and by how much
+#: that may be too slow for the rest.
+MOST_STEPS, PACE, HOPELESS = 500_000, 5000, 10.0
+
+#: What to do then.
+QUICKER = (
+    "fixed steps (time.step), which take the mean of what is quicker than they are; a looser time.tolerance; or an "
+    "earlier time.end"
+)
 
 
 class Scout(Stepper):
@@ -70,7 +77,7 @@ class AdaptiveSteps:
         self.shortest = steps.min_step or SHORTEST * self.end
         self.measure = ErrorMeasure(stepper.system, stepper.scheme, self.end)
         cells = np.append(np.arange(round(1 / CELL)) * (CELL * self.end), self.end)
-        self.cells = Itinerary(stepper.system.courses, cells, CELL * self.end, fixed=False)
+        self.cells = TimeGrid(stepper.system.courses, cells, CELL * self.end, fixed=False)
         self.landings, self.dense = self.cells.landings()
         self.least = NOISE * stepper.newton.tolerance
         self.wanted, self.allowed = min(self.longest, FIRST * self.end), np.inf
@@ -89,40 +96,54 @@ class AdaptiveSteps:
             ComputationError: a step failed, or would have to be shorter than allowed, or there are too many.
         """
         state, wanted, stepper, allowed = self.state, self.wanted, self.stepper, self.allowed
-        for _ in range(MOST_STEPS):
+        least = self.cells.step
+        began = state.t
+        for number in range(1, MOST_STEPS + 1):
             if state.t >= self.end:
                 return
-            stop, h = self._next(state.t, wanted)
+            if number % PACE == 0:
+                self._check_pace((state.t - began) / PACE, state.t)
+                began = state.t
+            stop, h = self._next(state.t, wanted, least)
             averaged, lands = self._averaged(state.t, stop), stop in self.landings
             start = stepper.restart(state, View(), View(window=(0.0, h))) if averaged else state
             finish = View(-1 if lands else 0, (h, 0.0) if averaged else None)
             drifts = h <= LEAST * (1 + 1e-6) * min(self.cells.step, wanted)
             new, ratio = self._drifted(start, h, stop, finish) if drifts else self._tried(start, h, stop, finish)
             power, most = 1 / (stepper.scheme.estimate[1] - 1), stepper.scheme.growth
+            if averaged and ratio > 1.0 and ratio != FAILED and h <= self.cells.step * (1 + 1e-9):
+                ratio = 1.0  # the time grid has nothing finer; shorter steps would follow each breakpoint after all
             factor = float(np.clip(SAFETY * max(ratio, 1e-12) ** -power, SHRINK, most))
             if ratio > 1.0:
                 stepper.rejected += 1
-                allowed = h if ratio == FAILED else allowed
+                allowed, least = (h, 0.0) if ratio == FAILED else (allowed, least)
                 wanted = self._shorter(state.t, h * min(factor, SAFETY))
                 continue
+            least = self.cells.step
             allowed = min(h * max(ratio, 1e-12) ** -power, STEADY * allowed)
             factor = min(factor, max(SAFETY * allowed / h, SHRINK))
             if h >= wanted or factor < 1.0:
                 wanted = min(self.longest, h if KEEP[0] <= factor <= KEEP[1] else h * factor)
             if stepper.watch is not None:
                 stepper.watch(start, new, Leg(stop, h, lands, averaged, drifts, plain=False))
-            following = self._next(new.t, wanted)[1] if new.t < self.end else h
+            following = self._next(new.t, wanted, least)[1] if new.t < self.end else h
             if not drifts and following != h:
                 new = stepper.scheme.resized(new, start, following)
             if lands or averaged:
                 new = stepper.restart(new, finish, View(1 if lands else 0))
             state, stepper.pace = new, (wanted, self.largest, allowed)
             yield state
-        raise ComputationError(
-            f"{MOST_STEPS} steps have not reached the end",
-            time=state.t,
-            advice="a looser time.tolerance, fixed steps (time.step), or an earlier time.end",
-        )
+        raise ComputationError(f"{MOST_STEPS} steps have not reached the end", time=state.t, advice=QUICKER)
+
+    def _check_pace(self, advance: float, t: float) -> None:
+        """Refuse a march whose last steps were so short (s, on average) that it would not reach its end.
+
+        Raises:
+            ComputationError: it would take more than HOPELESS times the steps that there may be.
+        """
+        if self.end - t > HOPELESS * MOST_STEPS * advance:
+            what = f"the last {PACE} steps were of {advance:.3g} s on average: {MOST_STEPS} do not reach the end"
+            raise ComputationError(what, time=t, advice=QUICKER)
 
     def _scouted(self, number: int) -> float:
         """Return the largest displacement (scaled) in so many steps, which see all that is prescribed; 0 if they fail.
@@ -161,11 +182,16 @@ class AdaptiveSteps:
         new = self.stepper.drift(start, h, stop)
         return (new if finish.window is None else self.stepper.struck(new, h)), 0.0
 
-    def _next(self, t: float, wanted: float) -> tuple[float, float]:
-        """Return end and length of a step from t that is about as long as wanted and steps over nothing."""
+    def _next(self, t: float, wanted: float, least: float) -> tuple[float, float]:
+        """Return end and length of a step from t that is about as long as wanted and steps over nothing.
+
+        Where breakpoints are denser than the time grid it is not shorter than `least`, s.
+        """
         i = int(np.searchsorted(self.landings, t * (1 + SAME), side="right"))
         stop = float(self.landings[i]) if i < len(self.landings) else self.end
         left, h = stop - t, min(wanted, self.longest)
+        if h < least and self._averaged(t, t + min(h, left)):
+            h = least
         while h > self.cells.step and self.cells.bent(t, t + min(h, left)) > BENT:
             h /= 2
         if h >= left * (1 - 1e-9):

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
-from time import sleep
+from time import monotonic, sleep
 from typing import Any, NoReturn
 
 from rotfem.commands.interrupts import Interrupted
@@ -23,6 +23,9 @@ from rotfem.results.files import json_text
 
 #: Seconds that mpirun is given to pass on what was printed.
 PASSED_ON = 0.2
+
+#: Seconds after which a computation says how far it is where there is no bar; again after twice the time, and so on.
+LONG = 10.0
 
 
 #: Where to find out what is to be done without FEniCSx.
@@ -204,6 +207,8 @@ class ProgressBar:
         self._bar: Any = None
         self._title = title
         self._on, self._speaks = on, speaks
+        self._started = monotonic()
+        self._due, self._last = self._started + LONG, (self._started, 0.0)
 
     def says(self, line: str) -> None:
         """Print a line, above the bar if there is one."""
@@ -214,7 +219,7 @@ class ProgressBar:
 
     def __enter__(self) -> Callable[[float], None]:
         if not self._on:
-            return lambda share: None
+            return self._tell if self._speaks else lambda share: None
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
@@ -227,6 +232,16 @@ class ProgressBar:
     def __exit__(self, *_: object) -> None:
         if self._bar is not None:
             self._bar.stop()
+
+    def _tell(self, share: float) -> None:
+        """Print how far a long computation is and how long it will still take, by its pace since the last such line."""
+        now = monotonic()
+        since, before = self._last
+        if now < self._due or not before < share < 1.0:
+            return
+        left = (1.0 - share) * (now - since) / (share - before)
+        self._due, self._last = self._started + 2 * (now - self._started), (now, share)
+        self.says(f"{self._title}: {100 * share:.3g} % after {now - self._started:.0f} s, about {left:.3g} s to go")
 
 
 def _interrupt(signum: int, frame: object) -> NoReturn:

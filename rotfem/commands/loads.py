@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -154,24 +155,27 @@ def checked(function: Callable[..., Any], key: str, size: int, of: str, planar: 
         The function; it raises an InputError that says at what arguments the other one failed, and how.
     """
 
+    def refused(arguments: tuple[Any, ...], why: str) -> InputError:
+        return InputError(key, None, f"the function of {of}, at {', '.join(map(_shown, arguments))}, {why}")
+
     def at(*arguments: Any) -> Array:
-        where = f"the function of {of}, at {', '.join(map(_shown, arguments))},"
         try:
-            value: Array = np.asarray(function(*arguments), dtype=np.float64).ravel()
+            given = function(*arguments)
+            value: Array = np.array(given, dtype=np.float64, ndmin=1).ravel()
         except (TypeError, ValueError) as error:
-            raise InputError(key, None, f"{where} must return {size} numbers: {error}") from error
+            raise refused(arguments, f"must return {size} numbers: {error}") from error
         except Exception as error:
-            raise InputError(key, None, f"{where} raised {type(error).__name__}: {error}") from error
+            raise refused(arguments, f"raised {type(error).__name__}: {error}") from error
         if value.size == 2 and size == 3:
-            value = np.append(value, 0.0)
+            value = np.array([value[0], value[1], 0.0])
         if value.size == 3 and size == 1 and not np.any(value[:2]):  # a moment about axis 3
             value = value[2:]
         if value.size != size:
-            raise InputError(key, None, f"{where} returned so many numbers: {value.size}; must be {size}")
-        if not np.all(np.isfinite(value)):
-            raise InputError(key, None, f"{where} returned {value}; must return finite numbers")
+            raise refused(arguments, f"returned so many numbers: {value.size}; must be {size}")
+        if not all(map(math.isfinite, value)):
+            raise refused(arguments, f"returned {value}; must return finite numbers")
         if planar and size == 3 and value[2] != 0.0:
-            raise InputError(key, None, f"{where} returned {value}; the third component must be 0 for a planar_beam")
+            raise refused(arguments, f"returned {value}; the third component must be 0 for a planar_beam")
         return value
 
     return at

@@ -60,6 +60,9 @@ class Course:
         marks: further times (s) between which it is nearly straight, where it is known to be fast.
         many: the same of an array of times, shape (n, components); made of `at` if None.
         looks: times (s) at which it is looked at to see whether a step resolves it, but not landed on.
+        samples: times (n,) and values (n, components) of a function that has been sampled, nearly straight between;
+            jumps are two times; None of anything else.
+        data: what has been made of its values at knots and marks (`rotfem.analysis.time_grid`); None before.
         continuous: derivatives, from 0 on, that must not jump, as no force is large enough for that: 2 are the value
             and its rate.
         known: whether all knots are known; otherwise it is a function that has to be looked at.
@@ -72,7 +75,10 @@ class Course:
     many: Callable[[Array], Array] | None = None
     known: bool = True
     looks: Array = field(default_factory=lambda: np.empty(0))
+    samples: tuple[Array, Array] | None = None
+    data: Any = None
     continuous: int = 0
+    _kept: tuple[Array, Array, Array] | None = None
 
     def values(self, t: Array) -> Array:
         """Return the values at times (n,), shape (n, components)."""
@@ -82,15 +88,26 @@ class Course:
 
     def mean(self, t: float, before: float, after: float) -> Any:
         """Return f̄(t), as a scalar or shape (components,) as `at` does."""
-        points = np.concatenate([self.knots, self.marks])
-        inside = points[(points > t - before) & (points < t + after)]
+        points = self._points()
+        inside = points[np.searchsorted(points, t - before, "right") : np.searchsorted(points, t + after, "left")]
         edges = np.unique(np.concatenate([[t - before, t, t + after], inside]))
         lengths = np.diff(edges)
         s = (edges[:-1, None] + lengths[:, None] * POINTS).ravel()
         hat = np.where(s < t, 1 + (s - t) / (before or 1.0), 1 - (s - t) / (after or 1.0))
         weights = (lengths[:, None] * WEIGHTS).ravel() * hat
-        mean = weights @ self.values(s) / weights.sum()
+        mean = weights @ (self.values(s) if self.samples is None else self._straight(s, *self.samples)) / weights.sum()
         return mean if np.ndim(self.at(t)) else float(mean[0])
+
+    def _points(self) -> Array:
+        """Return knots and marks in order; kept until others have been found."""
+        if self._kept is None or self._kept[0] is not self.knots or self._kept[1] is not self.marks:
+            self._kept = self.knots, self.marks, np.union1d(self.knots, self.marks)
+        return self._kept[2]
+
+    @staticmethod
+    def _straight(s: Array, t: Array, f: Array) -> Array:
+        """Return values at times s (n,) on the straight lines between samples f at times t, (n, components)."""
+        return np.stack([np.interp(s, t, column) for column in f.T], axis=1)
 
     def seen(self, view: View) -> Callable[[float], Any]:
         """Return the course as a function of time that shows what a view shows."""

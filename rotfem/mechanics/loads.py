@@ -92,7 +92,7 @@ class Term:
     @classmethod
     def table(cls, rows: npt.ArrayLike, shapes: Shapes) -> Term:
         """Return amplitudes that are given by rows (t, a…), linear between them and constant outside."""
-        t, *columns = np.asarray(rows, dtype=float).T
+        t, *columns = np.ascontiguousarray(np.asarray(rows, dtype=float).T)  # or interp copies them at every call
         if not np.any(np.ptp(columns, axis=1)):
             values = np.einsum("k,ksc->sc", np.array([column[0] for column in columns]), shapes.values)
             return cls(replace(shapes, values=values[None]), knots=tuple(t))

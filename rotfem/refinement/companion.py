@@ -15,10 +15,10 @@ import numpy as np
 
 from rotfem.analysis.dense_output import between
 from rotfem.analysis.fixed_steps import started, travel
-from rotfem.analysis.itinerary import Leg
 from rotfem.analysis.roots import check_root
 from rotfem.analysis.schemes import Array, Scheme, Stage, State
 from rotfem.analysis.stepper import Stepper
+from rotfem.analysis.time_grid import Leg
 from rotfem.errors import ComputationError
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.carrier import carrier

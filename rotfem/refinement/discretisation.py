@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from rotfem.analysis.itinerary import Leg
 from rotfem.analysis.schemes import Array, Scheme, State
+from rotfem.analysis.time_grid import Leg
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError
 from rotfem.mechanics.problem import Problem

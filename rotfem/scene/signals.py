@@ -128,7 +128,7 @@ class Signal(Given):
     @cached_property
     def _columns(self) -> tuple[Array, ...]:
         """Columns of the table as arrays; kept, because a time history asks for them at every step."""
-        return tuple(np.array(self.table, dtype=np.float64).T)
+        return tuple(np.ascontiguousarray(np.array(self.table, dtype=np.float64).T))
 
     @model_validator(mode="after")
     def _check_one(self) -> Self:

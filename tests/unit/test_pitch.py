@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rotfem import SceneError
-from rotfem.analysis.looks import look_at
+from rotfem.analysis.time_grid import find_breakpoints
 from rotfem.commands.problem import Problem
 from rotfem.errors import InputError
 from rotfem.mechanics.courses import Course
@@ -112,7 +112,7 @@ def angle(function: Any) -> Course:
 )
 def test_a_rate_that_jumps_is_refused(function: Any, at: float) -> None:
     with pytest.raises(InputError, match="its rate jumps at t = ") as caught:
-        look_at(angle(function), np.linspace(0, 2, 101))
+        find_breakpoints(angle(function), np.linspace(0, 2, 101))
     assert float(str(caught.value).split("t = ")[1].split(" s")[0]) == pytest.approx(at, abs=1e-6)
 
 
@@ -121,7 +121,7 @@ def test_a_rate_that_jumps_is_refused(function: Any, at: float) -> None:
     [lambda t: 0.3, lambda t: 0.3 + 1e-9 * np.sin(t), lambda t: np.sin(40 * t), lambda t: max(t - 1.0, 0.0) ** 2],
 )
 def test_what_is_smooth_is_not(function: Any) -> None:
-    look_at(angle(function), np.linspace(0, 2, 101))
+    find_breakpoints(angle(function), np.linspace(0, 2, 101))
 
 
 def test_dead_loads_keep_their_direction_in_the_hub() -> None:

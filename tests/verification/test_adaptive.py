@@ -105,3 +105,37 @@ def test_work_without_end_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(rotfem.ComputationError, match="50 steps have not reached the end") as caught:
         moved("tip release", tolerance=1e-4)
     assert len(caught.value.result.history["t"]) > 10  # type: ignore[attr-defined]
+
+
+def test_jumps_denser_than_steps_act_by_their_mean() -> None:
+    """A force that jumps 10000 times is its mean and a ripple at ω = 10⁴π/T, which moves less than its part of (ω₁/ω)².
+
+    Of 2000 cells of the time grid each has five jumps and one step; what is left is the tolerance.
+    """
+    end, found = 0.5, []
+    starts = np.arange(10_000) * end / 10_000
+    rows = [[t, 0.0, 10.0 * (i % 2)] for i, start in enumerate(starts) for t in (start, start + end / 10_001)]
+    for force in ({"over_time": rows}, [0.0, 5.0]):
+        scene = {"structure": STRUCTURE, "motion": STILL, "mesh": {"elements": 2}, "loads": {"tip_force": force}}
+        model, time = {"theory": "consistent_linear"}, {"end": end, "tolerance": 1e-3}
+        found.append(run({**scene, "model": model, "time": time, "output": {"error": False}}))
+    ripple, mean = (result.history for result in found)
+    assert found[0].summary["steps"] < 2100
+    off = np.interp(ripple["t"], mean["t"], mean["tip_u2"]) - ripple["tip_u2"]
+    assert np.max(np.abs(off)) < 3e-3 * np.max(np.abs(mean["tip_u2"]))
+
+
+def test_a_pace_that_reaches_no_end_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A hub held at a speed by a switch slides on its jump in ever shorter steps: said when the pace is known."""
+    monkeypatch.setattr("rotfem.analysis.adaptive.PACE", 100)
+    monkeypatch.setattr("rotfem.analysis.adaptive.MOST_STEPS", 1000)
+    switch = {
+        "type": "torque",
+        "hub_inertia": 50.0,
+        "function": lambda t, psi, speed, tip: -40.0 * np.sign(speed - 0.1),
+    }
+    scene = {"structure": STRUCTURE, "motion": switch, "mesh": {"elements": 2}}
+    with pytest.raises(rotfem.ComputationError, match="do not reach the end") as caught:
+        run({**scene, "time": {"end": 1.0, "tolerance": 1e-3}, "output": {"error": False}})
+    assert "time.step" in caught.value.advice
+    assert caught.value.time is not None

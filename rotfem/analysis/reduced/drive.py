@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.looks import look_at
+from rotfem.analysis.time_grid import find_breakpoints
 from rotfem.mechanics.courses import SAME
 from rotfem.mechanics.pitch import Pitch
 
@@ -42,7 +42,7 @@ class Drive:
         self._turns: dict[bytes, tuple[Array, Array, Array]] = {}
         self._courses = {course.name: course for course in system.courses}
         for course in system.courses:
-            look_at(course, times)
+            find_breakpoints(course, times)
         first, last = float(times[0]), float(times[-1])
         points = np.concatenate([np.empty(0), *(np.concatenate([c.knots, c.marks]) for c in system.courses)])
         inside = np.unique(points[(points > first) & (points < last)])

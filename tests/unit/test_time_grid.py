@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from rotfem import SceneError, run
-from rotfem.analysis.itinerary import Itinerary
-from rotfem.analysis.looks import look_at
+from rotfem.analysis.time_grid import TimeGrid, find_breakpoints
 from rotfem.mechanics.courses import Course
 from tests.beams import STRUCTURE
 
@@ -18,7 +17,7 @@ TIMES = np.linspace(0.0, 2.0, 201)
 
 def looked(f: Any, name: str = "loads.tip_force") -> Course:
     course = Course(name, f, np.empty(0), np.empty(0), known=False)
-    look_at(course, TIMES)
+    find_breakpoints(course, TIMES)
     return course
 
 
@@ -51,7 +50,7 @@ def test_what_is_smooth_in_up_to_three_steps_is_averaged_wherever_they_end(
         np.array([0.0, 0.5, 0.52, 1.0]),
         looks=np.array([0.25, 0.51, 0.76]),
     )
-    legs = [leg for _, leg in Itinerary([course], np.append(np.arange(0.0, 1.0, step), 1.0), step, order)]
+    legs = [leg for _, leg in TimeGrid([course], np.append(np.arange(0.0, 1.0, step), 1.0), step, order)]
     inside = [leg for leg in legs if leg.end > 0.5 + 1e-9 and leg.end - leg.length < 0.52 - 1e-9]
     assert {leg.averaged for leg in inside} == {averages}
     if averages:

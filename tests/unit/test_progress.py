@@ -1,0 +1,27 @@
+"""What a long computation says where there is no bar."""
+
+from __future__ import annotations
+
+import pytest
+
+from rotfem.commands import console
+
+
+def test_lines_with_a_predicted_time(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing before ten seconds, then at doubled times, by the pace since the last line."""
+    now = [0.0]
+    monkeypatch.setattr(console, "monotonic", lambda: now[0])
+    with console.ProgressBar("arm", on=False, speaks=True) as progress:
+        for now[0], share in ((5.0, 0.05), (11.0, 0.1), (15.0, 0.2), (23.0, 0.4), (60.0, 1.0)):
+            progress(share)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == ["arm: 10 % after 11 s, about 99 s to go", "arm: 40 % after 23 s, about 24 s to go"]
+
+
+def test_quiet_is_quiet(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    now = [0.0]
+    monkeypatch.setattr(console, "monotonic", lambda: now[0])
+    with console.ProgressBar("arm", on=False, speaks=False) as progress:
+        now[0] = 100.0
+        progress(0.1)
+    assert capsys.readouterr().err == ""
