@@ -106,8 +106,10 @@ def tables_of(row: Row, folder: Path) -> Tables:
     }
     if row["loads"] != "none":
         tables["loads"] = loads_of(row)
+    if row["root"] == "hinge" and row["motion"] != "constant":  # no spin, or little, holds it: there is no equilibrium
+        tables["initial"] = {"state": "undeformed"}
     if row["time"] == "accuracy":
-        tables |= {"accuracy": 0.4, "time": {"end": END}}
+        tables |= {"accuracy": 0.5, "time": {"end": END}}
     elif row["time"] == "tolerance":
         tables["time"] = {"end": END, "tolerance": 0.03}
     elif row["time"] != "steady":
@@ -210,10 +212,12 @@ def loads_of(row: Row) -> Tables:
     planar, plate = row["structure"] == "planar", row["structure"] in ("plate", "mesh")
     size = 20.0 if plate else 0.3
     across = [0.0, size] if planar else [0.0, 0.0, size]
+    # A beam of the exact theory is bent by a third of its length, so that Newton's way is a long one.
+    thrown = 100.0 * size if row["theory"] == "reissner" and not plate else size
     return {
         "gravity": {"gravity": [0.0, -2.0, 0.0]},
         "weight": {"gravity": [0.0, 0.0, -2.0]},
-        "tip": {"tip_force": [0.0, size]},
+        "tip": {"tip_force": [0.0, thrown]},
         "span": {"distributed": {"over_span": [[0.0, *(0.0 * f for f in across)], [LENGTH, *across]]}},
         "harmonic": {"tip_force": {"harmonic": [{"amplitude": across, "frequency": 5.0}]}},
         "follower": {"tip_force": {"value": across, "kind": "follower"}},

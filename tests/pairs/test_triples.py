@@ -20,10 +20,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "row" not in metafunc.fixturenames:
         return
     every = "nightly" in str(metafunc.config.option.markexpr)
-    ROWS[:] = islice(rows_of(3, 1 if every else SEED), None if every else SAMPLE)
-    metafunc.parametrize(
-        "row", parameters(ROWS, f"seed{1 if every else SEED}-", [pytest.mark.nightly] if every else [])
-    )
+    ROWS[:] = islice(rows_of(3, SEED), None if every else SAMPLE)
+    metafunc.parametrize("row", parameters(ROWS, f"seed{SEED}-", [pytest.mark.nightly] if every else []))
 
 
 @pytest.fixture(scope="module")

@@ -165,6 +165,21 @@ def test_refused(output: dict[str, Any], key: str) -> None:
         rotfem.Scene.from_dict({**SPIN_UP, "output": output})
 
 
+def test_a_run_that_fails_before_its_first_row_says_so(tmp_path: Path) -> None:
+    # A hinge that nothing holds has no equilibrium under a follower to start from, and so no station has a row.
+    scene = {
+        "structure": {**STRUCTURE, "root": {"lag_stiffness": 0.0}},
+        "motion": STILL,
+        "loads": {"tip_force": {"value": [0.0, 3.0], "kind": "follower"}},
+        "mesh": {"elements": 2},
+        "time": {"end": 0.1, "step": 0.05},
+        "output": {"stations": 3},
+    }
+    with pytest.raises(rotfem.ComputationError, match="no equilibrium to start from"):
+        rotfem.run(scene, folder=tmp_path)
+    assert (tmp_path / "summary.json").exists()
+
+
 def test_a_resumed_run_has_the_same_rows(tmp_path: Path) -> None:
     scene = {**SPIN_UP, "time": {"end": 0.4, "step": 0.02}, "output": {"stations": 3, "every": 3, "error": False}}
     whole = rotfem.run(scene)
