@@ -84,7 +84,7 @@ class ErrorMeasure:
         slow = SHARP * (0.5 * constant * self.end / h) ** (1 / order)
         times = [slow] * (order // 2) + [slow**0.5] * (order % 2)
         inner = self.inner
-        inner.set_time(0.0)
+        inner.set_time(0.0, inner.model.problem.motion)  # of a free hub the speed it starts with, not that of now
         inner.set_state(inner.zeros())
         self._mass = self._mass or inner.matrix(0.0, 0.0, 1.0, 0.0)
         made = {tau: DirectSolver(inner.matrix((tau * h) ** 2, 0.0, 1.0, 1.0)) for tau in {lost, *times}}

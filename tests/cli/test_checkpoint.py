@@ -65,6 +65,7 @@ KINDS: dict[str, dict[str, Any]] = {
     },
     "adaptive": {"time": {"end": 0.4, "tolerance": 1e-3}},
     "free hub": {"motion": HUB},
+    "free hub, adaptive": {"motion": HUB, "time": {"end": 0.8, "tolerance": 1e-4}},
     "chosen model": {"model": {"tolerance": 0.05}},
     "release": {"initial": {"tip_displacement": 0.5}},
     "inactive unknowns": {"structure": SPATIAL, "time": {"end": 0.4, "tolerance": 1e-3}},
