@@ -39,8 +39,7 @@ CAPABILITIES = {
         analysis.turning mechanics.courses
     """,
     "loads": """
-        commands.loads mechanics.composed_loads mechanics.loads mechanics.pitched_loads
-        mechanics.sums scene.harmonic scene.load structures.applied_loads structures.load_fields
+        commands.loads mechanics.loads mechanics.sums scene.load structures.applied_loads
         structures.plate_loads
     """,
     "modes and other analyses": "analysis",
