@@ -208,7 +208,7 @@ class ProgressBar:
         self._title = title
         self._on, self._speaks = on, speaks
         self._started = monotonic()
-        self._due, self._last = self._started + LONG, (self._started, 0.0)
+        self._due, self._last = self._started + LONG, (0.0, -1.0)
 
     def says(self, line: str) -> None:
         """Print a line, above the bar if there is one."""
@@ -237,6 +237,9 @@ class ProgressBar:
         """Print how far a long computation is and how long it will still take, by its pace since the last such line."""
         now = monotonic()
         since, before = self._last
+        if before < 0.0:  # compilation is over
+            self._due, self._last = max(self._due, now + LONG / 2), (now, share)
+            return
         if now < self._due or not before < share < 1.0:
             return
         left = (1.0 - share) * (now - since) / (share - before)

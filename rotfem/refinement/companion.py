@@ -101,7 +101,8 @@ class FollowingStepper(Stepper):
     def follow(self, step: Followed, state: State) -> None:
         """Take a step as the one that is followed from a state."""
         same = all(s.datum is state.datum for pair in step.steps for s in pair)
-        self._before, self.followed = self.last if same else None, step if same else None
+        again = self.last is not None and self.last[0] == state.t  # a step that was interrupted
+        self._before, self.followed = self.last if same and not again else None, step if same else None
         self.last = (state.t, self._difference(state)) if same else None
 
     def _difference(self, state: State) -> Array:
