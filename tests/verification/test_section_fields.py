@@ -18,6 +18,7 @@ from numpy.polynomial import legendre
 import rotfem
 from rotfem.commands.problem import Problem
 from rotfem.scene import Scene
+from rotfem.scene.advice import advise
 from rotfem.structures import build
 from rotfem.structures.section_fields import not_negative, positive_matrices
 from tests.beams import STRUCTURE
@@ -135,3 +136,12 @@ def test_definite_matrices_are_told_from_others_whatever_their_units() -> None:
     assert semidefinite(half[upper][None])
     assert not definite((half - 1e-3 * np.diag(np.diag(half)))[upper][None])
     assert not semidefinite((half - 1e-3 * np.diag(np.diag(half)))[upper][None])
+
+
+def test_masses_are_nodes_and_a_hint_says_so_where_they_ask_for_more_elements() -> None:
+    masses = [{"x": x, "mass": 0.1} for x in (2.0, 4.0, 6.0)]
+    structure = {**STRUCTURE, "length": LENGTH, "masses": masses}
+    case = scene(2).replace({"structure": structure})
+    assert advise(case, "modes", list[str]().append)[0].startswith("masses and kinks at 3 places")
+    ends = np.unique(beam(case).mesh.geometry.x[:, 0])
+    np.testing.assert_allclose(ends, [0.0, 2.0, 4.0, 6.0, LENGTH], atol=1e-12)
