@@ -22,7 +22,7 @@ from mpi4py import MPI
 
 from rotfem.analysis.turning import recounted
 from rotfem.errors import ComputationError
-from rotfem.numerics.inertia import negative_eigenvalues, symmetric
+from rotfem.numerics.inertia import surely_negative
 from rotfem.numerics.linear import DirectSolver, Increment
 from rotfem.numerics.newton import Newton
 
@@ -49,7 +49,7 @@ class Point:
         q: local dof array.
         s: share of speed squared and loads.
         t_q, t_s: unit tangent.
-        negative: number of negative eigenvalues of K; None where it is not symmetric.
+        negative: number of eigenvalues of K that are negative beyond round-off; None where they are not counted.
     """
 
     q: Array
@@ -196,7 +196,7 @@ class Tracer:
         if before is not None and self._product(t_q, before.t_q) + t_s * before.t_s < 0.0:
             t_q, t_s = -t_q, -t_s
         K = self.system.matrix(1.0, 0.0, 0.0, 1.0)
-        return Point(q, s, t_q, t_s, negative_eigenvalues(K) if symmetric(K) else None)
+        return Point(q, s, t_q, t_s, surely_negative(K))
 
     def _product(self, a: Array, b: Array) -> float:
         """Return the mean of the products of two arrays in the scales of the unknowns, over all ranks."""

@@ -23,17 +23,13 @@ import numpy.typing as npt
 
 from rotfem.analysis.modal import GROWTH
 from rotfem.errors import ComputationError
-from rotfem.numerics.bounds import ROUNDED
 from rotfem.numerics.eigenproblem import SAME, ZERO, Eigenpairs, Pencil
-from rotfem.numerics.inertia import negative_eigenvalues, symmetric
+from rotfem.numerics.inertia import negative_eigenvalues, surely_negative, symmetric
 
 Array = npt.NDArray[np.float64]
 
 #: Eigenvalues that are looked at where none can be counted, and the most that are looked at where they can.
 FIRST, MOST = 8, 64
-
-#: Entries of a row that err together, as the root of their number (see `rotfem.numerics.bounds`).
-ROWS = 10.0
 
 
 @dataclass(frozen=True)
@@ -149,7 +145,7 @@ def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Sta
     """
     count = FIRST if negative is None else max(FIRST, 2 * negative + 2)
     held = negative is not None and not symmetric(pencil.C)  # by gyroscopic forces, which are all that can
-    if negative and _round_off(pencil.K):
+    if negative and surely_negative(pencil.K) == 0:
         return Stability(negative, complete=False, lost=True)
     growth = frequency = 0.0
     while True:
@@ -176,15 +172,6 @@ def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Sta
             # A negative eigenvalue that makes nothing grow, and that nothing holds, is one of round-off.
             return Stability(negative, growth, frequency, complete=False, lost=lost or not held)
         count *= 2
-
-
-def _round_off(K: Any) -> bool:
-    """Return whether a part of its diagonal that rounding may have taken from K makes it positive."""
-    d = K.getDiagonal()
-    d.array[:] *= 1.0 + ROWS * ROUNDED
-    righted = K.copy()
-    righted.setDiagonal(d)
-    return _negative(righted) == 0
 
 
 def _counted(pencil: Pencil, pairs: Eigenpairs, held: bool) -> int:

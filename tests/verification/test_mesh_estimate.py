@@ -128,3 +128,17 @@ def test_rows_over_speed_say_what_modes_say() -> None:
     over_speed = [row for row in campbell(tables, [0.0, 6.0]).rows if row["speed"] == 6.0]
     alone = modes(tables).rows
     assert [row["mesh_error"] for row in over_speed] == pytest.approx([row["mesh_error"] for row in alone], rel=1e-3)
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+def test_thin_plates_are_told_the_error_of_their_limit(theory: str) -> None:
+    """From 1e-3 to 1e-4 of the length neither modes nor their errors change any more; round-off is not in the way."""
+    found = []
+    for thickness in (1e-3, 1e-4):
+        plate = {"type": "plate", "length": 1.0, "width": 1.0, "E": 7e10, "nu": 0.3, "rho": 2700.0}
+        tables = {"structure": {**plate, "thickness": thickness}, "motion": {"type": "constant", "speed": 0.0}}
+        result = modes({**tables, "model": {"theory": theory}, "mesh": {"elements": [8, 8]}, "modes": {"count": 4}})
+        assert not any("rough" in text for text in result.summary["warnings"])
+        found.append([row["mesh_error"] for row in result.rows])
+    for thick, thin in zip(*found, strict=True):
+        assert 0.5 < thin / thick < 2.0

@@ -176,3 +176,19 @@ def test_round_off_is_no_instability_that_something_holds() -> None:
     assert result.frequencies[0] == pytest.approx(exact, rel=1e-3)
     assert "held_by_gyroscopic_forces" not in result.summary["stability"]
     assert not any("gyroscopic" in text for text in result.summary["warnings"])
+
+
+@pytest.mark.parametrize("force", [5.0, -1.0])
+def test_round_off_of_a_slender_beam_is_no_bifurcation(force: float) -> None:
+    """r/L = 3e-7 on 256 elements, pulled, and pressed by 0.4 of Euler's load: pivots change their signs at random."""
+    section = {"EA": 1e13, "GA": 3e12, "EI": 1.0, "mass_per_length": 1.0, "rotary_inertia": 1e-13}
+    scene = {
+        "structure": {"type": "planar_beam", "length": 1.0, "section": section},
+        "motion": {"type": "constant", "speed": 0.0},
+        "loads": {"tip_force": [force, 0.0]},
+        "mesh": {"elements": 256},
+        "output": {"error": False},
+    }
+    result = rotfem.run(scene)
+    assert not any("bifurcation" in text or "unstable" in text for text in result.summary["warnings"])
+    assert result.summary["stability"]["stable"] is not False
