@@ -7,7 +7,6 @@ C = ∂F/∂v, K = ∂F/∂q at (q̄, 0, 0).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from time import perf_counter
 from typing import Any
 
@@ -16,9 +15,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import steady_state
-from rotfem.analysis.frequency_error import FrequencyErrors
 from rotfem.analysis.kept_digits import KeptDigits
-from rotfem.analysis.mesh_estimate import MeshEstimate
 from rotfem.analysis.mode_labels import with_overdamped
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.modes_at_rest import family_products, massed
@@ -78,7 +75,6 @@ class ModalAnalysis:
         past_limits: whether the path to an equilibrium is followed past maxima of the load.
         estimates: whether the error by the mesh is wanted.
         notes: what there is to be said of these paths.
-        mesh_by_shape: whether shapes alone told the last mesh errors, of plates, which may be far too small.
     """
 
     def __init__(
@@ -98,7 +94,7 @@ class ModalAnalysis:
         self.newton = newton or Newton()
         self._unit: float | None = None
         self._kept = KeptDigits(self.system)
-        self.past_limits, self.notes, self.mesh_by_shape = False, list[str](), False
+        self.past_limits, self.notes = False, list[str]()
         self.estimates = True
         assembled = self.system.assembled
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
@@ -227,32 +223,6 @@ class ModalAnalysis:
         local = np.array([turned, products.sum(axis=0)])
         part, total = self.comm.allreduce(local) if self.comm.size > 1 else local
         return np.asarray(part / total)
-
-    def mesh_errors(self, spinning: Spinning) -> list[float]:
-        """Return for every mode how far the mesh can put its frequency off, relative.
-
-        A finer mesh says it (see `frequency_error`); without one the shape does (see `mesh_estimate`).
-        """
-        motion, steady = self.system.motion.at_speed(spinning.speed), self.about != "undeformed"
-        found = self._frequency_errors(spinning, motion, steady)
-        self.mesh_by_shape = found is None and self.structure.mesh.topology.dim > 1 and len(spinning.pairs.values) > 0
-        if found is not None:
-            return found
-        shares, names = self.shares(spinning), self.structure.components
-        turns = [c for c, name in enumerate(names) if not name.startswith("u")]
-        moves = [c for c, name in enumerate(names) if name.startswith("u")]
-        families = [name for name in shares if name != "hub"]
-        leading = np.argmax([shares[name] for name in families], axis=0)
-        bends = [bool(set(turns) & set(self.structure.families[families[i]][0])) for i in leading]
-        return self._mesh_estimate.of_shapes(self.right(spinning), [turns if bend else moves for bend in bends])
-
-    @cached_property
-    def _frequency_errors(self) -> FrequencyErrors:
-        return FrequencyErrors(self.system)
-
-    @cached_property
-    def _mesh_estimate(self) -> MeshEstimate:
-        return MeshEstimate(self.system.V)
 
     def names(self, spinning: Spinning) -> list[str]:
         """Return "kind n" for every mode, as its structure counts them; mixed ones name both families."""

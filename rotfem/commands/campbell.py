@@ -20,7 +20,7 @@ from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accur
 from rotfem.commands.error_report import error_of_modes
 from rotfem.commands.finite import check_rows
 from rotfem.commands.loads import held
-from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows, rough
+from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
 from rotfem.commands.modes import analysis_of, hints_of, theory_error
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.summary import modal_summary
@@ -28,6 +28,7 @@ from rotfem.errors import SceneError, input_of
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Problem as ProblemData
+from rotfem.refinement.frequencies import FrequencyErrors
 from rotfem.refinement.refine import Clock, Setting
 from rotfem.results import CampbellResult
 from rotfem.scene import Scene, as_scene
@@ -40,7 +41,7 @@ from rotfem.units import split_unit
 Array = npt.NDArray[Any]
 
 #: What a row of a diagram has of the row of its mode.
-KEPT = ("frequency", "frequency_hz", "damping", "growth", "residual", "error_bound", "mesh_error")
+KEPT = ("frequency", "frequency_hz", "damping", "growth", "residual", "error_bound")
 
 
 def parse_speeds(text: str, limits: Limits | None = None) -> list[float]:
@@ -159,14 +160,17 @@ class Diagram:
         if orders is None:
             orders = int(np.clip(np.ceil(max(found, default=lowest) / max(fastest, 1e-300)), 1, 4))
         labels = branch_labels(analysis, sweep.nodes[0], count)
-        rows = [row for node in sweep.nodes for row in node_rows(analysis, node, labels)]
+        mesh = branch_errors(analysis, sweep, count) if analysis.estimates else None
+        rows = [row for node in sweep.nodes for row in node_rows(analysis, node, labels, mesh)]
         check_rows(rows)
         crossings, onsets = sweep.crossings(orders), sweep.onsets()
         for crossing in crossings:
             crossing["label"] = labels[crossing["branch"] - 1]
-        ends = mode_rows(analysis, first_modes(sweep.nodes[-1].spinning, count))
+        last = first_modes(sweep.nodes[-1].spinning, count)
+        of_last = None if mesh is None else dict(zip(sweep.nodes[-1].order, mesh, strict=False))
+        ends = mode_rows(analysis, last, of_last and [of_last.get(i) for i in range(len(last.pairs.values))])
         warnings = [] if self.choice is not None else advice(analysis, fastest)
-        warnings += [*held(self.analysis.problem), *told(sweep, labels, onsets, ends), *rough(analysis)]
+        warnings += [*held(self.analysis.problem), *told(sweep, labels, onsets, ends)]
         off = theory_error(analysis, sweep.nodes[-1].spinning)
         warnings += [off.warning()] if off.warning() else []
         summary = {
@@ -238,14 +242,34 @@ def first_modes(spinning: Spinning, count: int) -> Spinning:
     return replace(spinning, pairs=spinning.pairs.select(np.arange(min(count, len(spinning.pairs.values)))))
 
 
-def node_rows(analysis: ModalAnalysis, node: Node, labels: list[str]) -> list[dict[str, Any]]:
-    """Return one row a branch at one speed; `mode` is its present name, `label` the name of the branch."""
+def branch_errors(analysis: ModalAnalysis, sweep: Sweep, count: int) -> list[float | None]:
+    """Return the relative error of each branch by the mesh, the larger one of those at both ends of the diagram."""
+    errors, found = FrequencyErrors(analysis), list[list[float]]()
+    for node in (sweep.nodes[0], sweep.nodes[-1]):
+        order = [int(i) for i in node.order[:count]]
+        there = errors(first_modes(node.spinning, 1 + max(order)))
+        found.append([np.nan if i < 0 or (e := there[i]) is None else e for i in order])
+    larger = np.fmax(*np.array(found))
+    return [float(x) if np.isfinite(x) else None for x in larger]
+
+
+def node_rows(
+    analysis: ModalAnalysis, node: Node, labels: list[str], mesh: Sequence[float | None] | None
+) -> list[dict[str, Any]]:
+    """Return one row a branch at one speed; `mode` is its present name, `label` the name of the branch.
+
+    Args:
+        analysis: of the modes.
+        node: at the speed.
+        labels: names of the branches.
+        mesh: their relative errors by the mesh; None where they are not wanted.
+    """
     columns, rows = mode_rows(analysis, first_modes(node.spinning, 1 + max(node.order[: len(labels)]))), []
     for b, label in enumerate(labels):
         if node.order[b] < 0:
             continue
         row = columns[node.order[b]]
-        kept = {k: row[k] for k in KEPT if k in row}
+        kept = {k: row[k] for k in KEPT} | ({} if mesh is None else {"mesh_error": mesh[b]})
         shares = {k: v for k, v in row.items() if k.startswith("share_") or k == "turning"}
         rows.append(
             {

@@ -72,13 +72,13 @@ def _of_reduced(run: Simulation, scale: float) -> float | None:
     own, other = run.reduced, on_other_mesh(run.problem, run.system)
     if own is None or other is None or not scale > 0.0:
         return None
-    system, halved = other
+    system, ratio = other
     try:
         start, _ = run.start_of(system)
         there = reduced_response(system, own.times, start, accuracy_of(run.scene))
     except ComputationError:
         return None
-    return error_by_cells(largest_of(own.model, there.tips - own.tips) / scale, halved)
+    return error_by_cells(largest_of(own.model, there.tips - own.tips) / scale, ratio)
 
 
 def model_share(theory: TheoryError | None, choice: Choice | None) -> float | None:
@@ -92,8 +92,10 @@ def model_share(theory: TheoryError | None, choice: Choice | None) -> float | No
 def error_of_modes(rows: Iterable[Mapping[str, Any]], theory: TheoryError) -> ErrorEstimate:
     """Return the largest relative error of the frequencies of rows."""
     flexible = [row for row in rows if row.get("stability") != "neutral"]
-    space, bound = (max((row[key] for row in flexible), default=0.0) for key in ("mesh_error", "error_bound"))
-    return ErrorEstimate({"space": float(space), "model": theory.estimate, "round_off": float(bound)})
+    mesh = [row["mesh_error"] for row in flexible]
+    bound = float(max((row["error_bound"] for row in flexible), default=0.0))
+    space = None if None in mesh else float(max(mesh, default=0.0))
+    return ErrorEstimate({"space": space, "model": theory.estimate, "round_off": bound})
 
 
 def warnings_of_run(run: Simulation, error: ErrorEstimate) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
+from rotfem.refinement.frequencies import FrequencyErrors
 
 Array = npt.NDArray[Any]
 
@@ -55,8 +57,8 @@ def mode_tables(analysis: ModalAnalysis, speed: float, count: int, *, keep: bool
     spinning = analysis.at(speed, count, keep=keep)
     rigid = int(spinning.rigid)
     spinning.pairs = spinning.pairs.select(np.arange(min(count - rigid, len(spinning.pairs.values))))
-    rows = mode_rows(analysis, spinning)
-    warnings = [*advice(analysis, speed), *instabilities(rows), *doubtful(rows), *rough(analysis)]
+    rows = mode_rows(analysis, spinning, FrequencyErrors(analysis)(spinning) if analysis.estimates else None)
+    warnings = [*advice(analysis, speed), *instabilities(rows), *doubtful(rows)]
     rows = [{**row, "mode": row["mode"] + rigid} for row in rows]
     scaled = spinning.pairs.right / scales(analysis, spinning)
     titles = [f"mode {row['mode']}: {row['label']}" for row in rows]
@@ -64,10 +66,18 @@ def mode_tables(analysis: ModalAnalysis, speed: float, count: int, *, keep: bool
     return ModeTables(spinning, [rigid_row(rows), *rows] if rigid else rows, shapes, scaled, warnings)
 
 
-def mode_rows(analysis: ModalAnalysis, spinning: Spinning) -> list[dict[str, Any]]:
-    """Return one row a mode: frequency (rad/s, Hz), damping ratio, growth (1/s), label, shares, errors."""
+def mode_rows(
+    analysis: ModalAnalysis, spinning: Spinning, mesh: Sequence[float | None] | None = None
+) -> list[dict[str, Any]]:
+    """Return one row a mode: frequency (rad/s, Hz), damping ratio, growth (1/s), label, shares, errors.
+
+    Args:
+        analysis: of the modes.
+        spinning: at the speed.
+        mesh: relative errors by the mesh; None where they are not wanted.
+    """
     shares, names, turning = analysis.shares(spinning), analysis.names(spinning), analysis.turning(spinning)
-    rows, pairs, mesh = [], spinning.pairs, analysis.mesh_errors(spinning) if analysis.estimates else None
+    rows, pairs = [], spinning.pairs
     for i, (lam, error, bound) in enumerate(zip(pairs.values, pairs.errors, pairs.bounds, strict=True)):
         size = abs(lam)
         rows.append(
@@ -111,18 +121,11 @@ def doubtful(rows: list[dict[str, Any]]) -> list[str]:
 
 def coarse(rows: list[dict[str, Any]]) -> list[str]:
     """Return a warning if the mesh may have put frequencies off by more than RESOLVED of them."""
-    found = {row["label"]: row["mesh_error"] for row in rows if row.get("mesh_error", 0.0) > RESOLVED}
+    found = {row["label"]: row["mesh_error"] for row in rows if (row.get("mesh_error") or 0.0) > RESOLVED}
     if not found:
         return []
     listed = ", ".join(f"{label} by about {100 * error:.2g} %" for label, error in found.items())
     return [f"coarse: the mesh may have put off {listed} (mesh_error); more mesh.elements, or a higher mesh.degree"]
-
-
-def rough(analysis: ModalAnalysis) -> list[str]:
-    """Return a warning if no finer mesh has told what the mesh puts off the modes that were judged last."""
-    if not analysis.mesh_by_shape:
-        return []
-    return ["rough: mesh_error is told by the shapes of the modes alone and may be far too small; compare another mesh"]
 
 
 def unreliable(rows: list[dict[str, Any]]) -> list[str]:

@@ -28,30 +28,6 @@ def wrap(x: la.Vector) -> Any:
     return dolfinx.la.petsc.create_vector_wrap(x)
 
 
-def form_elsewhere(compiled: Any, f: Any, V: fem.FunctionSpace, functions: dict[Any, Any], subdomains: Any) -> Any:
-    """Return a form on another mesh, from what was compiled of it: of spaces, functions and entities nothing is.
-
-    Args:
-        compiled: the form where it was compiled.
-        f: the same as UFL form, whose constants stay.
-        V: space of its arguments.
-        functions: its coefficients ↦ those on the other mesh.
-        subdomains: name of a type of integrals ↦ [(number, entities)].
-    """
-    ufcx, module, known = compiled.ufcx_form, compiled.module, f.coefficients()
-    pointer = int(module.ffi.cast("uintptr_t", module.ffi.addressof(ufcx)))
-    order = [ufcx.original_coefficient_positions[i] for i in range(ufcx.num_coefficients)]
-    types = {getattr(fem.IntegralType, name): entities for name, entities in subdomains.items()}
-    given: list[Any] = [[V._cpp_object] * len(f.arguments()), [functions[known[i]]._cpp_object for i in order]]
-    given += [[c._cpp_object for c in f.constants()], types]
-    make, on = fem.forms.form_cpp_class(V.mesh.geometry.x.dtype), V.mesh._cpp_object
-    try:
-        made = make([pointer], *given, [], on)
-    except TypeError:  # dolfinx 0.9
-        made = make(pointer, *given, {}, on)
-    return fem.Form(made, ufcx, compiled.code, module)
-
-
 def _gmshio() -> Any:
     try:
         from dolfinx.io import gmsh as gmshio

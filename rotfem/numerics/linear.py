@@ -28,9 +28,6 @@ FACTORS = (PETSc.PC.Type.LU, PETSc.PC.Type.CHOLESKY)
 #: Relative difference of two solutions from which a matrix is singular.
 LOST = 1e-2
 
-#: Relative residual with which iterations end, and how many there are at most before a matrix is factored itself.
-CLOSE, ITERATIONS = 1e-8, 15
-
 
 def combine(target: Any, matrices: list[Any], weights: Array) -> Any:
     """Return Σ weight · matrix, its sparse part in target; all share one pattern, and one of them may have B Bᵀ."""
@@ -170,39 +167,6 @@ class DirectSolver:
         return np.array(x.array)
 
 
-class NearbySolver:
-    """Solver of A x = b by iterations with the factor of a matrix near by; by a factor of A where these are many.
-
-    Args:
-        A: assembled PETSc matrix.
-        near: solver of the other matrix, which must not change any more and has been solved with.
-    """
-
-    def __init__(self, A: Any, near: DirectSolver):
-        self._A, self._near = A, near
-        self._own: DirectSolver | None = None
-        factor = near._ksp.getPC()
-        factor.setReusePreconditioner(True)
-        self._ksp = PETSc.KSP().create(A.comm)
-        self._ksp.setType(PETSc.KSP.Type.GMRES)
-        self._ksp.setPC(factor)
-        self._ksp.setTolerances(rtol=CLOSE, atol=0.0, max_it=ITERATIONS)
-
-    def solve(self, b: Any, x: Any) -> None:
-        """Solve A x = b.
-
-        Raises:
-            ComputationError: A is singular to working precision.
-        """
-        if self._own is None:
-            self._ksp.setOperators(self._A, self._near.A)  # the factor keeps them, and others may share it
-            self._ksp.solve(b, x)
-            if self._ksp.getConvergedReason() > 0:
-                return
-            self._own = DirectSolver(self._A)
-        self._own.solve(b, x)
-
-
 class SingularSolver:
     """Solver of A x = b with a singular A and a small K beside it; what A does not feel, A n = 0, follows: n·K x = 0.
 
@@ -252,7 +216,7 @@ class Increment:
         self._array: Array = self.function.x.array
         self._shared = V.mesh.comm.size > 1
 
-    def solve(self, solver: DirectSolver | NearbySolver | SingularSolver, b: Any) -> Array:
+    def solve(self, solver: DirectSolver | SingularSolver, b: Any) -> Array:
         """Return the local array (owned and ghosts) of the solution of A x = b; it is overwritten by the next call."""
         solver.solve(b, self._x)
         if self._shared:

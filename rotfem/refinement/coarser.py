@@ -20,8 +20,8 @@ def by_itself(problem: Problem) -> Problem:
     return problem.replace(outputs={}, motion=replace(problem.motion, hub=own))
 
 
-def on_other_mesh(problem: Problem, system: Any, moving: bool = True) -> tuple[Any, bool] | None:
-    """Return a system of a problem on half the cells, and True; on a finer mesh, and False.
+def on_other_mesh(problem: Problem, system: Any, moving: bool = True) -> tuple[Any, float] | None:
+    """Return a system of a problem on half the cells or a finer mesh, and the ratio of its cell sizes to the own ones.
 
     Where the nodes that a section, a mass or a load asks for fix the cells they are halved in length, and those of a
     mesh file have one degree more. None where there is no other mesh at all.
@@ -34,25 +34,29 @@ def on_other_mesh(problem: Problem, system: Any, moving: bool = True) -> tuple[A
     problem = by_itself(problem)
     nodes = system.V.dofmap.index_map.size_global
     cells = system.structure.mesh.topology.index_map(system.structure.mesh.topology.dim).size_global
-    for mesh in _meshes(problem, cells):
+    for mesh, ratio in _meshes(problem, cells):
         try:
             other = compile_system(problem.replace(mesh=mesh), system.comm, moving)
         except InputError:
             continue
-        if (number := other.V.dofmap.index_map.size_global) != nodes:
-            return other, number < nodes
+        if other.V.dofmap.index_map.size_global != nodes:
+            return other, ratio
     return None
 
 
-def _meshes(problem: Problem, cells: int) -> Iterator[Any]:
+def _meshes(problem: Problem, cells: int) -> Iterator[tuple[Any, float]]:
+    """Yield meshes, and the ratios of their cell sizes to those of a problem; of an odd number, half is less than 2."""
     mesh = problem.mesh
     if problem.structure.mesh_file is not None:
-        yield mesh.model_copy(update={"degree": mesh.degree + 1})
+        yield mesh.model_copy(update={"degree": mesh.degree + 1}), 0.5
         return
     n = mesh.elements
     if isinstance(n, tuple):
-        yield mesh.model_copy(update={"elements": tuple((k + 1) // 2 for k in n)})
-        yield mesh.model_copy(update={"elements": tuple(2 * k for k in n)})
+        half = tuple((k + 1) // 2 for k in n)
+        ratios = [k / h for k, h in zip(n, half, strict=True) if h < k]
+        yield mesh.model_copy(update={"elements": half}), min(ratios, default=1.0)
+        yield mesh.model_copy(update={"elements": tuple(2 * k for k in n)}), 0.5
     else:
-        yield mesh.model_copy(update={"elements": (n + 1) // 2})
-        yield mesh.model_copy(update={"elements": 2 * cells})
+        number = (cells + 1) // 2
+        yield mesh.model_copy(update={"elements": number}), cells / number
+        yield mesh.model_copy(update={"elements": 2 * cells}), 0.5

@@ -40,27 +40,29 @@ MOST_OF_IT = 0.5
 Start = Callable[[Any], tuple[Array | None, Array | None]]
 
 
-def error_of(difference: float, order: float) -> float:
-    """Return the error of the finer of two answers whose step or cell sizes are 1 and 2.
+def error_of(difference: float, order: float, ratio: float = 2.0) -> float:
+    """Return the error of the finer of two answers.
 
     Args:
         difference: relative.
         order: of convergence; 0 where none is known.
+        ratio: of their step or cell sizes.
     """
     if difference > ASYMPTOTIC or order < 1.0:
         return difference
-    return float(difference / (2.0**order - 1.0))
+    return float(difference / (ratio**order - 1.0))
 
 
-def error_by_cells(difference: float, halved: bool) -> float:
+def error_by_cells(difference: float, ratio: float) -> float:
     """Return the error of an answer by its mesh.
 
     Args:
         difference: to an answer on another mesh, relative.
-        halved: whether that has half the cells; otherwise it is the finer one of the two.
+        ratio: of the cell sizes of the other mesh to the own ones; below 1 the other one is the finer of the two.
     """
-    coarser = error_of(difference, OF_ELEMENTS)
-    return coarser if halved else difference + coarser
+    if ratio > 1.0:
+        return error_of(difference, OF_ELEMENTS, ratio)
+    return difference + error_of(difference, OF_ELEMENTS, 1.0 / ratio)
 
 
 class HistoryErrors:
@@ -76,7 +78,8 @@ class HistoryErrors:
 
     Attributes:
         steps: companion in steps of twice the length; followed by the two others.
-        mesh: companion in the same long steps on another mesh, and whether that has half the cells; None without one.
+        mesh: companion in the same long steps on another mesh, and the ratio of its cell sizes to the own ones; None
+            without one.
         order: companion in steps of four times the length; None where the order is certain.
     """
 
@@ -89,7 +92,7 @@ class HistoryErrors:
             return compile_system(by_itself(problem), system.comm)
 
         same, other = twice(), on_other_mesh(problem, system)
-        self.mesh: tuple[Companion, bool] | None = None
+        self.mesh: tuple[Companion, float] | None = None
         self.order: Companion | None = None
         if other is not None:
             self.mesh = Companion(other[0], same, scheme, newton, doubles=False, output=output), other[1]
@@ -140,8 +143,8 @@ class HistoryErrors:
     def _of_mesh(self, scale: float) -> float | None:
         if self.mesh is None or not self.steps.sound or not self.mesh[0].sound:
             return None
-        companion, halved = self.mesh
-        return error_by_cells(_relative(companion.difference[0], scale), halved)
+        companion, ratio = self.mesh
+        return error_by_cells(_relative(companion.difference[0], scale), ratio)
 
 
 def error_of_shape(
@@ -160,12 +163,12 @@ def error_of_shape(
     other = on_other_mesh(problem, system, moving=False)
     if other is None:
         return None
-    coarse, halved = other
+    coarse, ratio = other
     try:
         there = output(coarse, State.at_rest(coarse, *coarse.start(solve(coarse))))
     except ComputationError:
         return None
-    return error_by_cells(_relative(float(np.linalg.norm(there - here)), float(np.linalg.norm(here))), halved)
+    return error_by_cells(_relative(float(np.linalg.norm(there - here)), float(np.linalg.norm(here))), ratio)
 
 
 def _relative(size: float, scale: float) -> float:

@@ -26,9 +26,10 @@ class ErrorEstimate:
 
     @property
     def total(self) -> float | None:
-        """Sum of the shares that are known; None if none is."""
+        """Sum of the shares; None where that of the steps or the mesh is unknown, or all are."""
         known = [float(share) for share in self.shares.values() if share is not None]
-        return sum(known) if known else None
+        whole = all(self.shares.get(name, 0.0) is not None for name in ("time", "space"))
+        return sum(known) if known and whole else None
 
     def summary(self) -> dict[str, Any]:
         """Return what a summary has of it."""

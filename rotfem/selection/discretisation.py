@@ -98,6 +98,6 @@ def _of_modes(trial: Trial, theory: str, problem: Any, out: Discretisation) -> N
     system = compile_system(problem, trial.comm, moving=False)
     other = on_other_mesh(problem, system, moving=False)
     if other is not None:
-        there, halved = other
+        there, ratio = other
         values = [_on(trial, problem, s).eigenvalues(trial.speeds) for s in (system, there)]
-        out.mesh[MODES] = error_by_cells(modes_change(*values), halved)
+        out.mesh[MODES] = error_by_cells(modes_change(*values), ratio)
