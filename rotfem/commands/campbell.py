@@ -167,8 +167,9 @@ class Diagram:
         for crossing in crossings:
             crossing["label"] = labels[crossing["branch"] - 1]
         last = first_modes(sweep.nodes[-1].spinning, count)
-        of_last = None if mesh is None else dict(zip(sweep.nodes[-1].order, mesh, strict=False))
-        ends = mode_rows(analysis, last, of_last and [of_last.get(i) for i in range(len(last.pairs.values))])
+        of_last = {} if mesh is None else dict(zip(sweep.nodes[-1].order, mesh, strict=False))
+        known = None if mesh is None else [of_last.get(i) for i in range(len(last.pairs.values))]
+        ends = mode_rows(analysis, last, known)
         warnings = [] if self.choice is not None else advice(analysis, fastest)
         warnings += [*held(self.analysis.problem), *told(sweep, labels, onsets, ends)]
         off = theory_error(analysis, sweep.nodes[-1].spinning)
