@@ -58,6 +58,16 @@ def test_harmonics_and_functions_have_the_rates_of_their_sum() -> None:
         assert found.acceleration(t) == pytest.approx(acceleration(t), abs=1e-6)
 
 
+def test_a_function_may_have_its_rate_beside_it() -> None:
+    """The rate that is given is taken, and the acceleration is that of the rate: here of another angle than given."""
+    found = course({"function": lambda t: 0.1 * t, "rate": lambda t: np.sin(300.0 * t)})
+    assert found.angle(0.7) == pytest.approx(0.07, rel=1e-14)
+    assert found.rate(0.7) == np.sin(210.0)
+    assert found.acceleration(0.7) == pytest.approx(300.0 * np.cos(210.0), rel=1e-9)
+    with pytest.raises(InputError, match="rate: the function of time, at 0.5, must return a number"):
+        course({"function": lambda t: 0.1, "rate": lambda t: "fast"}).rate(0.5)
+
+
 def test_units() -> None:
     given = {"table": [[0, "6 deg"], ["2 min", 0.2]], "harmonic": {"amplitude": "3 deg", "frequency": "1 Hz"}}
     pitch = scene(given).structure.root.pitch  # type: ignore[union-attr]
@@ -77,6 +87,8 @@ def test_units() -> None:
         ({"harmonic": {"amplitude": 0.1}}, {}, "structure.root.pitch.harmonic.0.frequency"),
         ({"harmonic": {"frequency": 0.1}}, {}, "structure.root.pitch.harmonic.0.amplitude"),
         (lambda t, x: 0.1, {}, "structure.root.pitch.function"),
+        ({"value": 0.1, "rate": lambda t: 0.0}, {}, "structure.root.pitch.rate"),
+        ({"function": lambda t: 0.1, "rate": 0.0}, {}, "structure.root.pitch.rate"),
         ([[0, "3 m"], [1, 0]], {}, "structure.root.pitch"),
         ([[0, 0.1], [1, 0.2]], {"root": {"flap_stiffness": 0.0}}, "structure.root.lag_stiffness"),
         ([[0, 0.1], [1, 0.2]], {"motion": {"type": "torque", "hub_inertia": 1.0}}, "structure.root.pitch"),
