@@ -9,7 +9,16 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.arc_length import LoadPath, Tracer
-from rotfem.analysis.load_steps import LESS, SMALLEST_SHARE, Raised, balance, counted, from_held_root, raised
+from rotfem.analysis.load_steps import (
+    SMALLEST_SHARE,
+    Raised,
+    balance,
+    counted,
+    from_held_root,
+    less,
+    raised,
+    richest_advice,
+)
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError, InputError
@@ -71,7 +80,7 @@ def steady_state(
     except ComputationError as error:
         path = _path(system, omega, newton, False, notes)
         if path is None or path.share < 1.0:
-            raise error if path is None or not path.limits else _at_limit(omega, path) from None
+            raise error if path is None or not path.limits else _at_limit(system, omega, path) from None
         return counted(system, omega, 1.0, path.q, newton)
     return _judged(system, omega, newton, found, notes)
 
@@ -88,7 +97,7 @@ def _judged(system: Any, omega: float, newton: Newton, found: Raised, notes: lis
     total = system.structure.total(found.q)
     path = _path(system, omega, newton, False, notes)
     if path is not None and path.limits:
-        raise _at_limit(omega, path)
+        raise _at_limit(system, omega, path)
     if path is None or path.share < 1.0:
         if not found.sure:
             notes.append("whether this is the equilibrium that the growing load leads to, or another one, is not known")
@@ -134,7 +143,7 @@ def _followed(system: System, omega: float, newton: Newton, notes: list[str]) ->
         raise ComputationError(
             f"no steady state at {omega:g} rad/s: the path of equilibria ends at {share:.6g} of the load{limits}: "
             f"{why}",
-            advice=LESS,
+            advice=less(system),
         )
     return counted(system, omega, 1.0, path.q, newton)
 
@@ -143,14 +152,14 @@ def _shares(shares: list[float]) -> str:
     return ", ".join(f"{share:.6g}" for share in shares)
 
 
-def _at_limit(omega: float, path: LoadPath) -> ComputationError:
+def _at_limit(system: Any, omega: float, path: LoadPath) -> ComputationError:
     """Return what is said of a path with a maximum of the load."""
     share = path.limits[0]
     speed = f" ({np.sqrt(share) * omega:.6g} rad/s)" if omega else ""
     return ComputationError(
         f"no steady state at {omega:g} rad/s to which a growing load leads: it has a maximum, a limit point, at "
         f"{share:.6g} of the load{speed}, where the structure snaps",
-        advice=f'solver.continuation = "arc_length" to follow the path past it, or {LESS}',
+        advice=f'solver.continuation = "arc_length" to follow the path past it, or {less(system)}',
     )
 
 
@@ -198,7 +207,8 @@ def static_tip_shape(problem: Problem, displacement: float, newton: Newton, comm
                 raise ComputationError(
                     f"no static shape with a tip displacement of {displacement:g} m: the tip was led to "
                     f"{done * displacement:.4g} m; {error.what}",
-                    advice="a smaller initial.tip_displacement, or a theory that holds at large deflection",
+                    advice="a smaller initial.tip_displacement"
+                    + ("" if problem.theory.exact else f", or {richest_advice()}"),
                 ) from None
             continue
         done = target

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from rotfem.analysis.turning import reached, recounted
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
+from rotfem.mechanics.theories import richest
 from rotfem.numerics.linear import DirectSolver, Increment
 from rotfem.numerics.newton import REACH, Newton
 from rotfem.structures.datum import BeyondReach
@@ -20,14 +21,24 @@ Array = npt.NDArray[np.float64]
 #: Newton iterations after which the stresses of the last correction are worth compiling a tangent with.
 SOON = 4
 
-#: What helps where there is no equilibrium.
-LESS = "a lower speed or load, a stiffer section, or a theory that holds at large deflection"
-
 #: A continuation that must cut its steps below this share of the whole has met a limit point.
 SMALLEST_SHARE = 1e-3
 
 #: Part of their range from which rotations are counted afresh where the next step of the load leads out of it.
 NEAR = 0.3
+
+
+def less(system: System) -> str:
+    """Return what helps where there is no equilibrium: another theory only where there is one that holds farther."""
+    exact = system.model.theory.exact
+    return "a lower speed or load, " + (
+        "or a stiffer section" if exact else f"a stiffer section, or {richest_advice()}"
+    )
+
+
+def richest_advice() -> str:
+    """Return the advice to take the theory that holds for any deflection."""
+    return f'model.theory = "{richest().name}", which holds at large deflection'
 
 
 @dataclass
@@ -82,7 +93,7 @@ def raised(system: System, omega: float, newton: Newton) -> Raised:
             raise ComputationError(
                 f"no steady state at {omega:g} rad/s: the last equilibrium was at {done:.3g} of the load "
                 f"({np.sqrt(done) * omega:.4g} rad/s); {failure}",
-                advice=LESS,
+                advice=less(system),
             )
         system.count_rotations_from(datum)
         if afresh:

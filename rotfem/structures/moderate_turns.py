@@ -31,11 +31,14 @@ def check_sections(beam: Structure, q: Array, time: float | None = None) -> None
     turns = np.linalg.norm(values[:, 3:], axis=1)
     worst = int(np.argmax(turns))
     if turns[worst] > FULL_TURN:
+        theory = beam.problem.theory
+        limited = "behind a hinge" if theory.exact else f"in the theory {theory.name}"
+        others = "a spring or a damper at the root" if theory.exact else f'model.theory = "{richest().name}"'
         raise ComputationError(
             f"the section at X = {coordinates['x'][worst]:.4g} m has turned by {turns[worst] / (2 * np.pi):.3g} turns "
-            f"relative to the frame; in the theory {beam.problem.theory.name} rotations are limited to one",
+            f"relative to the frame; {limited} rotations are limited to one",
             time,
-            f'a smaller load, or model.theory = "{richest().name}", which holds for any rotation',
+            f"a smaller load, or {others}",
         )
 
 
