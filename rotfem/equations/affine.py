@@ -144,10 +144,9 @@ class AffineSystem(AffineStiffness, AffineEnergies):
         values = {**self.model.frame.values(motion, 0.0), **self.load_values(0.0, motion)}
         return self._products(np.concatenate([ONE, *(np.ravel(values[name]) for name in self._constants)]))
 
-    def factors(self, values: Mapping[str, Array]) -> Array:
-        """Return the factor of every piece at many times, shape (n, pieces), from the values (n, size) of constants."""
-        given = [values[name] for name in self._constants]
-        return self._products(np.hstack([np.ones((len(given[0]), 1)), *given]).T)
+    def factors(self, values: Mapping[str, Array], n: int) -> Array:
+        """Return the factor of every piece at n times, shape (n, pieces), from the values (n, size) of constants."""
+        return self._products(np.hstack([np.ones((n, 1)), *(values[name] for name in self._constants)]).T)
 
     def _products(self, values: Array) -> Array:
         """Return the product that multiplies each piece, from 1 and the values of all constants in their order."""

@@ -24,10 +24,14 @@ KNOWN: tuple[Failure, ...] = (
     Failure(
         {
             "theory": ("linear", "consistent_linear", "von_karman_linear"),
-            "motion": ("rest",),
+            "motion": ("rest", "spin_up", "torque", "controller"),
             "root": ("hinge",),
             "time": ("accuracy",),
         },
         "the error of a linear theory is without bound where nothing holds a hinge, so no accuracy is met",
+    ),
+    Failure(
+        {"motion": ("rest",), "loads": ("none",), "time": ("accuracy",)},
+        "where nothing moves no error is known relative to the largest displacement, so no accuracy is met",
     ),
 )

@@ -14,6 +14,7 @@ from rotfem.analysis.reduced.collocation import collocate
 from rotfem.analysis.reduced.propagator import Propagator, cubics, functions
 from rotfem.scene import Scene
 from rotfem.structures.planar_beam import PlanarBeam
+from tests.beams import STRUCTURE
 
 Array = npt.NDArray[np.float64]
 MakeScene = Callable[..., Scene]
@@ -287,3 +288,14 @@ def test_what_nothing_moves_stays_where_it_is(spin_up: MakeScene, motion: dict[s
     assert not np.any(other.history["tip_u1"])
     assert ("reduced" in other.summary) == (motion["type"] == "spin_up")
     assert all(row["estimate"].get("history", 0.0) == 0.0 for row in explain(scene.replace({"accuracy": None})).rows)
+
+
+def test_where_nothing_acts_nothing_moves() -> None:
+    scene = {
+        "structure": STRUCTURE,
+        "motion": {"type": "constant", "speed": 0.0},
+        "model": {"theory": "linear", "reduced": True},
+        "mesh": {"elements": 2},
+        "time": {"end": 0.1, "step": 0.05},
+    }
+    assert not np.any(run(scene).history["tip_u2"])

@@ -66,7 +66,7 @@ class Drive:
 
     def made_of(self, constants: dict[str, Array], n: int) -> Array:
         """Return the factor of every piece, shape (n, pieces), from the values of constants (n, size)."""
-        return np.asarray(self.system.factors(constants) if constants else np.ones((n, len(self.system.pieces))))
+        return np.asarray(self.system.factors(constants, n))
 
     def constants(self, t: Array, angle: Array, speed: Array, rate: Array) -> dict[str, Array]:
         """Return the values of all constants of frame and loads, by name, (n, size).
