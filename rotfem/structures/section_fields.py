@@ -38,7 +38,7 @@ SEMIDEFINITE = 1e-12
 
 @dataclass(frozen=True)
 class SectionField:
-    """Sets a discontinuous field on any mesh of one beam.
+    """Sets a discontinuous field on a mesh of a beam.
 
     Attributes:
         at: (x, near), (n,) in m ↦ values (n,) or (n, components); near are on the side of x that counts at a jump.
@@ -54,9 +54,8 @@ class SectionField:
     valid: Valid | None = None
 
     def __call__(self, f: fem.Function) -> fem.Function:
-        """Set the field, and return it; on other meshes it is set anew, not interpolated."""
+        """Set the field, and return it."""
         f.x.array[:] = self.values(f.function_space).ravel()
-        f.on_mesh = self  # which a refined mesh asks for
         return f
 
     def values(self, space: fem.FunctionSpace) -> Array:
