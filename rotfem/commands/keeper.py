@@ -103,13 +103,14 @@ class Keeper:
             raise SceneError("command line", option, None, "has no meaning with model.reduced, which takes no steps")
         if self.folder is None:
             raise SceneError("command line", option, None, "needs a folder")
-        from rotfem.commands.checkpoint import check_end, check_identity, identity
+        from rotfem.commands.checkpoint import check_end, check_identity, check_parts, identity
         from rotfem.results.checkpoint_file import read_checkpoint
 
         self._identity, path, end = identity(scene, terms, outputs), self.folder.path / CHECKPOINT, scene.time.end
 
         def read(files: ResultSet) -> Tree:
             tree = read_checkpoint(path)
+            check_parts(path, tree)
             check_identity(path, tree, self._identity)
             check_end(path, tree, end)
             return tree

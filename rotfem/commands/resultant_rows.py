@@ -73,9 +73,15 @@ class ResultantRows:
         more = {name: value for name, value in vars(self.frames).items() if name != "kept"}
         return {"frames": frames, "more": more, "last": self.last, "largest": list(self.largest)}
 
-    def put_back(self, known: dict[str, Any]) -> None:
-        """Take what a checkpoint has."""
-        frames = known["frames"]
-        self.frames.kept = list(zip(frames["t"], frames["values"], strict=True))
-        vars(self.frames).update(known["more"])
-        self.last, self.largest = known["last"], tuple(known["largest"])
+    def put_back(self, known: dict[str, Any], rows: int) -> None:
+        """Take what a checkpoint has, where the history has so many rows.
+
+        Raises:
+            ValueError: it is not what there is after so many.
+        """
+        frames, last = known["frames"], known["last"]
+        kept = [(float(t), x) for t, x in zip(frames["t"], frames["values"], strict=True)]
+        if any(x.shape != last.shape for _, x in kept) or len(known["largest"]) != len(self.largest):
+            raise ValueError("resultants")
+        self.frames.put_back({**known["more"], "kept": kept}, rows)
+        self.last, self.largest = last, tuple(known["largest"])

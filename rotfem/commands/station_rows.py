@@ -56,10 +56,17 @@ class StationRows:
         """Return what a checkpoint has of it."""
         return {"seen": self.seen, "t": [t for t, _ in self.kept], "values": [x.tolist() for _, x in self.kept]}
 
-    def put_back(self, known: dict[str, Any]) -> None:
-        """Take what a checkpoint has."""
-        self.seen = known["seen"]
-        self.kept = [(t, np.array(x)) for t, x in zip(known["t"], known["values"], strict=True)]
+    def put_back(self, known: dict[str, Any], rows: int) -> None:
+        """Take what a checkpoint has, where the history has so many rows.
+
+        Raises:
+            ValueError: it is not what there is after so many.
+        """
+        t, values = np.array(known["t"], dtype=float), np.array(known["values"], dtype=float)
+        shape = 1 + (rows - 1) // self.output.every, len(self._stations.positions), len(self.names)
+        if known["seen"] != rows or t.shape != shape[:1] or values.shape != shape:
+            raise ValueError(f"values at stations of shape {values.shape} instead of {shape}")
+        self.seen, self.kept = rows, [(float(a), x) for a, x in zip(t, values, strict=True)]
 
     def result(self) -> StationHistory:
         """Return what has been kept."""

@@ -95,12 +95,31 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
         raise refused("is damaged: it does not sum up to what its head says; start the run anew, without --resume")
     try:
         with h5py.File(io.BytesIO(data), "r") as file:
-            text = bytes(file["tree"][()]).decode()
-            arrays = [file[f"arrays/{i}"][()] for i in range(len(file.get("arrays", ())))]
-        tree: dict[str, Any] = _full(json.loads(text), arrays)
-    except (OSError, KeyError, ValueError, TypeError, IndexError) as error:
+            text = _array(file["tree"], len(data)).tobytes().decode()
+            arrays = [_array(file[f"arrays/{i}"], len(data)) for i in range(len(file.get("arrays", ())))]
+        tree = _full(json.loads(text), arrays)
+    except (OSError, KeyError, ValueError, TypeError, IndexError, AttributeError, RecursionError) as error:
         raise refused(f"is damaged ({type(error).__name__}); start the run anew, without --resume") from None
+    if not isinstance(tree, dict):
+        raise refused("is damaged (no tree); start the run anew, without --resume")
     return tree
+
+
+def _array(data: Any, size: int) -> np.ndarray[Any, Any]:
+    """Return an HDF5 dataset of numbers that lies in the file as it is, so that it takes no more memory than that.
+
+    Args:
+        data: the dataset.
+        size: of the file, bytes.
+
+    Raises:
+        ValueError: it is none: packed, of text, elsewhere, or of a shape that is not all in the file.
+    """
+    placed = data.size == 0 or data.id.get_offset() is not None  # what is packed, missing or elsewhere has no place
+    if data.dtype.kind not in "biufc" or not placed or data.nbytes > size:
+        raise ValueError("a dataset is not in the file")
+    out: np.ndarray[Any, Any] = data[()]
+    return np.asarray(out)
 
 
 def _plain(value: Any, arrays: list[Any]) -> Any:
