@@ -115,7 +115,7 @@ def kind_of(name: str) -> str:
     if table == "history":
         known = {"t": "t", "tip": "tip", "root": "root", "balance": "root", "psi": "psi"}
         return f"history.{known.get(word, 'energy')}"
-    return f"{table}.{column.rstrip('0123456789')}"
+    return "shape" if table == "shape" else f"{table}.{column.rstrip('0123456789')}"
 
 
 def check_same(one: Columns, other: Columns, digits: float, what: str, only: tuple[str, ...] = ()) -> None:

@@ -31,6 +31,16 @@ KNOWN: tuple[Failure, ...] = (
         "the error of a linear theory is without bound where nothing holds a hinge, so no accuracy is met",
     ),
     Failure(
+        {
+            "command": ("modes", "campbell", "response"),
+            "structure": ("spatial",),
+            "theory": ("second_order",),
+            "root": ("hinge",),
+            "loads": ("tip",),
+        },
+        "the equilibrium on a hinge that a force turns is not found in the first step of the load",
+    ),
+    Failure(
         {"motion": ("rest",), "loads": ("none",), "time": ("accuracy",)},
         "where nothing moves no error is known relative to the largest displacement, so no accuracy is met",
     ),
