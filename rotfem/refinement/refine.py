@@ -22,7 +22,7 @@ from typing import Any, Generic, Self, TypeVar
 
 from mpi4py import MPI
 
-from rotfem.errors import ComputationError
+from rotfem.errors import ComputationError, InputError
 from rotfem.listeners import Hint
 
 R = TypeVar("R")
@@ -311,6 +311,11 @@ def refine(
         try:
             clock.begin(setting.words(), len(found.tried) + 1, predicted(found, setting))
             result, error = compute(setting)
+        except InputError as refusal:  # a model that cannot have what the scene has gives way to a richer one
+            following = setting.richer()
+            if following is None:
+                raise
+            found.tried.append({**setting.summary(), "failed": refusal.allowed, "seconds": clock.used() - began})
         except ComputationError as failure:
             found.tried.append({**setting.summary(), "failed": failure.what, "seconds": clock.used() - began})
             following = None if isinstance(failure, TooDear) else setting.richer()

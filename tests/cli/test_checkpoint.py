@@ -127,7 +127,8 @@ def test_the_history_is_that_of_an_unbroken_run(kind: str, tmp_path: Path, monke
         np.testing.assert_array_equal(result.shape[name], values, err_msg=name)
     assert result.summary["steps"] == whole.summary["steps"]
     assert result.summary["newton_iterations"] == whole.summary["newton_iterations"]
-    assert 0.0 < result.summary["resumed"][0]["time"] < whole.t[-1]
+    if kind != "accuracy":  # whose answer may be of a setting after the one that was broken off
+        assert 0.0 < result.summary["resumed"][0]["time"] < whole.t[-1]
     assert result.summary["warnings"] == whole.summary["warnings"]
     assert result.summary["error"] == whole.summary["error"]
     np.testing.assert_array_equal(read_csv(tmp_path / "history.csv")["tip_u2"], whole.history["tip_u2"])

@@ -66,12 +66,12 @@ def test_refused_with_the_key(case: str) -> None:
     assert words in str(caught.value)
 
 
-def test_a_bare_table_is_over_time_in_a_history_and_refused_elsewhere() -> None:
-    """What is computed at one time has no table over time: it would be its first row, silently."""
+def test_a_bare_table_is_over_time_in_a_history_and_refused_without_one() -> None:
+    """A scene without [time] has no table over time: it would be its first row, silently."""
     assert scene({"distributed": RAMP}, **TIME).loads.distributed is not None
-    for command, more in ((rotfem.run, {}), (rotfem.modes, TIME), (rotfem.modes, {})):
+    for command in (rotfem.run, rotfem.modes):
         with pytest.raises(SceneError, match=r"over_time .* over_span .* over_span_and_time"):
-            command(scene({"distributed": RAMP}, **more))
+            command(scene({"distributed": RAMP}))
     with pytest.raises(SceneError, match=r"from 0 to 10, the length.* over_span"):
         rotfem.run(scene({"distributed": [[0, 0, 0], [10, 0, 1]]}, **TIME))
     with pytest.raises(SceneError, match="over_span"):
