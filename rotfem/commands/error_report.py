@@ -70,7 +70,9 @@ def _resting(run: Simulation, system: Any) -> Any:
 def _of_reduced(run: Simulation, scale: float) -> float | None:
     """Return the error of a reduced answer by the mesh: its difference to a reduced answer on another one."""
     own, other = run.reduced, on_other_mesh(run.problem, run.system)
-    if own is None or other is None or not scale > 0.0:
+    if not scale > 0.0:
+        return 0.0  # nothing moves it, on no mesh
+    if own is None or other is None:
         return None
     system, ratio = other
     try:

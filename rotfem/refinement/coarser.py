@@ -47,7 +47,7 @@ def on_other_mesh(problem: Problem, system: Any, moving: bool = True) -> tuple[A
 def _meshes(problem: Problem, cells: int) -> Iterator[tuple[Any, float]]:
     """Yield meshes, and the ratios of their cell sizes to those of a problem; of an odd number, half is less than 2."""
     mesh = problem.mesh
-    if problem.structure.mesh_file is not None:
+    if getattr(problem.structure, "mesh_file", None) is not None:  # a structure of a user need not say it
         yield mesh.model_copy(update={"degree": mesh.degree + 1}), 0.5
         return
     n = mesh.elements

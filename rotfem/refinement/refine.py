@@ -316,6 +316,7 @@ def refine(
             if following is None:
                 raise
             found.tried.append({**setting.summary(), "failed": refusal.allowed, "seconds": clock.used() - began})
+            continue
         except ComputationError as failure:
             found.tried.append({**setting.summary(), "failed": failure.what, "seconds": clock.used() - began})
             following = None if isinstance(failure, TooDear) else setting.richer()

@@ -40,8 +40,4 @@ KNOWN: tuple[Failure, ...] = (
         },
         "the equilibrium on a hinge that a force turns is not found in the first step of the load",
     ),
-    Failure(
-        {"motion": ("rest",), "loads": ("none",), "time": ("accuracy",)},
-        "where nothing moves no error is known relative to the largest displacement, so no accuracy is met",
-    ),
 )

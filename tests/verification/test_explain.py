@@ -185,8 +185,8 @@ def add() -> Iterator[Callable[[Any], None]]:
 def test_estimates_are_within_a_factor_three(tables: dict[str, Any]) -> None:
     """Every change above 1e-8 (below it, rounding of the two solutions), and none above 1 % is called negligible.
 
-    The error of a mesh is a third of the difference to half the cells: of cubic elements, which converge with order 6 at
-    the tip and in frequencies, up to 21 times the true one (docs/theory.md, section 18). It counts above 1e-6.
+    The error of a mesh is a third of the difference to half the cells: of cubic elements, which converge with order 6,
+    up to 21 times the true one (docs/theory.md, section 18). It counts above 1e-6.
     """
     result = rotfem.explain(scene(tables), check=True)
     compared = 0

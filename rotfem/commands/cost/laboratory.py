@@ -26,11 +26,10 @@ class Prediction:
 
     Args:
         plate: whether the mesh is one of a plate.
-        end: length of the history, s; 0 where there is none.
     """
 
-    def __init__(self, plate: bool, end: float):
-        self.plate, self.end = plate, end
+    def __init__(self, plate: bool):
+        self.plate = plate
         self.known: dict[Setting, Measurement] = {}
 
     def learn(self, setting: Setting, measurement: Measurement) -> None:
@@ -48,8 +47,7 @@ class Prediction:
         near = min(self.known, key=lambda other: self._far(setting, other))
         m, n = self.known[near], self.known[near].dofs
         more = n * count(setting) / count(near)
-        alike = (setting.step is None) == (near.step is None)
-        march = self._growth(n, more) * (self._steps(setting) / self._steps(near) if alike else 1.0)
+        march = self._growth(n, more) * self._steps(setting, near)
         return {
             "cpu": m.median("setup_cpu") * max(more / n, 1.0) + m.median("cpu") * march,
             "memory": m.memory * self._filled(n, more),
@@ -63,18 +61,20 @@ class Prediction:
         """Return the ratio of the memory of n and of more unknowns."""
         return more / n * (log(max(more, 3.0)) / log(max(n, 3.0)) if self.plate else 1.0)
 
-    def _steps(self, setting: Setting) -> float:
-        """Return the number of stages of a history; 1 outside one."""
-        scheme = scheme_of(setting)
-        if scheme is None:
+    def _steps(self, setting: Setting, near: Setting) -> float:
+        """Return the ratio of the numbers of stages of two histories; of adaptive steps (tolerance)^(-1/p) are needed.
+
+        It is 1 outside histories, and where nothing tells how fixed steps compare with adaptive ones.
+        """
+        scheme, other = scheme_of(setting), scheme_of(near)
+        if scheme is None or other is None:
             return 1.0
-        if setting.step is not None:
-            return float(scheme.stages * self.end / setting.step)
-        if setting in self.known:
-            return float(scheme.stages * self.known[setting].steps)
-        # (tolerance)^(-1/p) steps; nothing else tells how many they are of another tolerance
-        assert setting.tolerance is not None
-        return float(scheme.stages * setting.tolerance ** (-1 / scheme.order))
+        stages = float(scheme.stages / other.stages)
+        if setting.step is not None and near.step is not None:
+            return stages * near.step / setting.step
+        if setting.tolerance is not None and near.tolerance is not None:
+            return stages * float((near.tolerance / setting.tolerance) ** (1 / scheme.order))
+        return stages
 
     def _far(self, one: Setting, other: Setting) -> tuple[float, ...]:
         """Return how far a measured setting is from one to be predicted: way of the steps, theory, size."""
@@ -83,7 +83,7 @@ class Prediction:
             float(one.scheme != other.scheme),
             float(one.theory != other.theory),
             abs(log(count(one) / count(other))),
-            abs(log(self._steps(one) / self._steps(other))),
+            abs(log(self._steps(one, other))),
         )
 
     def scaling(self) -> list[dict[str, Any]]:
@@ -130,8 +130,7 @@ class Laboratory:
         path = path if self.comm.rank == 0 else None
         self.record = Record(path, fingerprint(scene, output, self.comm.size), fresh=not resume)
         self.bench = Bench(scene, output, self.comm)
-        end = scene.time.end if output == "tip" and scene.time is not None else 0.0
-        self.prediction = Prediction(scene.structure.type == "plate", end)
+        self.prediction = Prediction(scene.structure.type == "plate")
         self.measured: dict[Setting, tuple[str, Measurement]] = {}
         self.taken: set[Setting] = set()
         self.new = 0

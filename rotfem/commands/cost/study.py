@@ -159,14 +159,14 @@ class Study:
         self.references: References = {}
         self.failures: dict[str, str] = {}
         self.chosen: Mapping[str, Sequence[Any] | None] = {}
-        self.interval = 0.0
+        self.interval = self.goal = 0.0
         self.outlook: dict[str, Any] | None = None
 
     def run(
         self, quick: bool, accuracy: float, chosen: Mapping[str, Sequence[Any] | None], progress: Progress
     ) -> CostResult:
         """Return the result (see `cost`)."""
-        self.chosen = chosen
+        self.chosen, self.goal = chosen, accuracy
         base = self.base_step()
         settings = grid(self.scene, self.output, quick, base, chosen)
         check_degrees(self.scene, chosen.get("degrees") or (), self.laboratory.comm)
@@ -385,12 +385,17 @@ class Study:
         return {key: error for key, (_, error) in found.items()}
 
     def _other_ways(self, setting: Setting, error: float) -> list[tuple[Setting, float]]:
-        """Return a setting with half and twice its step, and the error of each by the order of the scheme."""
+        """Return a setting with half and twice its step, and the error of each by the order of the scheme.
+
+        A tolerance is a relative error: none above the accuracy is of use.
+        """
         scheme = scheme_of(setting)
         power = 0 if scheme is None else scheme.order if setting.step is not None else 1
         found = [(restepped(setting, factor, self.interval), error * factor**power) for factor in (0.5, 2.0)]
         end = self.scene.time.end if self.scene.time is not None else 0.0
-        return [(s, e) for s, e in found if s is not None and (s.step is None or s.step <= end)]
+        return [
+            (s, e) for s, e in found if s is not None and (s.step or 0.0) <= end and (s.tolerance or 0.0) <= self.goal
+        ]
 
     def _other_meshes(self, setting: Setting, error: float) -> list[tuple[Setting, float]]:
         """Return a setting on the next coarser and finer mesh, with errors of order k + 1, of eigenvalues 2k.
