@@ -42,6 +42,8 @@ cell = "triangle"
 [time]
 end = 0.02
 step = 1e-3
+[initial]
+state = "undeformed"
 """
 
 
