@@ -377,7 +377,7 @@ def check_state(system: Any, stepper: Stepper, state: State) -> None:
     if not suits(state.datum, Datum | None):
         raise ValueError("datum")
     memory, first = state.memory, stepper.scheme.start(state.changed(memory=None)).memory
-    kinds = (type(first),) if first is not None else (stepper.scheme.remembers, type(None))
+    kinds = (type(first),) if first is not None else (stepper.scheme.remembers, tuple, type(None))
     arrays = [x for x in (*vars(memory).values(),) if isinstance(x, np.ndarray)] if is_dataclass(memory) else [memory]
     shapes = {x.shape for x in arrays if isinstance(x, np.ndarray)}
     if not isinstance(memory, kinds) or not shapes <= {state.q.shape}:

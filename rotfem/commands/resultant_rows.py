@@ -81,7 +81,7 @@ class ResultantRows:
         """
         frames, last = known["frames"], known["last"]
         kept = [(float(t), x) for t, x in zip(frames["t"], frames["values"], strict=True)]
-        if any(x.shape != last.shape for _, x in kept) or len(known["largest"]) != len(self.largest):
+        if any(x.shape != last.shape for _, x in kept) or len(known["largest"]) != 4:  # value, x, y, t
             raise ValueError("resultants")
         self.frames.put_back({**known["more"], "kept": kept}, rows)
         self.last, self.largest = last, tuple(known["largest"])

@@ -107,7 +107,10 @@ def tables_of(row: Row, folder: Path) -> Tables:
     if row["loads"] != "none":
         tables["loads"] = loads_of(row)
     # A quick spin holds a hinge in theories that have its stiffness; else there is no equilibrium to start from.
-    if row["root"] == "hinge" and (row["motion"] != "constant" or row["theory"] == "linear"):
+    # A follower has none that a growing load leads to, or an unstable one.
+    if row["loads"] == "follower" or (
+        row["root"] == "hinge" and (row["motion"] != "constant" or row["theory"] == "linear")
+    ):
         tables["initial"] = {"state": "undeformed"}
     if row["time"] == "accuracy":
         tables |= {"accuracy": 0.5, "time": {"end": END}}

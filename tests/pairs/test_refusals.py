@@ -42,7 +42,7 @@ def test_documented_refusals(refusal: Refusal, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "failure",
-    [pytest.param(known, marks=pytest.mark.xfail(strict=True, reason=known.fails), id=known.fails) for known in KNOWN],
+    [pytest.param(known, marks=pytest.mark.xfail(reason=known.fails), id=known.fails) for known in KNOWN],
 )
 def test_known_failures(failure: Failure, tmp_path: Path) -> None:
     row = rows_with(failure.choices)[0]

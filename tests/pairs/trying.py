@@ -16,7 +16,7 @@ import pytest
 from tests.launch import MPIRUN, environment
 from tests.pairs.answers import answer, check_answer, check_same, columns_of
 from tests.pairs.covering import Levels, Row, covering, missing
-from tests.pairs.known import KNOWN
+from tests.pairs.known import KNOWN, OPEN
 from tests.pairs.refusals import REFUSALS
 from tests.pairs.scenes import ACTIVE, LEVELS, as_toml, shuffled, tables_of
 
@@ -41,8 +41,18 @@ def rows_of(strength: int, seed: int) -> Iterator[Row]:
 
 def parameters(rows: Sequence[Row], before: str = "", marks: Sequence[Any] = ()) -> list[Any]:
     """Return rows as parameters of a test, those of two processes where there is mpirun."""
-    ranked = [*marks, pytest.mark.mpi, pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")]
-    return [pytest.param(row, id=before + name_of(row), marks=ranked if row["ranks"] == "2" else marks) for row in rows]
+    ranked = [pytest.mark.mpi, pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")]
+
+    def marked(row: Row) -> list[Any]:
+        known = [pytest.mark.xfail(reason=failure.fails) for failure in OPEN if meets(row, failure.choices)]
+        return [*marks, *known, *(ranked if row["ranks"] == "2" else [])]
+
+    return [pytest.param(row, id=before + name_of(row), marks=marked(row)) for row in rows]
+
+
+def meets(row: Row, choices: Levels) -> bool:
+    """Return whether a row has one of the levels of every factor."""
+    return all(row[factor] in levels for factor, levels in choices.items())
 
 
 class Trial:
