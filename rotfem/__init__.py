@@ -32,9 +32,8 @@ if TYPE_CHECKING:
     from rotfem.commands.run import run
     from rotfem.mechanics.effects import DampingModel, Effect
     from rotfem.mechanics.free_hub import FreeHub, Torque
-    from rotfem.mechanics.laws import MotionLaw
     from rotfem.mechanics.loads import ConstantLoad, Loads
-    from rotfem.mechanics.motion import Motion
+    from rotfem.mechanics.motion import Motion, MotionLaw
     from rotfem.mechanics.outputs import Output
     from rotfem.mechanics.theories import Theory
     from rotfem.results import CampbellResult, CheckResult, ExplainResult, ModesResult, ResponseResult, RunResult
@@ -43,9 +42,9 @@ if TYPE_CHECKING:
     from rotfem.scene.beams import SpatialBeamStructure as SpatialBeam
     from rotfem.scene.blades.deck import Deck
     from rotfem.scene.blades.formats import Asked, BladeFormat
-    from rotfem.scene.kinds import StructureKind
     from rotfem.scene.plates import PlateStructure as Plate
     from rotfem.scene.section_shapes import Geometry, Shape
+    from rotfem.scene.structure import StructureKind
 
 #: Module ↦ public names it has: imported when one is first asked for, as most of them load FEniCSx.
 _HOMES = {
@@ -63,9 +62,8 @@ _HOMES = {
     "commands.run": ("run",),
     "mechanics.effects": ("DampingModel", "Effect"),
     "mechanics.free_hub": ("FreeHub", "Torque"),
-    "mechanics.laws": ("MotionLaw",),
     "mechanics.loads": ("ConstantLoad", "Loads"),
-    "mechanics.motion": ("Motion",),
+    "mechanics.motion": ("Motion", "MotionLaw"),
     "mechanics.outputs": ("Output",),
     "mechanics.theories": ("Theory",),
     "commands.cost.result": ("CostResult",),
@@ -73,7 +71,7 @@ _HOMES = {
     "scene": ("BeamMesh", "PlateMesh"),
     "scene.blades.deck": ("Deck",),
     "scene.blades.formats": ("Asked", "BladeFormat"),
-    "scene.kinds": ("StructureKind",),
+    "scene.structure": ("StructureKind",),
     "scene.section_shapes": ("Geometry", "Shape"),
 }
 _LATER = {name: f"rotfem.{module}:{name}" for module, names in _HOMES.items() for name in names}

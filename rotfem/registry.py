@@ -9,15 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Protocol, TypeVar, cast
-
-if TYPE_CHECKING:
-    from rotfem.mechanics.effects import DampingModel, Effect
-    from rotfem.mechanics.outputs import Output
-    from rotfem.mechanics.theories import Theory
-    from rotfem.scene.blades.formats import BladeFormat
-    from rotfem.scene.kinds import StructureKind
-    from rotfem.scene.section_shapes import Shape
+from typing import Any, ClassVar, Generic, Protocol, TypeVar, cast
 
 
 class Entry(Protocol):
@@ -89,18 +81,17 @@ class Registry(Generic[E]):
 
 
 # The registries themselves are here, on the ground, so that a scene knows the names of what lies above it.
-theories: Registry[Theory] = Registry("theory", "rotfem.mechanics.theories")
-effects: Registry[Effect] = Registry("effect", "rotfem.mechanics.effects")
+theories: Registry[Any] = Registry("theory", "rotfem.mechanics.theories")
+effects: Registry[Any] = Registry("effect", "rotfem.mechanics.effects")
 schemes: Registry[Any] = Registry(
     "scheme",
     "rotfem.analysis.alpha_family",
     "rotfem.analysis.esdirk",
     "rotfem.analysis.radau",
-    "rotfem.analysis.energy_conserving",
 )
-shapes: Registry[Shape] = Registry("section shape", "rotfem.scene.section_shapes")
-outputs: Registry[Output] = Registry("output", "rotfem.mechanics.outputs")
-blade_formats: Registry[BladeFormat] = Registry(
+shapes: Registry[Any] = Registry("section shape", "rotfem.scene.section_shapes")
+outputs: Registry[Any] = Registry("output", "rotfem.mechanics.outputs")
+blade_formats: Registry[Any] = Registry(
     "format of blade files",
     "rotfem.scene.blades.openfast",
     "rotfem.scene.blades.bmodes",
@@ -108,8 +99,8 @@ blade_formats: Registry[BladeFormat] = Registry(
     "rotfem.scene.blades.windio",
 )
 motion_laws: Registry[Any] = Registry("type of motion", "rotfem.scene.motion")
-damping_models: Registry[DampingModel] = Registry("damping model")
-structures: Registry[StructureKind] = Registry("structure", "rotfem.scene.kinds")
+damping_models: Registry[Any] = Registry("damping model")
+structures: Registry[Any] = Registry("structure", "rotfem.scene.structure")
 
 ALL: tuple[Registry[Any], ...] = (
     *(theories, effects, schemes, motion_laws, damping_models),

@@ -7,6 +7,11 @@ One step from t_n to t_{n+1} = t_n + h satisfies F(q, v, q̈) = 0 at t_{n+1}, wi
     (1 − α_m) a_{n+1} + α_m a_n = (1 − α_f) q̈_{n+1} + α_f q̈_n
 
 where a is an auxiliary acceleration, the memory of the scheme; Newmark is α_m = α_f = 0.
+
+q_{n+1} = q_n + h v,    v_{n+1} = v_n + h a,    F̄(q, v, a; t_n + h/2) = 0,    q = (q_n + q_{n+1})/2, v likewise.
+
+What F̄ is the system says (`rotfem.equations.energy_balance`): of a linear theory F itself, whose quadratic energy the
+rule conserves; of a nonlinear one the mean stress of the step's ends and a discrete gradient do.
 """
 
 from __future__ import annotations
@@ -17,7 +22,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
-from rotfem.analysis.schemes import Array, Scheme, Stage, State
+from rotfem.analysis.schemes import Array, Scheme, Span, Stage, State
 from rotfem.registry import register
 
 #: Growth of the step, and distance in steps, from which on the memory is not moved along.
@@ -153,3 +158,26 @@ class Newmark(AlphaFamily):
 
 register(GeneralisedAlpha)
 register(Newmark)
+
+
+@dataclass(frozen=True)
+class EnergyConserving(Scheme):
+    """Energy to round-off for as many steps as there are; nothing is damped, resolved or not."""
+
+    name: ClassVar[str] = "energy_conserving"
+    order: ClassVar[int] = 2
+    balanced_at_end: ClassVar[bool] = False
+
+    def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
+        """Return the middle of the step, predicted by the acceleration of the last one."""
+        v = state.v + h / 2 * state.a
+        return Stage((state.t + end) / 2, state.q + h / 2 * v, v, state.a.copy(), 2 / h, 4 / h**2, Span(state, end))
+
+    def finish(self, state: State, h: float, done: Sequence[Stage]) -> State:
+        """Return the end of the step; its acceleration is that of the middle."""
+        (s,) = done
+        assert s.over is not None
+        return State(s.over.end, 2 * s.q - state.q, 2 * s.v - state.v, s.a, s.memory, balanced=False)
+
+
+register(EnergyConserving)

@@ -10,8 +10,7 @@ import numpy.typing as npt
 from rotfem.equations.resultants import Resultants, Saddle
 from rotfem.errors import ComputationError
 from rotfem.numerics.balance import power_of_two
-from rotfem.numerics.bounds import ROUNDED, RoundOff, relative
-from rotfem.numerics.eigenproblem import Eigenpairs, Pencil
+from rotfem.numerics.eigenproblem import ROUNDED, Eigenpairs, Pencil, RoundOff, relative
 from rotfem.numerics.low_rank import sparse_part
 
 Array = npt.NDArray[Any]

@@ -2,10 +2,18 @@
 
 Small motions e^{λt} x about an equilibrium q̄ at constant speed satisfy (λ² M + λ C + K) x = 0 with M = ∂F/∂a,
 C = ∂F/∂v, K = ∂F/∂q at (q̄, 0, 0).
+
+With the kinetic energy ½ vᵀM v of the whole structure, that of the clamped unknowns included, a mode x of largest entry
+1 has the modal mass x^H M x, and of a motion r_i of all points along direction i it has the effective mass
+
+    |r_iᵀ M x|² / x^H M x;
+
+those of all modes that a structure at rest has add up to its mass r_iᵀ M r_i (Clough & Penzien 1993, section 26-4).
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -16,13 +24,136 @@ from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.kept_digits import KeptDigits
-from rotfem.analysis.mode_labels import with_overdamped
 from rotfem.equations.compiled import compile_system
+from rotfem.equations.functionals import Functionals
 from rotfem.equations.modes_at_rest import family_products, massed
 from rotfem.errors import InputError
 from rotfem.mechanics.problem import Problem
+from rotfem.mechanics.work import kinetic_parts
 from rotfem.numerics.eigenproblem import SAME, ZERO, Eigenpairs, Pencil
 from rotfem.numerics.newton import Newton
+
+
+def with_overdamped(names: list[str], values: Array, energies: tuple[Array, Array]) -> list[str]:
+    """Return the names of modes, those of overdamped ones as "lag 4, slow" and "lag 4, fast".
+
+    The number of an overdamped mode is not that of its nodes, which damping can move, but its place in its family: each
+    undamped mode becomes one that vibrates, or a slow and a fast one.
+
+    Args:
+        names: "kind n" of every mode, in the order of the undamped frequencies of the shapes.
+        values: λ, 1/s.
+        energies: x^H M x and x^H K x of every mode, over all ranks; a negative K tells of an instability.
+    """
+    mass, stiffness = (np.real(e) for e in energies)
+    over = (values.imag == 0.0) & (values.real < 0.0) & (stiffness > 0.0) & (mass > 0.0)
+    if not np.any(over):
+        return names
+    vibrating, out = Counter[str](), list(names)
+    counted: dict[str, Counter[str]] = {"slow": Counter(), "fast": Counter()}
+    for j, name in enumerate(names):
+        kind, _, _ = name.rpartition(" ")
+        if not over[j]:
+            vibrating[kind] += 1
+            continue
+        speed = "slow" if abs(values[j]) ** 2 * mass[j] < stiffness[j] else "fast"
+        counted[speed][kind] += 1
+        out[j] = f"{kind} {vibrating[kind] + counted[speed][kind]}, {speed}"
+    return out
+
+
+def participation(analysis: ModalAnalysis, spinning: Spinning) -> tuple[list[dict[str, float]], dict[str, float]]:
+    """Return modal and effective masses of every mode, and the mass that there is.
+
+    Args:
+        analysis: compiled problem.
+        spinning: equilibrium and eigenpairs at one speed.
+
+    Returns:
+        Rows of `modal_mass` (kg, where the largest entry of the shape is a displacement, kg·m² where it is a rotation)
+        and `effective_mass_1`, … (kg) along the directions of the frame in which the structure moves; and the mass
+        (kg) by the same names of directions.
+    """
+    system = analysis.system.held
+    energy = Functionals({"T2": kinetic_parts(system.model.mechanics)["T2"]()}, system.structure.mesh)
+    owned = system.V.dofmap.index_map.size_local * system.V.dofmap.index_map_bs
+
+    def twice(v: Array) -> float:
+        system.v.x.array[:owned] = v
+        system.v.x.scatter_forward()
+        return 2.0 * energy()["T2"]
+
+    names = list(system.structure.unknowns)
+    along = {i + 1: np.zeros(owned) for i in range(3) if f"u{i + 1}" in names}
+    for i, r in along.items():
+        r[names.index(f"u{i}") :: len(names)] = 1.0
+    system.set_state(spinning.q[: len(system.q.x.array)])
+    whole = {i: twice(r) for i, r in along.items()}
+    rows = []
+    for x in analysis.right(spinning).T:
+        shape = x[:owned] / largest(analysis, x[:owned])
+        pieces = [(part, twice(part)) for part in (shape.real, shape.imag)]
+        mass = sum(size for _, size in pieces)
+        row = {"modal_mass": mass}
+        for i, r in along.items():
+            momenta = [0.5 * (twice(part + r) - size - whole[i]) for part, size in pieces]
+            row[f"effective_mass_{i}"] = (momenta[0] ** 2 + momenta[1] ** 2) / mass
+        rows.append(row)
+    system.set_state(spinning.q[: len(system.q.x.array)])
+    return rows, {f"effective_mass_{i}": mass for i, mass in whole.items()}
+
+
+def largest(analysis: ModalAnalysis, x: Array) -> complex:
+    """Return the entry of largest size of owned unknowns, over all ranks."""
+    here = complex(x[np.argmax(np.abs(x))]) if x.size else 0.0j
+    found: complex = max(analysis.comm.allgather(here), key=abs)
+    return found
+
+
+def self_checks(analysis: ModalAnalysis, spinning: Spinning) -> dict[str, float]:
+    """Return how far symmetry, the spectrum and the linearisation are from what theory says (all relative).
+
+    M and K symmetric and C skew without damping and follower loads; then −λ̄ is an eigenvalue with λ. The tangents are
+    compared with central differences of the residual in the nonlinear theories.
+    """
+    out = {f"asymmetry_{name}": value for name, value in spinning.pencil.asymmetries().items()}
+    if spinning.pencil.spectrum_error is not None:
+        out["spectrum"] = spinning.pencil.spectrum_error
+    if not analysis.system.linear:  # a linear system's residual is made of these very matrices
+        out["linearisation"] = linearisation_error(analysis, spinning)
+    return out
+
+
+def linearisation_error(analysis: ModalAnalysis, spinning: Spinning) -> float:
+    """Return the relative difference between M, C, K times a vector and central differences of the residual."""
+    system, pencil = analysis.system.held, spinning.clamped
+    zero = system.zeros()
+    # A direction without structure: for a mode, K x is what is left when large axial terms cancel.
+    system.q.x.array[:] = np.random.default_rng(1).standard_normal(zero.size) * system.scale
+    system.q.x.scatter_forward()
+    direction = system.q.x.array.copy()
+    system.set_time(0.0, system.motion.at_speed(spinning.speed))
+    worst = 0.0
+
+    def residual(q: Array, v: Array, a: Array) -> Array:
+        system.set_state(q, v, a)
+        return -np.asarray(system.residual_in_motion().array)
+
+    owned = system.V.dofmap.index_map.size_local * system.V.dofmap.index_map_bs
+    direction[system.clamped] = 0.0
+    # The residual is quadratic in v and linear in a, so that central differences are exact there, however long.
+    for A, slot, step in ((pencil.K, 0, 1e-7), (pencil.C, 1, 1.0), (pencil.M, 2, 1.0)):
+        plus, minus = [spinning.q, zero, zero], [spinning.q, zero, zero]
+        plus[slot], minus[slot] = plus[slot] + step * direction, minus[slot] - step * direction
+        difference = (residual(*plus) - residual(*minus)) / (2 * step)
+        exact = pencil.apply(A, direction[:owned, None].astype(complex))[:, 0].real
+        exact[system.clamped] = 0.0
+        sums = np.array([np.sum((difference - exact) ** 2), np.sum(exact**2)])
+        error, size = analysis.comm.allreduce(sums)
+        worst = max(worst, float(np.sqrt(error / size)) if size > 0 else 0.0)
+    system.set_state(spinning.q)
+    return worst
+
 
 Array = npt.NDArray[Any]
 

@@ -16,9 +16,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
-from rotfem.numerics.bounds import RoundOff, relative
 from rotfem.numerics.damped import quadratic
-from rotfem.numerics.eigenproblem import Eigenpairs, Pencil
+from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, relative
 from rotfem.numerics.projection import orthonormal, summed, times
 
 Array = npt.NDArray[Any]

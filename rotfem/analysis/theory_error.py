@@ -36,8 +36,7 @@ from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.sums import added
 from rotfem.mechanics.theories import richest, theories
 from rotfem.numerics import compat, forms
-from rotfem.numerics.bounds import RoundOff
-from rotfem.numerics.eigenproblem import Pencil
+from rotfem.numerics.eigenproblem import Pencil, RoundOff
 from rotfem.numerics.inertia import negative_eigenvalues
 from rotfem.numerics.linear import DirectSolver, Increment, set_diagonal
 

@@ -13,12 +13,11 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.branches import SPARE, Node, Sweep
-from rotfem.analysis.modal import ModalAnalysis, Spinning
-from rotfem.analysis.mode_checks import self_checks
+from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
 from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy
+from rotfem.commands.energy_growth import check_rows
 from rotfem.commands.error_report import error_of_modes
-from rotfem.commands.finite import check_rows
 from rotfem.commands.loads import held
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
 from rotfem.commands.modes import analysis_of, hints_of, theory_error

@@ -12,8 +12,8 @@ from mpi4py import MPI
 
 from rotfem.commands.problem import Problem
 from rotfem.commands.summary import summary
+from rotfem.equations.functionals import rigid_body
 from rotfem.equations.model import Model
-from rotfem.equations.rigid_body import rigid_body
 from rotfem.errors import input_of
 from rotfem.mechanics.effects import Effect
 from rotfem.mechanics.theories import Theory

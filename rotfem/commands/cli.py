@@ -25,7 +25,7 @@ from rotfem.commands.result_folder import Writer
 from rotfem.errors import input_of
 from rotfem.results.result_set import read_summary, said_of
 from rotfem.scene import load_scene
-from rotfem.scene.reading import noted_files
+from rotfem.scene.files import noted_files
 
 
 @command()

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rotfem.errors import ComputationError
+from rotfem.mechanics.theories import Theory, richest, theories
 
 Array = npt.NDArray[np.float64]
 
@@ -114,3 +117,65 @@ def with_cause(
         return error
     why, _, advice = cause.partition("; ")
     return ComputationError(f"{error.what}; before that {why}", time=error.time, advice=advice.removeprefix("give "))
+
+
+def diverged(theory: Theory, time: float, critical: float | None, since: float | None) -> ComputationError:
+    """Return the error of a linear solution that has diverged.
+
+    Args:
+        theory: its theory.
+        time: when (s).
+        critical: speed at which its stiffness is singular, rad/s; None if there is none.
+        since: from when on (s) the speed was above that; None if it never was.
+    """
+    why = "the motion is unstable or its load too large for a linear theory"
+    if since is not None:
+        why = f"its stiffness is not definite above {critical:.6g} rad/s, passed at t = {since:.4g} s"
+        if not theory.prestress:
+            why += ": first-order strains keep the softening by the centrifugal force but not the stiffening"
+    return ComputationError(
+        f"the {theory.name} solution diverged (a displacement exceeds the length, or a rotation 1 rad; {why})",
+        time=time,
+        advice=better_theories(theory),
+    )
+
+
+def better_theories(theory: Theory) -> str:
+    """Return which theories to use in the place of a linear one that diverged."""
+    exact = richest().name
+    if theory.prestress:
+        return f'use model.theory = "{exact}", which holds for any deflection'
+    stiffened = next(t.name for t in theories() if t.linear and t.prestress)
+    return f'use model.theory = "{stiffened}" for small or "{exact}" for any deflection'
+
+
+#: What to try where numbers overflow.
+ADVICE = "the numbers of the scene are out of all proportion (units?), or the step is too long for the motion"
+
+
+def check_finite(values: Iterable[tuple[str, Any]], time: float | None = None, where: str = "") -> None:
+    """See that all values are finite; what is no number passes.
+
+    Args:
+        values: name and value of each.
+        time: when they were computed (s), where there is a time.
+        where: what they belong to, for the message.
+
+    Raises:
+        ComputationError: names those that are not.
+    """
+    wrong = [name for name, value in values if isinstance(value, float) and not math.isfinite(value)]
+    if wrong:
+        more = f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
+        raise ComputationError(f"not a finite number{where}: {', '.join(wrong[:3])}{more}", time, ADVICE)
+
+
+def check_rows(rows: Iterable[Mapping[str, Any]]) -> None:
+    """See that all numbers of modes, or of branches over speed, are finite.
+
+    Raises:
+        ComputationError: names the first mode with one that is not.
+    """
+    for number, row in enumerate(rows, start=1):
+        where = f" at {row['speed']:g} rad/s" if "speed" in row else ""
+        check_finite(row.items(), where=f" of mode {row.get('branch', number)}{where}")

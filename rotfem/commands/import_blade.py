@@ -9,8 +9,8 @@ from typing import Any
 
 from rotfem.results.files import write_text
 from rotfem.scene import Scene
+from rotfem.scene.files import apply_overrides
 from rotfem.scene.scene import plain
-from rotfem.scene.toml import apply_overrides
 
 
 def import_blade(file: str | Path, format: str | None = None, changes: Sequence[str] = ()) -> Scene:

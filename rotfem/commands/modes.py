@@ -16,14 +16,13 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.critical_speed import critical_speed
-from rotfem.analysis.modal import ModalAnalysis, Spinning
-from rotfem.analysis.mode_checks import self_checks
-from rotfem.analysis.participation import participation as masses_of
+from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
+from rotfem.analysis.modal import participation as masses_of
 from rotfem.analysis.stability import Stability, stability_of_pencil
 from rotfem.analysis.theory_error import TheoryCheck, TheoryError
 from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy
+from rotfem.commands.energy_growth import check_rows
 from rotfem.commands.error_report import error_of_modes
-from rotfem.commands.finite import check_rows
 from rotfem.commands.loads import held
 from rotfem.commands.mode_tables import advice, mode_tables
 from rotfem.commands.problem import Problem, case_of
@@ -64,7 +63,7 @@ def modes(
         comm: MPI communicator; every rank gets the whole result.
         sensitivities: also compute the derivatives of all eigenvalues to the scene's parameters.
         blade_tables: also write polynomials and tables of the modes of a beam over its span.
-        participation: also say modal and effective masses (see `rotfem.analysis.participation`).
+        participation: also say modal and effective masses (see `rotfem.analysis.modal`).
         hint: called with every line of advice before the computation starts; None asks for none.
         terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form (see `rotfem.Effect`).
 

@@ -9,15 +9,151 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.schemes import State
+from rotfem.commands.energy_growth import check_finite
 from rotfem.commands.fields import fields_writer, stations_writer
-from rotfem.commands.finite import check_finite
 from rotfem.commands.moment import hub_values, write_state
-from rotfem.commands.resultant_rows import ResultantRows
-from rotfem.commands.station_rows import StationRows
+from rotfem.equations.plate_resultants import PlateResultants
+from rotfem.equations.stations import Stations
 from rotfem.errors import InputError
 from rotfem.results.run import RunResult, Table
-from rotfem.scene import OutputTable
+from rotfem.results.stations import StationHistory
+from rotfem.scene.output import OutputTable
 from rotfem.structures.paraview import Snapshots
+
+#: What the equivalent stress is called.
+STRESS = "von_mises"
+
+
+class ResultantRows:
+    """Takes the states of the rows of a history.
+
+    Args:
+        system: equations of motion of a plate, the hub held.
+        names: of the resultants that are wanted.
+
+    Attributes:
+        frames: values (nodes, names) at the times of the fields' snapshots, which the recorder adds.
+        last: at the last row.
+        largest: largest equivalent stress (Pa) so far, where, and when: value, x, y (m), t (s).
+    """
+
+    def __init__(self, system: Any, names: tuple[str, ...]):
+        self.names, self._system = names, system
+        self._resultants = PlateResultants(system)
+        self._columns = [self._resultants.names.index(name) for name in names]
+        self._stress = self._resultants.names.index(STRESS)
+        self.frames = Snapshots()
+        self.last: Array | None = None
+        self.largest: tuple[float, ...] = ()
+
+    def __call__(self, t: float) -> float:
+        """Keep the values at the state that is written into the system; return the largest equivalent stress, Pa.
+
+        Raises:
+            ComputationError: a number is not finite.
+        """
+        values = self._resultants()
+        worst = int(np.argmax(values[:, self._stress]))
+        stress = float(values[worst, self._stress])
+        check_finite([("the equivalent stress", float(values.sum()))], t)
+        if not self.largest or stress > self.largest[0]:
+            coordinates = self._system.structure.nodes(self._system.zeros())[0]
+            self.largest = (stress, float(coordinates["x"][worst]), float(coordinates["y"][worst]), t)
+        self.last = values[:, self._columns]
+        return stress
+
+    def columns(self) -> dict[str, Array]:
+        """Return the positions of the nodes (m), and the resultants of the last row; empty of no row."""
+        if self.last is None:
+            return {}
+        coordinates = self._system.structure.nodes(self._system.zeros())[0]
+        return {**coordinates, **dict(zip(self.names, self.last.T, strict=True))}
+
+    def summary(self) -> dict[str, float]:
+        """Return the largest equivalent stress (Pa), where (m) and when (s)."""
+        return dict(zip((STRESS, "x", "y", "t"), self.largest, strict=False))
+
+    def kept_arrays(self) -> dict[str, Any]:
+        """Return what a checkpoint has of it."""
+        kept = self.frames.kept
+        frames = {"t": [t for t, _ in kept], "values": np.array([x for _, x in kept])}
+        more = {name: value for name, value in vars(self.frames).items() if name != "kept"}
+        return {"frames": frames, "more": more, "last": self.last, "largest": list(self.largest)}
+
+    def put_back(self, known: dict[str, Any], rows: int) -> None:
+        """Take what a checkpoint has, where the history has so many rows.
+
+        Raises:
+            ValueError: it is not what there is after so many.
+        """
+        frames, last = known["frames"], known["last"]
+        kept = [(float(t), x) for t, x in zip(frames["t"], frames["values"], strict=True)]
+        if any(x.shape != last.shape for _, x in kept) or len(known["largest"]) != 4:  # value, x, y, t
+            raise ValueError("resultants")
+        self.frames.put_back({**known["more"], "kept": kept}, rows)
+        self.last, self.largest = last, tuple(known["largest"])
+
+
+class StationRows:
+    """Takes the states of every so many rows of a history.
+
+    Args:
+        system: equations of motion of a beam.
+        output: what is asked for, with stations.
+
+    Attributes:
+        kept: (time in s, values (stations, quantities)) so far.
+        seen: rows of the history so far.
+    """
+
+    def __init__(self, system: Any, output: OutputTable):
+        self.output, beam = output, system.structure
+        self._stations = Stations(system, output.positions(beam.length))
+        self.names = (*output.sections(beam.type), *beam.components)
+        self._columns = [self._stations.names.index(name) for name in self.names]
+        self.kept: list[tuple[float, Array]] = []
+        self.seen = 0
+
+    @property
+    def due(self) -> bool:
+        """Whether the next row is one of those that are kept."""
+        return self.seen % self.output.every == 0
+
+    def __call__(self, t: float) -> None:
+        """Keep the values at the state that is written into the system, or pass the row by.
+
+        Raises:
+            ComputationError: a number is not finite.
+        """
+        if self.due:
+            values = self._stations()[:, self._columns]
+            check_finite(zip(self.names, map(float, values.sum(axis=0)), strict=True), t, " at the stations")
+            self.kept.append((t, values))
+        self.seen += 1
+
+    def kept_arrays(self) -> dict[str, Any]:
+        """Return what a checkpoint has of it."""
+        return {"seen": self.seen, "t": [t for t, _ in self.kept], "values": [x.tolist() for _, x in self.kept]}
+
+    def put_back(self, known: dict[str, Any], rows: int) -> None:
+        """Take what a checkpoint has, where the history has so many rows.
+
+        Raises:
+            ValueError: it is not what there is after so many.
+        """
+        t, values = np.array(known["t"], dtype=float), np.array(known["values"], dtype=float)
+        shape = 1 + (rows - 1) // self.output.every, len(self._stations.positions), len(self.names)
+        if known["seen"] != rows or t.shape != shape[:1] or values.shape != shape:
+            raise ValueError(f"values at stations of shape {values.shape} instead of {shape}")
+        self.seen, self.kept = rows, [(float(a), x) for a, x in zip(t, values, strict=True)]
+
+    def result(self) -> StationHistory:
+        """Return what has been kept."""
+        shape = len(self.kept), len(self._stations.positions), len(self.names)
+        t, values = np.array([t for t, _ in self.kept]), np.array([x for _, x in self.kept]).reshape(shape)
+        named = {name: values[:, :, i] for i, name in enumerate(self.names)}
+        return StationHistory(t, self._stations.positions, named, self.output.format)
+
 
 Array = npt.NDArray[np.float64]
 

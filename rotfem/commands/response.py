@@ -16,9 +16,15 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import steady_state
-from rotfem.analysis.frequency_response import FrequencyResponse
+from rotfem.analysis.frequency_response import (
+    FrequencyResponse,
+    HubOutput,
+    RootOfFreeHub,
+    RootOutput,
+    StationOutput,
+    TipOutput,
+)
 from rotfem.analysis.modal import ModalAnalysis, Spinning
-from rotfem.analysis.response_outputs import HubOutput, RootOfFreeHub, RootOutput, StationOutput, TipOutput
 from rotfem.analysis.stability import stability_of_pencil
 from rotfem.commands.loads import SWEPT, held_in_frame, swept_loads
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows

@@ -22,12 +22,12 @@ from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.theory_error import Farthest, TheoryError, said_of
 from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
 from rotfem.commands import energy_growth
+from rotfem.commands.energy_growth import diverged
 from rotfem.commands.error_report import error_of_run, output_of, warnings_of_run
 from rotfem.commands.first_state import first_state
 from rotfem.commands.interrupts import Interrupted
 from rotfem.commands.keeper import Keeper
 from rotfem.commands.loads import held
-from rotfem.commands.other_models import diverged
 from rotfem.commands.problem import scheme_of
 from rotfem.commands.recorder import Recorder
 from rotfem.commands.reduced_history import by_reduced_model

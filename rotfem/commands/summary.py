@@ -11,7 +11,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.modal import ModalAnalysis
-from rotfem.results.extremes import figures
+from rotfem.results.columns import figures
 from rotfem.scene import Scene
 from rotfem.selection.model_choice import Choice
 from rotfem.version import versions

@@ -2,18 +2,70 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import ufl
 from basix.ufl import element
 from dolfinx import fem
 from mpi4py import MPI
 
+from rotfem.equations.model import Model
 from rotfem.numerics import forms
+from rotfem.structures.structure import Array
 
-Array = npt.NDArray[np.float64]
+
+class RigidBody(NamedTuple):
+    """Integrals over the undeformed structure, frame axes.
+
+    Attributes:
+        mass: ∫ dm (kg).
+        first_moment: ∫ x dm about the origin of the frame (kg·m), (3,).
+        second_moment: ∫ x xᵀ dm about it, directors included (kg·m²), (3, 3).
+    """
+
+    mass: float
+    first_moment: Array
+    second_moment: Array
+
+    def about(self, point: Array) -> Array:
+        """Return the inertia tensor tr(E) 1 − E (kg·m²), (3, 3), about a point (m), of E = ∫ (x−p)(x−p)ᵀ dm."""
+        cross = np.outer(self.first_moment, point)
+        E = self.second_moment - cross - cross.T + self.mass * np.outer(point, point)
+        return np.asarray(np.trace(E) * np.eye(3) - E)
+
+
+def rigid_body(model: Model) -> RigidBody:
+    """Return the rigid body that the structure of a model is at rest, with all mass that its effects bring.
+
+    All integrals are one form whose factors are constants: it is compiled once.
+    """
+    structure = model.structure
+    factors = [structure.constant(value) for value in (0.0, np.zeros(3), np.zeros((3, 3)))]
+    one, linear, square = factors
+
+    def density(body: Any) -> Any:
+        inner = ufl.dot(body.x, ufl.dot(square, body.x))
+        return body.density * (one + ufl.dot(linear, body.x) + inner if body.is_position else inner) * body.measure
+
+    form = forms.form(sum(density(body) for body in model.mechanics.bodies), once=True)
+
+    def total() -> float:
+        value = float(model.comm.allreduce(fem.assemble_scalar(form)))
+        for factor in factors:
+            factor.value[...] = 0.0
+        return value
+
+    one.value = 1.0
+    mass = total()
+    first, second = np.zeros(3), np.zeros((3, 3))
+    for i in range(3):
+        linear.value[i] = 1.0
+        first[i] = total()
+        for j in range(i, 3):
+            square.value[i, j] = 1.0
+            second[i, j] = second[j, i] = total()
+    return RigidBody(mass, first, second)
 
 
 class Functionals:

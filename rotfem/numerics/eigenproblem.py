@@ -1,4 +1,17 @@
-"""The quadratic eigenproblem (λ² M + λ C + K) x = 0 with its left vectors, by SLEPc PEP; no physics."""
+"""The quadratic eigenproblem (λ² M + λ C + K) x = 0 with its left vectors, by SLEPc PEP; no physics.
+
+To first order a change of the matrices moves a simple eigenvalue by
+
+    δλ = −y^H (λ² δM + λ δC + δK) x / n,   n = y^H (2λ M + C) x
+
+(Tisseur 2000, section 2.2). The solver's part is the residual r = (λ² M + λ C + K) x; −y^H r/n is taken off, which
+leaves what is of second order in |y|ᵀ|r|/|n λ|.
+
+What rounding did to K when it was assembled, no backward error shows. An entry of K is a sum over quadrature points of
+products that the diagonal bounds, |Σ B_i D B_j| ≤ √(K_ii K_jj), so its error is a few units of round-off of that, and
+not of what is left of it. Entries of one row err at random, rows alike in all elements: squares are summed along a row,
+and rows are added up.
+"""
 
 from __future__ import annotations
 
@@ -15,12 +28,152 @@ from scipy.sparse import csr_array
 from slepc4py import SLEPc
 
 from rotfem.errors import ComputationError
-from rotfem.numerics.asymmetry import asymmetries
 from rotfem.numerics.balance import balanced, least_frequency, power_of_two
-from rotfem.numerics.bounds import RoundOff
 from rotfem.numerics.damped import MORE, damped_pairs, heavily_damped
-from rotfem.numerics.linear import transposed, use_direct_solver
+from rotfem.numerics.linear import SMALL, transposed, use_direct_solver
 from rotfem.numerics.low_rank import sparse_part
+
+#: Random vectors by which norms of large matrices are estimated.
+PROBES = 4
+
+#: Relative asymmetry that is round-off of assembly.
+ROUND_OFF = 1e-14
+
+
+def asymmetries(pencil: Pencil) -> dict[str, float]:
+    """Return relative ‖M − Mᵀ‖, ‖C + Cᵀ‖ and ‖K − Kᵀ‖ (Frobenius).
+
+    Of large matrices, and of one with a part of low rank, they are estimates from a few random signs r: the mean of
+    ‖A r‖² is the norm's square.
+    """
+    out = {}
+    matrices = pencil.M, pencil.C, pencil.K
+    with balanced(*matrices, scale=pencil.unknowns):  # else the unit of length would say which entries count
+        for name, A, sign in zip("MCK", matrices, (-1.0, 1.0, -1.0), strict=True):
+            distance, size = (_distance(A, sign), A.norm()) if sparse_part(A) is A else _by_probes(A, sign)
+            out[name] = distance / size if size > 0 else 0.0
+    return out
+
+
+def is_symmetric(A: Any) -> bool:
+    """Return whether a PETSc matrix is symmetric to round-off, by random probes."""
+    distance, size = _by_probes(A, -1.0)
+    return distance <= ROUND_OFF * size
+
+
+def _distance(A: Any, sign: float) -> float:
+    """Return ‖Aᵀ + sign A‖."""
+    if A.getSize()[0] > SMALL:
+        return _by_probes(A, sign)[0]
+    D = transposed(A)
+    D.axpy(sign, A)
+    return float(D.norm())
+
+
+def _by_probes(A: Any, sign: float) -> tuple[float, float]:
+    """Return estimates of ‖Aᵀ + sign A‖ and ‖A‖."""
+    r, y = A.createVecs()
+    z, squares, random = y.duplicate(), np.zeros(2), np.random.default_rng(A.comm.rank)
+    for _ in range(PROBES):
+        r.array[:] = random.choice([-1.0, 1.0], r.getLocalSize())
+        A.mult(r, y)
+        A.multTranspose(r, z)
+        size = y.norm()
+        z.axpy(sign, y)
+        squares += z.norm() ** 2, size**2
+    distance, size = np.sqrt(squares / PROBES)
+    return float(distance), float(size)
+
+
+#: Units of round-off in an entry of an assembled matrix, in those of √(K_ii K_jj): sums over quadrature points.
+ROUNDED = 2 * float(np.finfo(np.float64).eps)
+
+#: Largest bound that is told; what is above it is not known at all.
+LARGEST = 1e6
+
+#: What is left of the residual's part once it is taken off: at most this times its square, of isolated modes.
+SECOND = 10.0
+
+#: Relative distance of λ² within which two eigenvalues are one, or a conjugate pair.
+SAME_MODE = 1e-3
+
+#: Part of an eigenvalue above which a correction says that its vectors are none.
+TRUSTED = 1e-4
+
+
+class RoundOff:
+    """Round-off of the matrices of a pencil, as it acts on pairs of vectors.
+
+    Args:
+        pencil: M, C and K.
+        sizes: √ of the stiffness that entries are sums of, one for each owned unknown; by default √|K_ii|.
+        factors: part of K whose entries are no sums, but rounded relative to themselves, a PETSc matrix; None without.
+    """
+
+    def __init__(self, pencil: Pencil, sizes: Array | None = None, factors: Any = None):
+        self.pencil, self.factors = pencil, factors
+        self.sizes = np.sqrt(np.abs(pencil.K.getDiagonal().array)) if sizes is None else sizes
+
+    def stiffness(self, Y: Array, X: Array) -> Array:
+        """Return a bound of |y^H δK x| for the columns of Y and X (owned unknowns), over all ranks, shape (m,)."""
+        squares = (self.sizes[:, None] * np.abs(X)) ** 2
+        rows = self.sizes[:, None] * np.sqrt(self._along_rows(squares))
+        if self.factors is not None:
+            rows += np.real(self.pencil.apply(self.factors, np.abs(X).astype(complex)))
+        return ROUNDED * self._sum((np.abs(Y) * rows).sum(axis=0))
+
+    def _along_rows(self, values: Array) -> Array:
+        """Return for every row the sum of values (n, m) over the columns that K has entries in."""
+        K = self.pencil.K
+        indptr, indices, data = K.getValuesCSR()
+        if self.pencil.comm.size == 1:
+            return np.asarray(csr_array((np.ones(len(data)), indices, indptr), shape=K.getSize()) @ values)
+        ones = K.duplicate()
+        ones.setValuesCSR(indptr, indices, np.ones(len(data)))
+        ones.assemble()
+        return np.real(self.pencil.apply(ones, values.astype(complex)))
+
+    def _sum(self, local: Array) -> Array:
+        return np.asarray(self.pencil.comm.allreduce(local) if self.pencil.comm.size > 1 else local)
+
+    def corrected(self, values: Array, left: Array, right: Array) -> tuple[Array, Array]:
+        """Return (λ, bound of |δλ|/|λ|): the eigenvalues without the residual's part, and how far they can be off.
+
+        With left vectors the correction −y^H r/n makes the error of λ one of second order in that of the vectors.
+        """
+        p = self.pencil
+        MX, CX, KX = (p.apply(A, right) for A in (p.M, p.C, p.K))
+        n = self._sum(np.sum(left.conj() * (2 * values * MX + CX), axis=0))
+        residual = values**2 * MX + values * CX + KX
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = -self._sum(np.sum(left.conj() * residual, axis=0)) / n
+            values = np.where(np.abs(step) < TRUSTED * np.abs(values), values + step, values)
+            residual = values**2 * MX + values * CX + KX
+            inertia = np.abs(values) ** 2 * np.abs(MX) + np.abs(values) * np.abs(CX)
+            size = np.abs(n * values)
+            solved = self._sum(np.sum(np.abs(left) * np.abs(residual), axis=0)) / size
+            rounded = (self.stiffness(left, right) + self._sum(np.sum(np.abs(left) * ROUNDED * inertia, axis=0))) / size
+            first_order = rounded + solved * np.minimum(1.0, SECOND * solved / isolation(values))
+        return values, relative(np.where(np.isfinite(first_order), first_order, np.inf))
+
+
+def isolation(values: Array) -> Array:
+    """Return the distance of every λ² from the next one, relative to |λ²|, shape (m,); large for a small λ."""
+    squares = values**2
+    distance = np.minimum(*(np.abs(squares[:, None] - other[None, :]) for other in (squares, squares.conj())))
+    distance[distance <= SAME_MODE * np.abs(squares)[:, None]] = np.inf
+    return np.asarray(distance.min(axis=1) / np.maximum(np.abs(squares), np.finfo(float).tiny))
+
+
+def relative(first_order: Array) -> Array:
+    """Return how far λ can be off, relative to |λ|, by a first-order estimate of it.
+
+    Where λ² is what is perturbed, by a part t of it, λ moves by 1 − √(1 − t), and past t = 1, where it changes from a
+    frequency to a growth, by √t. The first-order estimate is t/2.
+    """
+    t = 2 * first_order
+    return np.where(t < 1.0, 1.0 - np.sqrt(np.maximum(1.0 - t, 0.0)), np.sqrt(np.minimum(t, LARGEST**2)))
+
 
 Array = npt.NDArray[Any]
 
@@ -73,7 +226,7 @@ class Eigenpairs:
         right: x, shape (n_local, m), complex.
         left: y, shape (n_local, m), complex.
         errors: normwise backward errors, shape (m,).
-        bounds: how far λ can be off by round-off, relative to |λ|, shape (m,) (see `rotfem.numerics.bounds`).
+        bounds: how far λ can be off by round-off, relative to |λ|, shape (m,) (see `rotfem.numerics.eigenproblem`).
     """
 
     values: Array
@@ -106,7 +259,7 @@ class Pencil:
         self._smallest = 1.0
         #: Unit of λ in the eigensolver, 1/s, a power of two: numbers of order one keep all digits. None: not known yet.
         self.unit: float | None = None
-        #: What the entries of K are sums of, and entries that are none (see `rotfem.numerics.bounds.RoundOff`).
+        #: What the entries of K are sums of, and entries that are none (see `rotfem.numerics.eigenproblem.RoundOff`).
         self.sizes: Array | None = None
         self.factors: Any = None
         #: Scale of the unknowns, powers of two (None: that of the diagonal), and whether a factor needs pivots.
@@ -142,7 +295,7 @@ class Pencil:
         return np.asarray((lam[:, None] + mu[None, :]) * mass + gyroscopic)
 
     def asymmetries(self) -> dict[str, float]:
-        """Return how far M and K are from symmetric and C from skew (see `rotfem.numerics.asymmetry`)."""
+        """Return how far M and K are from symmetric and C from skew (see `rotfem.numerics.eigenproblem`)."""
         return asymmetries(self)
 
     @cached_property

@@ -8,14 +8,14 @@ import numpy as np
 from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
-from rotfem.numerics.bounds import ROUNDED
+from rotfem.numerics.eigenproblem import ROUNDED
 from rotfem.numerics.linear import SMALL
 
 #: What MUMPS needs to count pivots: a look-out for null ones, and the last front not left to ScaLAPACK.
 COUNTING = {24: 1, 13: 1}
 
 
-#: Entries of a row that err together, as the root of their number (see `rotfem.numerics.bounds`).
+#: Entries of a row that err together, as the root of their number (see `rotfem.numerics.eigenproblem`).
 ROWS = 10.0
 
 #: Asymmetry of an entry, in parts of the root of the two diagonal entries, up to which it is that of round-off.
@@ -53,7 +53,7 @@ def negative_eigenvalues(A: Any) -> int:
 def surely_negative(K: Any) -> int | None:
     """Return how many eigenvalues of a stiffness are negative whatever rounding did to it; None where none are counted.
 
-    An entry is off by ROUNDED √(K_ii K_jj) at most (`rotfem.numerics.bounds`), so K is by no more than the part
+    An entry is off by ROUNDED √(K_ii K_jj) at most (`rotfem.numerics.eigenproblem`), so K is by no more than the part
     ROWS · ROUNDED of its diagonal: with that added no eigenvalue that exact arithmetic has positive is negative.
     """
     if not symmetric(K):

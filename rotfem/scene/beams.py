@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -11,9 +12,7 @@ from pydantic_core import PydanticCustomError
 
 from rotfem.scene.beam_files import with_tables
 from rotfem.scene.clamp_and_damping import Damping, check_one_hub
-from rotfem.scene.magnitudes import check_magnitudes
 from rotfem.scene.plates import PlateStructure
-from rotfem.scene.point_masses import PointMass, as_inertia, check_masses
 from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_through
 from rotfem.scene.root import Held, Root, SpatialRoot, check_cone, check_pitch
 from rotfem.scene.section import PlanarSection
@@ -28,11 +27,66 @@ from rotfem.scene.values import (
     Number,
     Positive,
     Profile,
+    SceneModel,
     Vector,
+    Vector3,
+    as_padded_vector3,
     as_rows,
+    as_symmetric_matrix,
+    check_magnitudes,
     check_profile_length,
     problem,
 )
+
+#: Part of the length by which a place may be beside the beam.
+NEAR = 1e-9
+
+
+def as_inertia(value: Any) -> float | Matrix:
+    """Return a moment of inertia or a tensor, 3×3; raise on anything else."""
+    if isinstance(value, list | tuple):
+        return as_symmetric_matrix(value, 3, definite=False)
+    return Bounds(ge=0.0).number(value)
+
+
+class PointMass(SceneModel):
+    """A rigid body fixed to a section.
+
+    Attributes:
+        x: place along the beam (m).
+        mass: kg.
+        offset: position of its center relative to the axis, section axes (m).
+        inertia: about its center (kg·m²): of a planar beam about axis 3; of a spatial one a tensor in section axes, or
+            a number, isotropic.
+    """
+
+    x: Number = Field(description="a place along the beam (m)")
+    mass: NonNegative = 0.0
+    offset: Annotated[Vector3, PlainValidator(as_padded_vector3)] = (0.0, 0.0, 0.0)
+    inertia: Annotated[float | Matrix, PlainValidator(as_inertia)] = 0.0
+
+    @property
+    def inertia_matrix(self) -> Array:
+        """Inertia tensor (kg·m²), shape (3, 3)."""
+        return self.inertia * np.eye(3) if isinstance(self.inertia, float) else np.array(self.inertia)
+
+    @model_validator(mode="after")
+    def _check_any(self) -> Self:
+        if self.mass == 0.0 and not np.any(self.inertia_matrix):
+            raise problem("mass", self.mass, "give mass, inertia, or both")
+        return self
+
+
+def check_masses(masses: Iterable[PointMass], length: float, planar: bool) -> None:
+    """Refuse masses beside the beam (m), and those that are none of a planar one."""
+    for i, body in enumerate(masses):
+        key = f"masses.{i}"
+        if not -NEAR <= body.x / length <= 1 + NEAR:
+            raise problem(f"{key}.x", body.x, f"must be from 0 to the length {length:g}")
+        if planar and body.offset[2] != 0.0:
+            raise problem(f"{key}.offset", list(body.offset), "the third component must be 0 for a planar_beam")
+        if planar and not isinstance(body.inertia, float):
+            raise problem(f"{key}.inertia", None, "must be a number, about axis 3, for a planar_beam")
 
 
 def _as_sweep(value: Any) -> Profile:

@@ -8,12 +8,12 @@ from rotfem import registry
 from rotfem.errors import show
 from rotfem.scene.beams import PlanarBeamStructure, SpatialBeamStructure
 from rotfem.scene.limits import Limits
-from rotfem.scene.load_tables import FORCE
 from rotfem.scene.loads import Loads
 from rotfem.scene.motion import Motion, TorqueMotion
 from rotfem.scene.output import OutputTable
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh
+from rotfem.scene.span_tables import FORCE
 from rotfem.scene.stepping import Time
 from rotfem.scene.values import problem
 

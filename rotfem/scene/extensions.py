@@ -15,7 +15,7 @@ from pydantic import PlainValidator
 
 from rotfem import registry
 from rotfem.errors import SceneError
-from rotfem.scene.reading import Unreadable, read_bytes
+from rotfem.scene.files import Unreadable, read_bytes
 from rotfem.scene.values import SceneModel, problem
 
 #: Bytes of a file, at most.

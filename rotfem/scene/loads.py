@@ -8,9 +8,9 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from rotfem.scene.load_tables import FORCE, MOMENT, PRESSURE, Kind, Over
 from rotfem.scene.motion import Motion
 from rotfem.scene.signals import Given, TimeFunction, arguments
+from rotfem.scene.span_tables import FORCE, MOMENT, PRESSURE, Kind, Over
 from rotfem.scene.values import Matrix, Number, PaddedVector, Positive, SceneModel, as_number, as_vector, problem
 
 #: Part of the length by which a place may be off the structure.

@@ -12,10 +12,20 @@ from pydantic import ConfigDict, Discriminator, Field, PlainValidator, Tag, Vali
 from rotfem.errors import show
 from rotfem.registry import Registry, motion_laws, register
 from rotfem.scene.files import as_time_table
-from rotfem.scene.names import as_name
 from rotfem.scene.signals import Signal, arguments, as_function
 from rotfem.scene.stepping import parameters_of
-from rotfem.scene.values import Matrix, NonNegative, Number, Positive, SceneModel, Vector3, as_rows, as_vector3, problem
+from rotfem.scene.values import (
+    Matrix,
+    NonNegative,
+    Number,
+    Positive,
+    SceneModel,
+    Vector3,
+    as_name,
+    as_rows,
+    as_vector3,
+    problem,
+)
 
 
 def _as_axis(value: Any) -> Vector3:

@@ -9,8 +9,7 @@ import numpy as np
 from pydantic import PlainValidator
 
 from rotfem import registry
-from rotfem.scene.names import Named, as_names
-from rotfem.scene.values import Count, SceneModel, problem
+from rotfem.scene.values import Count, Named, SceneModel, as_names, problem
 from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
 
 AngularUnit = Literal["rad/s", "rpm", "Hz", "deg/s"]

@@ -13,7 +13,6 @@ from pydantic_core import PydanticCustomError
 from rotfem.scene.alternatives import Way, choose_way
 from rotfem.scene.clamp_and_damping import Damping, check_one_hub
 from rotfem.scene.files import existing_file
-from rotfem.scene.magnitudes import check_magnitudes
 from rotfem.scene.structure import StructureTable
 from rotfem.scene.values import (
     Array,
@@ -29,6 +28,7 @@ from rotfem.scene.values import (
     Vector,
     as_rows,
     as_taper,
+    check_magnitudes,
     check_profile_length,
     evaluate,
     problem,

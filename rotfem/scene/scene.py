@@ -38,16 +38,15 @@ from rotfem.scene.consistency import (
     check_theory,
 )
 from rotfem.scene.extensions import Extensions, load_wanted
-from rotfem.scene.kinds import designed, is_design
+from rotfem.scene.files import apply_overrides, check_depth, noted_files, read_toml, set_key, to_builtin
 from rotfem.scene.limits import Limits, limits_of
 from rotfem.scene.loads import Loads, check_loads, doubtful_table
 from rotfem.scene.motion import AnyMotion, Swept
 from rotfem.scene.output import OutputTable
 from rotfem.scene.problems import scene_error
-from rotfem.scene.reading import noted_files
 from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh, Solver
 from rotfem.scene.stepping import Time
-from rotfem.scene.toml import apply_overrides, check_depth, read_toml, set_key, to_builtin
+from rotfem.scene.structure import designed, is_design
 from rotfem.scene.units import in_si
 from rotfem.scene.values import Bounds, SceneModel
 

@@ -16,8 +16,7 @@ from pydantic import ConfigDict, PlainValidator, model_validator
 
 from rotfem import registry
 from rotfem.scene.alternatives import Way, choose_way, shape_ways
-from rotfem.scene.names import as_name
-from rotfem.scene.section_shapes import MATERIAL_AND_SHAPE, Geometry
+from rotfem.scene.section_shapes import MATERIAL_AND_SHAPE, Geometry, Shape
 from rotfem.scene.span_tables import is_table
 from rotfem.scene.values import (
     Array,
@@ -26,6 +25,7 @@ from rotfem.scene.values import (
     PositiveProfile,
     Profile,
     SceneModel,
+    as_name,
     evaluate,
     problem,
 )
@@ -108,7 +108,8 @@ class Section(SceneModel):
         return {name: self._at(name, x) for name in self.way.required if name not in MATERIAL_AND_SHAPE}
 
     def _geometry(self, x: Array) -> Geometry:
-        return registry.shapes[str(self.shape)].geometry(self._at("nu", x), **self._dimensions(x))
+        shape: Shape = registry.shapes[str(self.shape)]
+        return shape.geometry(self._at("nu", x), **self._dimensions(x))
 
     @model_validator(mode="before")
     @classmethod

@@ -10,9 +10,19 @@ from pydantic import PlainValidator, ValidationInfo, model_validator
 
 from rotfem import registry
 from rotfem.scene.files import as_table
-from rotfem.scene.names import as_name, as_names
 from rotfem.scene.plates import locking
-from rotfem.scene.values import Bounds, Count, Matrix, Number, Positive, SceneModel, as_increasing_rows, problem
+from rotfem.scene.values import (
+    Bounds,
+    Count,
+    Matrix,
+    Number,
+    Positive,
+    SceneModel,
+    as_increasing_rows,
+    as_name,
+    as_names,
+    problem,
+)
 
 
 def _as_theory(value: Any) -> str:

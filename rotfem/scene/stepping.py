@@ -11,8 +11,7 @@ from pydantic import ConfigDict, ValidationInfo, model_validator
 
 from rotfem import registry
 from rotfem.errors import show
-from rotfem.scene.names import as_name
-from rotfem.scene.values import Count, Number, Positive, SceneModel, problem
+from rotfem.scene.values import Count, Number, Positive, SceneModel, as_name, problem
 
 
 def parameters_of(scheme: type) -> dict[str, Field[Any]]:

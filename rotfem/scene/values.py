@@ -10,14 +10,90 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, PlainValidator, model_validator
 from pydantic_core import PydanticCustomError
 
+from rotfem.errors import show
+from rotfem.registry import Registry
 from rotfem.scene.problems import InputErrors, did_you_mean
+
+#: Sizes that a stiffness or a mass may have, if it is not 0; beyond them the products of the elements are none.
+SMALLEST, LARGEST = 1e-140, 1e140
+
+#: Properties of a section without which it moves all the same.
+MAY_BE_ZERO = ("rotary_inertia", "rotary_inertia2", "rotary_inertia3")
+
+
+def check_magnitudes(values: Callable[[], Mapping[str, Array]], key: str) -> None:
+    """Refuse what a section makes of good numbers: infinite, undefined, or nothing at all.
+
+    Args:
+        values: returns the properties of the section by name, each of any shape.
+        key: where the section is given.
+
+    Raises:
+        PydanticCustomError: names the property.
+    """
+    with np.errstate(all="ignore"):
+        try:
+            found = values()
+        except (OverflowError, ZeroDivisionError):
+            raise problem(key, None, "its numbers cannot be multiplied: too large or too small") from None
+    for name, value in found.items():
+        size = np.abs(value)
+        good = (size == 0.0) | ((size >= SMALLEST) & (size <= LARGEST))
+        if np.all(good & (size > 0.0) if name not in MAY_BE_ZERO else good):
+            continue
+        worst = float(np.ravel(value)[np.argmin(good & (size > 0.0))])
+        reason = f"its {name} comes out as {worst:g}; must be from {SMALLEST:g} to {LARGEST:g} in size"
+        raise problem(key, None, reason)
+
+
+class Named(Protocol):
+    """What a list may name, where that is more than one registry."""
+
+    kind: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All names, in their order."""
+
+
+def as_name(value: Any, registry: Registry[Any], key: str = "") -> str:
+    """Return the value; raise a problem at `key` if it is not the name of an entry."""
+    names = registry.names
+    if isinstance(value, str) and value in names:
+        return value
+    raise problem(key, value, f"{did_you_mean(value, names)}allowed: {', '.join(map(show, names))}")
+
+
+def as_names(value: Any, registry: Registry[Any] | Named, others: str = "") -> tuple[str, ...]:
+    """Return the value as a tuple.
+
+    Args:
+        value: a list of names.
+        registry: what they name: effects or outputs.
+        others: what is allowed beside a list, for the error message.
+
+    Raises:
+        PydanticCustomError: it is not a list, or has something in it that is not registered, or is there twice.
+    """
+    names = registry.names
+    allowed = f"allowed: {others}a list of {', '.join(names)}" if names else "none are registered"
+    if not isinstance(value, list | tuple):
+        raise problem("", value, allowed)
+    for name in value:
+        if name not in names:
+            hint = did_you_mean(name, names)
+            raise problem("", value, f"{show(name)} is not an {registry.kind}; {hint}{allowed}")
+        if list(value).count(name) > 1:
+            raise problem("", value, f"{show(name)} is listed twice")
+    return tuple(value)
+
 
 Array: TypeAlias = npt.NDArray[np.float64]
 Vector3: TypeAlias = tuple[float, float, float]

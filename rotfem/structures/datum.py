@@ -14,7 +14,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from inspect import signature
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -24,9 +24,7 @@ from mpi4py import MPI
 
 from rotfem.errors import ComputationError
 from rotfem.mechanics import turned_arrays as turned
-
-if TYPE_CHECKING:
-    from rotfem.structures.structure import Structure
+from rotfem.mechanics.problem import Problem
 
 Array = npt.NDArray[np.float64]
 
@@ -52,6 +50,17 @@ class Datum:
     curvature: Array
 
 
+class Discretised(Protocol):
+    """What of a structure its rotations are made of: its problem, its mesh and the space of its unknowns."""
+
+    problem: Problem
+    comm: MPI.Comm
+    type: ClassVar[str]
+    mesh: Any
+    V: Any
+    size: int
+
+
 class Turns(ABC):
     """The rotations of a structure, and the datum they are counted from.
 
@@ -73,7 +82,7 @@ class Turns(ABC):
     limit: ClassVar[float]
     enough: ClassVar[float]
 
-    def __init__(self, structure: Structure):
+    def __init__(self, structure: Discretised):
         self._structure = structure
         self.datum: Datum | None = None
         self.rotation: Any = None
@@ -81,7 +90,7 @@ class Turns(ABC):
         self.before: Any = None
 
     @classmethod
-    def of(cls, structure: Structure) -> Self | None:
+    def of(cls, structure: Discretised) -> Self | None:
         """Return the rotations of a structure; None in a theory whose strains do not allow a datum."""
         return cls(structure) if structure.problem.theory.exact else None
 
@@ -265,7 +274,7 @@ class DirectorTurns(Turns):
     enough = 1.1
 
     @classmethod
-    def of(cls, structure: Structure) -> Self | None:
+    def of(cls, structure: Discretised) -> Self | None:
         """Return the rotations of a plate; None in a theory whose strains are not those of a director t too."""
         theory = structure.problem.theory
         takes_director = len(signature(theory.measures(structure.type)).parameters) > 1

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from dolfinx import fem
 from numpy.polynomial import legendre
 
-from rotfem.structures.meshes.line import END
+from rotfem.structures.meshes.plate_mesh import END
 
 Array = npt.NDArray[np.float64]
 

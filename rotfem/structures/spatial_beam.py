@@ -10,27 +10,173 @@ along t_i⁰ of
 since t⁰ᵀ Λᵀ (Λ t⁰)' = t⁰ᵀ (Λᵀ Λ') t⁰ + t⁰ᵀ t⁰', whose last part, the initial twist and curvature K⁰, drops out. So it
 does not matter whether the axis is straight: sweep turns e about t_3⁰ by an angle that may vary, or jump, along X, and
 a reference line in space turns it by two.
+
+What is fixed in a section turns with Λ(θ), at the rate ω = T(θ) θ̇ along the turned axes. A director is followed in
+these axes, where it stands still and Λᵀw takes the place of w: the same accelerations as for any vector, but made of
+first derivatives of T instead of second ones of Λ, which compile to much less code.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 import ufl
+from basix.ufl import element
+from dolfinx import fem
 from mpi4py import MPI
+from ufl import cross
 
 from rotfem.errors import InputError
-from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
+from rotfem.mechanics.bodies import AppliedLoad, Body, Kinematics, Strain
 from rotfem.mechanics.problem import Problem
+from rotfem.mechanics.rotations import Turn
 from rotfem.structures.beam import Beam
-from rotfem.structures.curved_axis import curved_axis, swept_axis
 from rotfem.structures.datum import SectionTurns
 from rotfem.structures.moderate_turns import check_sections
 from rotfem.structures.spatial_section import SectionForms, euler_tensor
 from rotfem.structures.structure import Array
-from rotfem.structures.turning_bodies import AppliedMoment, Director, OffsetMass, SectionTurn, rotation_part
+
+#: Degree of the polynomials the axis of an arc is held in; strains see its exact angle, only inertia sees these.
+AXIS_DEGREE = 5
+
+
+def swept_axis(beam: Beam, sweep: Any, line: Any) -> tuple[Any, Any, Any]:
+    """Return (χ, ∫ cos χ dX, ∫ sin χ dX) of a sweep profile: angle (rad) and position of the axis (m) over X.
+
+    Args:
+        beam: the discretised beam; kinks and ends of arcs are its nodes.
+        sweep: a number, or rows (x, angle) between which the axis is an arc and, where one x stands twice, kinked.
+        line: the same as `at(x, near)` and `angles(x, near)` over the arc length (m).
+    """
+    if not isinstance(sweep, tuple):
+        chi = beam.scalar("sweep", sweep)
+        X = ufl.SpatialCoordinate(beam.mesh)[0]
+        return chi, X * ufl.cos(chi), X * ufl.sin(chi)
+    angle = beam.field("sweep", lambda x, near: line.angles(x, near)[0], 1)
+    position = fem.functionspace(beam.mesh, ("Lagrange", AXIS_DEGREE))
+    along, across = fem.Function(position, name="along"), fem.Function(position, name="across")
+    along.interpolate(lambda p: line.at(p[0])[0][:, 0])
+    across.interpolate(lambda p: line.at(p[0])[0][:, 1])
+    return angle, along, across
+
+
+def curved_axis(beam: Beam, line: Any) -> tuple[Any, Any, Any]:
+    """Return (χ, ζ, r): angles of the tangent (rad, see `rotfem.scene.reference_line`) and position (m) over X.
+
+    Angles are discontinuous, so that they jump at kinks. Where no point of the line lies inside an element they are
+    right to their degree. The axes that are made of them are unit vectors across each other everywhere.
+
+    Args:
+        beam: the discretised beam; kinks of the line are its nodes.
+        line: `at(x, near)` and `angles(x, near)` over the arc length (m).
+    """
+    both = beam.field("angles", lambda x, near: np.stack(line.angles(x, near), axis=-1), AXIS_DEGREE, 2)
+    space = element("Lagrange", beam.mesh.basix_cell(), AXIS_DEGREE, shape=(3,))
+    r = fem.Function(fem.functionspace(beam.mesh, space), name="line")
+    r.interpolate(lambda p: line.at(p[0])[0].T)
+    return both[0], both[1], r
+
+
+def rotation_part(q: Any) -> Any:
+    """Return θ of q = (u, θ), θ̇ of q̇ and so on."""
+    return ufl.as_vector([q[i] for i in (3, 4, 5)])
+
+
+@dataclass(frozen=True)
+class SectionTurn(Turn):
+    """The turn of a section: rates of Λ d for a d fixed in the section, all times Λᵀ."""
+
+    def spin(self, k: Kinematics) -> Any:
+        """Return ω = T θ̇."""
+        return self.material_rate(rotation_part(k.v))
+
+    def rate(self, k: Kinematics, d: Any) -> Any:
+        """Return ω×d."""
+        return cross(self.spin(k), d)
+
+    def second_rate(self, k: Kinematics, d: Any) -> Any:
+        """Return ω̇×d + ω×(ω×d), ω̇ = T θ̈ + Ṫ θ̇."""
+        w = self.spin(k)
+        dw = self.material_rate(rotation_part(k.a)) + k.rate(w)
+        return cross(dw, d) + cross(w, cross(w, d))
+
+    def variation(self, k: Kinematics, d: Any) -> Any:
+        """Return (T δθ)×d."""
+        return cross(self.material_rate(rotation_part(k.dq)), d)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Director(Body):
+    """The director Λ x, seen along the turned axes: x is what it is in the undeformed beam."""
+
+    turn: SectionTurn
+    is_position: bool = False
+
+    def rate(self, k: Kinematics) -> Any:
+        """Return ω×x."""
+        return self.turn.rate(k, self.x)
+
+    def second_rate(self, k: Kinematics) -> Any:
+        """Return ω̇×x + ω×(ω×x)."""
+        return self.turn.second_rate(k, self.x)
+
+    def variation(self, k: Kinematics) -> Any:
+        """Return (T δθ)×x."""
+        return self.turn.variation(k, self.x)
+
+    def resolve(self, v: Any) -> Any:
+        """Return Λᵀ v."""
+        return self.turn.rotate_back(v)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OffsetMass(Body):
+    """A mass at x = r + Λ d: beside the axis r, fixed in the section.
+
+    Attributes:
+        axis: r, an expression of q.
+        arm: d, what the offset is in the undeformed beam.
+        turn: Λ.
+    """
+
+    axis: Any
+    arm: Any
+    turn: SectionTurn
+
+    def rate(self, k: Kinematics) -> Any:
+        """Return ṙ + Λ (ω×d)."""
+        return k.rate(self.axis) + self.turn.rotate(self.turn.rate(k, self.arm))
+
+    def second_rate(self, k: Kinematics) -> Any:
+        """Return r̈ + Λ (ω̇×d + ω×(ω×d))."""
+        return k.second_rate(self.axis) + self.turn.rotate(self.turn.second_rate(k, self.arm))
+
+    def variation(self, k: Kinematics) -> Any:
+        """Return δr + Λ (T δθ×d)."""
+        return k.variation(self.axis) + self.turn.rotate(self.turn.variation(k, self.arm))
+
+
+@dataclass(frozen=True, kw_only=True)
+class AppliedMoment(AppliedLoad):
+    """A moment on a section (N·m, frame components): it works on k(δθ), the turning along the axes of the frame.
+
+    With x = θ its potential −M·θ, if it is dead, is right as long as θ keeps to one axis: a moment of fixed direction
+    has none in general (Argyris, Comput. Meth. Appl. Mech. Eng. 32 (1982) 85).
+    """
+
+    section: SectionTurn
+    conservative: ClassVar[bool] = False
+
+    def variation(self, k: Kinematics) -> Any:
+        """Return k(δθ)."""
+        return self.section.spatial_rate(rotation_part(k.dq))
+
+    def rigid_turn(self, e: Any) -> Any:
+        """Return the turn in a unit rigid turn about e, e itself."""
+        return e
 
 
 class SpatialBeam(Beam):

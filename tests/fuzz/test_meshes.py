@@ -13,8 +13,7 @@ from pathlib import Path
 import hypothesis.strategies as st
 import pytest
 
-from rotfem.structures.meshes.checks import BadMesh
-from rotfem.structures.meshes.gmsh_file import read
+from rotfem.structures.meshes.gmsh_file import BadMesh, read
 from tests.fuzz.trying import sized
 from tests.plate_mesh_files import grid, write_msh
 

@@ -14,8 +14,7 @@ import pytest
 import rotfem
 from rotfem.errors import InputError, Problem, SceneError, printable, show
 from rotfem.scene import Scene, load_scene
-from rotfem.scene.reading import Unreadable, read_bytes
-from rotfem.scene.toml import DEEPEST
+from rotfem.scene.files import DEEPEST, Unreadable, read_bytes
 from rotfem.structures.memory import check_memory
 
 SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6e-4}
@@ -138,10 +137,10 @@ def test_reading_is_bounded(tmp_path: Path) -> None:
 def test_a_scene_may_come_from_a_pipe_but_is_not_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pipe = tmp_path / "pipe.toml"
     os.mkfifo(pipe)
-    monkeypatch.setattr("rotfem.scene.reading.PATIENCE", 0.1)
+    monkeypatch.setattr("rotfem.scene.files.PATIENCE", 0.1)
     with pytest.raises(SceneError, match=r"no byte came in 0.1 s"):
         load_scene(pipe)
-    monkeypatch.setattr("rotfem.scene.reading.PATIENCE", 10.0)
+    monkeypatch.setattr("rotfem.scene.files.PATIENCE", 10.0)
     text = MOVING.format('motion = {type="constant", speed=1}')
     writer = threading.Thread(target=pipe.write_text, args=(text,))
     writer.start()

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rotfem.structures.meshes.checks import BadMesh
-from rotfem.structures.meshes.gmsh_file import read
+from rotfem.structures.meshes.gmsh_file import BadMesh, read
 from tests.launch import rotfem
 from tests.plate_mesh_files import grid, write_msh
 

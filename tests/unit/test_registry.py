@@ -130,7 +130,7 @@ def test_the_classes_share_the_registries_of_the_ground() -> None:
     assert (Scheme.registry, Output.registry) == (registry.schemes, registry.outputs)
     assert ladder()[0] == "linear"
     assert set(ladder()) == set(registry.theories.names)
-    assert registry.schemes.names == ("generalised_alpha", "newmark", "esdirk4", "radau5", "energy_conserving")
+    assert registry.schemes.names == ("generalised_alpha", "newmark", "energy_conserving", "esdirk4", "radau5")
 
 
 @pytest.mark.parametrize("name", ["", "two words", "2nd", "a-b", "a.b", None])
@@ -314,7 +314,7 @@ def test_a_parameter_cannot_have_the_name_of_a_key(add: Add) -> None:
 def test_unknown_schemes(scheme: Any) -> None:
     message = refusal(time={"end": 1, "step": 0.1, "scheme": scheme})
     assert message.startswith("test.toml: time.scheme")
-    assert 'allowed: "generalised_alpha", "newmark", "esdirk4", "radau5"' in message
+    assert 'allowed: "generalised_alpha", "newmark", "energy_conserving", "esdirk4", "radau5"' in message
 
 
 # --- section shapes -------------------------------------------------------------------------------------------------

@@ -16,8 +16,7 @@ from rotfem.errors import OutputError
 from rotfem.results import ModesResult, RunResult
 from rotfem.results.files import csv_text, read_csv
 from rotfem.results.live import LiveTable
-from rotfem.results.lock import NAME, FolderLock
-from rotfem.results.result_set import OURS, ResultSet, read_summary, said_of
+from rotfem.results.result_set import NAME, OURS, FolderLock, ResultSet, read_summary, said_of
 from rotfem.results.run import Table
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -265,7 +264,7 @@ def test_a_folder_in_the_place_of_a_file_is_no_end_of_the_set_before(tmp_path: P
 HOLDER = """
 import sys, time
 from pathlib import Path
-from rotfem.results.lock import FolderLock
+from rotfem.results.result_set import FolderLock
 FolderLock(Path(sys.argv[1])).acquire()
 print("locked", flush=True)
 time.sleep(60)

@@ -10,8 +10,7 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics import linear
-from rotfem.numerics.asymmetry import is_symmetric
-from rotfem.numerics.eigenproblem import mirror_error
+from rotfem.numerics.eigenproblem import is_symmetric, mirror_error
 from rotfem.numerics.linear import DirectSolver, SingularSolver, combine, is_regular
 from rotfem.numerics.low_rank import LowRank, PlusLowRank
 from rotfem.numerics.newton import Newton, OldFactor

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from rotfem import SceneError, modes
-from rotfem.results.blade_tables import POWERS, elastodyn_lines, fit
+from rotfem.results.modes import POWERS, elastodyn_lines, fit
 from tests.beams import STRUCTURE
 
 #: At rest modes are the real ones of a cantilever; r/L = 2e-3, so that Euler and Bernoulli's values hold to 1e-3.

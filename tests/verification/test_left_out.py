@@ -12,9 +12,8 @@ from rotfem import run
 from rotfem.commands.problem import Problem
 from rotfem.registry import damping_models
 from rotfem.scene import as_scene
-from rotfem.scene.beams import SpatialBeamStructure
+from rotfem.scene.beams import PointMass, SpatialBeamStructure
 from rotfem.scene.plates import PlateStructure
-from rotfem.scene.point_masses import PointMass
 from rotfem.scene.root import SpatialRoot
 from rotfem.structures.symmetry import inactive_unknowns
 

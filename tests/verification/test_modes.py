@@ -22,8 +22,7 @@ from scipy.optimize import brentq, minimize_scalar, newton
 
 from rotfem import ComputationError, InputError, Scene, SceneError, modes
 from rotfem.analysis.critical_speed import critical_speed
-from rotfem.analysis.modal import ModalAnalysis
-from rotfem.analysis.mode_checks import linearisation_error
+from rotfem.analysis.modal import ModalAnalysis, linearisation_error
 from rotfem.analysis.state_space import state_space, write_matrices
 from rotfem.commands.campbell import campbell
 from rotfem.commands.problem import Problem

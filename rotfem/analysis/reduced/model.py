@@ -10,7 +10,7 @@ import numpy.typing as npt
 from dolfinx import fem
 
 from rotfem.equations.pieces import PRESTRESS
-from rotfem.numerics.asymmetry import is_symmetric
+from rotfem.numerics.eigenproblem import is_symmetric
 from rotfem.numerics.linear import MIDDLE, DirectSolver, combine
 from rotfem.numerics.projection import orthonormal, summed, times
 

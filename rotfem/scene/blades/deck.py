@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from rotfem.errors import show, shown
-from rotfem.scene.files import SHOWN_CELL
-from rotfem.scene.reading import Unreadable, read_bytes
+from rotfem.scene.files import SHOWN_CELL, Unreadable, read_bytes
 from rotfem.scene.values import problem
 
 #: Bytes of a blade file, at most.

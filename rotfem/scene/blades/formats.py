@@ -89,8 +89,9 @@ def format_of(deck: Deck, name: Any) -> BladeFormat:
     if name is not None:
         if name not in registered.names:
             raise problem("section.format", name, f"{did_you_mean(name, registered.names)}allowed: {allowed}")
-        return registered[name]
-    found = [each for each in registered if each.recognises(deck)]
+        chosen: BladeFormat = registered[name]
+        return chosen
+    found: list[BladeFormat] = [each for each in registered if each.recognises(deck)]
     if len(found) != 1:
         known = "; ".join(f"{show(each.name)}: {each.what}" for each in registered)
         deck.fail(f"does not say which format it has; give section.format, or a file of one of these: {known}")
