@@ -11,7 +11,7 @@ from abc import ABC
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -196,9 +196,6 @@ class AffineSystem(AffineStiffness, AffineEnergies):
         self.pieces = self._decomposed.all
         self._constants = self._decomposed.constants
         self.assembled = self._decomposed.assembled
-        pattern = self._decomposed.pattern
-        self._operators = {kind: pattern.duplicate() for kind in "MCK"}
-        self._load = compat.create_vector(self.V)
         self._work = compat.create_vector(self.V)
         self._qva = [compat.wrap(x.x) for x in (self.q, self.v, self.a)]
         self._weights: Array = np.ones(len(self.pieces))
@@ -206,12 +203,23 @@ class AffineSystem(AffineStiffness, AffineEnergies):
         self._all_constants = list(self._constants.values())
         chosen = {kind: [i for i, p in enumerate(self.pieces) if p.kind == kind] for kind in "MCKf"}
         self._by_kind = {kind: (index, [self.pieces[i].operator for i in index]) for kind, index in chosen.items()}
+        self._increment: Increment | None = None
+        self._make_operators()
+        return self._decomposed.pattern.duplicate()
+
+    def _make_operators(self) -> None:
+        """Make M, C, K and f of a time, none of which is set yet."""
+        self._operators = {kind: self._decomposed.pattern.duplicate() for kind in "MCK"}
+        self._load = compat.create_vector(self.V)
         self._coefficients: Array | None = None
         self._shift: tuple[float, float, float] | None = None
-        self._changed = True
-        self._increment: Increment | None = None
-        self.settled = False
-        return pattern.duplicate()
+        self._changed, self.settled = True, False
+
+    def twin(self) -> Self:
+        """Return another system of the same pieces (see `System.twin`)."""
+        other = super().twin()
+        other._make_operators()
+        return other
 
     def check_terms(self) -> None:
         """Refuse terms of a user that no linear theory can have.

@@ -10,8 +10,9 @@ solved by block elimination, one factorisation for both right-hand sides.
 
 from __future__ import annotations
 
+from copy import copy
 from time import perf_counter
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -55,6 +56,13 @@ class BorderedSystem:
         if name == "inner":
             raise AttributeError(name)
         return getattr(self.inner, name)
+
+    def twin(self) -> Self:
+        """Return another system of the same forms (see `System.twin`)."""
+        other = copy(self)
+        other.inner, other._whole = self.inner.twin(), None
+        other._row = self.inner.compilations, self.row.of_twin(other.inner)
+        return other
 
     @property
     def row(self) -> HubRow:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from functools import cached_property
 from typing import Any
 
@@ -43,6 +44,12 @@ class HubRow:
         self._forms = dict(zip(there, forms.together(list(there.values()), once), strict=True))
         self._vector = compat.create_vector(system.V)
         self.hub.torque.attach(self._seen)
+
+    def of_twin(self, system: System) -> HubRow:
+        """Return the same equation of the structure's twin (see `System.twin`)."""
+        other = copy(self)
+        other.system = system
+        return other
 
     def _row_of(self, moment: Any) -> Any:
         """Return c_k ∂/∂q + c_v ∂/∂v + c_m ∂/∂a of the moment, a UFL form."""

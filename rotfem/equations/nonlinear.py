@@ -38,7 +38,7 @@ class NonlinearSystem(System):
         super().__init__(model, moving)
 
     def _compile(self) -> Any:
-        self._shift_values: tuple[float, ...] = (1.0, 0.0, 1.0)
+        self._shift_values = [1.0, 0.0, 1.0]
         self._shifts = [self.structure.constant(c) for c in self._shift_values]
         self._spin: Any = None
         if self.moving:
@@ -118,7 +118,7 @@ class NonlinearSystem(System):
                 float(kind == "C"),
                 float(kind == "M"),
             )
-        return () if self._parts[kind] is None else (kind,), self._shift_values
+        return () if self._parts[kind] is None else (kind,), tuple(self._shift_values)
 
     @property
     def integrals(self) -> dict[str, int]:
@@ -220,10 +220,10 @@ class NonlinearSystem(System):
 
     def shift(self, shifts: tuple[float, ...]) -> None:
         """Set the factors of K, C and M in the form J."""
-        if shifts != self._shift_values:
+        if self._shift_values != [*shifts]:
             for constant, value in zip(self._shifts, shifts, strict=True):
                 constant.value = value
-            self._shift_values = shifts
+            self._shift_values[:] = shifts
 
     def _assemble(self, A: Any, shifts: tuple[float, float, float], diagonal: float) -> None:
         if self.moving:

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection
+from copy import copy
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -227,7 +228,7 @@ class System(Readings, Solutions, ABC):
         self.V = self.structure.V
         self._state = tuple(x.x.array for x in (self.q, self.v, self.a))
         self.scale = self.structure.scales()
-        self.time = self.assembled = 0.0
+        self.assembled = 0.0
         self.compilations = 1
         self.seconds = {"assemble": 0.0, "solve": 0.0}
         self.bcs, self.clamped = self.structure.clamp_conditions(), self.structure.clamped_unknowns()
@@ -245,6 +246,23 @@ class System(Readings, Solutions, ABC):
         #: Whether a factor is kept for the steps that follow, where factorising is dear.
         self.keeps_factor = self.A.getSize()[0] > KEPT_FROM[self.structure.mesh.topology.dim]
 
+    def twin(self) -> Self:
+        """Return another system of the same forms, functions and constants, with matrices and a factor of its own.
+
+        Two marches may take turns: each writes its state and time before it reads anything.
+        """
+        other = copy(self)
+        vars(other).pop("balance", None)
+        other._solver, other.factored, other._mass = None, None, None
+        other.seconds = {"assemble": 0.0, "solve": 0.0}
+        other.A = self.A.duplicate()
+        return other
+
+    @property
+    def time(self) -> float:
+        """Time that is set, s."""
+        return self.model.time
+
     def count_rotations_from(self, datum: Any) -> None:
         """Count rotations from a datum (see `rotfem.structures.datum`), None for the undeformed structure.
 
@@ -257,12 +275,16 @@ class System(Readings, Solutions, ABC):
                 time=self.time,
                 advice="structure.damping.kelvin_voigt or rayleigh",
             )
-        if turns is not None and turns.use(datum):
+        if turns is None:
+            return
+        if turns.use(datum):
             self.model.compose()
+            self.model.compositions += 1
+        if datum is not None and self.compilations < self.model.compositions:
             forget(self)
             self._solver = None
             self.A = self._compile()
-            self.compilations += 1
+            self.compilations = self.model.compositions
 
     @property
     def datum(self) -> Any:
@@ -352,7 +374,7 @@ class System(Readings, Solutions, ABC):
             load_factor: multiplies loads, gravity and base acceleration (not the spin).
         """
         motion = motion or self.motion
-        self.time = t
+        self.model.time = t
         values = self.model.frame.values(motion, t)
         if load_factor != 1.0:
             values = {n: v * load_factor if n in ("a_o", "gravity") else v for n, v in values.items()}

@@ -19,11 +19,10 @@ import numpy as np
 
 from rotfem.analysis.schemes import Array, Scheme, State
 from rotfem.analysis.time_grid import Leg
-from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.coarser import by_itself, on_other_mesh
+from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.companion import Companion
 from rotfem.refinement.distance import Output, tip
 
@@ -88,16 +87,13 @@ class HistoryErrors:
     ):
         self.scheme = scheme
 
-        def twice() -> Any:
-            return compile_system(by_itself(problem), system.comm)
-
-        same, other = twice(), on_other_mesh(problem, system)
+        same, other = system.twin(), on_other_mesh(problem, system)
         self.mesh: tuple[Companion, float] | None = None
         self.order: Companion | None = None
         if other is not None:
             self.mesh = Companion(other[0], same, scheme, newton, doubles=False, output=output), other[1]
         if scheme.order > CERTAIN:
-            self.order = Companion(twice(), same, scheme, newton, output=output)
+            self.order = Companion(system.twin(), same, scheme, newton, output=output)
         further = [*(() if self.mesh is None else self.mesh[:1]), *(() if self.order is None else (self.order,))]
         self.steps = Companion(same, system, scheme, newton, further=further, output=output)
         for companion in self.companions:

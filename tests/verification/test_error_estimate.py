@@ -107,7 +107,7 @@ def test_estimate_has_the_order_of_the_scheme() -> None:
     ],
 )
 def test_estimate_changes_nothing_and_can_be_left_out(more: dict[str, Any]) -> None:
-    """The history with and without it is the same to the last bit: a companion has a system of its own."""
+    """The history with and without it is the same to the last bit: a companion shares nothing that lasts."""
     tables = scene(0.02, **{"loads": PULSE, "motion": {"type": "constant", "speed": 3.0}, **more})
     known, unknown = rotfem.run(tables), rotfem.run({**tables, "output": {"error": False}})
     assert "error" in known.summary
