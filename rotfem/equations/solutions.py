@@ -33,7 +33,7 @@ class Solutions:
     factored: dict[str, Any] | None = None
     factored_before = 0
     keeps_factor: bool
-    time: float
+    model: Any
     _state: tuple[Array, ...]
     _solver: DirectSolver | None
     _dx: Increment
@@ -82,7 +82,7 @@ class Solutions:
         A, changed = self.tangent(*shifts, before)
         if changed and self.keeps_factor:
             q, v, a = (x.copy() for x in self._state)
-            known = {"t": self.time, "q": q, "v": v, "a": a, "shifts": shifts, "before": before}
+            known = {"t": self.model.time, "q": q, "v": v, "a": a, "shifts": shifts, "before": before}
             self.factored = {**known, "datum": self.datum}
         assembled = perf_counter()
         dq = self._dx.solve(self.factor(A, changed), b)

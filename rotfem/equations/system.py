@@ -42,12 +42,16 @@ class Readings:
     structure: Structure
     motion: Motion
     comm: MPI.Comm
-    time: float
     scale: Array
     clamp: TurningClamp | None
     root: RootReaction
     q: Any
     V: Any
+
+    @property
+    def time(self) -> float:
+        """Time that is set, s."""
+        return self.model.time
 
     @abstractmethod
     def clamp_forces(self) -> Array:
@@ -257,11 +261,6 @@ class System(Readings, Solutions, ABC):
         other.seconds = {"assemble": 0.0, "solve": 0.0}
         other.A = self.A.duplicate()
         return other
-
-    @property
-    def time(self) -> float:
-        """Time that is set, s."""
-        return self.model.time
 
     def count_rotations_from(self, datum: Any) -> None:
         """Count rotations from a datum (see `rotfem.structures.datum`), None for the undeformed structure.
