@@ -1,19 +1,21 @@
-"""The error that a theory makes at a state: what its strains lack against the exact ones, as displacements.
+"""The error that a theory makes: the difference to the answer of a richer theory, and what that one lacks.
 
-At a state q the strains Γ of the theory and Γ_e of the exact one differ by ΔΓ. In the exact equations
+A linear theory without stress stiffness lacks a term of first order, a nonlinear one of moderate rotations terms whose
+effect grows with the time: what either does to an answer is its difference to that of the theory which has them
+(`rotfem.mechanics.theories.compared`), over a history by a companion (see `rotfem.refinement.discretisation`).
+
+What a linear theory with stress stiffness lacks is of second order, and estimated at a state. Its strains Γ and those
+Γ_e of the exact theory differ by ΔΓ. In the exact equations
 
     ∫ C Γ_e(q + Δq)·DΓ_e(q + Δq)[δq] = (forces)[δq],    Γ_e = Γ + ΔΓ,
 
 what is of first order in Δq and ΔΓ is a linear equation for the error Δq of the theory,
 
-    K Δq = −r,    r[δq] = ∫ C ΔΓ·DΓ[δq] + C Γ·DΔΓ[δq],
+    K Δq = −r,    r[δq] = ∫ C ΔΓ·DΓ[δq] + C Γ·DΔΓ[δq] − G q·δq,
 
-with K the tangent at q, the stress stiffness G = ∫ N D²Γ_1 in it. A linear theory with stress stiffness has G q in its
-own forces, so r is less by that. Where K has negative eigenvalues and the stiffness of the theory has none, the
-structure buckles and the theory does not see it. It is Newton's first correction but for the forces C ΔΓ·DΔΓ, which the
-correction itself relaxes (of a bent line that is not foreshortened, the membrane force). Forces on the masses are kept.
-
-Of a mode x, stress stiffness changes ω² by x·G x / x·M x.
+with K the tangent at q, and G = ∫ N D²Γ_1 the stress stiffness, which the theory has in its own forces. It is Newton's
+first correction but for the forces C ΔΓ·DΔΓ, which the correction itself relaxes (of a bent line that is not
+foreshortened, the membrane force). Forces on the masses are kept. What these terms do to a frequency is not in it.
 """
 
 from __future__ import annotations
@@ -34,10 +36,9 @@ from rotfem.equations.geometric import geometric_stiffness
 from rotfem.errors import ComputationError
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.sums import added
-from rotfem.mechanics.theories import richest, theories
+from rotfem.mechanics.theories import Theory, compared, richest, stiffened
 from rotfem.numerics import compat, forms
 from rotfem.numerics.eigenproblem import Pencil, RoundOff
-from rotfem.numerics.inertia import negative_eigenvalues
 from rotfem.numerics.linear import DirectSolver, Increment, set_diagonal
 
 Array = npt.NDArray[np.float64]
@@ -52,9 +53,6 @@ REPORTED = 0.01
 
 #: Part of the largest component below which one is round-off: Newton's method accepts such increments.
 RESOLVED = 1e-9
-
-#: What is said of a theory without stress stiffness.
-OF_STRESS = "it leaves out that stress stiffens or softens"
 
 #: By how much a state must exceed the largest one so far to take its place.
 MORE = 1.02
@@ -94,6 +92,19 @@ class TheoryError:
         how = "out of its range" if self.estimate >= 1.0 else f"off by about {100 * self.estimate:.2g} %"
         return f'model.theory = "{self.theory}" is {how} here ({self.basis}); "{richest().name}" is exact'
 
+    def of_poorer(self, theory: Theory, apart: float, components: dict[str, float]) -> TheoryError:
+        """Return the error of a poorer theory, whose answer differs from the one that this is the error of.
+
+        Args:
+            theory: the poorer one.
+            apart: distance of both answers, relative.
+            components: of the tip ↦ the same, relative to their own size.
+        """
+        names = components.keys() | self.components.keys()
+        sums = {name: components.get(name, 0.0) + self.components.get(name, 0.0) for name in sorted(names)}
+        listed = {name: x for name, x in sums.items() if x > REPORTED}
+        return TheoryError(self.estimate + apart, f'its answer against that of "{self.theory}"', theory.name, listed)
+
     def _of_components(self) -> str:
         """Return the warning of components that are far smaller than the error allows them to be known."""
         wrong = {name: error for name, error in self.components.items() if error > NOTICED}
@@ -106,15 +117,14 @@ class TheoryError:
 
 
 class TheoryCheck:
-    """Estimates the error of the theory of a system; compiles what it needs when it needs it.
+    """Estimates the error at a state of a linear theory with stress stiffness; compiles what it needs when it needs it.
 
     Args:
         system: equations of motion, the hub held.
-        motion: of the frame; that of the system if None.
     """
 
-    def __init__(self, system: Any, motion: Motion | None = None):
-        self.system, self.structure, self.motion = system, system.structure, motion or system.motion
+    def __init__(self, system: Any):
+        self.system, self.structure = system, system.structure
         self.theory = system.model.theory
         self._form: Any = None
 
@@ -122,12 +132,9 @@ class TheoryCheck:
     def known(self) -> bool:
         """Whether there is anything to estimate, and strains to do it by."""
         kind = self.structure.type
-        return not self.theory.exact and richest().holds_for(kind) and kind in stiffened().prestress
-
-    @property
-    def unstiffened(self) -> bool:
-        """Whether the theory leaves out that stress stiffens or softens."""
-        return self.theory.linear and not self.theory.prestress
+        if self.theory.exact or compared(self.theory, kind) is not None:
+            return False
+        return richest().holds_for(kind) and kind in stiffened().prestress
 
     def of_state(self, q: Array, tips: Array | None = None) -> TheoryError:
         """Return the error of the displacements of a state, whose time is set.
@@ -144,7 +151,7 @@ class TheoryCheck:
         tips = np.abs(self._tip(q)) if tips is None else tips
         resolved, neglected = self._resolved(tips), max(displacement, rotation) / 2
         small = neglected * np.max(tips[resolved], initial=0.0) <= REPORTED * np.min(tips[resolved], initial=np.inf)
-        if small and self.theory.prestress:
+        if small:
             return self._as(neglected, f"the largest rotation is {rotation:.2g}")
         return self._computed(q, tips, resolved, rotation)
 
@@ -154,22 +161,11 @@ class TheoryCheck:
         r = self._residual(q)
         K, state = system.matrix(1.0, 0.0, 0.0, 1.0), r.duplicate()
         stress = state.duplicate()
-        if self.theory.linear:
-            G = self._stress_stiffness(q)
-            state.array[:] = q[: r.getLocalSize()]
-            G.mult(state, stress)
-            if self.unstiffened:
-                own = negative_eigenvalues(K)
-                K.axpy(1.0, G)
-                if negative_eigenvalues(K) > own:
-                    return self._as(1.0, f"{OF_STRESS}: it is above a buckling load that it does not see")
-            else:
-                r.axpy(-1.0, stress)
-        solver, solution = DirectSolver(K), Increment(system.V)
-        change = -solution.solve(solver, r).copy()
+        state.array[:] = q[: r.getLocalSize()]
+        self._stress_stiffness(q).mult(state, stress)
+        r.axpy(-1.0, stress)
+        change = -Increment(system.V).solve(DirectSolver(K), r).copy()
         estimate = self._relative(q, change)
-        lacking = self._relative(q, -solution.solve(solver, stress)) if self.unstiffened else 0.0
-        basis = OF_STRESS if lacking > estimate / 2 else "its strains against the exact ones at the farthest state"
         if rotation > EXPANDED:
             estimate = max(estimate, rotation)
         if model.problem.inactive:  # among them are the displacements that bending makes along the structure
@@ -177,7 +173,7 @@ class TheoryCheck:
         errors = np.abs(self._tip(change))[resolved] / tips[resolved]
         names = [f"tip_{name}" for name in np.array(self.structure.components)[resolved]]
         wrong = {name: float(x) for name, x in zip(names, errors, strict=True) if x > REPORTED}
-        return replace(self._as(estimate, basis), components=wrong)
+        return replace(self._as(estimate, "its strains against the exact ones at the farthest state"), components=wrong)
 
     def _relative(self, q: Array, change: Array) -> float:
         """Return the size of a change of displacements over that of the smaller of the states before and after."""
@@ -194,36 +190,18 @@ class TheoryCheck:
         largest = np.where(moves, np.max(tips[moves]), np.max(tips[~moves], initial=0.0))
         return np.asarray(tips > RESOLVED * largest)
 
-    def of_modes(self, q: Array, values: Any, modes: Any, massed: Any) -> TheoryError:
-        """Return the error of frequencies about an equilibrium.
+    def under_load(self, motion: Motion) -> TheoryError:
+        """Return the error of the displacements under what is constant, which modes of a linear theory are not about.
 
         Args:
-            q: equilibrium of a nonlinear theory; a linear one has another, which is found here.
-            values: λ of the modes.
-            modes: x, one column each, of the locally owned unknowns (that of a free hub may follow them).
-            massed: M x.
+            motion: of the frame, at the speed of the modes.
         """
-        self.system.set_time(0.0, self.motion)
-        if self.known and self.theory.linear:
-            q = self._under_load()
-        out = self.of_state(q)
-        if not (self.known and self.unstiffened):
-            return out
-        G = self._stress_stiffness(q)
-        X = modes[: G.getLocalSize()[0]]
-        products = ((X, Pencil(G, G, G).apply(G, X)), (modes, massed))
-        sums = np.array([np.real(x.conj() * Ax).sum(axis=0) for x, Ax in products])
-        stress, mass = self.system.comm.allreduce(sums) if self.system.comm.size > 1 else sums
-        squares = np.real(-(values**2))  # ω², negative for a divergence
-        own, stressed = (np.sqrt(np.maximum(square, 0.0)) for square in (squares, squares + stress / mass))
-        errors = np.abs(stressed - own) / np.maximum(np.abs(values), 1e-300)
-        return self._as(float(errors.max(initial=0.0)), "it leaves out that stress stiffens or softens modes")
-
-    def _under_load(self) -> Array:
-        """Return the equilibrium of a linear theory at the time and speed set, which modes are not about."""
         system, out = self.system, Increment(self.system.V)
+        system.set_time(0.0, motion)
         system.set_state(system.zeros())
-        return out.solve(DirectSolver(system.matrix(1.0, 0.0, 0.0, 1.0)), system.residual()).copy()
+        if not self.known:
+            return self.of_state(system.zeros())
+        return self.of_state(out.solve(DirectSolver(system.matrix(1.0, 0.0, 0.0, 1.0)), system.residual()).copy())
 
     def _as(self, estimate: float, basis: str) -> TheoryError:
         return TheoryError(float(estimate), basis, self.theory.name)
@@ -276,11 +254,6 @@ class TheoryCheck:
         return G
 
 
-def stiffened() -> Any:
-    """Return the poorest linear theory that has the stiffening by stress."""
-    return next(theory for theory in theories() if theory.linear and theory.prestress)
-
-
 class Farthest:
     """Remembers the largest state of a motion, where a theory is farthest from the exact one.
 
@@ -292,34 +265,36 @@ class Farthest:
     """
 
     def __init__(self, system: Any):
-        self.system, self.check = system, TheoryCheck(system.held)
+        self.system = system
         self.seen: tuple[float, float, Array] = (-1.0, 0.0, system.zeros())
 
     def __call__(self, q: Array, t: float) -> None:
         """Look at a state (local dof array) of time t (s)."""
-        if not (self.check.known or self.system.linear):
+        if not self.system.linear:
             return
         size = float(np.max(self.system.sizes(q), initial=0.0))
         if size > MORE * self.seen[0]:
             self.seen = (size, t, np.array(q))
 
-    def error(self, tips: Array | None = None) -> TheoryError | None:
-        """Return the error of the theory there; None where that fails. State and time of the system stay.
+    def error(self, system: Any, tips: Array | None = None) -> TheoryError | None:
+        """Return the error of a theory there; None where that fails. State and time of its system stay.
 
         Args:
+            system: of the theory, on the mesh of the motion.
             tips: largest size of every component of the tip in the motion (m, rad); those of the state if None.
         """
-        if not self.check.known:
-            return self.check.of_state(self.seen[2])
-        return self._there(partial(self.check.of_state, tips=tips))
+        check = TheoryCheck(system.held)
+        if not check.known:
+            return check.of_state(system.held.zeros())
+        return self._there(system.held, partial(check.of_state, tips=tips))
 
     def lost_digits(self) -> float | None:
         """Return what round-off of the stiffness may have done there, relative; None where that cannot be said."""
-        return self._there(partial(lost_digits, self.system.held))
+        return self._there(self.system.held, partial(lost_digits, self.system.held))
 
-    def _there(self, of_state: Callable[[Array], T]) -> T | None:
+    def _there(self, system: Any, of_state: Callable[[Array], T]) -> T | None:
         """Return a function of the state, with its time set; None where nothing was seen, or it fails."""
-        system, (size, t, q) = self.system.held, self.seen
+        size, t, q = self.seen
         if size < 0.0:
             return None
         state, time = [x.x.array.copy() for x in (system.q, system.v, system.a)], system.time

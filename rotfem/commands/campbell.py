@@ -171,8 +171,8 @@ class Diagram:
         ends = mode_rows(analysis, last, known)
         warnings = [] if self.choice is not None else advice(analysis, fastest)
         warnings += [*held(self.analysis.problem), *told(sweep, labels, onsets, ends)]
-        off = theory_error(analysis, sweep.nodes[-1].spinning)
-        warnings += [off.warning()] if off.warning() else []
+        off = theory_error(analysis, last)
+        warnings += [off.warning()] if off and off.warning() else []
         summary = {
             **modal_summary("campbell", analysis, self.scene, self.choice, started),
             "branches": [{"branch": b + 1, "label": labels[b], **branch_summary(sweep, b)} for b in range(count)],
@@ -182,7 +182,7 @@ class Diagram:
             "ambiguous": sweep.ambiguous,
             "speeds": len(values),
             "speeds_solved": sweep.solves,
-            "theory_error": off.summary(),
+            **({} if off is None else {"theory_error": off.summary()}),
             **({"error": error_of_modes(rows, off).summary()} if self.scene.output.error else {}),
             "checks": self_checks(analysis, sweep.nodes[-1].spinning),
             **analysis.report(),

@@ -6,17 +6,22 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.reduced.response import reduced_response
 from rotfem.analysis.reduced.tips import largest as largest_of
-from rotfem.analysis.theory_error import TheoryError
+from rotfem.analysis.schemes import State
+from rotfem.analysis.stability import stability_of
+from rotfem.analysis.theory_error import RESOLVED, TheoryError
 from rotfem.commands.reduced_history import accuracy_of
-from rotfem.errors import ComputationError
+from rotfem.equations.compiled import compile_system
+from rotfem.errors import ComputationError, InputError
+from rotfem.mechanics.problem import Problem
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.coarser import on_other_mesh
-from rotfem.refinement.discretisation import error_by_cells, error_of_shape
-from rotfem.refinement.distance import COLUMNS, OUTPUTS, largest
+from rotfem.refinement.coarser import by_itself, on_other_mesh
+from rotfem.refinement.discretisation import error_by_cells, error_of_shape, richer_problem
+from rotfem.refinement.distance import COLUMNS, OUTPUTS, largest, tip
 from rotfem.refinement.estimate import ErrorEstimate, percent
 from rotfem.scene import Scene
 from rotfem.selection.model_choice import Choice
@@ -24,11 +29,21 @@ from rotfem.selection.model_choice import Choice
 if TYPE_CHECKING:
     from rotfem.commands.simulation import Simulation
 
+Array = npt.NDArray[np.float64]
+
 #: Contribution to an error below which no warning is given, and the part of it that advised steps aim at.
 WANTED, AIM = 0.01, 0.5
 
+#: What the contributions are called that a warning says to be unknown.
+UNKNOWN = {"time": "steps", "space": "mesh", "model": "theory"}
+
 #: Part of the sum from which a contribution is named.
 NAMED = 0.1
+
+
+def error_wanted(run: Simulation) -> bool:
+    """Return whether a run is to say its error."""
+    return run.scene.output.error or run.setting is not None
 
 
 def error_of_run(run: Simulation) -> ErrorEstimate | None:
@@ -36,8 +51,7 @@ def error_of_run(run: Simulation) -> ErrorEstimate | None:
 
     None where it is not wanted, or nothing was computed.
     """
-    wanted = run.scene.output.error or run.setting is not None
-    if not wanted or not len(run.record.history):
+    if not error_wanted(run) or not len(run.record.history):
         return None
     of = output_of(run.scene)
     columns = [values for name, values in run.record.history.arrays().items() if name.startswith(COLUMNS[of])]
@@ -83,6 +97,91 @@ def _of_reduced(run: Simulation, scale: float) -> float | None:
     return error_by_cells(largest_of(own.model, there.tips - own.tips) / scale, ratio)
 
 
+def theory_error_of_run(run: Simulation, history: Mapping[str, Array]) -> TheoryError | None:
+    """Return the error of the theory in what was computed so far; None where it is not known, or not wanted.
+
+    Args:
+        run: what is computed.
+        history: its columns so far.
+    """
+    if run.foreshortened is not None:
+        return run.foreshortened.theory_error()
+    if not len(run.record.history):
+        return None
+    names = run.system.structure.components
+    tips = np.array([np.max(np.abs(history[f"tip_{name}"])) for name in names])
+    richer = richer_problem(run.problem)
+    if richer is None:
+        return run.farthest.error(run.system, tips)
+    if not error_wanted(run):
+        return None
+    moves = [i for i, name in enumerate(names) if name.startswith("u")]
+    scale = largest(np.column_stack([history[f"tip_{names[i]}"] for i in moves]))
+    try:
+        found = _apart(run, richer, scale)
+    except (ComputationError, InputError):
+        return None
+    if found is None:
+        return None
+    system, apart, components = found
+    if run.scene.time is None and _buckles(run, system):
+        return TheoryError(1.0, "it is above a buckling load that it does not see", run.problem.theory.name)
+    base = run.farthest.error(system, tips)
+    if base is None:
+        return None
+    sizes = tips[moves]
+    resolved = sizes > RESOLVED * np.max(sizes, initial=0.0)
+    own = {f"tip_{names[i]}": d / s for i, d, s, known in zip(moves, components, sizes, resolved, strict=True) if known}
+    return base.of_poorer(run.problem.theory, apart, own)
+
+
+def _apart(run: Simulation, richer: Problem, scale: float) -> tuple[Any, float, Array] | None:
+    """Return the system of a richer theory, how far its tip is from the run's, relative, and that by components, m.
+
+    None where that is not known. The difference of equilibria is relative to the smaller displacement.
+
+    Args:
+        run: what is computed.
+        richer: its problem in the richer theory.
+        scale: largest displacement of the run's tip, m.
+
+    Raises:
+        ComputationError: there is no answer in that theory.
+        InputError: it cannot have what the problem has.
+    """
+    if run.companions is not None:
+        run.companions.steps.finish()
+        companion = run.companions.theory
+        if companion is None or not companion.sound or not run.companions.steps.sound:
+            return None
+        return companion.system, _relative(companion.difference[0], scale), np.array(companion.components or ())
+    system = compile_system(by_itself(richer), run.system.comm, moving=run.scene.time is not None)
+    if run.reduced is not None:
+        start, _ = run.start_of(system)
+        response = reduced_response(system, run.reduced.times, start, accuracy_of(run.scene))
+        moves = [i for i, name in enumerate(run.system.structure.components) if name.startswith("u")]
+        differences = (response.tips - run.reduced.tips)[:, moves]
+        return system, _relative(largest(differences), scale), np.abs(differences).max(axis=0)
+    assert run.last is not None
+    own, there = tip(run.system, run.last), tip(system, State.at_rest(system, *system.start(_resting(run, system))))
+    smaller = min(float(np.linalg.norm(there)), scale)
+    return system, _relative(float(np.linalg.norm(there - own)), smaller), np.abs(there - own)
+
+
+def _relative(apart: float, scale: float) -> float:
+    """Return a difference relative to a scale; all of it where there is no scale."""
+    if apart == 0.0:
+        return 0.0
+    return apart / scale if scale > 0.0 else 1.0
+
+
+def _buckles(run: Simulation, system: Any) -> bool:
+    """Return whether a richer theory has no stable equilibrium where that of a run says it has; its state is set."""
+    speed = run.problem.motion.speed(0.0)
+    there = stability_of(system, system.held.q.x.array.copy(), speed)
+    return there.stable is False and run.stability is not None and run.stability.stable is True
+
+
 def model_share(theory: TheoryError | None, choice: Choice | None) -> float | None:
     """Return the error by the theory and the effects that a choice has left out; None where it is unknown."""
     own = None if theory is None else theory.estimate
@@ -91,13 +190,13 @@ def model_share(theory: TheoryError | None, choice: Choice | None) -> float | No
     return max(own or 0.0, choice.estimated_error)
 
 
-def error_of_modes(rows: Iterable[Mapping[str, Any]], theory: TheoryError) -> ErrorEstimate:
+def error_of_modes(rows: Iterable[Mapping[str, Any]], theory: TheoryError | None) -> ErrorEstimate:
     """Return the largest relative error of the frequencies of rows."""
     flexible = [row for row in rows if row.get("stability") != "neutral"]
     mesh = [row["mesh_error"] for row in flexible]
     bound = float(max((row["error_bound"] for row in flexible), default=0.0))
     space = None if None in mesh else float(max(mesh, default=0.0))
-    return ErrorEstimate({"space": space, "model": theory.estimate, "round_off": bound})
+    return ErrorEstimate({"space": space, "model": None if theory is None else theory.estimate, "round_off": bound})
 
 
 def warnings_of_run(run: Simulation, error: ErrorEstimate) -> list[str]:
@@ -106,8 +205,8 @@ def warnings_of_run(run: Simulation, error: ErrorEstimate) -> list[str]:
     tolerance = None if scene.time is None else scene.time.tolerance
     if scene.accuracy is not None:  # what asked for it says what was reached
         return []
-    unknown = [word for name, word in (("time", "steps"), ("space", "mesh")) if error.shares[name] is None]
-    said = [f"the error by the {' and the '.join(unknown)} is unknown: {_why_unknown(run)}"] if unknown else []
+    unknown = [word for name, word in UNKNOWN.items() if error.shares[name] is None]
+    said = [f"the error by the {' and the '.join(unknown)} is unknown: {_why_unknown(run, error)}"] if unknown else []
     if not error.exceeds(max(WANTED, scene.model.tolerance or 0.0, tolerance or 0.0)):
         return said
     steps, mesh, model = (error.shares[name] or 0.0 for name in ("time", "space", "model"))
@@ -126,9 +225,11 @@ def warnings_of_run(run: Simulation, error: ErrorEstimate) -> list[str]:
     return [f"{off}: {', '.join(cures)}" if cures else off, *said]
 
 
-def _why_unknown(run: Simulation) -> str:
-    if run.companions is None:
+def _why_unknown(run: Simulation, error: ErrorEstimate) -> str:
+    if run.companions is None and error.shares["space"] is None:
         return "there is no other mesh to compare with"
+    if run.companions is None or error.shares["time"] is not None:
+        return "the same in a richer theory fails"
     if run.companions.steps.sound:
         return "what is prescribed leaves no room for steps of twice the length"
     return "steps of twice the length fail, so that these are hardly short enough"

@@ -32,6 +32,8 @@ from rotfem.listeners import Hint, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
+from rotfem.refinement.discretisation import richer_problem
+from rotfem.refinement.frequencies import FrequencyErrors
 from rotfem.refinement.refine import Clock, Setting
 from rotfem.results import ModesResult
 from rotfem.scene import Scene, as_scene
@@ -107,12 +109,12 @@ def _modes(
     stability, off = stability_of_pencil(spinning.pencil, spinning.clamped), theory_error(analysis, spinning)
     known = [] if choice is None else advice(analysis, speed)  # a choice knows what it left out
     warnings = [*held(problem), *analysis.notes, *(line for line in found.warnings if line not in known)]
-    warnings += [*_of_stability(stability, found.rows), *([said] if (said := off.warning()) else [])]
+    warnings += [*_of_stability(stability, found.rows), *([off.warning()] if off and off.warning() else [])]
     result = {
         **modal_summary("modes", analysis, scene, choice, started),
         "speed": speed,
         "stability": stability.summary(),
-        "theory_error": off.summary(),
+        **({} if off is None else {"theory_error": off.summary()}),
         **({"error": error_of_modes(found.rows, off).summary()} if scene.output.error else {}),
         "modes": found.rows,
         "shapes": {"length": analysis.structure.length},
@@ -165,11 +167,19 @@ def add_participation(found: ModesResult) -> None:
         row |= mass
 
 
-def theory_error(analysis: ModalAnalysis, spinning: Spinning) -> TheoryError:
-    """Return how far the theory is off at one speed."""
-    system = analysis.system.held
-    check = TheoryCheck(system, system.motion.at_speed(spinning.speed))
-    return check.of_modes(spinning.q, spinning.pairs.values, analysis.right(spinning), analysis.mass_times(spinning))
+def theory_error(analysis: ModalAnalysis, spinning: Spinning) -> TheoryError | None:
+    """Return the error of the frequencies at one speed by the theory; None where it is not known, or not wanted."""
+    richer, motion = richer_problem(analysis.problem), analysis.system.held.motion.at_speed(spinning.speed)
+    if richer is None:
+        return TheoryCheck(analysis.system.held).under_load(motion)
+    if not analysis.estimates:
+        return None
+    errors = FrequencyErrors(analysis, richer)
+    differences = [error for error in errors(spinning) if error is not None]
+    if errors.there is None or len(differences) < len(spinning.pairs.values):
+        return None
+    own = TheoryCheck(errors.there.system.held).under_load(motion)
+    return own.of_poorer(analysis.problem.theory, max(differences, default=0.0), {})
 
 
 def analysis_of(scene: Scene, problem: ProblemData, comm: MPI.Comm) -> ModalAnalysis:

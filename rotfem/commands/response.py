@@ -181,7 +181,7 @@ def result_of(
         *doubtful(modes),
     ]
     warnings += [stability.warning()] if not stability.stable else []
-    warnings += [said] if (said := theory.warning()) else []
+    warnings += [theory.warning()] if theory and theory.warning() else []
     usual = float(np.median(off))
     warnings += [*told(modes, undamped, usual, scene.modes.count), *not_pursued(scene)]
     summary = {
@@ -193,7 +193,7 @@ def result_of(
         "peaks": {name: peak_of(omegas, np.abs(direct[:, i])) for i, name in enumerate(outputs)},
         "difference": {"median": usual, "largest": float(np.max(off)), "worst": float(np.max(worst))},
         "modes": modes[: scene.modes.count],
-        "theory_error": theory.summary(),
+        **({} if theory is None else {"theory_error": theory.summary()}),
         "warnings": list(dict.fromkeys(warnings)),
         "advice": [],
     }

@@ -23,7 +23,7 @@ from rotfem.analysis.theory_error import Farthest, TheoryError, said_of
 from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
 from rotfem.commands import energy_growth
 from rotfem.commands.energy_growth import diverged
-from rotfem.commands.error_report import error_of_run, output_of, warnings_of_run
+from rotfem.commands.error_report import error_of_run, error_wanted, output_of, theory_error_of_run, warnings_of_run
 from rotfem.commands.first_state import first_state
 from rotfem.commands.interrupts import Interrupted
 from rotfem.commands.keeper import Keeper
@@ -37,7 +37,7 @@ from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.discretisation import HistoryErrors
+from rotfem.refinement.discretisation import HistoryErrors, richer_problem
 from rotfem.refinement.distance import OUTPUTS
 from rotfem.refinement.estimate import ErrorEstimate
 from rotfem.refinement.refine import Setting
@@ -157,7 +157,7 @@ class Simulation:
             return
         march = March(self.system, scheme, steps, newton, start, rates)
         self.stepper = march.stepper
-        if self.scene.output.error or self.setting is not None:
+        if error_wanted(self):
             self.companions = HistoryErrors(
                 self.problem,
                 self.system,
@@ -165,6 +165,7 @@ class Simulation:
                 newton,
                 lambda s: (start, rates) if self.keeper.goes_on else self.start_of(s, (start, rates)),
                 OUTPUTS[output_of(self.scene)],
+                richer_problem(self.problem),
             )
             self.stepper.watch = self.companions
         march.reached = self.keeper.start(self)
@@ -181,17 +182,22 @@ class Simulation:
     def start_of(
         self, system: Any, own: tuple[Array | None, Array | None] | None = None
     ) -> tuple[Array | None, Array | None]:
-        """Return the shape and the velocities at t = 0 on the mesh of a companion's system.
+        """Return the shape and the velocities at t = 0 of a companion's system.
 
         Args:
             system: of the companion.
-            own: of this run, for a companion on the same mesh.
+            own: of this run, for a companion on the same mesh in the same theory.
         """
-        if own is not None and system.V.dofmap.index_map.size_global == self.system.V.dofmap.index_map.size_global:
+        problem = system.model.problem
+        same = system.V.dofmap.index_map.size_global == self.system.V.dofmap.index_map.size_global
+        if own is not None and same and problem.theory == self.problem.theory:
             return own
-        mesh = system.model.problem.mesh
         there = copy(self)
-        there.problem, there.system, there.warnings = self.problem.replace(mesh=mesh), system, []
+        there.problem, there.system, there.warnings = (
+            self.problem.replace(mesh=problem.mesh, theory=problem.theory),
+            system,
+            [],
+        )
         return first_state(there)
 
     def look(self, state: State) -> None:
@@ -266,11 +272,7 @@ class Simulation:
                 f"the speed is above {self.critical:.6g} rad/s, where the {self.problem.theory.name} stiffness is no "
                 f"longer definite, since t = {self._critical_since:.4g} s"
             )
-        if self.foreshortened is not None:
-            self.theory_error = self.foreshortened.theory_error()
-        elif len(self.record.history):
-            names = self.system.structure.components
-            self.theory_error = self.farthest.error(np.array([np.max(np.abs(history[f"tip_{n}"])) for n in names]))
+        self.theory_error = theory_error_of_run(self, history)
         if self.theory_error is not None and (said := self.theory_error.warning()):
             self.warnings.append(said)
         if said := said_of(self.farthest.lost_digits() or 0.0):

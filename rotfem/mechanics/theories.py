@@ -74,6 +74,29 @@ def richest() -> Theory:
     return [theory for theory in theories() if theory.exact][-1]
 
 
+def stiffened() -> Theory:
+    """Return the poorest linear theory that has the stiffening by stress."""
+    return next(theory for theory in theories() if theory.linear and theory.prestress)
+
+
+def compared(theory: Theory, structure: str) -> Theory | None:
+    """Return the theory whose answers those of another one are compared with, to know the error of that.
+
+    It has the terms whose effect adds up over the time: stress stiffness, which linear theories may lack, and third
+    order, which nonlinear ones of moderate rotations lack. None of an exact theory, of a linear one that has stress
+    stiffness, and where the richer one has no strains.
+
+    Args:
+        theory: the poorer one.
+        structure: type of the structure.
+    """
+    if theory.exact or (theory.linear and theory.prestress):
+        return None
+    richer = stiffened() if theory.linear else richest()
+    holds = richer.holds_for(structure) and (not theory.linear or structure in richer.prestress)
+    return richer if holds else None
+
+
 def _measured_in(module: str) -> dict[str, Strains]:
     """Return the strains of all structures that a module of `rotfem.mechanics.strains` has."""
     return {kind: f"rotfem.mechanics.strains.{module}:{kind}" for kind in ("planar_beam", "spatial_beam", "plate")}

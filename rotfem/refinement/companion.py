@@ -1,8 +1,8 @@
-"""Companions of a march: the same problem in steps of twice the length, or on a coarser mesh, in lockstep with it.
+"""Companions of a march: the same problem in steps of twice the length, on a coarser mesh, or in a richer theory.
 
 A companion is one more march on a system of its own. It takes two steps of the march that it follows as one, wherever
-nothing prescribed lies between them, or on a coarser mesh the same ones; so it meets the same instants. Its first guess
-of a step is the motion that it follows plus the difference so far: mostly one Newton iteration is left to do.
+nothing prescribed lies between them, or the same ones as another companion; so it meets the same instants. Its first
+guess of a step is the motion that it follows plus the difference so far: mostly one Newton iteration is left to do.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ class Companion:
     """A march that follows another one; a watch of the steps of that.
 
     Args:
-        system: its own, of the same problem as that of the march that is followed.
+        system: its own, of the problem of the march that is followed or of another one with the same outputs.
         followed: the system of that march.
         scheme: of both.
         newton: iteration control of the march that is followed.
@@ -126,6 +126,7 @@ class Companion:
     Attributes:
         state: reached; None before `begin`.
         difference: largest distance of the two outputs so far, and when, s.
+        components: largest difference of every component of them.
         doubled: time gone in doubled steps, s.
         sound: whether all its steps could be solved.
     """
@@ -148,6 +149,7 @@ class Companion:
         self.further, self.stepper.watch = further, self._passed_on
         self.state: State | None = None
         self.difference, self.doubled, self.sound = (0.0, 0.0), 0.0, True
+        self.components: tuple[float, ...] | None = None
         #: Steps taken note of: those that may be doubled with the next, and those whose way on is not known yet.
         self.waiting: list[Followed | None] = [None, None]
 
@@ -223,8 +225,11 @@ class Companion:
     def _compare(self, there: State) -> None:
         """Take note of the distance of the outputs; that of tips says how well the next step is to be solved."""
         assert self.state is not None
-        size = float(np.linalg.norm(self.output(self.system, self.state) - self.output(self.followed, there)))
+        apart = self.output(self.system, self.state) - self.output(self.followed, there)
+        size = float(np.linalg.norm(apart))
         self.sound = bool(np.isfinite(size))
+        before = np.zeros(len(apart)) if self.components is None else self.components
+        self.components = tuple(float(x) for x in np.maximum(before, np.abs(apart)))
         if size > self.difference[0]:
             self.difference = size, there.t
         sizes = [c.difference[0] for c in (self, *self.further)] if self.output is tip else [0.0]

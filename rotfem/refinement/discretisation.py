@@ -19,10 +19,12 @@ import numpy as np
 
 from rotfem.analysis.schemes import Array, Scheme, State
 from rotfem.analysis.time_grid import Leg
+from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError
 from rotfem.mechanics.problem import Problem
+from rotfem.mechanics.theories import compared
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.coarser import on_other_mesh
+from rotfem.refinement.coarser import by_itself, on_other_mesh
 from rotfem.refinement.companion import Companion
 from rotfem.refinement.distance import Output, tip
 
@@ -64,6 +66,12 @@ def error_by_cells(difference: float, ratio: float) -> float:
     return difference + error_of(difference, OF_ELEMENTS, 1.0 / ratio)
 
 
+def richer_problem(problem: Problem) -> Problem | None:
+    """Return a problem in the theory that its answers are compared with; None where there is none."""
+    richer = compared(problem.theory, problem.structure.type)
+    return None if richer is None else problem.replace(theory=richer)
+
+
 class HistoryErrors:
     """The errors of a march by its companions; a watch of its steps.
 
@@ -74,27 +82,40 @@ class HistoryErrors:
         newton: its iteration control.
         start: what it starts from.
         output: whose errors these are.
+        richer: the problem in the theory that its answers are compared with; None for none.
 
     Attributes:
         steps: companion in steps of twice the length; followed by the two others.
         mesh: companion in the same long steps on another mesh, and the ratio of its cell sizes to the own ones; None
             without one.
         order: companion in steps of four times the length; None where the order is certain.
+        theory: companion in the same long steps in the richer theory, compared at the tip; None without one.
     """
 
     def __init__(
-        self, problem: Problem, system: Any, scheme: Scheme, newton: Newton, start: Start, output: Output = tip
+        self,
+        problem: Problem,
+        system: Any,
+        scheme: Scheme,
+        newton: Newton,
+        start: Start,
+        output: Output = tip,
+        richer: Problem | None = None,
     ):
         self.scheme = scheme
 
         same, other = system.twin(), on_other_mesh(problem, system)
         self.mesh: tuple[Companion, float] | None = None
         self.order: Companion | None = None
+        self.theory: Companion | None = None
         if other is not None:
             self.mesh = Companion(other[0], same, scheme, newton, doubles=False, output=output), other[1]
         if scheme.order > CERTAIN:
             self.order = Companion(system.twin(), same, scheme, newton, output=output)
-        further = [*(() if self.mesh is None else self.mesh[:1]), *(() if self.order is None else (self.order,))]
+        if richer is not None:
+            self.theory = Companion(compile_system(by_itself(richer), system.comm), same, scheme, newton, doubles=False)
+        others = (None if self.mesh is None else self.mesh[0], self.order, self.theory)
+        further = [companion for companion in others if companion is not None]
         self.steps = Companion(same, system, scheme, newton, further=further, output=output)
         for companion in self.companions:
             try:

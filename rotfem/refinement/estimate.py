@@ -26,10 +26,9 @@ class ErrorEstimate:
 
     @property
     def total(self) -> float | None:
-        """Sum of the shares; None where that of the steps or the mesh is unknown, or all are."""
+        """Sum of the shares; None where one is unknown."""
         known = [float(share) for share in self.shares.values() if share is not None]
-        whole = all(self.shares.get(name, 0.0) is not None for name in ("time", "space"))
-        return sum(known) if known and whole else None
+        return sum(known) if known and len(known) == len(self.shares) else None
 
     def summary(self) -> dict[str, Any]:
         """Return what a summary has of it."""

@@ -1,13 +1,15 @@
-"""The errors of frequencies by the mesh: modes on half the cells.
+"""The errors of frequencies: modes on half the cells, and in a richer theory.
 
 Elements converge at least with order 2, so that a third of the difference of an eigenvalue to that of the same mode on
-half the cells is its error, or more (see `rotfem.refinement.discretisation`). The same mode is the one whose shape is
-most alike in x^H M x.
+half the cells is its error, or more (see `rotfem.refinement.discretisation`). The error by a theory is the difference
+itself. The same mode is the one whose shape is most alike in x^H M x.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,8 +17,9 @@ import numpy.typing as npt
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.errors import ComputationError, InputError
+from rotfem.mechanics.problem import Problem
 from rotfem.refinement.carrier import interpolation
-from rotfem.refinement.coarser import on_other_mesh
+from rotfem.refinement.coarser import by_itself, on_other_mesh
 from rotfem.refinement.discretisation import error_by_cells
 
 Array = npt.NDArray[Any]
@@ -27,17 +30,17 @@ SPARE = 4
 
 @dataclass
 class Level:
-    """Modes of a problem on another mesh.
+    """Modes of a problem on another mesh, or in another theory.
 
     Attributes:
-        analysis: of the problem on that mesh.
-        ratio: of its cell sizes to the own ones.
+        analysis: of the problem there.
+        error: difference of a frequency, relative ↦ its error.
         weights: values at the nodes of the analysed mesh by those of this one; None on several processes.
         before: solution at the speed before.
     """
 
     analysis: ModalAnalysis
-    ratio: float
+    error: Callable[[float], float]
     weights: Any
     before: Spinning | None = None
 
@@ -47,10 +50,11 @@ class FrequencyErrors:
 
     Args:
         analysis: of the modes.
+        richer: the problem in the theory that frequencies are compared with; None for the errors by the mesh.
     """
 
-    def __init__(self, analysis: ModalAnalysis):
-        self.analysis = analysis
+    def __init__(self, analysis: ModalAnalysis, richer: Problem | None = None):
+        self.analysis, self.richer = analysis, richer
         self._level: Level | None = None
 
     def __call__(self, spinning: Spinning) -> list[float | None]:
@@ -64,19 +68,29 @@ class FrequencyErrors:
         except (ComputationError, InputError, np.linalg.LinAlgError):
             return [None] * len(lam)
         differences = np.abs(there - lam) / np.maximum(np.abs(lam), np.finfo(float).tiny)
-        return [error_by_cells(float(d), self._level.ratio) for d in differences]
+        return [self._level.error(float(d)) for d in differences]
+
+    @property
+    def there(self) -> ModalAnalysis | None:
+        """What the last frequencies were compared with; None where there is nothing."""
+        return None if self._level is None else self._level.analysis
 
     def _made(self) -> Level | None:
         own = self.analysis
-        other = on_other_mesh(own.problem, own.system, moving=False)
-        if other is None:
-            return None
-        system, ratio = other
-        problem = own.problem.replace(mesh=system.model.problem.mesh)
+        system: Any = None
+        error: Callable[[float], float] = float
+        if self.richer is None:
+            other = on_other_mesh(own.problem, own.system, moving=False)
+            if other is None:
+                return None
+            system, ratio = other
+            problem, error = own.problem.replace(mesh=system.model.problem.mesh), partial(error_by_cells, ratio=ratio)
+        else:
+            problem = by_itself(self.richer)
         there = ModalAnalysis(problem, own.about, own.newton, own.comm, system)
         there.past_limits = own.past_limits
         nodes = own.system.V.tabulate_dof_coordinates()
-        return Level(there, ratio, interpolation(system.V, nodes) if own.comm.size == 1 else None)
+        return Level(there, error, interpolation(there.system.V, nodes) if own.comm.size == 1 else None)
 
     def _matched(self, level: Level, spinning: Spinning) -> Array:
         """Return for every mode the eigenvalue of the most similar one on another mesh."""
@@ -85,7 +99,7 @@ class FrequencyErrors:
         level.before = there.at(spinning.speed, min(count + int(spinning.rigid) + SPARE, most), level.before)
         values = level.before.pairs.values
         if len(values) < count:
-            raise ComputationError("there are fewer modes on the coarser mesh")
+            raise ComputationError("there are fewer modes to compare with")
         if level.weights is None:
             return np.array([values[np.argmin(np.abs(values - lam))] for lam in spinning.pairs.values])
         block = self.analysis.structure.size

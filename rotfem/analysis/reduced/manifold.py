@@ -30,8 +30,8 @@ from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.reduced.solution import Solution, Trajectory
 from rotfem.analysis.reduced.third_order import Motion, ThirdOrder, expands, inside
 from rotfem.analysis.reduced.tips import largest, tips_of
-from rotfem.analysis.theory_error import stiffened
 from rotfem.equations.geometric import second_order_work
+from rotfem.mechanics.theories import stiffened
 from rotfem.numerics import compat, forms
 from rotfem.numerics.projection import summed, times
 
