@@ -1,4 +1,4 @@
-"""The two errors a user can meet: a scene that is not valid, and a computation that failed."""
+"""The errors a user can meet: a scene that is not valid, a computation that failed or was stopped, a full disk."""
 
 from __future__ import annotations
 
@@ -114,6 +114,7 @@ class ComputationError(RuntimeError):
         what: what failed, e.g. "Newton's method did not converge in 25 iterations".
         time: time at which it failed (s), or None outside a time history.
         advice: what to try; may be empty.
+        result: what was computed until then; None if nothing was.
     """
 
     def __init__(self, what: str, time: float | None = None, advice: str = "") -> None:
@@ -121,10 +122,23 @@ class ComputationError(RuntimeError):
         self.what = what
         self.time = time
         self.advice = advice
+        self.result: Any = None
 
     def __str__(self) -> str:
         message = self.what if self.time is None else f"{self.what} at t = {self.time:.6g} s"
         return f"{message}; {self.advice}" if self.advice else message
+
+
+class Stopped(KeyboardInterrupt):
+    """A computation was interrupted where all ranks agree, so that what they do together can still be done.
+
+    Attributes:
+        result: what was computed until then; None if nothing was.
+    """
+
+    def __init__(self, result: Any = None) -> None:
+        super().__init__()
+        self.result = result
 
 
 class OutputError(OSError):

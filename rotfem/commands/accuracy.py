@@ -8,7 +8,7 @@ from time import perf_counter
 from typing import Any, TypeVar
 
 from rotfem.commands.interrupts import together
-from rotfem.errors import ComputationError, SceneError
+from rotfem.errors import ComputationError, SceneError, Stopped
 from rotfem.mechanics.theories import theories
 from rotfem.refinement.estimate import WORDS
 from rotfem.refinement.refine import COARSE, SAFETY, Clock, Refinement, Setting, contribution, is_within, refine
@@ -134,7 +134,8 @@ def to_accuracy(scene: Scene, first: Setting, compute: Callable[[Setting], R], c
     Raises:
         Missed: none was found; its attribute `result` holds the best that was reached.
         ComputationError: nothing was reached.
-        KeyboardInterrupt: its attribute `result` holds the best that was reached, if anything was.
+        Stopped: its attribute `result` holds the best that was reached.
+        KeyboardInterrupt: nothing was, or the ranks do not agree.
     """
     started, found = perf_counter(), Refinement[R]()
     assert scene.accuracy is not None
@@ -147,8 +148,8 @@ def to_accuracy(scene: Scene, first: Setting, compute: Callable[[Setting], R], c
         refine(first, answer, scene.accuracy, clock, found)
     except KeyboardInterrupt as stop:
         if found.best is not None and together(clock.comm, stop):
-            described(scene, found, clock, started).summary["status"] = "interrupted"
-            vars(stop)["result"] = found.best.result
+            best = described(scene, found, clock, started)
+            raise Stopped(best.with_summary(status="interrupted")) from stop
         raise
     done = described(scene, found, clock, started)
     if not is_within(done.summary["error"], scene.accuracy):
@@ -157,13 +158,12 @@ def to_accuracy(scene: Scene, first: Setting, compute: Callable[[Setting], R], c
 
 
 def described(scene: Scene, found: Refinement[R], clock: Clock, started: float) -> R:
-    """Return the best result, with what its summary says of how it was found."""
+    """Return the best result, with how it was found in its summary."""
     best, accuracy = found.best, scene.accuracy
     assert best is not None
     assert accuracy is not None
     summary = best.result.summary
-    summary["scene"] = scene.digest()
-    summary["accuracy"] = {
+    how = {
         "asked": accuracy,
         "of": scene.accuracy_of or ("tip" if "time" in best.error else "frequencies"),
         "met": is_within(best.error, accuracy),
@@ -172,11 +172,10 @@ def described(scene: Scene, found: Refinement[R], clock: Clock, started: float) 
         "attempts": found.tried,
     }
     if clock.budget is not None:
-        summary["accuracy"]["budget"] = clock.summary()
-    timings = summary["timings"]
-    timings["choice"] = max(0.0, perf_counter() - started - timings["total"])
-    timings["total"] += timings["choice"]
-    return best.result
+        how["budget"] = clock.summary()
+    choice = max(0.0, perf_counter() - started - summary["timings"]["total"])
+    timings = {**summary["timings"], "choice": choice, "total": summary["timings"]["total"] + choice}
+    return best.result.with_summary(scene=scene.digest(), accuracy=how, timings=timings)
 
 
 def missed(scene: Scene, done: Result, failure: ComputationError | None) -> Missed:
@@ -184,7 +183,7 @@ def missed(scene: Scene, done: Result, failure: ComputationError | None) -> Miss
 
     Args:
         scene: with an accuracy.
-        done: the best result, whose summary says that it has failed from now on.
+        done: the best result.
         failure: of a further answer, where one failed or was too dear.
     """
     error = done.summary["error"]
@@ -207,7 +206,6 @@ def missed(scene: Scene, done: Result, failure: ComputationError | None) -> Miss
         f"an accuracy of {scene.accuracy:g} was not met: {reached}{why}",
         advice=(failure.advice if failure is not None else None) or advice,
     )
-    done.summary["status"] = "failed"
-    done.summary["failure"] = {"what": out.what, "time": None, "advice": out.advice}
-    vars(out)["result"] = done
+    failed = {"what": out.what, "time": None, "advice": out.advice}
+    out.result = done.with_summary(status="failed", failure=failed)
     return out

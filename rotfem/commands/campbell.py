@@ -16,11 +16,11 @@ from rotfem.analysis.branches import SPARE, Node, Sweep
 from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
 from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy
-from rotfem.commands.energy_growth import check_rows
 from rotfem.commands.error_report import error_of_modes
 from rotfem.commands.loads import held
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
 from rotfem.commands.modes import analysis_of, hints_of, theory_error
+from rotfem.commands.monitor import check_rows
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import SceneError, input_of

@@ -10,31 +10,29 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
 from time import perf_counter
 from types import NoneType, UnionType
-from typing import TYPE_CHECKING, Any, Union, get_args, get_origin, get_type_hints
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability
 from rotfem.analysis.stepper import Stepper
+from rotfem.commands.monitor import Monitor
+from rotfem.commands.recorder import Recorder
 from rotfem.errors import SceneError
-from rotfem.refinement.companion import Followed
+from rotfem.refinement.companion import Companion, Followed
 from rotfem.refinement.refine import Setting
-from rotfem.scene import Scene
+from rotfem.scene import Scene, Time
 from rotfem.selection.model_choice import Choice
 from rotfem.structures.datum import Datum
 from rotfem.structures.numbering import Numbering
 from rotfem.version import versions
-
-if TYPE_CHECKING:
-    from rotfem.commands.simulation import Simulation
-    from rotfem.refinement.companion import Companion
 
 #: Positions of nodes that differ by this part of the structure's size are those of another mesh.
 MOVED = 1e-9
@@ -42,8 +40,8 @@ MOVED = 1e-9
 #: Shape of what a free hub and its structure were given (see `State`).
 GIVEN = (3,)
 
-#: What of a simulation changes while it runs, besides what its parts know themselves.
-CHANGING = ("steps", "warnings", "resumed", "_critical_since", "_exceeded")
+#: What a run counts and has to say, and what its monitor has seen, that changes while it goes on.
+OF_LOG, OF_MONITOR = ("steps", "warnings", "resumed"), ("since", "exceeded")
 
 #: By class, attributes that a run makes anew or that have a place of their own in a checkpoint.
 _STEPPER = ("system", "newton", "patience", "scheme", "trust", "watch", "_linearised", "_about")
@@ -198,14 +196,49 @@ class Packing:
         return self.numbering.local(values, kind)
 
 
+@dataclass
+class Log:
+    """What a run counts and has to say.
+
+    Attributes:
+        started: `perf_counter()` then, s.
+        steps: number of the last step.
+        elapsed: time that it had taken before it went on from a checkpoint, s.
+        warnings, advice: texts.
+        resumed: time (s) and number of ranks of every checkpoint that it went on from.
+    """
+
+    started: float = field(default_factory=perf_counter)
+    steps: int = 0
+    elapsed: float = 0.0
+    warnings: list[str] = field(default_factory=list)
+    advice: list[str] = field(default_factory=list)
+    resumed: list[dict[str, Any]] = field(default_factory=list)
+
+
+@dataclass
+class Parts:
+    """What of a run a checkpoint holds: what marches, and what observes it; without a stepper nothing can be kept."""
+
+    time: Time
+    system: Any
+    stepper: Stepper | None
+    record: Recorder
+    monitor: Monitor
+    log: Log
+    companions: Sequence[Companion]
+    choice: Choice | None
+    setting: Setting | None
+
+
 class Memory:
     """What one run knows.
 
     Args:
-        run: the run.
+        run: its parts.
     """
 
-    def __init__(self, run: Simulation):
+    def __init__(self, run: Parts):
         self.run = run
         self.numbering = Numbering(run.system.V)
         self.packing = Packing(self.numbering)
@@ -228,10 +261,10 @@ class Memory:
             "state": self.packing.packed({k: v for k, v in vars(state).items() if k not in ("given", "inner")}),
             "factored": self.packing.packed(run.system.held.factored),
             "stepper": of_stepper(run.stepper, self.packing),
-            "run": {name: getattr(run, name) for name in CHANGING},
-            "seen": self.packing.packed({"farthest": run.farthest.seen, "stability": run.stability}),
+            "run": self._changing(),
+            "seen": self.packing.packed({"farthest": run.monitor.farthest.seen, "stability": run.monitor.stability}),
             "companions": self._of_companions(),
-            "elapsed": run.elapsed + perf_counter() - run.started,
+            "elapsed": run.log.elapsed + perf_counter() - run.log.started,
             "factorisations": run.system.factorisations,
             "columns": list(run.record.history.columns),
             "rows": np.array(run.record.history.rows()).reshape(len(run.record.history), -1),
@@ -240,6 +273,13 @@ class Memory:
             "snapshots": None if snapshots is None else self.packing.packed(vars(snapshots)),
             "choice": None if run.choice is None else vars(run.choice),
             "settings": None if run.setting is None else vars(run.setting),
+        }
+
+    def _changing(self) -> Tree:
+        log, monitor = self.run.log, self.run.monitor
+        return {
+            "log": {name: getattr(log, name) for name in OF_LOG},
+            "monitor": {name: getattr(monitor, name) for name in OF_MONITOR},
         }
 
     def put_back(self, path: Path, tree: Tree) -> State:
@@ -272,20 +312,20 @@ class Memory:
         check_state(run.system, stepper, state)
         if state.t != tree["t"]:
             raise ValueError("t")
-        changing = {name: getattr(run, name) for name in CHANGING}
-        alike(changing, tree["run"], "run")
+        alike(self._changing(), tree["run"], "run")
         seen = self.packing.unpacked(tree["seen"])
-        alike({"farthest": run.farthest.seen, "stability": None}, {**seen, "stability": None}, "seen")
+        alike({"farthest": run.monitor.farthest.seen, "stability": None}, {**seen, "stability": None}, "seen")
         if not suits(seen["stability"], Stability | None):
             raise TypeError("stability")
         for name, kind in (("warnings", str), ("resumed", dict)):
-            if not all(isinstance(entry, kind) for entry in tree["run"][name]):
+            if not all(isinstance(entry, kind) for entry in tree["run"]["log"][name]):
                 raise TypeError(name)
         restored(run.system, self.packing.unpacked(tree["factored"]), state)
         system.factored_before = tree["factorisations"] - system.factorisations
-        vars(run).update(tree["run"])
+        vars(run.log).update(tree["run"]["log"])
+        vars(run.monitor).update(tree["run"]["monitor"])
         put_back_stepper(stepper, self.packing, tree["stepper"], state)
-        run.farthest.seen, run.stability = seen["farthest"], seen["stability"]
+        run.monitor.farthest.seen, run.monitor.stability = seen["farthest"], seen["stability"]
         self._put_back_companions(tree["companions"])
         for row in tree["rows"]:
             run.record.history.append(row)
@@ -295,7 +335,7 @@ class Memory:
             run.record.resultants.put_back(tree["resultants"], len(tree["rows"]))
         if run.record.snapshots is not None:
             run.record.snapshots.put_back(self.packing.unpacked(tree["snapshots"]), len(tree["rows"]))
-        run.elapsed = tree["elapsed"]
+        run.log.elapsed = tree["elapsed"]
         return state
 
     def _check_rows(self, tree: Tree) -> None:
@@ -304,12 +344,11 @@ class Memory:
         Raises:
             ValueError: it is.
         """
-        rows, t, time = tree["rows"], tree["t"], self.run.scene.time
-        assert time is not None
-        if tree["columns"] != list(self.run.record.history.columns) or tree["run"]["steps"] < 0:
+        rows, t, time = tree["rows"], tree["t"], self.run.time
+        if tree["columns"] != list(self.run.record.history.columns) or tree["run"]["log"]["steps"] < 0:
             raise ValueError("columns")
         if time.output_step is None:
-            due = 1 + tree["run"]["steps"] // time.output_every
+            due = 1 + tree["run"]["log"]["steps"] // time.output_every
         else:
             due = 1 + int(min(t, time.end) / time.output_step * (1 + 1e-9))
         if rows.ndim != 2 or rows.shape[1] != len(tree["columns"]) or not due <= len(rows) <= due + 1:
@@ -319,9 +358,7 @@ class Memory:
 
     def _companions(self) -> list[tuple[Companion, Packing]]:
         """Return the companions of the march, each with what packs arrays over its own mesh."""
-        if self.run.companions is None:
-            return []
-        return [(c, Packing(Numbering(c.system.V))) for c in self.run.companions.companions]
+        return [(c, Packing(Numbering(c.system.V))) for c in self.run.companions]
 
     def _of_companions(self) -> list[Tree]:
         """Return what the companions know: steps that wait are of the run's mesh, the state of their own."""

@@ -16,7 +16,7 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Any, NoReturn
 
-from rotfem.commands.interrupts import Interrupted
+from rotfem.commands.interrupts import together
 from rotfem.commands.result_folder import ResultFolder, Writer
 from rotfem.errors import ComputationError, InputError, OutputError, SceneError, printable
 from rotfem.results.files import json_text
@@ -90,7 +90,7 @@ class Session:
         if isinstance(error, MemoryError):
             self._end("the computation failed: there is not enough memory; use fewer elements, or fewer modes", 3)
         if isinstance(error, KeyboardInterrupt):
-            if self.comm.size > 1 and not isinstance(error, Interrupted):
+            if not together(self.comm, error):
                 self._leave("interrupted", 130)
             self._end("interrupted", 130)
         if self.comm.size > 1 and not isinstance(error, SystemExit):

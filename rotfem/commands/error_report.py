@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,22 +14,20 @@ from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.reduced.response import reduced_response
 from rotfem.analysis.reduced.tips import largest as largest_of
 from rotfem.analysis.schemes import State
-from rotfem.analysis.stability import stability_of
-from rotfem.analysis.theory_error import RESOLVED, TheoryError
-from rotfem.commands.reduced_history import accuracy_of
+from rotfem.analysis.stability import Stability, stability_of
+from rotfem.analysis.theory_error import RESOLVED, Farthest, TheoryError
+from rotfem.commands.first_state import Start
+from rotfem.commands.reduced_history import ReducedHistory, accuracy_of
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import by_itself, on_other_mesh
-from rotfem.refinement.discretisation import error_by_cells, error_of_shape, richer_problem
+from rotfem.refinement.discretisation import HistoryErrors, error_by_cells, error_of_shape, richer_problem
 from rotfem.refinement.distance import COLUMNS, OUTPUTS, largest, tip
 from rotfem.refinement.estimate import ErrorEstimate, percent
 from rotfem.scene import Scene
 from rotfem.selection.model_choice import Choice
-
-if TYPE_CHECKING:
-    from rotfem.commands.simulation import Simulation
 
 Array = npt.NDArray[np.float64]
 
@@ -41,131 +41,200 @@ UNKNOWN = {"time": "steps", "space": "mesh", "model": "theory"}
 NAMED = 0.1
 
 
-def error_wanted(run: Simulation) -> bool:
-    """Return whether a run is to say its error."""
-    return run.scene.output.error or run.setting is not None
+@dataclass
+class RunErrors:
+    """The errors of what a run has computed.
 
-
-def error_of_run(run: Simulation) -> ErrorEstimate | None:
-    """Return the error of a run so far, relative to the largest displacement of its tip, or what `accuracy_of` names.
-
-    None where it is not wanted, or nothing was computed.
+    Attributes:
+        scene: what was run.
+        problem: its problem.
+        system: that of it.
+        history: columns of its rows.
+        wanted: whether errors are to be estimated.
+        choice: how the model was chosen, if it was.
+        farthest: largest state.
+        stability: of the equilibrium; None without one.
+        shape: the equilibrium, a local dof array; None of a history.
+        reduced: a reduced model's history; None of others.
+        companions: of a march; None without them.
+        stepper: of a march; None of others.
+        start: returns what the history starts from in another system of the problem.
     """
-    if not error_wanted(run) or not len(run.record.history):
-        return None
-    of = output_of(run.scene)
-    columns = [values for name, values in run.record.history.arrays().items() if name.startswith(COLUMNS[of])]
-    scale = largest(np.column_stack(columns))
-    shares: dict[str, float | None] = {"time": None, "space": None}
-    found: dict[str, Any] = {"scale": scale}
-    if run.reduced is not None:
-        shares = {"time": run.reduced.time_error + run.reduced.projection_error, "space": _of_reduced(run, scale)}
-    elif run.scene.time is None:
-        assert run.last is not None
-        space = error_of_shape(run.problem, run.system, run.last.q, lambda s: _resting(run, s), OUTPUTS[of])
-        shares = {"time": 0.0, "space": space}
-    elif run.companions is not None:
-        shares = run.companions.errors(scale)
-        found["time_at"] = run.companions.steps.difference[1]
-    return ErrorEstimate({**shares, "model": model_share(run.theory_error, run.choice)}, found)
 
+    scene: Scene
+    problem: Problem
+    system: Any
+    history: Mapping[str, Array]
+    wanted: bool
+    choice: Choice | None
+    farthest: Farthest
+    stability: Stability | None
+    shape: Array | None
+    reduced: ReducedHistory | None
+    companions: HistoryErrors | None
+    stepper: Any
+    start: Callable[[Any], Start]
 
-def output_of(scene: Scene) -> str:
-    """Return the name of the output whose error a run of a scene estimates."""
-    return scene.accuracy_of if scene.accuracy_of in OUTPUTS else "tip"
+    @property
+    def _scale(self) -> float:
+        """Largest displacement of the tip, m."""
+        return largest(np.column_stack([self.history[f"tip_{self._names[i]}"] for i in self._moves]))
 
+    @property
+    def _names(self) -> tuple[str, ...]:
+        names: tuple[str, ...] = self.system.structure.components
+        return names
 
-def _resting(run: Simulation, system: Any) -> Any:
-    """Return the equilibrium of a run on another mesh."""
-    solver = run.scene.solver
-    return steady_state(system, run.problem.motion.speed(0.0), Newton.of(solver), past_limits=solver.past_limits)
+    @property
+    def _moves(self) -> list[int]:
+        """Numbers of the components that are displacements."""
+        return [i for i, name in enumerate(self._names) if name.startswith("u")]
 
+    def estimate(self) -> ErrorEstimate | None:
+        """Return the error, relative to the largest value of its output; None if not wanted, or nothing was computed.
 
-def _of_reduced(run: Simulation, scale: float) -> float | None:
-    """Return the error of a reduced answer by the mesh: its difference to a reduced answer on another one."""
-    own, other = run.reduced, on_other_mesh(run.problem, run.system)
-    if not scale > 0.0:
-        return 0.0  # nothing moves it, on no mesh
-    if own is None or other is None:
-        return None
-    system, ratio = other
-    try:
-        start, _ = run.start_of(system)
-        there = reduced_response(system, own.times, start, accuracy_of(run.scene))
-    except ComputationError:
-        return None
-    return error_by_cells(largest_of(own.model, there.tips - own.tips) / scale, ratio)
-
-
-def theory_error_of_run(run: Simulation, history: Mapping[str, Array]) -> TheoryError | None:
-    """Return the error of the theory in what was computed so far; None where it is not known, or not wanted.
-
-    Args:
-        run: what is computed.
-        history: its columns so far.
-    """
-    if run.foreshortened is not None:
-        return run.foreshortened.theory_error()
-    if not len(run.record.history):
-        return None
-    names = run.system.structure.components
-    tips = np.array([np.max(np.abs(history[f"tip_{name}"])) for name in names])
-    richer = richer_problem(run.problem)
-    if richer is None:
-        return run.farthest.error(run.system, tips)
-    if not error_wanted(run):
-        return None
-    moves = [i for i, name in enumerate(names) if name.startswith("u")]
-    scale = largest(np.column_stack([history[f"tip_{names[i]}"] for i in moves]))
-    try:
-        found = _apart(run, richer, scale)
-    except (ComputationError, InputError):
-        return None
-    if found is None:
-        return None
-    system, apart, components = found
-    if run.scene.time is None and _buckles(run, system):
-        return TheoryError(1.0, "it is above a buckling load that it does not see", run.problem.theory.name)
-    base = run.farthest.error(system, tips)
-    if base is None:
-        return None
-    sizes = tips[moves]
-    resolved = sizes > RESOLVED * np.max(sizes, initial=0.0)
-    own = {f"tip_{names[i]}": d / s for i, d, s, known in zip(moves, components, sizes, resolved, strict=True) if known}
-    return base.of_poorer(run.problem.theory, apart, own)
-
-
-def _apart(run: Simulation, richer: Problem, scale: float) -> tuple[Any, float, Array] | None:
-    """Return the system of a richer theory, how far its tip is from the run's, relative, and that by components, m.
-
-    None where that is not known. The difference of equilibria is relative to the smaller displacement.
-
-    Args:
-        run: what is computed.
-        richer: its problem in the richer theory.
-        scale: largest displacement of the run's tip, m.
-
-    Raises:
-        ComputationError: there is no answer in that theory.
-        InputError: it cannot have what the problem has.
-    """
-    if run.companions is not None:
-        run.companions.steps.finish()
-        companion = run.companions.theory
-        if companion is None or not companion.sound or not run.companions.steps.sound:
+        The output is the displacement of the tip, or what `accuracy_of` names.
+        """
+        if not self.wanted or not len(self.history["t"]):
             return None
-        return companion.system, _relative(companion.difference[0], scale), np.array(companion.components or ())
-    system = compile_system(by_itself(richer), run.system.comm, moving=run.scene.time is not None)
-    if run.reduced is not None:
-        start, _ = run.start_of(system)
-        response = reduced_response(system, run.reduced.times, start, accuracy_of(run.scene))
-        moves = [i for i, name in enumerate(run.system.structure.components) if name.startswith("u")]
-        differences = (response.tips - run.reduced.tips)[:, moves]
-        return system, _relative(largest(differences), scale), np.abs(differences).max(axis=0)
-    assert run.last is not None
-    own, there = tip(run.system, run.last), tip(system, State.at_rest(system, *system.start(_resting(run, system))))
-    smaller = min(float(np.linalg.norm(there)), scale)
-    return system, _relative(float(np.linalg.norm(there - own)), smaller), np.abs(there - own)
+        of = output_of(self.scene)
+        scale = largest(np.column_stack([x for name, x in self.history.items() if name.startswith(COLUMNS[of])]))
+        shares: dict[str, float | None] = {"time": None, "space": None}
+        found: dict[str, Any] = {"scale": scale}
+        if self.reduced is not None:
+            response = self.reduced.response
+            shares = {"time": response.time_error + response.projection_error, "space": self._space_of_reduced(scale)}
+        elif self.shape is not None:
+            space = error_of_shape(self.problem, self.system, self.shape, self._resting, OUTPUTS[of])
+            shares = {"time": 0.0, "space": space}
+        elif self.companions is not None:
+            shares = self.companions.errors(scale)
+            found["time_at"] = self.companions.steps.difference[1]
+        return ErrorEstimate({**shares, "model": model_share(self.theory, self.choice)}, found)
+
+    @cached_property
+    def theory(self) -> TheoryError | None:
+        """Error of the theory; None where it is unknown, not wanted, or nothing was computed."""
+        if self.reduced is not None and self.reduced.foreshortened is not None:
+            return self.reduced.foreshortened.theory_error()
+        if not len(self.history["t"]):
+            return None
+        names, moves = self._names, self._moves
+        tips = np.array([np.max(np.abs(self.history[f"tip_{name}"])) for name in names])
+        richer = richer_problem(self.problem)
+        if richer is None:
+            return self.farthest.error(self.system, tips)
+        if not self.wanted:
+            return None
+        try:
+            found = self._apart(richer)
+        except (ComputationError, InputError):
+            return None
+        if found is None:
+            return None
+        system, apart, components = found
+        if self.shape is not None and self._buckles(system):
+            return TheoryError(1.0, "it is above a buckling load that it does not see", self.problem.theory.name)
+        base = self.farthest.error(system, tips)
+        if base is None:
+            return None
+        sizes = tips[moves]
+        resolved = sizes > RESOLVED * np.max(sizes, initial=0.0)
+        each = zip(moves, components, sizes, resolved, strict=True)
+        own = {f"tip_{names[i]}": d / size for i, d, size, known in each if known}
+        return base.of_poorer(self.problem.theory, apart, own)
+
+    def _apart(self, richer: Problem) -> tuple[Any, float, Array] | None:
+        """Return the system of a richer theory, how far its tip is from the run's, relative, and by components, m.
+
+        None where that is not known. The difference of equilibria is relative to the smaller displacement.
+
+        Raises:
+            ComputationError: there is no answer in that theory.
+            InputError: it cannot have what the problem has.
+        """
+        if self.companions is not None:
+            self.companions.steps.finish()
+            companion = self.companions.theory
+            if companion is None or not companion.sound or not self.companions.steps.sound:
+                return None
+            apart = _relative(companion.difference[0], self._scale)
+            return companion.system, apart, np.array(companion.components or ())
+        system = compile_system(by_itself(richer), self.system.comm, moving=self.scene.time is not None)
+        if self.reduced is not None:
+            response = self.reduced.response
+            there = reduced_response(system, response.times, self.start(system).q, accuracy_of(self.scene))
+            differences = (there.tips - response.tips)[:, self._moves]
+            return system, _relative(largest(differences), self._scale), np.abs(differences).max(axis=0)
+        if self.shape is None:
+            return None
+        shapes = ((self.system, self.shape), (system, self._resting(system)))
+        own, other = (tip(s, State.at_rest(s, *s.start(q.copy()))) for s, q in shapes)
+        smaller = min(float(np.linalg.norm(other)), self._scale)
+        return system, _relative(float(np.linalg.norm(other - own)), smaller), np.abs(other - own)
+
+    def _resting(self, system: Any) -> Array:
+        """Return the equilibrium in another system."""
+        solver, speed = self.scene.solver, self.problem.motion.speed(0.0)
+        return steady_state(system, speed, Newton.of(solver), past_limits=solver.past_limits)
+
+    def _buckles(self, system: Any) -> bool:
+        """Return whether a richer theory has no stable equilibrium where the run's is stable; its state is set."""
+        there = stability_of(system, system.held.q.x.array.copy(), self.problem.motion.speed(0.0))
+        return there.stable is False and self.stability is not None and self.stability.stable is True
+
+    def _space_of_reduced(self, scale: float) -> float | None:
+        """Return the error of a reduced answer by the mesh: its difference to a reduced answer on another one."""
+        other = on_other_mesh(self.problem, self.system)
+        if not scale > 0.0:
+            return 0.0  # nothing moves it, on no mesh
+        if self.reduced is None or other is None:
+            return None
+        (system, ratio), own = other, self.reduced.response
+        try:
+            there = reduced_response(system, own.times, self.start(system).q, accuracy_of(self.scene))
+        except ComputationError:
+            return None
+        return error_by_cells(largest_of(own.model, there.tips - own.tips) / scale, ratio)
+
+    def warnings(self, error: ErrorEstimate) -> list[str]:
+        """Return what is to be known of an error; nothing where it is small, asked for, or reported already."""
+        scene = self.scene
+        tolerance = None if scene.time is None else scene.time.tolerance
+        if scene.accuracy is not None:  # what asked for it says what was reached
+            return []
+        unknown = [word for name, word in UNKNOWN.items() if error.shares[name] is None]
+        said = (
+            [f"the error by the {' and the '.join(unknown)} is unknown: {self._why_unknown(error)}"] if unknown else []
+        )
+        if not error.exceeds(max(WANTED, scene.model.tolerance or 0.0, tolerance or 0.0)):
+            return said
+        steps, mesh, model = (error.shares[name] or 0.0 for name in ("time", "space", "model"))
+        if steps + mesh <= WANTED and self.theory is not None and self.theory.warning():
+            return said
+        cures = []
+        if steps >= WANTED / 2 and self.stepper is not None:
+            cures.append(finer_steps(scene, self.stepper, steps))
+        if mesh >= WANTED / 2:
+            cures.append("a higher mesh.degree" if scene.structure.mesh_file else "more mesh.elements")
+        if model >= WANTED / 2:
+            cures.append("a richer theory")
+        shares = {"steps": steps, "mesh": mesh, "model": model}
+        named = [f"{percent(share)} by the {n}" for n, share in shares.items() if share > NAMED * sum(shares.values())]
+        off = (
+            f"the tip may be off by {percent(error.total)} of its largest displacement (estimated: {', '.join(named)})"
+        )
+        return [f"{off}: {', '.join(cures)}" if cures else off, *said]
+
+    def _why_unknown(self, error: ErrorEstimate) -> str:
+        """Return why a contribution is unknown."""
+        if self.companions is None and error.shares["space"] is None:
+            return "there is no other mesh to compare with"
+        if self.companions is None or error.shares["time"] is not None:
+            return "the same in a richer theory fails"
+        if self.companions.steps.sound:
+            return "what is prescribed leaves no room for steps of twice the length"
+        return "steps of twice the length fail, so that these are hardly short enough"
 
 
 def _relative(apart: float, scale: float) -> float:
@@ -175,11 +244,9 @@ def _relative(apart: float, scale: float) -> float:
     return apart / scale if scale > 0.0 else 1.0
 
 
-def _buckles(run: Simulation, system: Any) -> bool:
-    """Return whether a richer theory has no stable equilibrium where that of a run says it has; its state is set."""
-    speed = run.problem.motion.speed(0.0)
-    there = stability_of(system, system.held.q.x.array.copy(), speed)
-    return there.stable is False and run.stability is not None and run.stability.stable is True
+def output_of(scene: Scene) -> str:
+    """Return the name of the output whose error a run of a scene estimates."""
+    return scene.accuracy_of if scene.accuracy_of in OUTPUTS else "tip"
 
 
 def model_share(theory: TheoryError | None, choice: Choice | None) -> float | None:
@@ -197,42 +264,6 @@ def error_of_modes(rows: Iterable[Mapping[str, Any]], theory: TheoryError | None
     bound = float(max((row["error_bound"] for row in flexible), default=0.0))
     space = None if None in mesh else float(max(mesh, default=0.0))
     return ErrorEstimate({"space": space, "model": None if theory is None else theory.estimate, "round_off": bound})
-
-
-def warnings_of_run(run: Simulation, error: ErrorEstimate) -> list[str]:
-    """Return what is to be said of the error of a run; nothing where that is small, asked for, or said already."""
-    scene = run.scene
-    tolerance = None if scene.time is None else scene.time.tolerance
-    if scene.accuracy is not None:  # what asked for it says what was reached
-        return []
-    unknown = [word for name, word in UNKNOWN.items() if error.shares[name] is None]
-    said = [f"the error by the {' and the '.join(unknown)} is unknown: {_why_unknown(run, error)}"] if unknown else []
-    if not error.exceeds(max(WANTED, scene.model.tolerance or 0.0, tolerance or 0.0)):
-        return said
-    steps, mesh, model = (error.shares[name] or 0.0 for name in ("time", "space", "model"))
-    if steps + mesh <= WANTED and run.theory_error is not None and run.theory_error.warning():
-        return said
-    cures = []
-    if steps >= WANTED / 2 and run.stepper is not None:
-        cures.append(finer_steps(scene, run.stepper, steps))
-    if mesh >= WANTED / 2:
-        cures.append("a higher mesh.degree" if scene.structure.mesh_file else "more mesh.elements")
-    if model >= WANTED / 2:
-        cures.append("a richer theory")
-    shares = {"steps": steps, "mesh": mesh, "model": model}
-    named = [f"{percent(share)} by the {n}" for n, share in shares.items() if share > NAMED * sum(shares.values())]
-    off = f"the tip may be off by {percent(error.total)} of its largest displacement (estimated: {', '.join(named)})"
-    return [f"{off}: {', '.join(cures)}" if cures else off, *said]
-
-
-def _why_unknown(run: Simulation, error: ErrorEstimate) -> str:
-    if run.companions is None and error.shares["space"] is None:
-        return "there is no other mesh to compare with"
-    if run.companions is None or error.shares["time"] is not None:
-        return "the same in a richer theory fails"
-    if run.companions.steps.sound:
-        return "what is prescribed leaves no room for steps of twice the length"
-    return "steps of twice the length fail, so that these are hardly short enough"
 
 
 def finer_steps(scene: Scene, stepper: Any, share: float) -> str:

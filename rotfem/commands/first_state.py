@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -10,14 +11,13 @@ import numpy.typing as npt
 from rotfem.analysis.constant_conditions import act_at_start, are_constant, stability_ahead
 from rotfem.analysis.equilibrium import static_tip_shape, steady_state
 from rotfem.analysis.modal import ModalAnalysis
-from rotfem.analysis.stability import stability_of
+from rotfem.analysis.stability import Stability, stability_of
 from rotfem.commands.problem import first_motion
 from rotfem.equations.compiled import compile_system, with_all_unknowns
 from rotfem.errors import ComputationError
+from rotfem.mechanics.problem import Problem
 from rotfem.numerics.newton import Newton
-
-if TYPE_CHECKING:
-    from rotfem.commands.simulation import Simulation
+from rotfem.scene import Scene
 
 Array = npt.NDArray[np.float64]
 
@@ -25,10 +25,27 @@ Array = npt.NDArray[np.float64]
 WITHOUT = 'initial.state = "undeformed" to start without an equilibrium'
 
 
-def hints_of_start(run: Simulation) -> list[str]:
+@dataclass
+class Start:
+    """What a history starts from.
+
+    Attributes:
+        q, v: shape in the turning frame and velocities relative to it, local dof arrays; None where it is undeformed,
+            or at rest.
+        stability: of the equilibrium that it starts from, or that constant conditions hold it in; None without one.
+        warnings: what is to be known of it.
+    """
+
+    q: Array | None = None
+    v: Array | None = None
+    stability: Stability | None = None
+    warnings: list[str] = field(default_factory=list)
+
+
+def hints_of_start(scene: Scene, problem: Problem) -> list[str]:
     """Return hints about what a history starts from: where that rings for ever, or never moves."""
-    initial, problem = run.scene.initial, run.problem
-    if run.scene.time is None or initial.tip_displacement is not None or not act_at_start(problem):
+    initial = scene.initial
+    if scene.time is None or initial.tip_displacement is not None or not act_at_start(problem):
         return []
     if initial.state == "undeformed":
         what = "what acts at t = 0 acts all at once, and what that sets ringing is followed to the end"
@@ -39,61 +56,67 @@ def hints_of_start(run: Simulation) -> list[str]:
     return [f'{what}; initial.state = "undeformed" lets them act all at once at t = 0']
 
 
-def first_state(run: Simulation) -> tuple[Array | None, Array | None]:
-    """Return (q, q̇) at t = 0 in the turning frame, local dof arrays; None where it is undeformed, or at rest.
+def first_state(scene: Scene, problem: Problem, system: Any) -> Start:
+    """Return what the history of a scene starts from.
 
-    What there is to be said of them is added to the warnings of the run.
-    """
-    q, motion = _shape(run), first_motion(run.scene)
-    if motion is None:
-        return q, None
-    analysis = ModalAnalysis(run.problem, run.scene.initial.state, comm=run.comm, system=run.system)
-    return motion.beside(q, analysis, Newton.of(run.scene.solver))
-
-
-def _shape(run: Simulation) -> Array | None:
-    """Return q at t = 0 in the turning frame, local dof array; None where it is undeformed.
+    Args:
+        scene: what is run.
+        problem: its problem, with the model and the mesh in use.
+        system: the equations of motion of that.
 
     Raises:
         ComputationError: there is no static shape, or no stable equilibrium.
     """
-    initial, solver = run.scene.initial, run.scene.solver
+    start, motion = _shape(scene, problem, system), first_motion(scene)
+    if motion is not None:
+        analysis = ModalAnalysis(problem, scene.initial.state, comm=system.comm, system=system)
+        start.q, start.v = motion.beside(start.q, analysis, Newton.of(scene.solver))
+    return start
+
+
+def _shape(scene: Scene, problem: Problem, system: Any) -> Start:
+    """Return a start at rest.
+
+    Raises:
+        ComputationError: there is no static shape, or no stable equilibrium.
+    """
+    initial, solver = scene.initial, scene.solver
     if initial.state == "steady":
-        return _equilibrium(run)
-    run.stability = stability_ahead(run.system, Newton.of(solver))
-    if run.stability is not None and (said := run.stability.warning()):
-        run.warnings.append(f"what constant conditions hold in balance: {said}")
-    if initial.tip_displacement is None:
-        return None
-    return static_tip_shape(run.problem, initial.tip_displacement, Newton.of(solver), run.comm)
+        return _equilibrium(scene, problem, system)
+    start = Start(stability=stability_ahead(system, Newton.of(solver)))
+    if start.stability is not None and (said := start.stability.warning()):
+        start.warnings.append(f"what constant conditions hold in balance: {said}")
+    if initial.tip_displacement is not None:
+        start.q = static_tip_shape(problem, initial.tip_displacement, Newton.of(solver), system.comm)
+    return start
 
 
-def _equilibrium(run: Simulation) -> Array | None:
-    """Return the equilibrium under the speed, loads and pitch of t = 0; None where nothing acts then.
+def _equilibrium(scene: Scene, problem: Problem, system: Any) -> Start:
+    """Return the equilibrium under the speed, loads and pitch of t = 0; undeformed where nothing acts then.
 
     Raises:
         ComputationError: there is none, or an unstable one.
     """
-    system, solver, speed = run.system, run.scene.solver, run.problem.motion.speed(0.0)
-    if run.problem.frame == "inertial":
-        system = compile_system(run.problem.replace(frame="rotating"), run.comm, moving=False)
+    solver, start, speed = scene.solver, Start(), problem.motion.speed(0.0)
+    if problem.frame == "inertial":
+        system = compile_system(problem.replace(frame="rotating"), system.comm, moving=False)
     if speed == 0.0 and not _is_loaded(system.held):
-        return None
+        return start
 
     def found(system: Any, notes: list[str]) -> Array:
         return steady_state(system, speed, Newton.of(solver), past_limits=solver.past_limits, notes=notes)
 
     try:
-        q, whole = found(system, run.warnings), with_all_unknowns(system)
-        run.stability = stability_of(whole, q if whole is system else found(whole, []), speed)
+        start.q, whole = found(system, start.warnings), with_all_unknowns(system)
+        start.stability = stability_of(whole, start.q if whole is system else found(whole, []), speed)
     except ComputationError as error:
         raise ComputationError(f"no equilibrium to start from: {error.what}", advice=WITHOUT) from error
-    said = run.stability.warning()
-    if run.stability.stable is False:
+    said = start.stability.warning()
+    if start.stability.stable is False:
         raise ComputationError(f"the history would start from an {said}", advice=WITHOUT)
     if said:
-        run.warnings.append(f"what the history starts from: {said}")
-    return q
+        start.warnings.append(f"what the history starts from: {said}")
+    return start
 
 
 def _is_loaded(system: Any) -> bool:

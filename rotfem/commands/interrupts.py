@@ -9,18 +9,15 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any, Self
 
 from rotfem.commands.signals import SIGNALS
+from rotfem.errors import Stopped
 
 if TYPE_CHECKING:
     from mpi4py import MPI
 
 
-class Interrupted(KeyboardInterrupt):
-    """All ranks have agreed to end, so that what they do together can still be done."""
-
-
 def together(comm: MPI.Comm, stop: KeyboardInterrupt) -> bool:
     """Return whether all ranks have been interrupted at the same place; otherwise the others may be anywhere."""
-    return comm.size == 1 or isinstance(stop, Interrupted)
+    return comm.size == 1 or isinstance(stop, Stopped)
 
 
 class Interrupts:

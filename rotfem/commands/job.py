@@ -15,7 +15,7 @@ from rotfem.commands.console import Session, missing
 from rotfem.commands.options import as_path, folder_name
 from rotfem.commands.result_folder import ResultFolder, Writer
 from rotfem.commands.signals import held_back
-from rotfem.errors import ComputationError, InputError
+from rotfem.errors import ComputationError, InputError, Stopped
 from rotfem.scene import Scene, load_scene
 from rotfem.scene.extensions import load
 from rotfem.version import __version__
@@ -130,10 +130,9 @@ def job(
             import rotfem.numerics.forms  # noqa: F401  PETSc first, which dolfinx would start in its own way
         try:
             yield Job(loaded, folder, session, not no_plots, session.hint(no_advice))
-        except (ComputationError, KeyboardInterrupt) as error:
-            so_far = getattr(error, "result", None)
-            if so_far is not None:
-                session.write(so_far, not no_plots)
+        except (ComputationError, Stopped) as error:
+            if error.result is not None:
+                session.write(error.result, not no_plots)
             raise
 
 

@@ -6,22 +6,22 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mpi4py import MPI
 
 from rotfem.analysis.schemes import State
-from rotfem.commands.interrupts import Interrupted, Interrupts
+from rotfem.commands.checkpoint import Memory, Parts, Tree, check_end, check_identity, check_parts, identity, told
+from rotfem.commands.interrupts import Interrupts
 from rotfem.commands.result_folder import ResultFolder
-from rotfem.errors import OutputError, SceneError
+from rotfem.errors import OutputError, SceneError, Stopped
+from rotfem.refinement.refine import Setting
+from rotfem.results.checkpoint_file import read_checkpoint, write_checkpoint
 from rotfem.results.files import CHECKPOINT
 from rotfem.results.live import LiveTable
 from rotfem.results.result_set import ResultSet, read_summary
 from rotfem.scene import Scene
-
-if TYPE_CHECKING:
-    from rotfem.commands.checkpoint import Memory, Tree
-    from rotfem.commands.simulation import Simulation
+from rotfem.selection.model_choice import Choice
 
 #: Bits of what ranks tell each other after a step.
 ASKED, DUE = 1, 2
@@ -72,6 +72,7 @@ class Keeper:
     ):
         self.comm, self.folder, self.every, self.resume = comm, folder, every, resume
         self._live: LiveTable | None = None
+        self._parts: Parts | None = None
         self._memory: Memory | None = None
         self._tree: Tree | None = None
         self._identity: Tree = {}
@@ -103,9 +104,6 @@ class Keeper:
             raise SceneError("command line", option, None, "has no meaning with model.reduced, which takes no steps")
         if self.folder is None:
             raise SceneError("command line", option, None, "needs a folder")
-        from rotfem.commands.checkpoint import check_end, check_identity, check_parts, identity
-        from rotfem.results.checkpoint_file import read_checkpoint
-
         self._identity, path, end = identity(scene, terms, outputs), self.folder.path / CHECKPOINT, scene.time.end
 
         def read(files: ResultSet) -> Tree:
@@ -123,26 +121,20 @@ class Keeper:
         """Return the summary in the folder if it is that of this run, done; None otherwise."""
         if self.folder is None:
             return None
-        from rotfem.commands.checkpoint import told
-
         summary = self.folder.first_does(lambda files: read_summary(files.folder))
         is_done = summary.get("command") == "run" and summary.get("status") == "done"
         return summary if is_done and told(summary.get("scene")) == told(scene.digest()) else None
 
-    def choice(self) -> Any:
+    def choice(self) -> Choice | None:
         """Return how the model was chosen that the run goes on with; None where it was not, or does not."""
         if self._tree is None or self._tree["choice"] is None:
             return None
-        from rotfem.selection.model_choice import Choice
-
         return Choice(**self._tree["choice"])
 
-    def setting(self) -> Any:
+    def setting(self) -> Setting | None:
         """Return the setting of the run that goes on, which an accuracy has led to; None where none has."""
         if self._tree is None or self._tree["settings"] is None:
             return None
-        from rotfem.refinement.refine import Setting
-
         return Setting(**self._tree["settings"])
 
     def interrupts(self) -> Interrupts:
@@ -150,23 +142,22 @@ class Keeper:
         self._interrupts = Interrupts(self.comm, self._secure, self.comm.size > 1 or self.every is not None)
         return self._interrupts
 
-    def start(self, run: Simulation) -> State | None:
+    def start(self, run: Parts) -> State | None:
         """Begin the set of a run; return the state that it goes on from, if it does.
 
         Raises:
             OutputError: the folder cannot be written.
             SceneError: the checkpoint does not fit.
         """
+        self._parts = run
         if self.folder is None:
             return None
         state, path = None, self.folder.path / CHECKPOINT
         if self.every is not None or self._tree is not None:
-            from rotfem.commands.checkpoint import Memory
-
             self._memory = Memory(run)
         if self._tree is not None and self._memory is not None:
             state = self._memory.put_back(path, self._tree)
-            run.resumed.append({"time": state.t, "ranks": self.comm.size})
+            run.log.resumed.append({"time": state.t, "ranks": self.comm.size})
         keep = (CHECKPOINT,) if self._tree is not None else ()
         self._tree = None  # a richer model would start afresh
 
@@ -178,54 +169,54 @@ class Keeper:
         self._written = monotonic()
         return state
 
-    def stepped(self, run: Simulation, state: State) -> None:
+    def stepped(self, state: State) -> None:
         """Take note of the end of a step.
 
         Raises:
-            Interrupted: a signal has asked one of the ranks to end.
+            Stopped: a signal has asked one of the ranks to end.
         """
         if self._live is not None:
             self._live.update()
-        told = ASKED * self._interrupts.asked + DUE * self._is_due(run)
+        told = ASKED * self._interrupts.asked + DUE * self._is_due()
         if self.comm.size > 1:
             told = self.comm.allreduce(told, op=MPI.BOR)
-        if told or self._is_last(run, state):
-            self._save(run, state)
+        if told or self._is_last(state):
+            self._save(state)
         if told & ASKED and self._interrupts.active:
-            raise Interrupted
+            raise Stopped
 
-    def _is_due(self, run: Simulation) -> bool:
-        if self.every is None or run.steps == 0:
+    def _is_due(self) -> bool:
+        run = self._parts
+        if self.every is None or run is None or run.log.steps == 0:
             return False
         if self.every.steps is not None:
-            return run.steps % self.every.steps == 0
+            return run.log.steps % self.every.steps == 0
         return self.comm.rank == 0 and monotonic() - self._written >= (self.every.seconds or 0.0)
 
-    @staticmethod
-    def _left(run: Simulation, state: State) -> float:
+    def _left(self, state: State) -> float:
         """Return how many more steps there are at least; of adaptive ones whether there is one."""
-        time = run.scene.time
-        assert time is not None
+        assert self._parts is not None
+        time = self._parts.time
         return (time.end - state.t) / (time.step or 1e-9 * time.end)
 
-    def _is_last(self, run: Simulation, state: State) -> bool:
+    def _is_last(self, state: State) -> bool:
         """Return whether this is the last state that a run with a later end would have met, too."""
-        time = run.scene.time
-        return time is not None and time.step is not None and 1 - 1e-6 <= self._left(run, state) < 2 - 1e-6
+        fixed = self._parts is not None and self._parts.time.step is not None
+        return fixed and 1 - 1e-6 <= self._left(state) < 2 - 1e-6
 
-    def _save(self, run: Simulation, state: State) -> None:
+    def _save(self, state: State) -> None:
         """Write a checkpoint, unless the last step is shorter than it would be in a run with a later end."""
-        if self._memory is None or self.every is None or self._left(run, state) < 1 - 1e-6:
+        if self._memory is None or self._parts is None or self.every is None or self._left(state) < 1 - 1e-6:
             return
-        from rotfem.results.checkpoint_file import write_checkpoint
-
         tree = self._memory.taken(state, self._identity) | {"every": vars(self.every)}
         if self.folder is not None and self.folder.set is not None:
             try:
                 write_checkpoint(self.folder.path / CHECKPOINT, tree)
             except OutputError as error:
                 if not self._failed:
-                    run.warnings.append(f"a checkpoint could not be written at t = {state.t:.6g} s: {error.reason}")
+                    self._parts.log.warnings.append(
+                        f"a checkpoint could not be written at t = {state.t:.6g} s: {error.reason}"
+                    )
                 self._failed = True
         self._written = monotonic()
 

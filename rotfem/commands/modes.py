@@ -21,10 +21,10 @@ from rotfem.analysis.modal import participation as masses_of
 from rotfem.analysis.stability import Stability, stability_of_pencil
 from rotfem.analysis.theory_error import TheoryCheck, TheoryError
 from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy
-from rotfem.commands.energy_growth import check_rows
 from rotfem.commands.error_report import error_of_modes
 from rotfem.commands.loads import held
 from rotfem.commands.mode_tables import advice, mode_tables
+from rotfem.commands.monitor import check_rows
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import ComputationError, SceneError, input_of

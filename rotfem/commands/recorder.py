@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.schemes import State
-from rotfem.commands.energy_growth import check_finite
 from rotfem.commands.fields import fields_writer, stations_writer
 from rotfem.commands.moment import hub_values, write_state
+from rotfem.commands.monitor import check_finite
 from rotfem.equations.plate_resultants import PlateResultants
 from rotfem.equations.stations import Stations
 from rotfem.errors import InputError

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.critical_speed import critical_speed, critical_speed_within
+from rotfem.analysis.critical_speed import critical_speed_within
 from rotfem.analysis.fixed_steps import Steps, grid
 from rotfem.analysis.reduced.energies import ReducedEnergies
-from rotfem.analysis.reduced.foreshortened import recover
+from rotfem.analysis.reduced.foreshortened import Foreshortened, recover
 from rotfem.analysis.reduced.response import ACCURACY, Response, reduced_response
 from rotfem.analysis.reduced.root_forces import root_forces
 from rotfem.analysis.schemes import State
+from rotfem.commands.checkpoint import Log
+from rotfem.commands.monitor import Monitor
+from rotfem.commands.recorder import Recorder
 from rotfem.errors import ComputationError
-from rotfem.listeners import Progress
 from rotfem.scene import Scene
 from rotfem.structures.paraview import MOST
 from rotfem.structures.root_reaction import along_axis
-
-if TYPE_CHECKING:
-    from rotfem.commands.simulation import Simulation
 
 Array = npt.NDArray[np.float64]
 
@@ -32,52 +32,59 @@ ROWS = 1000
 ENERGIES = ("kinetic", "strain", "jacobi")
 
 
-def by_reduced_model(run: Simulation, start: Array | None, progress: Progress) -> bool:
-    """Record the history of a reduced model; return whether one serves, which is said where it does not.
+@dataclass
+class ReducedHistory:
+    """The history of a run by a reduced model.
+
+    Attributes:
+        response: its coordinates.
+        foreshortened: what they move the structure back; None where that is not wanted.
+    """
+
+    response: Response
+    foreshortened: Foreshortened | None
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a summary has of it."""
+        out = self.response.summary()
+        return out if self.foreshortened is None else {**out, "foreshortening": self.foreshortened.summary()}
+
+
+def reduced_history(
+    scene: Scene, system: Any, start: Array | None, record: Recorder, monitor: Monitor, log: Log, alone: bool
+) -> ReducedHistory | None:
+    """Record the history of a reduced model; return None if none serves, which is noted.
 
     Args:
-        run: what is computed; its rows are added, and its warnings.
+        scene: what is run.
+        system: of its problem.
         start: shape at t = 0, local dof array; undeformed if None.
-        progress: called with 1 at the end.
+        record: takes the rows.
+        monitor: sees the states.
+        log: takes the warnings and the number of steps.
+        alone: whether the full system is of no use instead.
 
     Raises:
         ComputationError: it failed.
     """
-    if _recorded(run, start):
-        progress(1.0)
-        return True
-    run.critical = critical_speed(run.system)
-    return False
-
-
-def _recorded(run: Simulation, start: Array | None) -> bool:
-    """Record the history of a reduced model; return whether one serves."""
-    accuracy = accuracy_of(run.scene)
-    run.keeper.start(run)
-    with run.keeper.interrupts():
-        response = reduced_response(run.system, times_of(run.scene.time), start, accuracy)
-        run.response = response
-        if response.projection_error > accuracy:
-            if run.setting is not None:  # a full system of this theory costs as much as one of a richer theory
-                raise ComputationError(
-                    f"the reduced model of {response.model.size} vectors is off by {response.projection_error:.2g}"
-                )
-            run.warnings.append(
-                f"the reduced model of {response.model.size} vectors is off by {response.projection_error:.2g}, more "
-                f"than model.reduced allows ({accuracy:.2g}); the full system was used"
-            )
-            return False
-        run.reduced, run.steps = response, response.trajectory.steps
-        run.critical = critical_speed_within(run.system, response.model.V[response.model.owned])
-        if run.scene.model.foreshortening:
-            run.foreshortened = recover(response)
-        Rows(run, response).record()
+    accuracy = accuracy_of(scene)
+    response = reduced_response(system, times_of(scene.time), start, accuracy)
+    if response.projection_error > accuracy:
+        what = f"the reduced model of {response.model.size} vectors is off by {response.projection_error:.2g}"
+        if alone:  # a full system of this theory costs as much as one of a richer theory
+            raise ComputationError(what)
+        log.warnings.append(f"{what}, more than model.reduced allows ({accuracy:.2g}); the full system was used")
+        return None
+    log.steps = response.trajectory.steps
+    monitor.critical = critical_speed_within(system, response.model.V[response.model.owned])
+    done = ReducedHistory(response, recover(response) if scene.model.foreshortening else None)
+    Rows(done, record, monitor).record()
     if response.time_error > accuracy:
-        run.warnings.append(
+        log.warnings.append(
             f"the steps of the reduced model leave an error of {response.time_error:.2g}, more than model.reduced "
             f"allows ({accuracy:.2g})"
         )
-    return True
+    return done
 
 
 def accuracy_of(scene: Scene) -> float:
@@ -101,13 +108,14 @@ class Rows:
     """Rows and fields of a run, from a response.
 
     Args:
-        run: what is computed.
-        response: its history.
+        history: that of a reduced model.
+        record: takes the rows.
+        monitor: sees the states.
     """
 
-    def __init__(self, run: Simulation, response: Response):
-        self.run, self.response, self.system = run, response, run.system
-        self.foreshortened = run.foreshortened
+    def __init__(self, history: ReducedHistory, record: Recorder, monitor: Monitor):
+        self.response, self.foreshortened = history.response, history.foreshortened
+        self.rows, self.monitor, self.system = record, monitor, record.system
 
     def record(self) -> None:
         """Add all rows to the run's history, and look at states of it as a march does."""
@@ -120,14 +128,15 @@ class Rows:
         columns = np.column_stack([times, *turn[:2], tips, *energies[:3], root, *energies[3:]])
         for i, values in enumerate(columns):
             row = [float(value) for value in values]
-            record = self.run.record
+            record = self.rows
             wanted = record.needs_state
             state = self._state(i, a, turn) if i in kept or wanted else None
             if state is not None:
-                self.run.look(state)
+                self.monitor.step(state)
+                self.monitor.farthest(state.q, state.t)
                 row += self._outputs(state) if wanted else []
             row += record.also(float(times[i]))
-            self.run.record.add(row, self._shown(state, i) if i in kept else None)
+            record.add(row, self._shown(state, i) if i in kept else None)
 
     def _turn(self) -> tuple[Array, Array, Array]:
         """Return angle, speed and its rate of the frame in all rows, rad, rad/s, rad/s²."""

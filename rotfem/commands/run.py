@@ -11,19 +11,17 @@ from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady
 from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy
-from rotfem.commands.first_state import hints_of_start
 from rotfem.commands.keeper import Interval, Keeper
 from rotfem.commands.problem import Problem, case_of
 from rotfem.commands.result_folder import ResultFolder
 from rotfem.commands.simulation import Simulation
-from rotfem.errors import ComputationError, input_of
+from rotfem.errors import ComputationError, Stopped, input_of
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.outputs import Functional
 from rotfem.refinement.refine import Clock, Setting
 from rotfem.results.run import RunResult
 from rotfem.scene import Scene, as_scene
-from rotfem.scene.advice import advise
 from rotfem.selection.distance import HISTORY, STEADY
 from rotfem.selection.model_choice import RangeExceeded, choose
 
@@ -66,10 +64,9 @@ def run(
     with ResultFolder(comm, Path(folder), "run", scene.inputs) as results:
         try:
             done = simulate(scene, Keeper(comm, results, every, resume), progress, hint, terms, outputs)
-        except (ComputationError, KeyboardInterrupt) as error:
-            so_far = getattr(error, "result", None)
-            if so_far is not None:
-                results.write(so_far, plots=False)
+        except (ComputationError, Stopped) as error:
+            if error.result is not None:
+                results.write(error.result, plots=False)
             raise
         problems = results.write(done, plots=False)
         if problems:
@@ -97,15 +94,9 @@ def simulate(
             return run_to_accuracy(scene, keeper, (progress, hint), terms, outputs)
         if scene.model.tolerance is not None:
             return run_chosen(scene, problem, keeper, progress, hint)
-        return hinted(Simulation(scene, problem, comm, keeper=keeper), hint).run(progress)
-
-
-def hinted(simulation: Simulation, hint: Hint | None) -> Simulation:
-    """Return a simulation after its hints are told."""
-    simulation.advice = advise(
-        simulation.scene, "run", hint, critical=simulation.critical, also=hints_of_start(simulation)
-    )
-    return simulation
+        simulation = Simulation(scene, problem, comm, keeper=keeper)
+        simulation.advise(hint)
+        return simulation.run(progress)
 
 
 def run_to_accuracy(
@@ -127,9 +118,8 @@ def run_to_accuracy(
 
     def compute(setting: Setting) -> RunResult:
         variant = scene.replace(changes_of(scene, setting))
-        simulation = Simulation(variant, Problem.of(variant, terms=terms, outputs=outputs), keeper.comm, keeper=keeper)
-        simulation.setting, simulation.clock = setting, clock
-        return simulation.run(progress)
+        problem = Problem.of(variant, terms=terms, outputs=outputs)
+        return Simulation(variant, problem, keeper.comm, keeper=keeper, setting=setting, clock=clock).run(progress)
 
     return to_accuracy(scene, keeper.setting() or first_setting(scene), compute, clock)
 
@@ -146,7 +136,8 @@ def run_chosen(
     while True:
         try:
             simulation = Simulation(scene, choice.applied(problem), keeper.comm, choice, keeper)
-            return hinted(simulation, hint).run(progress)
+            simulation.advise(hint)
+            return simulation.run(progress)
         except ComputationError as error:
             if choice.full or scene.model.on_exceed != "upgrade":
                 raise

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from rotfem.errors import printable
 
@@ -25,6 +25,10 @@ class Result(ABC):
     """
 
     summary: dict[str, Any]
+
+    def with_summary(self, **entries: Any) -> Self:
+        """Return this result with further entries of its summary, or others in the place of those it has."""
+        return replace(self, summary={**self.summary, **entries})
 
     @property
     def status(self) -> str:

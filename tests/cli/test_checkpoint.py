@@ -95,14 +95,14 @@ class Killed(Exception):
 
 def cut(monkeypatch: pytest.MonkeyPatch, step: int) -> None:
     """Let runs end in the middle of a step."""
-    real = Simulation._check
+    real = Simulation._stepped
 
-    def check(self: Simulation, state: Any) -> None:
-        if self.steps == step:
+    def stepped(self: Simulation, *arguments: Any) -> None:
+        if self.log.steps == step:
             raise Killed
-        real(self, state)
+        real(self, *arguments)
 
-    monkeypatch.setattr(Simulation, "_check", check)
+    monkeypatch.setattr(Simulation, "_stepped", stepped)
 
 
 def scene_of(changes: dict[str, Any]) -> rotfem.Scene:
@@ -173,14 +173,14 @@ import os, signal, sys
 from rotfem.commands.simulation import Simulation
 from rotfem.commands.cli import main
 
-check = Simulation._check
+stepped = Simulation._stepped
 
-def signalled(self, state):
-    check(self, state)
-    if self.steps == {step}:
+def signalled(self, *arguments):
+    if self.log.steps == {step}:
         os.kill(os.getpid(), signal.{name})
+    stepped(self, *arguments)
 
-Simulation._check = signalled
+Simulation._stepped = signalled
 main()
 """
 

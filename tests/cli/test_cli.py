@@ -255,14 +255,14 @@ import os, signal, sys
 from rotfem.commands.simulation import Simulation
 from rotfem.commands.cli import main
 
-check = Simulation._check
+stepped = Simulation._stepped
 
-def signalled(self, state):
-    check(self, state)
-    if self.steps == 30:
+def signalled(self, *arguments):
+    if self.log.steps == 30:
         os.kill(os.getpid(), signal.{name})
+    stepped(self, *arguments)
 
-Simulation._check = signalled
+Simulation._stepped = signalled
 main()
 """
 

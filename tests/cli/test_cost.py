@@ -43,7 +43,7 @@ SMALL += ("--schemes", "generalised_alpha,newmark")
 def test_cost_writes_table_figure_and_tuned_scene(rotfem: Rotfem, folder: Path) -> None:
     done = rotfem("cost", "beam.toml", *SMALL, "--accuracy", "0.02", "--write", "tuned.toml")
     assert done.status == 0
-    assert done.err == ""
+    assert all(line.startswith("beam: cost: ") for line in done.err.splitlines())  # progress, where it takes long
     assert "tuned scene in tuned.toml" in done.out
     assert "for 0.02: reissner, " in done.out
     results = folder / "results" / "beam"

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from rotfem.commands.simulation import Simulation
+from rotfem.commands.monitor import Monitor
 from rotfem.results.files import read_csv
 from tests.beams import BEAM_TABLE
 from tests.cli.conftest import Done
@@ -75,10 +75,10 @@ def test_a_table_of_an_earlier_run_may_be_read_elsewhere(rotfem: Any) -> None:
 
 
 def test_an_error_nobody_foresaw_leaves_the_status_failed(rotfem: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    def spoilt(self: Simulation, state: Any) -> None:
+    def spoilt(self: Monitor, state: Any) -> None:
         raise ZeroDivisionError("nobody foresaw it")
 
-    monkeypatch.setattr(Simulation, "_check", spoilt)
+    monkeypatch.setattr(Monitor, "step", spoilt)
     with pytest.raises(ZeroDivisionError):
         rotfem("run", "beam.toml", "-o", "out")
     assert status("out") == "failed"

@@ -11,7 +11,7 @@ import pytest
 from mpi4py import MPI
 
 from rotfem.commands.accuracy import Missed, to_accuracy
-from rotfem.errors import ComputationError
+from rotfem.errors import ComputationError, Stopped
 from rotfem.refinement.distance import distance
 from rotfem.refinement.refine import MOST, SAFETY, Clock, Refinement, Setting, TooDear, refine
 from rotfem.scene import Scene
@@ -27,10 +27,17 @@ LINEAR, FULL = ({"theory": name, "reduced": False} for name in ("consistent_line
 SETTING = Setting((FULL,), 6, 3, "esdirk4", 1e-2)
 
 
+class Answer(SimpleNamespace):
+    """Something with a summary."""
+
+    def with_summary(self, **entries: Any) -> Answer:
+        return Answer(summary={**self.summary, **entries})
+
+
 def result(total: float | None, **parts: float | None) -> Any:
     """Return something with the summary of a result that has such an error."""
     error = {"time": total, "space": 0.0, "model": 0.0, **parts, "total": total}
-    return SimpleNamespace(summary={"status": "done", "error": error, "timings": {"total": 1.0}})
+    return Answer(summary={"status": "done", "error": error, "timings": {"total": 1.0}})
 
 
 def attempts(*outcomes: Any) -> tuple[list[Setting], Callable[[Setting], Any]]:
@@ -101,10 +108,11 @@ def test_the_largest_contribution_is_refined_by_its_order() -> None:
 def test_the_first_that_meets_it_is_returned() -> None:
     good = result(4e-4)
     asked, attempt = attempts(result(1.6e-2), good)
-    assert to_accuracy(SCENE, SETTING, attempt, clock()) is good
+    done = to_accuracy(SCENE, SETTING, attempt, clock())
+    assert done.summary["error"] is good.summary["error"]
     assert asked[1].tolerance is not None
     assert asked[1].tolerance < 1e-2
-    told = good.summary["accuracy"]
+    told = done.summary["accuracy"]
     assert told["met"]
     assert [tried["error"] for tried in told["attempts"]] == [1.6e-2, 4e-4]
 
@@ -114,9 +122,10 @@ def test_a_failure_in_finer_steps_leaves_what_was_reached() -> None:
     reached = result(2e-3)
     with pytest.raises(Missed, match=r"0\.002 was reached, .* a further attempt failed: no convergence") as caught:
         to_accuracy(SCENE, SETTING, attempts(reached, ComputationError("no convergence", advice="x"))[1], clock())
-    assert vars(caught.value)["result"] is reached
-    assert reached.summary["status"] == "failed"
-    assert reached.summary["failure"]["advice"] == caught.value.advice == "x"
+    kept = caught.value.result.summary
+    assert kept["error"] is reached.summary["error"]
+    assert kept["status"] == "failed"
+    assert kept["failure"]["advice"] == caught.value.advice == "x"
 
 
 def test_a_failure_of_a_richer_model_stands() -> None:
@@ -131,13 +140,13 @@ def test_a_failure_of_a_richer_model_stands() -> None:
 
 def test_what_interrupts_an_answer_has_the_best_result_before() -> None:
     """Whatever of the next answer is there: it is not whole. Before the first one there is nothing."""
-    reached, stop = result(2e-3), KeyboardInterrupt()
-    vars(stop)["result"] = result(None)
-    with pytest.raises(KeyboardInterrupt):
-        to_accuracy(SCENE, SETTING, attempts(reached, stop)[1], clock())
-    assert vars(stop)["result"] is reached
-    assert reached.summary["status"] == "interrupted"
-    assert not reached.summary["accuracy"]["met"]
+    reached = result(2e-3)
+    with pytest.raises(Stopped) as caught:
+        to_accuracy(SCENE, SETTING, attempts(reached, Stopped(result(None)))[1], clock())
+    kept = caught.value.result.summary
+    assert kept["error"] is reached.summary["error"]
+    assert kept["status"] == "interrupted"
+    assert not kept["accuracy"]["met"]
     first = KeyboardInterrupt()
     with pytest.raises(KeyboardInterrupt):
         to_accuracy(SCENE, SETTING, attempts(first)[1], clock())
@@ -157,7 +166,7 @@ def test_what_is_too_dear_is_said_with_what_to_try(monkeypatch: pytest.MonkeyPat
     with pytest.raises(Missed, match="accuracy_budget are left") as caught:
         to_accuracy(SCENE, SETTING, attempt, budget)
     assert "accuracy_budget" in caught.value.advice
-    assert reached.summary["accuracy"]["budget"]["wanted"] > 10.0
+    assert caught.value.result.summary["accuracy"]["budget"]["wanted"] > 10.0
     with pytest.raises(TooDear):  # nothing was reached
         to_accuracy(SCENE, SETTING, attempts(TooDear("nothing is left"))[1], clock(60.0))
 

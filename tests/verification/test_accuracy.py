@@ -86,7 +86,7 @@ def test_what_cannot_be_met_is_said_with_what_was_reached() -> None:
     """First-order strains are off by the stiffening of the spin, whatever the mesh and the steps."""
     with pytest.raises(Missed, match="an accuracy of 0.001 was not met") as caught:
         run(scene("spin-up", **{"model.theory": "linear", "motion.speed": 1.5}))
-    result = vars(caught.value)["result"]
+    result = caught.value.result
     assert result.summary["status"] == "failed"
     assert result.summary["error"]["model"] > 1e-3
     assert "model.theory" in caught.value.advice

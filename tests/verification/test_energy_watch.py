@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rotfem import ComputationError, run
-from rotfem.commands.energy_growth import growth, growth_on_hub, said, with_cause
+from rotfem.commands.monitor import growth, growth_on_hub, said, with_cause
 from tests.beams import STRUCTURE
 
 T = np.linspace(0.0, 100.0, 1001)

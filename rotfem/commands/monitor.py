@@ -1,4 +1,7 @@
-"""Energy and momentum that a history has from nowhere: what steps that are too long do before anything else is seen."""
+"""What a run watches in its states: the range of its theory and of a chosen model, finite numbers, and energy.
+
+Energy and momentum that a history has from nowhere show what steps that are too long do before anything else is seen.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.schemes import State
+from rotfem.analysis.stability import Stability
+from rotfem.analysis.theory_error import Farthest
+from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION
 from rotfem.errors import ComputationError
 from rotfem.mechanics.theories import Theory, richest, theories
+from rotfem.selection.model_choice import Choice, RangeExceeded
 
 Array = npt.NDArray[np.float64]
 
@@ -25,6 +33,77 @@ TURNED = 0.01
 
 #: Rows from which on a growth can be told from a fluctuation.
 FEWEST = 20
+
+
+class Monitor:
+    """Sees that the theory and the chosen model of a run hold for its states; an observer of these.
+
+    Args:
+        system: equations of motion.
+        critical: speed at which the stiffness of its theory is singular, rad/s; None if there is none.
+        moving: whether the states are those of a history.
+        choice: how the model was chosen, if it was.
+        on_exceed: what happens beyond the range of that: "warn", or a failure.
+        warnings: where warnings go.
+
+    Attributes:
+        since: from when on (s) the speed was above the critical one; None before.
+        exceeded: how the motion has left the range of the chosen model; empty before.
+        farthest: largest state so far.
+        stability: of the equilibrium that is computed, or that a history starts from; None where there is none.
+    """
+
+    def __init__(
+        self,
+        system: Any,
+        critical: float | None,
+        moving: bool,
+        choice: Choice | None,
+        on_exceed: str,
+        warnings: list[str],
+    ):
+        self.system, self.critical, self.moving, self.choice = system, critical, moving, choice
+        self.on_exceed, self.warnings = on_exceed, warnings
+        self.since: float | None = None
+        self.exceeded = ""
+        self.farthest = Farthest(system)
+        self.stability: Stability | None = None
+
+    def step(self, state: State) -> None:
+        """Stop a history that has left the range of its theory.
+
+        Raises:
+            ComputationError: displacements of a linear theory beyond the structure's length, or not finite.
+        """
+        if not self.system.linear:
+            return
+        speed = abs(self.system.motion.speed(state.t))
+        if self.since is None and self.critical is not None and speed > self.critical:
+            self.since = state.t
+        size = self.system.size(state.q)
+        if np.isfinite(size) and size <= LARGEST_LINEAR_DEFLECTION:
+            return
+        raise diverged(self.system.model.problem.theory, state.t, self.critical, self.since)
+
+    def row(self, state: State) -> None:
+        """Take note of a state that is recorded.
+
+        Raises:
+            RangeExceeded: the motion has left the range of the chosen model.
+            ComputationError: that of the theory.
+        """
+        if not self.system.linear:
+            self.system.structure.check_range(state.q, state.t)
+        self.farthest(state.q, state.t)
+        if self.choice is None or self.exceeded:
+            return
+        sizes = self.system.sizes(state.q)
+        self.exceeded = self.choice.check(sizes)
+        if not self.exceeded:
+            return
+        if self.on_exceed != "warn":
+            raise RangeExceeded(self.exceeded, state.t if self.moving else None, sizes)
+        self.warnings.append(f"{self.exceeded}, at t = {state.t:.6g} s")
 
 
 def growth(history: dict[str, Array], between: bool = False) -> float:
