@@ -21,9 +21,9 @@ from explain_scenes import FRESH, scene
 
 import rotfem
 from rotfem.commands.explain import compared
+from rotfem.refinement.distance import distance
+from rotfem.refinement.explain import LARGE, NOTICEABLE, modes_change
 from rotfem.scene import Scene
-from rotfem.selection.distance import modes_change, tip_change
-from rotfem.selection.estimate import LARGE, NOTICEABLE
 
 #: Below it a change is not compared: round-off of two Newton solutions.
 SMALLEST = 1e-8
@@ -34,7 +34,7 @@ FINER_STEPS = 4
 
 def finer(of: Scene, mesh: bool = True, steps: bool = True) -> Scene:
     """Return a scene with finer mesh or steps, its rows where they were."""
-    changes: dict[str, Any] = {"solver.increment_tolerance": 1e-12}
+    changes: dict[str, Any] = {"solver.increment_tolerance": 1e-12, "output.error": False}
     if mesh:
         n = of.mesh.elements
         changes["mesh.elements"] = [2 * k for k in n] if isinstance(n, tuple) else 2 * (n or 1)
@@ -67,7 +67,7 @@ def apart(of: dict[str, Any], to: dict[str, Any]) -> dict[str, float]:
     """Return output ↦ relative change from one truth to another; infinite where one fails."""
     measures = {"modes": modes_change}
     return {
-        name: np.inf if here is None or to[name] is None else measures.get(name, tip_change)(here, to[name])
+        name: np.inf if here is None or to[name] is None else measures.get(name, distance)(here, to[name])
         for name, here in of.items()
     }
 
@@ -105,11 +105,15 @@ def main() -> None:
                 missed.append(f"{name}: {row['name']}")
             for output, truth in row["truth"].items():
                 guess = row["estimate"][output]
-                off = 1.0 if max(guess, truth) < SMALLEST or guess == truth else guess / max(truth, 1e-300)
-                inside.append(1 / 3 <= off <= 3 or min(guess, truth) >= LARGE)
+                off = (
+                    1.0
+                    if guess is None or max(guess, truth) < SMALLEST or guess == truth
+                    else guess / max(truth, 1e-300)
+                )
+                inside.append(1 / 3 <= off <= 3 or min(guess or 0.0, truth) >= LARGE)
                 mark = "" if inside[-1] else "  <-- off"
                 what = f"    {row['kind']:<15}{row['name']:<20}{output:<9}"
-                print(f"{what}{guess:>9.1e}{truth:>9.1e}{off:>8.2f}{mark}", flush=True)
+                print(f"{what}{-1.0 if guess is None else guess:>9.1e}{truth:>9.1e}{off:>8.2f}{mark}", flush=True)
     print(f"{sum(inside)} of {len(inside)} within a factor 3; above 1 % but called negligible: {missed or 'none'}")
 
 

@@ -23,7 +23,7 @@ PACKAGE = ROOT / "rotfem"
 #: Capability ↦ what its modules begin with, dots for slashes; a module counts for the first that fits.
 CAPABILITIES = {
     "error, accuracy, explain, cost": """
-        refinement selection commands.cost commands.explain commands.accuracy commands.ahead
+        refinement commands.cost commands.explain commands.accuracy commands.ahead
         commands.attempts commands.known_error commands.pace commands.pursuit commands.root_accuracy
         analysis.error_ analysis.frequency_error
         analysis.mesh_estimate analysis.mesh_force analysis.reduced_tangents analysis.refined_mesh

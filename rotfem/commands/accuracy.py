@@ -7,9 +7,11 @@ from collections.abc import Callable
 from time import perf_counter
 from typing import Any, TypeVar
 
+from mpi4py import MPI
+
 from rotfem.commands.interrupts import together
 from rotfem.errors import ComputationError, SceneError, Stopped
-from rotfem.mechanics.theories import theories
+from rotfem.mechanics.theories import Theory, theories
 from rotfem.refinement.estimate import WORDS
 from rotfem.refinement.refine import COARSE, SAFETY, Clock, Refinement, Setting, contribution, is_within, refine
 from rotfem.results.result import Result
@@ -29,7 +31,7 @@ NODES, NODES_A_MODE, NODES_OF_PLATES, FEWEST = 30, 4, 24, 3
 
 
 class Missed(ComputationError):
-    """No setting was found that meets the accuracy."""
+    """No setting was found that meets the accuracy, or the tolerance of the model."""
 
 
 def first_setting(scene: Scene, modes: int = 0) -> Setting:
@@ -72,16 +74,21 @@ def models_of(scene: Scene, moving: bool) -> tuple[dict[str, Any], ...]:
     The theory that a scene names is the richest of them. A history of small motions is cheapest by a reduced linear
     model; steady states and modes cost little by any theory, and moments at the root are those of the theory itself.
     """
-    kind, own = scene.structure.type, scene.model.theory
-    full = {"theory": own, "reduced": False, "foreshortening": False}
+    full = {"theory": scene.model.theory, "reduced": False, "foreshortening": False}
     if not moving or scene.accuracy_of == ROOT_MOMENT:
         return (full,)
-    named = {theory.name: theory for theory in theories() if theory.holds_for(kind)}
-    linear = own if named[own].linear else next((n for n in named[own].poorer if named[n].prestress), None)
+    linear = linear_of(scene)
     assert scene.accuracy is not None
-    gives_back = linear is not None and bool(named[linear].prestress)
-    quick = {"theory": linear, "reduced": scene.accuracy / (4 * SAFETY), "foreshortening": gives_back}
+    gives_back = linear is not None and bool(linear.prestress)
+    quick = {"theory": linear and linear.name, "reduced": scene.accuracy / (4 * SAFETY), "foreshortening": gives_back}
     return (quick, full) if linear and allows(scene, quick) else (full,)
+
+
+def linear_of(scene: Scene) -> Theory | None:
+    """Return the linear theory in the family of a scene's own, the one with stress stiffness; None without one."""
+    named = {theory.name: theory for theory in theories() if theory.holds_for(scene.structure.type)}
+    own = named[scene.model.theory]
+    return own if own.linear else next((named[n] for n in own.poorer if n in named and named[n].prestress), None)
 
 
 def allows(scene: Scene, model: dict[str, Any]) -> bool:
@@ -157,6 +164,74 @@ def to_accuracy(scene: Scene, first: Setting, compute: Callable[[Setting], R], c
     return done
 
 
+def within_tolerance(
+    scene: Scene, compute: Callable[[Setting], R], comm: MPI.Comm, resumed: Setting | None = None
+) -> R:
+    """Return the result of the cheapest theory whose own error is within the model.tolerance of a scene.
+
+    The theory that the scene names is the richest; mesh and steps are those of the scene. Where that theory misses the
+    tolerance, too, model.on_exceed says what happens.
+
+    Args:
+        scene: with a model.tolerance.
+        compute: setting ↦ its result, with a `theory_error` in its summary where that is known.
+        comm: of the processes.
+        resumed: setting of a run that goes on.
+
+    Raises:
+        Missed: no theory is within the tolerance and model.on_exceed = "stop"; its attribute `result` holds the best.
+        ComputationError: the richest theory failed.
+    """
+    tolerance, own, linear = scene.model.tolerance, scene.model.theory, linear_of(scene)
+    assert tolerance is not None
+    names = [own] if linear is None or linear.name == own else [linear.name, own]
+    first = resumed or Setting(tuple({"theory": name} for name in names), None, scene.mesh.degree)
+    found, started = Refinement[R](), perf_counter()
+
+    def answer(setting: Setting) -> tuple[R, dict[str, Any]]:
+        done = compute(setting)
+        error = done.summary.get("theory_error", {}).get("estimate")
+        return done, {"model": error, "total": error}
+
+    refine(first, answer, tolerance, Clock(None, comm), found)
+    assert found.best is not None
+    error, summary = found.best.error["model"], found.best.result.summary
+    chosen, effects = found.best.setting.models[0]["theory"], summary["effects"]
+    upgrades = [
+        {"from": row["theory"], "to": chosen, "why": row.get("failed") or f"its error is {estimated(row['error'])}"}
+        for row in found.tried
+        if row["theory"] != chosen
+    ]
+    seconds = max(0.0, perf_counter() - started - summary["timings"]["total"])
+    choice = {
+        "theory": chosen,
+        "effects": effects,
+        "estimated_error": None if error is None else SAFETY * error,
+        "tolerance": tolerance,
+        "dropped": [] if chosen == own else [{"kind": "theory", "name": f"{own} → {chosen}", "estimate": error}],
+        "full_model": {"theory": own, "effects": effects},
+        "seconds": seconds,
+        **({"upgrades": upgrades} if upgrades else {}),
+    }
+    warnings = [*summary["warnings"], *(f"{row['from']} was given up: {row['why']}" for row in upgrades)]
+    missed_by = "" if is_within(found.best.error, tolerance) else f"the error of {chosen} is {estimated(error)}"
+    what = f"model.tolerance = {tolerance:g} is not met: {missed_by}"
+    done = found.best.result.with_summary(
+        scene=scene.digest(),
+        choice=choice,
+        warnings=[*warnings, what] if missed_by else warnings,
+        timings={**summary["timings"], "choice": seconds, "total": summary["timings"]["total"] + seconds},
+    )
+    if missed_by and scene.model.on_exceed == "stop":
+        raise failed(done, what, f"a larger model.tolerance, or a richer model.theory than {own}")
+    return done
+
+
+def estimated(error: float | None) -> str:
+    """Return an estimate in words."""
+    return "unknown" if error is None else f"estimated as {error:.2g}"
+
+
 def described(scene: Scene, found: Refinement[R], clock: Clock, started: float) -> R:
     """Return the best result, with how it was found in its summary."""
     best, accuracy = found.best, scene.accuracy
@@ -202,10 +277,13 @@ def missed(scene: Scene, done: Result, failure: ComputationError | None) -> Miss
         reached = f"an error of {error['total']:.2g} was reached, most of it ({WORDS[worst]}) {share:.2g}, where an "
         reached += f"estimate of {(scene.accuracy or 0.0) / SAFETY:.2g} is wanted"
     why = "" if failure is None else f", and a further attempt failed: {failure.what}"
-    out = Missed(
-        f"an accuracy of {scene.accuracy:g} was not met: {reached}{why}",
-        advice=(failure.advice if failure is not None else None) or advice,
-    )
-    failed = {"what": out.what, "time": None, "advice": out.advice}
-    out.result = done.with_summary(status="failed", failure=failed)
+    what = f"an accuracy of {scene.accuracy:g} was not met: {reached}{why}"
+    return failed(done, what, (failure.advice if failure is not None else None) or advice)
+
+
+def failed(done: Result, what: str, advice: str) -> Missed:
+    """Return the error of a result that is not what was asked for."""
+    out = Missed(what, advice=advice)
+    failure = {"what": out.what, "time": None, "advice": out.advice}
+    out.result = done.with_summary(status="failed", failure=failure)
     return out

@@ -15,13 +15,13 @@ from mpi4py import MPI
 from rotfem.analysis.branches import SPARE, Node, Sweep
 from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
-from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy
+from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.error_report import error_of_modes
 from rotfem.commands.loads import held
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
 from rotfem.commands.modes import analysis_of, hints_of, theory_error
 from rotfem.commands.monitor import check_rows
-from rotfem.commands.problem import Problem, case_of
+from rotfem.commands.problem import Problem
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import SceneError, input_of
 from rotfem.listeners import Hint, Progress, silent
@@ -33,8 +33,6 @@ from rotfem.results import CampbellResult
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.limits import Limits
 from rotfem.scene.values import LARGEST
-from rotfem.selection.distance import MODES
-from rotfem.selection.model_choice import choose
 from rotfem.units import split_unit
 
 Array = npt.NDArray[Any]
@@ -115,6 +113,8 @@ def campbell(
 
     scene.check_tables("what modes are about" if scene.time is None else "")
     with input_of(scene.file):
+        if scene.model.tolerance is not None:
+            return within_tolerance(scene, attempt, comm)
         if scene.accuracy is None:
             return attempt()
         refuse(scene, ("frequencies",), "campbell")
@@ -133,14 +133,7 @@ class Diagram:
     """
 
     def __init__(self, scene: Scene, problem: ProblemData, values: Sequence[float], comm: MPI.Comm, hint: Hint | None):
-        self.scene, self.values, self.choice = scene, values, None
-        if scene.model.tolerance is not None:
-            turning = problem.motion.at_speed(values[-1] or values[0])
-            spinning = problem if problem.motion.is_spinning else problem.replace(motion=turning)
-            case = case_of(scene).replace(problem=spinning)
-            speeds = (values[0], 0.5 * (values[0] + values[-1]), values[-1])
-            self.choice = choose(case, (MODES,), speeds, comm)
-            problem = self.choice.applied(problem)
+        self.scene, self.values = scene, values
         self.analysis = analysis_of(scene, problem.spinning(), comm)
         self.hints = hints_of(self.analysis, scene, "campbell", hint, max(map(abs, values)))
         if worth_while(self.analysis, values):
@@ -169,12 +162,11 @@ class Diagram:
         of_last = {} if mesh is None else dict(zip(sweep.nodes[-1].order, mesh, strict=False))
         known = None if mesh is None else [of_last.get(i) for i in range(len(last.pairs.values))]
         ends = mode_rows(analysis, last, known)
-        warnings = [] if self.choice is not None else advice(analysis, fastest)
-        warnings += [*held(self.analysis.problem), *told(sweep, labels, onsets, ends)]
+        warnings = [*advice(analysis, fastest), *held(self.analysis.problem), *told(sweep, labels, onsets, ends)]
         off = theory_error(analysis, last)
         warnings += [off.warning()] if off and off.warning() else []
         summary = {
-            **modal_summary("campbell", analysis, self.scene, self.choice, started),
+            **modal_summary("campbell", analysis, self.scene, started),
             "branches": [{"branch": b + 1, "label": labels[b], **branch_summary(sweep, b)} for b in range(count)],
             "per_rev": orders,
             "critical_speeds": crossings,

@@ -29,7 +29,6 @@ from rotfem.errors import SceneError
 from rotfem.refinement.companion import Companion, Followed
 from rotfem.refinement.refine import Setting
 from rotfem.scene import Scene, Time
-from rotfem.selection.model_choice import Choice
 from rotfem.structures.datum import Datum
 from rotfem.structures.numbering import Numbering
 from rotfem.version import versions
@@ -41,7 +40,7 @@ MOVED = 1e-9
 GIVEN = (3,)
 
 #: What a run counts and has to say, and what its monitor has seen, that changes while it goes on.
-OF_LOG, OF_MONITOR = ("steps", "warnings", "resumed"), ("since", "exceeded")
+OF_LOG, OF_MONITOR = ("steps", "warnings", "resumed"), ("since",)
 
 #: By class, attributes that a run makes anew or that have a place of their own in a checkpoint.
 _STEPPER = ("system", "newton", "patience", "scheme", "trust", "watch", "_linearised", "_about")
@@ -56,7 +55,7 @@ Tree = dict[str, Any]
 #: Parts of a checkpoint, and the types they may have.
 PARTS: dict[str, Any] = {
     **dict.fromkeys(("identity", "versions", "state", "stepper", "run", "seen", "every"), dict),
-    **dict.fromkeys(("factored", "stations", "resultants", "snapshots", "choice", "settings"), (dict, NoneType)),
+    **dict.fromkeys(("factored", "stations", "resultants", "snapshots", "settings"), (dict, NoneType)),
     **dict.fromkeys(("positions", "rows"), np.ndarray),
     **dict.fromkeys(("t", "elapsed"), float),
     "given": (np.ndarray, NoneType),
@@ -120,15 +119,7 @@ def check_parts(path: Path, tree: Tree) -> None:
         json.dumps([tree["identity"], tree["versions"]["rotfem"]])
         if not any(tree["every"][name] > 0.0 for name in ("seconds", "steps") if tree["every"][name] is not None):
             raise ValueError("every")
-        choice, settings = tree["choice"], tree["settings"]
-        if choice is not None:
-            alike(
-                vars(Choice(theory="", effects=(), tolerance=0.0, richest="", everything=()))
-                | {"sizes": choice["sizes"]},
-                choice,
-                "choice",
-            )
-        if settings is not None:
+        if (settings := tree["settings"]) is not None:
             known = {name: settings[name] for name in ("elements", "scheme")}
             alike(vars(Setting((), None, 0)) | known, settings, "settings")
     except (LookupError, TypeError, ValueError) as error:
@@ -227,7 +218,6 @@ class Parts:
     monitor: Monitor
     log: Log
     companions: Sequence[Companion]
-    choice: Choice | None
     setting: Setting | None
 
 
@@ -271,7 +261,6 @@ class Memory:
             "stations": None if run.record.stations is None else run.record.stations.kept_arrays(),
             "resultants": None if run.record.resultants is None else run.record.resultants.kept_arrays(),
             "snapshots": None if snapshots is None else self.packing.packed(vars(snapshots)),
-            "choice": None if run.choice is None else vars(run.choice),
             "settings": None if run.setting is None else vars(run.setting),
         }
 

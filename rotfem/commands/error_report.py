@@ -27,7 +27,6 @@ from rotfem.refinement.discretisation import HistoryErrors, error_by_cells, erro
 from rotfem.refinement.distance import COLUMNS, OUTPUTS, largest, tip
 from rotfem.refinement.estimate import ErrorEstimate, percent
 from rotfem.scene import Scene
-from rotfem.selection.model_choice import Choice
 
 Array = npt.NDArray[np.float64]
 
@@ -51,7 +50,6 @@ class RunErrors:
         system: that of it.
         history: columns of its rows.
         wanted: whether errors are to be estimated.
-        choice: how the model was chosen, if it was.
         farthest: largest state.
         stability: of the equilibrium; None without one.
         shape: the equilibrium, a local dof array; None of a history.
@@ -66,7 +64,6 @@ class RunErrors:
     system: Any
     history: Mapping[str, Array]
     wanted: bool
-    choice: Choice | None
     farthest: Farthest
     stability: Stability | None
     shape: Array | None
@@ -110,7 +107,7 @@ class RunErrors:
         elif self.companions is not None:
             shares = self.companions.errors(scale)
             found["time_at"] = self.companions.steps.difference[1]
-        return ErrorEstimate({**shares, "model": model_share(self.theory, self.choice)}, found)
+        return ErrorEstimate({**shares, "model": None if self.theory is None else self.theory.estimate}, found)
 
     @cached_property
     def theory(self) -> TheoryError | None:
@@ -247,14 +244,6 @@ def _relative(apart: float, scale: float) -> float:
 def output_of(scene: Scene) -> str:
     """Return the name of the output whose error a run of a scene estimates."""
     return scene.accuracy_of if scene.accuracy_of in OUTPUTS else "tip"
-
-
-def model_share(theory: TheoryError | None, choice: Choice | None) -> float | None:
-    """Return the error by the theory and the effects that a choice has left out; None where it is unknown."""
-    own = None if theory is None else theory.estimate
-    if choice is None or choice.full:
-        return own
-    return max(own or 0.0, choice.estimated_error)
 
 
 def error_of_modes(rows: Iterable[Mapping[str, Any]], theory: TheoryError | None) -> ErrorEstimate:

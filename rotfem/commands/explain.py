@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -10,24 +10,22 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from rotfem.analysis.time_loop import Steps
 from rotfem.commands.loads import held
 from rotfem.commands.modes import modes
-from rotfem.commands.problem import Problem, case_of
+from rotfem.commands.problem import Problem, first_motion, scheme_of
 from rotfem.commands.run import run
 from rotfem.commands.summary import summary
 from rotfem.errors import ComputationError, SceneError, input_of
 from rotfem.listeners import Progress
 from rotfem.mechanics.effects import Effect, Work
 from rotfem.mechanics.theories import Theory
+from rotfem.numerics.newton import Newton
+from rotfem.refinement.dimensionless import MEANING, groups
+from rotfem.refinement.distance import distance
+from rotfem.refinement.explain import HISTORY, MODES, RESOLVED, STEADY, Case, Change, Explanation, modes_change
 from rotfem.results import ExplainResult
 from rotfem.scene import Scene, as_scene
-from rotfem.selection.case import Case
-from rotfem.selection.coarse_case import INCREMENT
-from rotfem.selection.coarse_model import Trial
-from rotfem.selection.dimensionless import MEANING, groups
-from rotfem.selection.distance import HISTORY, MODES, STEADY, Outputs, change, notes, outputs_of
-from rotfem.selection.estimate import RESOLVED, Change, Estimates
-from rotfem.selection.model_choice import choose
 
 #: What follows from the size of a change: for an effect or a richer theory, and for a poorer theory.
 NEEDED = {"negligible": "not needed", "noticeable": "needed where {:.1%} matters", "large": "needed"}
@@ -37,8 +35,14 @@ ENOUGH = {"negligible": "good enough", "noticeable": "good to {:.1%}", "large": 
 FINE = {"negligible": "fine enough", "noticeable": "off by {:.1%}", "large": "too coarse: off by {:.1%}"}
 FINER = 4
 
-#: What the notes of a check are marked with.
-FULL = " of the full model"
+#: The same where nothing is known, of models and of steps or mesh.
+UNKNOWN = ("nothing is known of it: steps of twice the length fail", "the error is unknown")
+
+#: What the notes of a check are marked with, and where its Newton's method stops: small differences are wanted.
+FULL, INCREMENT = " of the full model", 1e-10
+
+#: How far two answers are apart, by the name of the output.
+MEASURES = {HISTORY: distance, STEADY: distance, MODES: modes_change}
 
 
 def explain(
@@ -65,51 +69,65 @@ def explain(
     if check and terms:
         raise SceneError(scene.file, "--check", None, "runs the scene's own models; register the terms as effects")
     with input_of(scene.file):
-        case = case_of(scene).replace(problem=Problem.of(scene, terms=terms))
-        return _explained(scene, case, check, comm, progress or (lambda share: None))
+        of = Explanation(case_of(scene, terms), comm)
+        return _explained(scene, of, check, progress or (lambda share: None))
 
 
-def _explained(scene: Scene, case: Case, check: bool, comm: MPI.Comm, progress: Progress) -> ExplainResult:
-    started = perf_counter()
-    trial, theory = Trial(case, comm=comm), case.problem.theory
-    effects = case.problem.replace(frame="rotating").effective_effects()
-    estimates = Estimates(trial, theory.name, effects)
-    changes = estimates.all()
+def case_of(scene: Scene, terms: Mapping[str, Work] | None = None) -> Case:
+    """Return the case of a scene: its problem, and what is to be computed of it."""
+    time, initial, unsteady = scene.time, scene.initial, ""
+    try:
+        scene.check_run()
+    except SceneError as error:
+        unsteady = str(error)
+    return Case(
+        problem=Problem.of(scene, terms=terms),
+        steps=None if time is None else Steps.of(time),
+        scheme=None if time is None else scheme_of(time),
+        tip_displacement=initial.tip_displacement,
+        from_steady=initial.state == "steady",
+        first=first_motion(scene),
+        mode_count=scene.modes.count,
+        about=scene.modes.about,
+        newton=lambda: Newton.of(scene.solver),
+        past_limits=scene.solver.past_limits,
+        unsteady=unsteady,
+    )
+
+
+def _explained(scene: Scene, of: Explanation, check: bool, progress: Progress) -> ExplainResult:
+    started, theory = perf_counter(), of.problem.theory
+    changes = of.all()
     spent = {"estimate": perf_counter() - started, "check": 0.0}
     if check:
-        check_changes(scene, effects, changes, trial, comm, progress)
+        check_changes(scene, of, changes, progress)
         spent["check"] = perf_counter() - started - spent["estimate"]
-    numbers = groups(trial, estimates.own)
+    numbers = groups(of)
     rows = [{**item.row(), "why": why(item, theory)} for item in changes]
-    chosen = case.tolerance is not None
     result: dict[str, Any] = {
-        **summary("explain", scene, comm, choose(case, trial.wanted, comm=comm) if chosen else None),
+        **summary("explain", scene, of.system.comm),
         "theory": theory.name,
-        "effects": list(effects),
+        "effects": list(of.own),
         "groups": numbers,
         "meaning": {name: MEANING[name] for name in numbers},
-        "outputs": list(trial.wanted),
+        "outputs": list(of.wanted),
         "resolution": RESOLVED,
-        "absent_outputs": trial.absent,
-        "absent_effects": {
-            effect.name: effect.reasons[1] for effect in Effect.registry if effect.name not in trial.effects
-        },
+        "absent_outputs": of.absent,
+        "absent_effects": {e.name: e.reasons[1] for e in Effect.registry if e.name not in of.effects},
         "rows": rows,
-        "speeds": list(trial.speeds),
-        "warnings": doubts(scene, trial, estimates),
+        "speeds": [of.speed],
+        "warnings": doubts(scene, of),
         "timings": {**spent, "total": sum(spent.values())},
     }
     return ExplainResult(result, rows)
 
 
-def doubts(scene: Scene, trial: Trial, estimates: Estimates) -> list[str]:
+def doubts(scene: Scene, of: Explanation) -> list[str]:
     """Return warnings about what the estimates are of."""
-    out = [f"{name} of {estimates.theory} cannot be computed: {why}" for name, why in estimates.own.failed.items()]
-    if trial.unknown:
-        out.append(f"frequencies at rest cannot be computed, the estimates take the scene's steps: {trial.unknown}")
-    if MODES in trial.wanted:
-        out += [f"modes: {line}" for line in held(trial.case.problem)]
-    if scene.frame == "inertial":
+    out = [f"{name} of {of.problem.theory.name} cannot be computed: {what}" for name, what in of.failed.items()]
+    if MODES in of.wanted:
+        out += [f"modes: {line}" for line in held(of.problem)]
+    if scene.model.frame == "inertial":
         out.append("estimates are of the rotating frame, where the same physics is a sum of effects")
     return out
 
@@ -127,6 +145,8 @@ def why(item: Change, own: Theory) -> str:
         if not item.included:
             reason += ", but it is not in model.effects"
         return f"{reason}; {NEEDED[item.verdict].format(item.worst)}{failed}"
+    if item.verdict == "unknown":
+        return UNKNOWN[item.kind == "discretisation"] + failed
     if item.kind == "discretisation":
         return FINE[item.verdict].format(item.worst)
     poorer = Theory.registry[item.name].rank < own.rank
@@ -136,44 +156,36 @@ def why(item: Change, own: Theory) -> str:
 # --- the truth ------------------------------------------------------------------------------------------------------
 
 
-def check_changes(
-    scene: Scene,
-    effects: tuple[str, ...],
-    changes: list[Change],
-    trial: Trial,
-    comm: MPI.Comm,
-    progress: Progress,
-) -> None:
+def check_changes(scene: Scene, of: Explanation, changes: list[Change], progress: Progress) -> None:
     """Write the true change into every row: both models run as the scene says, on its own mesh with its own steps.
 
     Args:
         scene: as it was given; it runs in the rotating frame with the model of each row.
-        effects: of its own model.
+        of: the changes.
         changes: the rows.
-        trial: what was tried out.
-        comm: MPI communicator.
         progress: called with the share of the rows that are done.
     """
     increment = min(INCREMENT, scene.solver.increment_tolerance)
     exact = {"model.frame": "rotating", "model.tolerance": None, "solver.increment_tolerance": increment}
-    scene = scene.replace(exact)
-    own = full_outputs(scene.replace({"model.effects": list(effects)}), trial, comm)
+    scene = scene.replace({**exact, "model.effects": list(of.own), "output.error": False})
+    own, own_notes = full_outputs(scene, of)
     for i, item in enumerate(changes, start=1):
         if item.name == "time.tolerance":
             continue  # adaptive steps have no common times
         if item.kind == "discretisation":
-            finer = finer_steps if item.name == "time.step" else finer_mesh
-            other = finer(scene).replace({"model.effects": list(effects)})
+            other = finer_steps(scene) if item.name == "time.step" else finer_mesh(scene)
         elif item.kind == "effect":
-            kept = set(effects) ^ {item.name}
-            other = scene.replace({"model.effects": [name for name in trial.effects if name in kept]})
+            kept = set(of.own) ^ {item.name}
+            other = scene.replace({"model.effects": [name for name in of.effects if name in kept]})
         else:
             prestress = scene.model.prestress if Theory.registry[item.name].prestress else None
-            said = {"model.theory": item.name, "model.prestress": prestress, "model.effects": list(effects)}
-            other = scene.replace(said)
-        there = full_outputs(other, trial, comm)
-        item.truth = change(own, there, trial.wanted)
-        item.notes |= {f"{name}{FULL}": text for name, text in notes(there).items()}
+            other = scene.replace({"model.theory": item.name, "model.prestress": prestress})
+        there, notes = full_outputs(other, of)
+        item.truth = {
+            name: np.inf if x is None or there[name] is None else MEASURES[name](x, there[name])
+            for name, x in own.items()
+        }
+        item.notes |= {f"{name}{FULL}": text for name, text in (own_notes | notes).items()}
         progress(i / len(changes))
 
 
@@ -187,7 +199,7 @@ def finer_steps(scene: Scene) -> Scene:
 
 def finer_mesh(scene: Scene) -> Scene:
     """Return a scene with twice the elements in each direction; of a mesh file, of a higher degree."""
-    if getattr(scene.structure, "mesh", None) is not None:
+    if scene.structure.mesh_file is not None:
         return scene.replace({"mesh.degree": scene.mesh.degree + 1})
     elements = scene.mesh.elements
     return scene.replace({"mesh.elements": [2 * n for n in elements] if isinstance(elements, tuple) else 2 * elements})
@@ -198,28 +210,21 @@ def compared(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     return [row for row in rows if row["label"] != "rigid body" and not row["label"].endswith(", fast")]
 
 
-def full_outputs(scene: Scene, trial: Trial, comm: MPI.Comm) -> Outputs:
-    """Return the outputs of a scene as `rotfem run` and `rotfem modes` give them, the latter at the trial's speed."""
-    wanted = trial.wanted
-    turning = scene.replace({"motion.speed": trial.speeds[0]}) if trial.case.problem.motion.hub is not None else scene
-    failed: dict[str, str] = {}
-    history: Mapping[str, Any] = {}
-    rows: list[Mapping[str, Any]] = []
+def full_outputs(scene: Scene, of: Explanation) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return the outputs of a scene as `rotfem run` and `rotfem modes` give them, None of what fails, and why.
 
-    def attempt(name: str, compute: Callable[[], Any]) -> Any:
+    Modes are those at the speed of the explanation.
+    """
+    comm, out, notes = of.system.comm, dict[str, Any](), dict[str, str]()
+    turning = scene.replace({"motion.speed": of.speed}) if of.problem.motion.hub is not None else scene
+    for name in of.wanted:
         try:
-            return compute()
+            if name == MODES:
+                rows = compared(modes(turning, comm=comm).rows)
+                out[name] = np.array([complex(row["growth"], row["frequency"]) for row in rows])
+            else:
+                history = run(scene, comm=comm).history
+                out[name] = np.column_stack([x for key, x in history.items() if key.startswith("tip_u")])
         except ComputationError as error:
-            failed[name] = error.what
-            return None
-
-    for name in wanted:
-        if name in (HISTORY, STEADY):
-            done = attempt(name, lambda: run(scene, comm=comm))
-            history = done.history if done is not None else {"tip_u": np.zeros(1)}
-        else:
-            found = attempt(MODES, lambda: modes(turning, comm=comm))
-            rows = compared(found.rows) if found is not None else []
-    out = outputs_of(wanted, history, rows)
-    out.failed = failed
-    return out
+            out[name], notes[name] = None, error.what
+    return out, notes

@@ -21,7 +21,6 @@ from rotfem.results.files import CHECKPOINT
 from rotfem.results.live import LiveTable
 from rotfem.results.result_set import ResultSet, read_summary
 from rotfem.scene import Scene
-from rotfem.selection.model_choice import Choice
 
 #: Bits of what ranks tell each other after a step.
 ASKED, DUE = 1, 2
@@ -125,14 +124,8 @@ class Keeper:
         is_done = summary.get("command") == "run" and summary.get("status") == "done"
         return summary if is_done and told(summary.get("scene")) == told(scene.digest()) else None
 
-    def choice(self) -> Choice | None:
-        """Return how the model was chosen that the run goes on with; None where it was not, or does not."""
-        if self._tree is None or self._tree["choice"] is None:
-            return None
-        return Choice(**self._tree["choice"])
-
     def setting(self) -> Setting | None:
-        """Return the setting of the run that goes on, which an accuracy has led to; None where none has."""
+        """Return the setting of the run that goes on, which an accuracy or a tolerance has led to; None without."""
         if self._tree is None or self._tree["settings"] is None:
             return None
         return Setting(**self._tree["settings"])

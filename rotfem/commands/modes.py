@@ -20,12 +20,12 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.modal import participation as masses_of
 from rotfem.analysis.stability import Stability, stability_of_pencil
 from rotfem.analysis.theory_error import TheoryCheck, TheoryError
-from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy
+from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.error_report import error_of_modes
 from rotfem.commands.loads import held
-from rotfem.commands.mode_tables import advice, mode_tables
+from rotfem.commands.mode_tables import mode_tables
 from rotfem.commands.monitor import check_rows
-from rotfem.commands.problem import Problem, case_of
+from rotfem.commands.problem import Problem
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import ComputationError, SceneError, input_of
 from rotfem.listeners import Hint, silent
@@ -38,8 +38,6 @@ from rotfem.refinement.refine import Clock, Setting
 from rotfem.results import ModesResult
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.advice import advise
-from rotfem.selection.distance import MODES
-from rotfem.selection.model_choice import choose
 from rotfem.structures.paraview import writer
 
 Array = npt.NDArray[Any]
@@ -87,6 +85,8 @@ def modes(
 
     scene.check_tables("what modes are about" if scene.time is None else "")
     with input_of(scene.file):
+        if scene.model.tolerance is not None:
+            return within_tolerance(scene, attempt, comm)
         if scene.accuracy is None:
             return attempt()
         refuse(scene, ("frequencies",), "modes")
@@ -96,10 +96,7 @@ def modes(
 def _modes(
     scene: Scene, problem: ProblemData, comm: MPI.Comm, sensitivities: bool, around: tuple[Hint | None, float]
 ) -> ModesResult:
-    (hint, started), choice = around, None
-    if scene.model.tolerance is not None:
-        choice = choose(case_of(scene).replace(problem=problem), (MODES,), comm=comm)
-        problem = choice.applied(problem)
+    hint, started = around
     analysis = analysis_of(scene, problem, comm)
     speed = problem.motion.final_speed(scene.time.end if scene.time is not None else 0.0)
     hints = hints_of(analysis, scene, "modes", hint, speed)
@@ -107,11 +104,10 @@ def _modes(
     check_rows(found.rows)
     spinning = found.spinning
     stability, off = stability_of_pencil(spinning.pencil, spinning.clamped), theory_error(analysis, spinning)
-    known = [] if choice is None else advice(analysis, speed)  # a choice knows what it left out
-    warnings = [*held(problem), *analysis.notes, *(line for line in found.warnings if line not in known)]
+    warnings = [*held(problem), *analysis.notes, *found.warnings]
     warnings += [*_of_stability(stability, found.rows), *([off.warning()] if off and off.warning() else [])]
     result = {
-        **modal_summary("modes", analysis, scene, choice, started),
+        **modal_summary("modes", analysis, scene, started),
         "speed": speed,
         "stability": stability.summary(),
         **({} if off is None else {"theory_error": off.summary()}),

@@ -18,7 +18,6 @@ from rotfem.analysis.theory_error import Farthest
 from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION
 from rotfem.errors import ComputationError
 from rotfem.mechanics.theories import Theory, richest, theories
-from rotfem.selection.model_choice import Choice, RangeExceeded
 
 Array = npt.NDArray[np.float64]
 
@@ -36,19 +35,14 @@ FEWEST = 20
 
 
 class Monitor:
-    """Sees that the theory and the chosen model of a run hold for its states; an observer of these.
+    """Sees that the theory of a run holds for its states; an observer of these.
 
     Args:
         system: equations of motion.
         critical: speed at which the stiffness of its theory is singular, rad/s; None if there is none.
-        moving: whether the states are those of a history.
-        choice: how the model was chosen, if it was.
-        on_exceed: what happens beyond the range of that: "warn", or a failure.
-        warnings: where warnings go.
 
     Attributes:
         since: from when on (s) the speed was above the critical one; None before.
-        exceeded: how the motion has left the range of the chosen model; empty before.
         farthest: largest state so far.
         stability: of the equilibrium that is computed, or that a history starts from; None where there is none.
     """
@@ -57,15 +51,9 @@ class Monitor:
         self,
         system: Any,
         critical: float | None,
-        moving: bool,
-        choice: Choice | None,
-        on_exceed: str,
-        warnings: list[str],
     ):
-        self.system, self.critical, self.moving, self.choice = system, critical, moving, choice
-        self.on_exceed, self.warnings = on_exceed, warnings
+        self.system, self.critical = system, critical
         self.since: float | None = None
-        self.exceeded = ""
         self.farthest = Farthest(system)
         self.stability: Stability | None = None
 
@@ -89,21 +77,11 @@ class Monitor:
         """Take note of a state that is recorded.
 
         Raises:
-            RangeExceeded: the motion has left the range of the chosen model.
-            ComputationError: that of the theory.
+            ComputationError: the motion has left the range of the theory.
         """
         if not self.system.linear:
             self.system.structure.check_range(state.q, state.t)
         self.farthest(state.q, state.t)
-        if self.choice is None or self.exceeded:
-            return
-        sizes = self.system.sizes(state.q)
-        self.exceeded = self.choice.check(sizes)
-        if not self.exceeded:
-            return
-        if self.on_exceed != "warn":
-            raise RangeExceeded(self.exceeded, state.t if self.moving else None, sizes)
-        self.warnings.append(f"{self.exceeded}, at t = {state.t:.6g} s")
 
 
 def growth(history: dict[str, Array], between: bool = False) -> float:

@@ -160,13 +160,15 @@ def choice_report(summary: dict[str, Any]) -> list[str]:
     if choice is None:
         return accuracy_report(summary)
     dropped = ", ".join(row["name"] for row in choice["dropped"]) or "nothing"
-    error = f"estimated error {choice['estimated_error']:.1e} of {choice['tolerance']:g} allowed"
-    error = choice.get("remark", error)
+    known = choice["estimated_error"]
+    error = f"estimated error {'unknown' if known is None else f'{known:.1e}'} of {choice['tolerance']:g} allowed"
     return [f"chosen in {choice['seconds']:.2f} s: {choice['theory']}; left out: {dropped}; {error}"]
 
 
-def size_of_change(estimate: float, resolution: float) -> str:
-    """Return an estimate as text; one that is smaller than can be told, as smaller than that."""
+def size_of_change(estimate: float | None, resolution: float) -> str:
+    """Return an estimate as text; one that is below the resolution as smaller than that."""
+    if estimate is None:
+        return "unknown"
     return f"<{resolution:.0e}".replace("e-0", "e-") if 0.0 < estimate < resolution else f"{estimate:.1e}"
 
 

@@ -29,7 +29,6 @@ from rotfem.numerics.newton import Newton
 from rotfem.results import ModesResult
 from rotfem.scene import Scene, Time, as_scene
 from rotfem.scene.stepping import estimates_error, usual
-from rotfem.selection.case import Case
 
 
 class Problem(ProblemData):
@@ -184,29 +183,6 @@ def check_steps(end: float, step: float | None, tolerance: float | None, scheme:
             raise InputError(f"time.{name}", value, "must be greater than 0")
     if tolerance is not None and not estimates_error(type(scheme)):
         raise InputError("time.tolerance", tolerance, f"{scheme.name} does not estimate its error; give step")
-
-
-def case_of(scene: Scene) -> Case:
-    """Return the case of a scene: its problem, and what is to be computed of it."""
-    time, unsteady = scene.time, ""
-    try:
-        scene.check_run()
-    except SceneError as error:
-        unsteady = str(error)
-    return Case(
-        problem=Problem.of(scene),
-        steps=None if time is None else Steps.of(time),
-        scheme=None if time is None else scheme_of(time),
-        tip_displacement=scene.initial.tip_displacement,
-        from_steady=scene.initial.state == "steady",
-        first=first_motion(scene),
-        mode_count=scene.modes.count,
-        about=scene.modes.about,
-        increment_tolerance=scene.solver.increment_tolerance,
-        max_iterations=scene.solver.max_iterations,
-        tolerance=scene.model.tolerance,
-        unsteady=unsteady,
-    )
 
 
 def first_motion(scene: Scene) -> FirstMotion | None:

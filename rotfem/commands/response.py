@@ -185,7 +185,7 @@ def result_of(
     usual = float(np.median(off))
     warnings += [*told(modes, undamped, usual, scene.modes.count), *not_pursued(scene)]
     summary = {
-        **modal_summary("response", analysis, scene, None, started),
+        **modal_summary("response", analysis, scene, started),
         "speed": spinning.speed,
         "stability": stability.summary(),
         "outputs": outputs,

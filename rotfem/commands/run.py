@@ -6,13 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady
-from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy
+from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.keeper import Interval, Keeper
-from rotfem.commands.problem import Problem, case_of
+from rotfem.commands.problem import Problem
 from rotfem.commands.result_folder import ResultFolder
 from rotfem.commands.simulation import Simulation
 from rotfem.errors import ComputationError, Stopped, input_of
@@ -22,8 +21,6 @@ from rotfem.mechanics.outputs import Functional
 from rotfem.refinement.refine import Clock, Setting
 from rotfem.results.run import RunResult
 from rotfem.scene import Scene, as_scene
-from rotfem.selection.distance import HISTORY, STEADY
-from rotfem.selection.model_choice import RangeExceeded, choose
 
 
 def run(
@@ -93,7 +90,7 @@ def simulate(
         if scene.accuracy is not None:
             return run_to_accuracy(scene, keeper, (progress, hint), terms, outputs)
         if scene.model.tolerance is not None:
-            return run_chosen(scene, problem, keeper, progress, hint)
+            return run_within_tolerance(scene, keeper, (progress, hint), terms, outputs)
         simulation = Simulation(scene, problem, comm, keeper=keeper)
         simulation.advise(hint)
         return simulation.run(progress)
@@ -124,23 +121,25 @@ def run_to_accuracy(
     return to_accuracy(scene, keeper.setting() or first_setting(scene), compute, clock)
 
 
-def run_chosen(
-    scene: Scene, problem: Problem, keeper: Keeper, progress: Progress | None, hint: Hint | None
+def run_within_tolerance(
+    scene: Scene,
+    keeper: Keeper,
+    listeners: tuple[Progress | None, Hint | None],
+    terms: Mapping[str, Work] | None,
+    outputs: Mapping[str, Functional] | None,
 ) -> RunResult:
-    """Return the result of the cheapest model within model.tolerance, and of richer ones where it does not hold.
+    """Return the result of the cheapest theory within the model.tolerance of a scene (see `within_tolerance`).
 
     Raises:
-        ComputationError: the full model failed, or one of them with on_exceed = "stop" or "warn".
+        ComputationError: the richest theory failed, or misses the tolerance with model.on_exceed = "stop".
     """
-    choice = keeper.choice() or choose(case_of(scene).replace(problem=problem), (HISTORY, STEADY), comm=keeper.comm)
-    while True:
-        try:
-            simulation = Simulation(scene, choice.applied(problem), keeper.comm, choice, keeper)
-            simulation.advise(hint)
-            return simulation.run(progress)
-        except ComputationError as error:
-            if choice.full or scene.model.on_exceed != "upgrade":
-                raise
-            # Any other failure of a poorer model is one that the richer one may not have: it is taken as far out.
-            sizes = error.sizes if isinstance(error, RangeExceeded) else np.full_like(choice.sizes, np.inf)
-            choice = choice.richer(sizes, error.time, error.what)
+    progress, hint = listeners
+
+    def compute(setting: Setting) -> RunResult:
+        variant = scene.replace(setting.changes())
+        problem = Problem.of(variant, terms=terms, outputs=outputs)
+        simulation = Simulation(variant, problem, keeper.comm, keeper=keeper, setting=setting)
+        simulation.advise(hint)
+        return simulation.run(progress)
+
+    return within_tolerance(scene, compute, keeper.comm, keeper.setting())

@@ -42,7 +42,6 @@ from rotfem.results.columns import figures
 from rotfem.results.run import RunResult
 from rotfem.scene import Scene, Time
 from rotfem.scene.advice import advise
-from rotfem.selection.model_choice import Choice
 from rotfem.structures.symmetry import inactive_unknowns
 
 Array = npt.NDArray[np.float64]
@@ -55,7 +54,6 @@ class Simulation:
         scene: the scene as it was asked for.
         problem: its problem, with the model it is run with.
         comm: MPI communicator.
-        choice: how this model was chosen, if it was.
         keeper: what is kept of it on disk while it goes on.
         setting: of the refinement that it is an answer of, if it is.
         clock: called with the number of steps and the part of the history that is done.
@@ -66,14 +64,12 @@ class Simulation:
         scene: Scene,
         problem: Problem,
         comm: MPI.Comm = MPI.COMM_WORLD,
-        choice: Choice | None = None,
         keeper: Keeper | None = None,
         setting: Setting | None = None,
         clock: Callable[[int, float], None] | None = None,
     ):
-        self.scene, self.choice, self.setting, self.clock = scene, choice, setting, clock
+        self.scene, self.setting, self.clock = scene, setting, clock
         self.keeper, self.log = keeper or Keeper(comm), Log()
-        self.log.warnings += [] if choice is None else choice.upgrade_warnings()
         if scene.time is None and problem.frame == "inertial":
             problem = problem.replace(frame="rotating")
             self.log.warnings.append("a steady state is one only in the rotating frame, where it was computed")
@@ -84,9 +80,7 @@ class Simulation:
         self.record = Recorder(self.system, scene.output)
         by_basis = scene.time is not None and bool(scene.model.reduced)
         critical = None if by_basis else critical_speed(self.system)
-        self.monitor = Monitor(
-            self.system, critical, scene.time is not None, choice, scene.model.on_exceed, self.log.warnings
-        )
+        self.monitor = Monitor(self.system, critical)
         self.iteration = Newton.of(scene.solver)
         self.start = Start()
         #: What the states came from: of a march its stepper, companions and rows between steps; or a reduced model.
@@ -224,7 +218,7 @@ class Simulation:
         companions = [] if self.companions is None else self.companions.companions
         return Parts(
             *(self.scene.time, self.system, self.stepper, self.record, self.monitor, self.log),
-            *(companions, self.choice, self.setting),
+            *(companions, self.setting),
         )
 
     # --- the result -------------------------------------------------------------------------------------------------
@@ -278,7 +272,7 @@ class Simulation:
     def _errors(self, history: dict[str, Array]) -> RunErrors:
         """Return the errors of what was computed."""
         return RunErrors(
-            *(self.scene, self.problem, self.system, history, self._wants_error, self.choice, self.monitor.farthest),
+            *(self.scene, self.problem, self.system, history, self._wants_error, self.monitor.farthest),
             *(self.monitor.stability, self.shape, self.reduced, self.companions, self.stepper, self._start),
         )
 
@@ -293,10 +287,9 @@ class Simulation:
         parts = {"compile": self.compiled, **(system.seconds if stepper else {})}
         if self.reduced is not None:
             parts["reduce"] = self.reduced.response.seconds["wall"]
-        before = {} if self.choice is None or log.resumed else {"choice": self.choice.seconds}
-        before |= {"before": log.elapsed} if log.resumed else {}
+        before = {"before": log.elapsed} if log.resumed else {}
         out = {
-            **summary("run", scene, system.comm, self.choice),
+            **summary("run", scene, system.comm),
             "status": status,
             "kind": "steady" if scene.time is None else "history",
             "theory": self.problem.theory.name,

@@ -10,22 +10,19 @@ from mpi4py import MPI
 
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.scene import Scene
-from rotfem.selection.model_choice import Choice
 from rotfem.version import versions
 
 
-def summary(command: str, scene: Scene, comm: MPI.Comm, choice: Choice | None = None) -> dict[str, Any]:
+def summary(command: str, scene: Scene, comm: MPI.Comm) -> dict[str, Any]:
     """Return what every summary has.
 
     Args:
         command: the verb.
-        scene: the scene as it was given; the model may have been chosen by its tolerance.
+        scene: the scene as it was given.
         comm: MPI communicator.
-        choice: how it was, if so.
     """
     out: dict[str, Any] = {"command": command, "status": "done", "name": scene.name}
-    out |= {"versions": versions(), "ranks": comm.size, "scene": scene.digest()}
-    return out if choice is None else {**out, "choice": choice.summary()}
+    return out | {"versions": versions(), "ranks": comm.size, "scene": scene.digest()}
 
 
 def timings(parts: Mapping[str, float], started: float, before: Mapping[str, float] | None = None) -> dict[str, float]:
@@ -36,21 +33,18 @@ def timings(parts: Mapping[str, float], started: float, before: Mapping[str, flo
     return {**named, "other": total - sum(named.values()), "total": total}
 
 
-def modal_summary(
-    command: str, analysis: ModalAnalysis, scene: Scene, choice: Choice | None, started: float
-) -> dict[str, Any]:
+def modal_summary(command: str, analysis: ModalAnalysis, scene: Scene, started: float) -> dict[str, Any]:
     """Return what the summaries of modes and Campbell diagrams have in common (see `summary`).
 
     Args:
         command: the verb.
         analysis: what was solved.
         scene: the scene as it was given.
-        choice: how its model was chosen, if it was.
         started: `perf_counter()` at the start.
     """
     space = analysis.system.V.dofmap
     return {
-        **summary(command, scene, analysis.comm, choice),
+        **summary(command, scene, analysis.comm),
         "theory": analysis.problem.theory.name,
         "about": "undeformed" if analysis.system.linear else analysis.about,
         "effects": list(analysis.model.effects),

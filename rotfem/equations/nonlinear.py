@@ -34,7 +34,7 @@ class NonlinearSystem(System):
     """
 
     def __init__(self, model: Model, moving: bool = True, parted: bool = False):
-        self._parted = parted
+        self.parted = parted
         super().__init__(model, moving)
 
     def _compile(self) -> Any:
@@ -42,12 +42,12 @@ class NonlinearSystem(System):
         self._shifts = [self.structure.constant(c) for c in self._shift_values]
         self._spin: Any = None
         if self.moving:
-            self._residuals = self.model.by_strains() if self._parted else [self._residual_form]
-            self._tangents = [self._tangent_of(F) for F in self._residuals] if self._parted else [self._tangent_form]
+            self._residuals = self.model.by_strains() if self.parted else [self._residual_form]
+            self._tangents = [self._tangent_of(F) for F in self._residuals] if self.parted else [self._tangent_form]
             libraries = [list(part) for part in zip(self._residuals, self._tangents, strict=True)]
             if self.model.hub is not None and self._by_spin.ufl is not None:
                 libraries[-1].append(self._by_spin.ufl)
-            compiled = [forms.together(library, once=self._parted and self.structure.planar) for library in libraries]
+            compiled = [forms.together(library, once=self.parted and self.structure.planar) for library in libraries]
             self._F, self._J = [part[0] for part in compiled], [part[1] for part in compiled]
             self._spin = compiled[-1][2] if len(compiled[-1]) > 2 else None
             self._pattern = self._J[0]

@@ -214,6 +214,8 @@ class System(Readings, Solutions, ABC):
         assembled: time spent on assembly while compiling, s.
         plain: whether tangents do without what is known of the way to a state (see `PointStresses`), which takes a form
             of its own.
+        parted: whether other theories of the problem share forms with it (see `NonlinearSystem`).
+        left_out: effects that are switched off.
         compilations: how often the forms were made; once, or twice where rotations have become very large.
     """
 
@@ -221,6 +223,8 @@ class System(Readings, Solutions, ABC):
     solved_at_once = False
     settled = False
     plain = False
+    parted = False
+    left_out: frozenset[str] = frozenset()
     hub: Any = None
     courses: tuple[Course, ...] = ()
     view: View
@@ -326,6 +330,7 @@ class System(Readings, Solutions, ABC):
 
     def leave_out(self, effects: Collection[str]) -> None:
         """Switch effects off, all others on."""
+        self.left_out = frozenset(effects)
         for name, switch in self.model.switches.items():
             switch.value = 0.0 if name in effects else 1.0
         self._damped = EFFECT not in effects

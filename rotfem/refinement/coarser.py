@@ -20,6 +20,23 @@ def by_itself(problem: Problem) -> Problem:
     return problem.replace(outputs={}, motion=replace(problem.motion, hub=own))
 
 
+def like(system: Any, problem: Problem, moving: bool = True) -> Any:
+    """Return the system of a variant of a problem, compiled as another one is and without what that leaves out.
+
+    Args:
+        system: of the problem.
+        problem: the variant.
+        moving: whether it will be stepped in time.
+
+    Raises:
+        InputError: a mesh that cannot be computed with.
+    """
+    other, held = compile_system(problem, system.comm, moving, system.held.parted), system.held
+    if held.left_out:
+        other.leave_out(held.left_out)
+    return other
+
+
 def on_other_mesh(problem: Problem, system: Any, moving: bool = True) -> tuple[Any, float] | None:
     """Return a system of a problem on half the cells or a finer mesh, and the ratio of its cell sizes to the own ones.
 
@@ -36,7 +53,7 @@ def on_other_mesh(problem: Problem, system: Any, moving: bool = True) -> tuple[A
     cells = system.structure.mesh.topology.index_map(system.structure.mesh.topology.dim).size_global
     for mesh, ratio in _meshes(problem, cells):
         try:
-            other = compile_system(problem.replace(mesh=mesh), system.comm, moving)
+            other = like(system, problem.replace(mesh=mesh), moving)
         except InputError:
             continue
         if other.V.dofmap.index_map.size_global != nodes:

@@ -143,10 +143,10 @@ class Companion:
     ):
         self.system, self.followed, self.doubles, self.output = system, followed, doubles, output
         self.tolerance = newton.tolerance
-        system.plain = True
+        system.held.plain = True
         own = Newton(newton.tolerance, newton.max_iterations, foreseeing=True)
         self.stepper = FollowingStepper(system, scheme, own, carrier(followed, system))
-        self.further, self.stepper.watch = further, self._passed_on
+        self.further, self.stepper.watch = list(further), self._passed_on
         self.state: State | None = None
         self.difference, self.doubled, self.sound = (0.0, 0.0), 0.0, True
         self.components: tuple[float, ...] | None = None

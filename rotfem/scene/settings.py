@@ -61,8 +61,9 @@ class Model(SceneModel):
         frame: frame to which displacements refer.
         prestress: of the prestressed linear theories of beams, what their geometric stiffness is of: "axial" forces, or
             "all" forces and moments; None for what is usual for the structure.
-        tolerance: relative model error up to which effects are left out and the theory may be poorer, or None.
-        on_exceed: what a run does that leaves the range its model was chosen for.
+        tolerance: estimated error of the theory up to which a poorer one may take its place, or None.
+        on_exceed: what happens where the named theory misses the tolerance, too: "stop" ends with the failure that it
+            is, "warn" and "upgrade" (a richer one is tried before in any case) warn.
         reduced: whether a history is that of a reduced model, of a linear theory; a number is its accuracy.
         foreshortening: whether a reduced model gives back the foreshortening that linear strains lack.
         all_unknowns: whether unknowns that are zero by symmetry are unknowns of a history all the same.
@@ -80,12 +81,8 @@ class Model(SceneModel):
 
     @model_validator(mode="after")
     def _check_choice(self) -> Self:
-        if self.tolerance is not None and self.effects != "auto":
-            reason = 'needs effects = "auto": it says which effects may be left out'
-            raise problem("tolerance", self.tolerance, reason)
         if self.tolerance is not None and self.frame == "inertial":
-            reason = 'needs frame = "rotating": only there can effects be left out one by one'
-            raise problem("tolerance", self.tolerance, reason)
+            raise problem("tolerance", self.tolerance, 'needs frame = "rotating", as the cheaper theories do')
         if self.tolerance is not None and self.reduced:
             raise problem("reduced", self.reduced, "cannot be combined with tolerance, which chooses the model")
         if self.foreshortening and not self.reduced:

@@ -26,7 +26,6 @@ ORDER = (
     "equations",
     "analysis",
     "refinement",
-    "selection",
     "commands",
 )
 #: Those that are read without FEniCSx.

@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
 
+from rotfem.errors import ComputationError
 from rotfem.numerics import forms
-from rotfem.selection.case import Case
-from rotfem.selection.coarse_model import Trial
-from rotfem.selection.distance import Outputs
+from rotfem.numerics.eigenproblem import Pencil
+from rotfem.refinement.explain import Case, Explanation
 
 Array = npt.NDArray[np.float64]
 
@@ -28,42 +28,52 @@ MEANING = {
     "steps_per_period": "steps in a period of the fastest wanted mode",
 }
 
-#: Times at which a motion is looked at.
+#: Times at which the speed of a motion is sampled.
 SAMPLES = 400
 
 
-def groups(trial: Trial, own: Outputs) -> dict[str, float]:
-    """Return name ↦ number, those that the case has; `MEANING` says what they are.
+def groups(of: Explanation) -> dict[str, float]:
+    """Return name ↦ number, those that a case has; `MEANING` says what they are.
 
     Args:
-        trial: the case, to be tried out.
-        own: what its model gives.
+        of: its changes, which were computed.
     """
-    case, system = trial.full, trial.poorest
-    structure = case.problem.structure
+    case, system = of.case, of.system
+    structure, values = case.problem.structure, of.values
     # Neither a mesh file's plate nor any other structure need have a length of its own.
     length = float(getattr(structure, "length", None) or system.structure.length)
-    first = float(trial.at_rest[0]) if trial.at_rest.size else None
+    at_rest = _frequencies_at_rest(of)
+    first = float(at_rest[0]) if at_rest.size else None
     speeds, rates = _turning(case, system)
     out = {} if first is None else {"speed_ratio": float(np.abs(speeds).max()) / first}
     radius = _radius(structure)
     if radius is not None and radius > 0.0:
         out["slenderness"] = length / radius
-    if own.tip.size:
-        out["deflection"] = float(np.linalg.norm(own.tip, axis=1).max()) / length
-        out["rotation"] = own.size
+    if of.size > 0.0:
+        out |= {"deflection": of.scale / length, "rotation": of.size}
     root = getattr(structure, "root_position", structure.hub_radius)
     out["hub_ratio"] = float(np.linalg.norm(root)) / length
     if first is not None:
         out["spin_rate_change"] = float(np.abs(rates).max()) / first**2
-    if len(own.values) and not structure.damping.is_zero:
-        out["damping"] = float(-own.values[0].real / abs(own.values[0]))
+    if len(values) and not structure.damping.is_zero:
+        out["damping"] = float(-values[0].real / abs(values[0]))
     if structure.has_tip_mass:
         out["tip_mass_ratio"] = _added_mass(system, "tip_mass")
-    if case.steps is not None and case.steps.step is not None and (first is not None or len(own.values)):
-        fastest = float(np.abs(own.values).max()) if len(own.values) else float(trial.at_rest[-1])
+    if case.steps is not None and case.steps.step is not None and (first is not None or len(values)):
+        fastest = float(np.abs(values).max()) if len(values) else float(at_rest[-1])
         out["steps_per_period"] = 2 * np.pi / fastest / case.steps.step
     return out
+
+
+def _frequencies_at_rest(of: Explanation) -> Array:
+    """Return the frequencies (rad/s) of the resting structure, its hub held; none where they cannot be computed."""
+    held = of.system.held
+    held.set_time(0.0, of.problem.motion.at_speed(0.0))
+    held.set_state(held.zeros())
+    try:
+        return np.sort(np.abs(Pencil(*held.mass_damping_stiffness()).solve(max(2, of.case.mode_count)).values))
+    except ComputationError:
+        return np.empty(0)
 
 
 def _turning(case: Case, system: Any) -> tuple[Array, Array]:

@@ -1,0 +1,438 @@
+"""What every effect and every theory changes: answers with one less, or with another theory, beside the own one.
+
+A history is marched once, with the companions that know its error (`rotfem.refinement.discretisation`). The one on half
+the cells, in steps of twice the length, is followed by one more companion for every model that differs by one effect or
+by the theory. So the two have mesh, steps and their errors in common, and what is between them is the change by the
+model,
+
+    max_t |u_model − u_own| / max_t |u_own|,    max_i |λ_model,i − λ_own,i| / |λ_own,i|,
+
+with u the displacement of the tip and λ the eigenvalues, sorted by size. Steady states and modes are on half the cells,
+too. How well the change is known follows from the errors of the two answers, which the rows of steps and mesh say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from rotfem.analysis.equilibrium import check_steady, static_tip_shape, steady_state
+from rotfem.analysis.first_motion import FirstMotion
+from rotfem.analysis.modal import ModalAnalysis
+from rotfem.analysis.schemes import Scheme, State
+from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
+from rotfem.equations.compiled import compile_system
+from rotfem.errors import ComputationError, InputError
+from rotfem.mechanics.problem import Problem
+from rotfem.mechanics.theories import Theory, theories
+from rotfem.numerics.eigenproblem import ZERO, Pencil
+from rotfem.numerics.newton import Newton
+from rotfem.refinement.coarser import by_itself, on_other_mesh
+from rotfem.refinement.companion import Companion
+from rotfem.refinement.discretisation import HistoryErrors, error_by_cells
+from rotfem.refinement.distance import distance, tip
+from rotfem.structures.symmetry import inactive_unknowns
+
+Array = npt.NDArray[Any]
+T = TypeVar("T")
+
+#: Names of the outputs that models are compared by.
+HISTORY, STEADY, MODES = "history", "steady", "modes"
+
+#: Factor within which a change is known; a relative change that nobody would call negligible; one that is large.
+SAFETY, NOTICEABLE, LARGE = 3.0, 1e-2, 1e-1
+
+#: Changes below are not told from none: Newton's increments, and round-off of eigenvalues.
+RESOLVED = 1e-8
+
+#: Distance of two histories, relative to the largest displacement, from which steps are too long to compare models in:
+#: a sine that is late by a twelfth of its period is as far from itself.
+FAR = 0.5
+
+#: Times at which the speed of a free hub is sampled.
+HUB_SAMPLES = 2001
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A problem with what is to be computed of it.
+
+    Attributes:
+        problem: what moves, and how.
+        steps: end and steps of the history; None where a steady state is wanted.
+        scheme: time-stepping scheme of the history.
+        tip_displacement: u_2 (m) of the tip of the static shape it starts from, or None.
+        from_steady: whether it starts from the equilibrium at its speed.
+        first: the mode or the velocities it starts with beside that; None where it starts at rest.
+        mode_count: number of modes that are wanted.
+        about: the state that modes are about: "steady" or "undeformed".
+        newton: iteration control, of which everything takes its own.
+        past_limits: whether the path to an equilibrium is followed past maxima of the load.
+        unsteady: why there is neither history nor steady state; "" if there is one.
+    """
+
+    problem: Problem
+    steps: Steps | None = None
+    scheme: Scheme | None = None
+    tip_displacement: float | None = None
+    from_steady: bool = False
+    first: FirstMotion | None = None
+    mode_count: int = 6
+    about: str = "steady"
+    newton: Callable[[], Newton] = Newton
+    past_limits: bool = False
+    unsteady: str = ""
+
+    def absent(self) -> dict[str, str]:
+        """Return output ↦ why there is none of it, among history, steady state and modes."""
+        out = {STEADY: "the scene asks for a history"}
+        if self.steps is None:
+            out = {HISTORY: "the scene has no [time]"} | ({STEADY: self.unsteady} if self.unsteady else {})
+        try:
+            check_steady(self.problem.replace(effects=None))
+        except InputError as error:
+            out.setdefault(STEADY, str(error))
+        return out
+
+    def equilibrium(self, system: Any, speed: float) -> Array:
+        """Return the equilibrium of a system at a speed (rad/s), a local dof array.
+
+        Raises:
+            ComputationError: there is none.
+        """
+        return plainly(system, lambda: steady_state(system, speed, self.newton(), past_limits=self.past_limits))
+
+    def start(self, system: Any) -> tuple[Array | None, Array | None]:
+        """Return (q, q̇) of a system at t = 0, local dof arrays; None where it is undeformed, or at rest.
+
+        Raises:
+            ComputationError: there is no such state.
+        """
+        problem, q = system.model.problem, None
+        if self.tip_displacement is not None:
+            return static_tip_shape(problem, self.tip_displacement, self.newton(), system.comm), None
+        if self.from_steady:
+            q = self.equilibrium(system, problem.motion.speed(0.0))
+        if self.first is None:
+            return q, None
+        about = "steady" if self.from_steady else "undeformed"
+        modal, first = ModalAnalysis(problem, about, self.newton(), system.comm, system), self.first
+        return plainly(system, lambda: first.beside(q, modal, self.newton()))
+
+    def eigenvalues(self, system: Any, speed: float) -> Array:
+        """Return λ of the wanted modes at a speed (rad/s), without those of a rigid body.
+
+        Raises:
+            ComputationError: no equilibrium, or eigenpairs not to be trusted.
+        """
+        held, count = system.held, self.mode_count
+        if self.about == "undeformed" or held.linear:
+            held.set_time(0.0, held.motion.at_speed(speed))
+            held.set_state(held.zeros())
+        else:
+            self.equilibrium(held, speed)
+        matrices = held.mass_damping_stiffness()
+        pencil = Pencil(*matrices)
+        if system.hub is None:
+            return pencil.lasting(count)
+        values = Pencil(*system.with_hub(matrices)).lasting(count, pencil.scale())
+        flexible: Array = np.abs(values) > ZERO * np.median(np.abs(values))
+        return values[flexible][: count - int(not flexible.all())]
+
+
+def plainly(system: Any, compute: Callable[[], T]) -> T:
+    """Return what is computed with plain tangents, or where that fails with those that take longer to compile."""
+    held = system.held
+    held.plain = True
+    try:
+        return compute()
+    except ComputationError:
+        if held.linear:
+            raise
+        held.plain = False
+        return compute()
+    finally:
+        held.plain = True
+
+
+@dataclass
+class Change:
+    """What one step from a model to another changes, or what steps or mesh do.
+
+    Attributes:
+        kind: "effect", "theory" or "discretisation".
+        name: of the effect, of the theory that takes the place of the model's, or the key that is too coarse.
+        included: whether the model itself has it.
+        estimate: output ↦ relative change; infinite where the other model fails, None where nothing is known.
+        notes: output ↦ why a model fails.
+        truth: output ↦ relative change on the case's own mesh and steps, where it was computed.
+    """
+
+    kind: str
+    name: str
+    included: bool
+    estimate: dict[str, float | None] = field(default_factory=dict)
+    notes: dict[str, str] = field(default_factory=dict)
+    truth: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def worst(self) -> float:
+        """Largest estimate over the outputs, of those that are known."""
+        return max((x for x in self.estimate.values() if x is not None), default=0.0)
+
+    @property
+    def verdict(self) -> str:
+        """Word for it: "negligible" (below 1 % even with the safety factor), "noticeable", "large", or "unknown"."""
+        if self.worst >= LARGE:
+            return "large"
+        if None in self.estimate.values():
+            return "unknown"
+        return "negligible" if SAFETY * self.worst < NOTICEABLE else "noticeable"
+
+    def row(self) -> dict[str, Any]:
+        """Return it as a dictionary fit for JSON."""
+        row: dict[str, Any] = {"kind": self.kind, "name": self.name, "included": self.included}
+        row |= {"estimate": self.estimate, "worst": self.worst, "verdict": self.verdict}
+        return row | ({"notes": self.notes} if self.notes else {}) | ({"truth": self.truth} if self.truth else {})
+
+
+class Explanation:
+    """The changes of a case's outputs by effects, theories, steps and mesh.
+
+    Args:
+        case: what is computed.
+        comm: MPI communicator.
+
+    Raises:
+        InputError: a mesh or a section that cannot be computed with.
+
+    Attributes:
+        effects: all that there are data for; `own` are those of the model.
+        absent: output ↦ why there is none; `wanted` are the others.
+        system: of the own model on the case's mesh.
+        speed: of the modes, rad/s.
+        scale: largest displacement of the tip, m; and `size`, the largest displacement over the length or rotation.
+        values: λ of the own model.
+        failed: output ↦ why the own model has none.
+    """
+
+    def __init__(self, case: Case, comm: MPI.Comm = MPI.COMM_WORLD):
+        self.case, self.absent = case, case.absent()
+        self.wanted = tuple(name for name in (HISTORY, STEADY, MODES) if name not in self.absent)
+        problem = case.problem.replace(frame="rotating", outputs={})
+        self.own = problem.effective_effects()
+        problem = problem.replace(effects=None)
+        self.effects, kind = problem.effective_effects(), problem.structure.type
+        named = {t.name: t for t in theories() if t.holds_for(kind)} | {problem.theory.name: problem.theory}
+        self.theories: tuple[Theory, ...] = tuple(sorted(named.values(), key=lambda t: t.rank))
+        self.moving = HISTORY in self.wanted
+        if self.moving and case.first is None and case.tip_displacement is None:
+            of_each = [set(inactive_unknowns(problem.replace(theory=t))) for t in self.theories]
+            problem = problem.replace(inactive=tuple(sorted(set.intersection(*of_each))))
+        self.problem = problem
+        self.system = self._compiled(problem, comm, set(self.effects) - set(self.own))
+        self.speed, self.failed = self._reached(), dict[str, str]()
+        self.scale = self.size = 0.0
+        self.values: Array = np.empty(0)
+        self.changes = [Change("effect", name, name in self.own) for name in self.effects]
+        self.changes += [Change("theory", t.name, False) for t in self.theories if t is not problem.theory]
+        self.steps, self.mesh = Change("discretisation", "", True), Change("discretisation", "", True)
+        self._others: list[Any] = []
+
+    def all(self) -> list[Change]:
+        """Return every effect there are data for, then every other theory, the steps of a history, and the mesh."""
+        steps, from_file = self.case.steps, getattr(self.problem.structure, "mesh", None) is not None
+        self.mesh.name = "mesh.degree" if from_file else "mesh.elements"
+        coarse, ratio = self._history() if self.moving else self._coarser()
+        for name, of, measure in ((STEADY, self._tip, distance), (MODES, self._modes, modes_change)):
+            if name in self.wanted:
+                self._compare(name, of, measure, coarse, ratio)
+        if steps is None:
+            return [*self.changes, self.mesh]
+        self.steps.name = "time.tolerance" if steps.step is None else "time.step"
+        return [*self.changes, self.steps, self.mesh]
+
+    # --- systems ------------------------------------------------------------------------------------------------------
+
+    def _compiled(self, problem: Problem, comm: MPI.Comm, without: set[str]) -> Any:
+        system = compile_system(problem, comm, self.moving, parted=True)
+        if system.linear:
+            system.held.check_terms()
+        if without:
+            system.leave_out(without)
+        return system
+
+    def _coarser(self) -> tuple[Any, float]:
+        """Return the own model's system on half the cells, and the ratio of cell sizes; on its own mesh without one."""
+        other = on_other_mesh(self.problem, self.system, self.moving)
+        return other if other is not None else (self.system, 1.0)
+
+    def _variants(self, mesh: Any) -> list[Any]:
+        """Return the systems of all changes on a mesh; None of a theory that cannot have all terms."""
+        if not self._others:
+            off = set(self.effects) - set(self.own)
+            for change in self.changes:
+                problem, without = by_itself(self.problem).replace(mesh=mesh), off
+                if change.kind == "effect":
+                    without = off ^ {change.name}
+                else:
+                    problem = problem.replace(theory=change.name)
+                try:
+                    self._others.append(self._compiled(problem, self.system.comm, without))
+                except InputError as error:
+                    self._others.append(None)
+                    change.notes |= dict.fromkeys(self.wanted, str(error))
+                    change.estimate |= dict.fromkeys(self.wanted, np.inf)
+        return self._others
+
+    def _reached(self) -> float:
+        """Return the speed of the modes: the final one, of a free hub the largest with a rigid structure; rad/s."""
+        motion, steps = self.problem.motion, self.case.steps
+        hub, end = motion.hub, 0.0 if steps is None else steps.end
+        if hub is None or steps is None:
+            return motion.final_speed(end)
+        times = np.unique([*np.linspace(0.0, end, HUB_SAMPLES), *hub.torque.knots])
+        speeds = hub.rigid_speeds(times, self.system.row.rest_inertia())
+        return float(speeds[np.argmax(np.abs(speeds))])
+
+    # --- a history ----------------------------------------------------------------------------------------------------
+
+    def _history(self) -> tuple[Any, float]:
+        """March the own model with its companions, and write what they say; return a system on half the cells.
+
+        Where steps of twice the length fail or lead far away, the models are marched once more in the case's own.
+        """
+        case, system, newton = self.case, self.system, self.case.newton()
+        assert case.scheme is not None
+        try:
+            errors = HistoryErrors(self.problem, system, case.scheme, newton, case.start)
+            own, ratio = errors.mesh if errors.mesh is not None and errors.mesh[1] > 1.0 else (errors.steps, 1.0)
+            others = self._march(errors, own, newton)
+            known = errors.errors(self.scale)
+            if not own.sound or errors.steps.difference[0] + own.difference[0] > FAR * self.scale:
+                own = Companion(own.system, system, case.scheme, newton, doubles=False)
+                own.begin(*case.start(own.system))
+                others = self._march(own, own, newton)
+                own.finish()
+        except ComputationError as error:
+            self._fails(HISTORY, error.what)
+            return self._coarser()
+        self.mesh.estimate[HISTORY] = known["space"]
+        self.steps.estimate = {**dict.fromkeys(self.wanted, 0.0), HISTORY: known["time"]}
+        for change, other in zip(self.changes, others, strict=True):
+            if other is not None:
+                resolved = own.sound and other.sound and not (known["time"] or 0.0) > FAR
+                change.estimate[HISTORY] = self._between(other, resolved, change)
+        return own.system, ratio
+
+    def _march(self, watch: Any, own: Companion, newton: Newton) -> list[Companion | None]:
+        """March the own model to the end, and return companions of all changes.
+
+        Args:
+            watch: of its steps.
+            own: companion of the own model, which passes its steps on to them.
+            newton: iteration control.
+        """
+        case, system, others = self.case, self.system, self._following(own)
+        assert case.scheme is not None
+        assert case.steps is not None
+        march = March(system, case.scheme, case.steps, newton, *case.start(system))
+        march.stepper.watch = watch
+        for state in march:
+            self.size = max(self.size, float(system.size(state.q)))
+            if system.linear and not self.size <= LARGEST_LINEAR_DEFLECTION:
+                raise ComputationError(f"it diverges at t = {state.t:.4g} s")
+            self.scale = max(self.scale, float(np.linalg.norm(tip(system, state))))
+        return others
+
+    def _between(self, other: Companion, resolved: bool, change: Change) -> float | None:
+        """Return the change of a history; None where it is not resolved, unless it is large."""
+        size = other.difference[0]
+        if other.system.linear and not size <= LARGEST_LINEAR_DEFLECTION * other.system.structure.length:
+            change.notes[HISTORY] = "it diverges"
+            return float(np.inf)
+        relative = size / self.scale if size > 0.0 and self.scale > 0.0 else np.inf if size > 0.0 else 0.0
+        return float(relative) if resolved or relative >= LARGE else None
+
+    def _following(self, own: Companion) -> list[Companion | None]:
+        """Return companions of all changes that follow that of the own model, which passes its steps on to them."""
+        out: list[Companion | None] = []
+        for system in self._variants(own.system.model.problem.mesh):
+            if system is None:
+                out.append(None)
+                continue
+            companion = Companion(system, own.system, own.stepper.scheme, own.stepper.newton, doubles=False)
+            try:
+                companion.begin(*self.case.start(system))
+            except ComputationError:
+                companion.sound = False
+            own.further.append(companion)
+            out.append(companion)
+        return out
+
+    # --- steady state and modes ---------------------------------------------------------------------------------------
+
+    def _tip(self, system: Any) -> Array:
+        q = self.case.equilibrium(system, self.problem.motion.speed(0.0))
+        if system is self.system:
+            self.size = float(system.size(q))
+        values = tip(system, State.at_rest(system, *system.start(q)))
+        self.scale = float(np.linalg.norm(values)) if system is self.system else self.scale
+        return values[None, :]
+
+    def _modes(self, system: Any) -> Array:
+        return self.case.eigenvalues(system, self.speed)
+
+    def _compare(
+        self,
+        name: str,
+        of: Callable[[Any], Array],
+        measure: Callable[[Array, Array], float],
+        coarse: Any,
+        ratio: float,
+    ) -> None:
+        """Write the changes of an output that needs no history.
+
+        Args:
+            name: of the output.
+            of: system ↦ its output.
+            measure: distance of two of them, relative to the first.
+            coarse: system of the own model on another mesh.
+            ratio: of its cell sizes to the own ones.
+        """
+        try:
+            own = of(self.system)
+            other = own if coarse is self.system else of(coarse)
+        except ComputationError as error:
+            self._fails(name, error.what)
+            return
+        if name == MODES:
+            self.values = own
+        self.mesh.estimate[name] = error_by_cells(measure(own, other), ratio) if coarse is not self.system else None
+        level = other if ratio > 1.0 else own
+        mesh = (coarse if ratio > 1.0 else self.system).model.problem.mesh
+        for change, system in zip(self.changes, self._variants(mesh), strict=True):
+            if system is None:
+                continue
+            try:
+                change.estimate[name] = measure(level, of(system))
+            except ComputationError as error:
+                change.estimate[name], change.notes[name] = np.inf, error.what
+
+    def _fails(self, name: str, what: str) -> None:
+        """Note that the own model has no such output."""
+        self.failed[name] = what
+        for change in self.changes:
+            change.estimate[name], change.notes[name] = np.inf, what
+        self.mesh.estimate[name] = None
+
+
+def modes_change(of: Array, to: Array) -> float:
+    """Return max |Δλ| / |λ| of eigenvalues sorted by size."""
+    n = min(len(of), len(to))
+    return max((distance(np.array([[a]]), np.array([[b]])) for a, b in zip(of[:n], to[:n], strict=True)), default=0.0)
