@@ -1,6 +1,6 @@
-"""The path of equilibria F(q, s) = 0 as speed and loads grow together, past limit points where that is wanted.
+"""The path of equilibria F(q, s) = 0 as speed and loads grow, past limit points where that is wanted.
 
-s multiplies loads, gravity, base acceleration and Ω², so F is linear in s. The unknown is (q, s), and a step of length
+Loads, gravity, base acceleration and Ω² are linear in s, so F is, too. The unknown is (q, s), and a step of length
 l along the unit tangent t is corrected in the plane across it (Riks 1979; Keller's pseudo-arclength),
 
     [ K   F_s ] [dq]     [ F                          ]
@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from rotfem.analysis.load_steps import Growth
 from rotfem.analysis.turning import recounted
 from rotfem.errors import ComputationError
 from rotfem.numerics.inertia import surely_negative
@@ -83,24 +84,24 @@ class Tracer:
 
     Args:
         system: equations of motion, the hub held.
-        omega: speed at s = 1, rad/s.
+        growth: what grows with s.
         newton: tolerance of the corrections; their count is added to.
     """
 
-    def __init__(self, system: Any, omega: float, newton: Newton):
-        self.system, self.omega, self.newton = system, omega, newton
+    def __init__(self, system: Any, growth: Growth, newton: Newton):
+        self.system, self.growth, self.newton = system, growth, newton
         self._owned = system.V.dofmap.index_map.size_local * system.V.dofmap.index_map_bs
         self._count = system.V.dofmap.index_map.size_global * system.V.dofmap.index_map_bs
         self._y, self._z = Increment(system.V), Increment(system.V)
 
     def follow(self, past_limits: bool) -> LoadPath:
-        """Return where the path leads from the unloaded state.
+        """Return where the path leads from its start.
 
         Args:
             past_limits: whether to go on where the load has a maximum.
         """
-        self.system.count_rotations_from(None)
-        path, point, length = LoadPath(self.system.zeros()), self._point(self.system.zeros(), 0.0, None), FIRST
+        q = self.growth.begin(self.system)
+        path, point, length = LoadPath(q), self._point(q, 0.0, None), FIRST
         for _ in range(MOST_STEPS):
             try:
                 new, used = self._step(point, length)
@@ -169,11 +170,8 @@ class Tracer:
         return Point(q, point.s, t_q / size, point.t_s / size, point.negative)
 
     def _set(self, q: Array, s: float) -> None:
-        system = self.system
-        if s < 0.0 and self.omega != 0.0:
-            raise ComputationError("the square of the speed would have to be negative")
-        system.set_time(0.0, system.motion.at_speed(np.sqrt(max(s, 0.0)) * self.omega), s)
-        system.set_state(q)
+        self.growth.set(self.system, s)
+        self.system.set_state(q)
 
     def _solutions(self, q: Array, s: float) -> tuple[Array, Array]:
         """Return −K⁻¹ F and −K⁻¹ F_s; F is linear in s, so a difference over any distance is exact."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rotfem.analysis.equilibrium import gravity_turns
-from rotfem.analysis.load_steps import balance
+from rotfem.analysis.load_steps import Growth, balance
 from rotfem.analysis.stability import Stability, stability_of
 from rotfem.equations.compiled import with_all_unknowns
 from rotfem.errors import ComputationError
@@ -45,7 +45,7 @@ def stability_ahead(system: Any, newton: Newton) -> Stability | None:
         return None
     system, speed = with_all_unknowns(system), problem.motion.speed(0.0)
     try:
-        q = balance(system, speed, 1.0, system.zeros(), newton, looked_at=False)
+        q = balance(system, Growth(speed), 1.0, system.zeros(), newton, looked_at=False)
         return stability_of(system, q, speed)
     except ComputationError:
         return None

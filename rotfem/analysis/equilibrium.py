@@ -11,11 +11,12 @@ from mpi4py import MPI
 from rotfem.analysis.arc_length import LoadPath, Tracer
 from rotfem.analysis.load_steps import (
     SMALLEST_SHARE,
+    Growth,
     Raised,
     balance,
     counted,
-    from_held_root,
     less,
+    on_hinges,
     raised,
     richest_advice,
 )
@@ -45,9 +46,9 @@ def steady_state(
 ) -> Array:
     """Return q (local dof array) with F(q, 0, 0) = 0 at constant speed: the equilibrium in the rotating frame.
 
-    Speed and loads are raised together, in one step where Newton allows and in smaller ones where not; the state is
-    left in the system's functions. Where that ends at no minimum of the energy, or not at all, the path of equilibria
-    from the unloaded state is followed (`rotfem.analysis.arc_length`): Newton may have left it.
+    Speed and loads are raised together (on hinges the loads at the full speed), in one step where Newton allows and in
+    smaller ones where not; the state is left in the system's functions. Where that ends at no minimum of the energy, or
+    not at all, the path of equilibria is followed (`rotfem.analysis.arc_length`): Newton may have left it.
 
     Args:
         system: equations of motion.
@@ -61,31 +62,43 @@ def steady_state(
         ComputationError: no equilibrium was reached; says how far the load got.
     """
     notes = [] if notes is None else notes
-    system = system.held
+    system, growth = system.held, Growth(omega)
+    loose = [hinge.name for hinge in system.structure.hinges.values() if hinge.stiffness == 0.0]
     if start is not None:
         try:
-            return counted(system, omega, 1.0, balance(system, omega, 1.0, start, newton), newton)
+            return counted(system, growth, 1.0, balance(system, growth, 1.0, start, newton), newton)
         except ComputationError:
             pass
-    if system.linear:
-        return balance(system, omega, 1.0, system.zeros(), newton)
-    if any(hinge.stiffness == 0.0 for hinge in system.structure.hinges.values()):
-        released = from_held_root(system, omega, newton)
-        if released is not None:
-            return released
-    if past_limits:
-        return _followed(system, omega, newton, notes)
+    if loose and not system.linear:
+        growth = on_hinges(system, omega, newton)
     try:
-        found = raised(system, omega, newton)
+        if system.linear:
+            return balance(system, growth, 1.0, system.zeros(), newton)
+        return _grown(system, growth, newton, past_limits, notes)
     except ComputationError as error:
-        path = _path(system, omega, newton, False, notes)
+        if not loose or growth.start is not None:
+            raise
+        raise ComputationError(
+            f"nothing holds the root's hinge ({', '.join(loose)}): {error.what}",
+            advice=f"structure.root.{loose[0]}_stiffness, a speed whose tension holds it, or {less(system)}",
+        ) from error
+
+
+def _grown(system: Any, growth: Growth, newton: Newton, past_limits: bool, notes: list[str]) -> Array:
+    """Return the equilibrium at the full load, in a nonlinear theory."""
+    if past_limits:
+        return _followed(system, growth, newton, notes)
+    try:
+        found = raised(system, growth, newton)
+    except ComputationError as error:
+        path = _path(system, growth, newton, False, notes)
         if path is None or path.share < 1.0:
-            raise error if path is None or not path.limits else _at_limit(system, omega, path) from None
-        return counted(system, omega, 1.0, path.q, newton)
-    return _judged(system, omega, newton, found, notes)
+            raise error if path is None or not path.limits else _at_limit(system, growth, path) from None
+        return counted(system, growth, 1.0, path.q, newton)
+    return _judged(system, growth, newton, found, notes)
 
 
-def _judged(system: Any, omega: float, newton: Newton, found: Raised, notes: list[str]) -> Array:
+def _judged(system: Any, growth: Growth, newton: Newton, found: Raised, notes: list[str]) -> Array:
     """Return the equilibrium that the growing load leads to, which is the one found unless Newton left the path.
 
     Raises:
@@ -95,17 +108,17 @@ def _judged(system: Any, omega: float, newton: Newton, found: Raised, notes: lis
         return found.q
     system.count_rotations_from(found.datum)
     total = system.structure.total(found.q)
-    path = _path(system, omega, newton, False, notes)
+    path = _path(system, growth, newton, False, notes)
     if path is not None and path.limits:
-        raise _at_limit(system, omega, path)
+        raise _at_limit(system, growth, path)
     if path is None or path.share < 1.0:
         if not found.sure:
             notes.append("whether this is the equilibrium that the growing load leads to, or another one, is not known")
         system.count_rotations_from(found.datum)
-        return balance(system, omega, 1.0, found.q, newton)
+        return balance(system, growth, 1.0, found.q, newton)
     if system.size(system.structure.total(path.q) - total) > SAME_STATE:
         notes.append("Newton met another equilibrium first; this is the one that the growing load leads to")
-    return counted(system, omega, 1.0, path.q, newton)
+    return counted(system, growth, 1.0, path.q, newton)
 
 
 def _has_descent(system: Any) -> bool:
@@ -116,10 +129,10 @@ def _has_descent(system: Any) -> bool:
     return bool(surely_negative(system.A))
 
 
-def _path(system: Any, omega: float, newton: Newton, past_limits: bool, notes: list[str]) -> LoadPath | None:
-    """Return the path from the unloaded state and note what there is on it; None where it cannot be followed."""
+def _path(system: Any, growth: Growth, newton: Newton, past_limits: bool, notes: list[str]) -> LoadPath | None:
+    """Return the path and note what there is on it; None where it cannot be followed."""
     try:
-        path = Tracer(system, omega, newton).follow(past_limits)
+        path = Tracer(system, growth, newton).follow(past_limits)
     except ComputationError:
         return None
     if path.branches:
@@ -130,35 +143,33 @@ def _path(system: Any, omega: float, newton: Newton, past_limits: bool, notes: l
     return path
 
 
-def _followed(system: System, omega: float, newton: Newton, notes: list[str]) -> Array:
+def _followed(system: System, growth: Growth, newton: Newton, notes: list[str]) -> Array:
     """Return the equilibrium at full load at the end of the path, past maxima of the load.
 
     Raises:
         ComputationError: the path does not lead there.
     """
-    path = _path(system, omega, newton, True, notes)
+    path = _path(system, growth, newton, True, notes)
     if path is None or path.share < 1.0:
         share, why = (0.0, "its first step failed") if path is None else (path.share, path.why)
         limits = "" if path is None or not path.limits else f", past limit points at {_shares(path.limits)} of it"
         raise ComputationError(
-            f"no steady state at {omega:g} rad/s: the path of equilibria ends at {share:.6g} of the load{limits}: "
-            f"{why}",
+            f"no steady state at {growth.omega:g} rad/s: the path of equilibria ends at {share:.6g} of the load"
+            f"{limits}: {why}",
             advice=less(system),
         )
-    return counted(system, omega, 1.0, path.q, newton)
+    return counted(system, growth, 1.0, path.q, newton)
 
 
 def _shares(shares: list[float]) -> str:
     return ", ".join(f"{share:.6g}" for share in shares)
 
 
-def _at_limit(system: Any, omega: float, path: LoadPath) -> ComputationError:
+def _at_limit(system: Any, growth: Growth, path: LoadPath) -> ComputationError:
     """Return what is said of a path with a maximum of the load."""
-    share = path.limits[0]
-    speed = f" ({np.sqrt(share) * omega:.6g} rad/s)" if omega else ""
     return ComputationError(
-        f"no steady state at {omega:g} rad/s to which a growing load leads: it has a maximum, a limit point, at "
-        f"{share:.6g} of the load{speed}, where the structure snaps",
+        f"no steady state at {growth.omega:g} rad/s to which a growing load leads: it has a maximum, a limit point, at "
+        f"{growth.where(path.limits[0])}, where the structure snaps",
         advice=f'solver.continuation = "arc_length" to follow the path past it, or {less(system)}',
     )
 

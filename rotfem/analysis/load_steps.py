@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from mpi4py import MPI
 
+from rotfem.analysis.theory_error import KNOWN, lost_digits
 from rotfem.analysis.turning import reached, recounted
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
@@ -23,6 +25,9 @@ SOON = 4
 
 #: A continuation that must cut its steps below this share of the whole has met a limit point.
 SMALLEST_SHARE = 1e-3
+
+#: Turn of a root (rad) by springs that are as soft as lets it begin to swing when they let go.
+LET_GO = 0.1
 
 #: Part of their range from which rotations are counted afresh where the next step of the load leads out of it.
 NEAR = 0.3
@@ -56,7 +61,56 @@ class Raised:
     sure: bool = True
 
 
-def raised(system: System, omega: float, newton: Newton) -> Raised:
+@dataclass(frozen=True)
+class Growth:
+    """What grows on the way to an equilibrium: with its share s the square of the speed and the loads, linearly.
+
+    A hinge has no stiffness before the spin is there: then it grows first, and the loads at the full speed.
+
+    Attributes:
+        omega: full speed, rad/s.
+        spin: shares of Ω² at s = 0 and s = 1.
+        load: shares of loads, gravity and base acceleration at s = 0 and s = 1.
+        springs: stiffness of the root's springs (N·m/rad) at s = 0 and s = 1, where that changes.
+        start: the equilibrium at s = 0; undeformed if None.
+    """
+
+    omega: float
+    spin: tuple[float, float] = (0.0, 1.0)
+    load: tuple[float, float] = (0.0, 1.0)
+    springs: tuple[tuple[Any, float, float], ...] = ()
+    start: Raised | None = None
+
+    def speed(self, share: float) -> float:
+        """Return the speed (rad/s) at a share.
+
+        Raises:
+            ComputationError: it would be imaginary.
+        """
+        part = self.spin[0] + share * (self.spin[1] - self.spin[0])
+        if part < 0.0 and self.omega != 0.0:
+            raise ComputationError("the square of the speed would have to be negative")
+        return float(np.sqrt(max(part, 0.0))) * self.omega
+
+    def set(self, system: System, share: float) -> None:
+        """Write speed, loads and springs of a share into a system."""
+        for constant, first, last in self.springs:
+            constant.value = first + share * (last - first)
+        loads = self.load[0] + share * (self.load[1] - self.load[0])
+        system.set_time(0.0, system.motion.at_speed(self.speed(share)), loads)
+
+    def begin(self, system: System) -> Array:
+        """Return the equilibrium at s = 0, rotations counted as they were there."""
+        system.count_rotations_from(None if self.start is None else self.start.datum)
+        return system.zeros() if self.start is None else self.start.q.copy()
+
+    def where(self, share: float) -> str:
+        """Return a share of the load in words, with its speed where that grows."""
+        speed = f" ({self.speed(share):.4g} rad/s)" if self.omega and self.spin[0] != self.spin[1] else ""
+        return f"{share:.6g} of the load{speed}"
+
+
+def raised(system: System, growth: Growth, newton: Newton) -> Raised:
     """Return the equilibrium at full load, in one step or by halved ones.
 
     Where there are several equilibria, a way that wanders may end at any of them. Then smaller steps are taken, whose
@@ -65,16 +119,15 @@ def raised(system: System, omega: float, newton: Newton) -> Raised:
     Raises:
         ComputationError: none was found; says how far the load got.
     """
-    datum: Any = None
-    system.count_rotations_from(datum)
-    q, done, share = system.zeros(), 0.0, 1.0
+    q, done, share = growth.begin(system), 0.0, 1.0
+    datum = system.datum
     other: Raised | None = None
     while done < 1.0:
         target = min(1.0, done + share)
         try:
-            new = balance(system, omega, target, q, newton)
+            new = balance(system, growth, target, q, newton)
             wandered = newton.wandered
-            new = counted(system, omega, target, new, newton)
+            new = counted(system, growth, target, new, newton)
         except BeyondReach as error:
             failure, afresh = error.what, reached(system, q) > NEAR
         except ComputationError as error:
@@ -91,8 +144,8 @@ def raised(system: System, omega: float, newton: Newton) -> Raised:
             if other is not None:
                 return other
             raise ComputationError(
-                f"no steady state at {omega:g} rad/s: the last equilibrium was at {done:.3g} of the load "
-                f"({np.sqrt(done) * omega:.4g} rad/s); {failure}",
+                f"no steady state at {growth.omega:g} rad/s: the last equilibrium was at {growth.where(done)}; "
+                f"{failure}",
                 advice=less(system),
             )
         system.count_rotations_from(datum)
@@ -103,38 +156,49 @@ def raised(system: System, omega: float, newton: Newton) -> Raised:
     return Raised(np.asarray(q), datum)
 
 
-def from_held_root(system: System, omega: float, newton: Newton) -> Array | None:
-    """Return the equilibrium with hinges that the spin holds, from that of a root held by springs; None if it fails.
+def on_hinges(system: System, omega: float, newton: Newton) -> Growth:
+    """Return how the load of a structure grows whose root is free to turn: from an equilibrium that holds its hinges.
 
-    At q = 0 a hinge without a spring has no stiffness: it comes of the tension that the spin makes.
+    At q = 0 a hinge without a spring has no stiffness: it comes of the tension that the spin makes, and of loads where
+    nothing spins. So springs hold the root first, and let it go; the loads grow at the full speed.
 
     Args:
         system: equations of motion of a nonlinear theory, the hub held.
         omega: speed, rad/s.
         newton: iteration control.
+
+    Returns:
+        Speed and loads growing together, as of other structures, where that equilibrium is not found.
     """
-    constants = [spring.stiffness for spring in system.structure.springs()]
-    given = [float(constant.value) for constant in constants]
-    system.count_rotations_from(None)
-    system.set_time(0.0, system.motion.at_speed(0.0), 0.0)
-    system.set_state(system.zeros())
-    A, _ = system.tangent(1.0, 0.0, 0.0)
-    held = float(A.norm(norm_type=3))  # the largest sum of a row: far above the stiffness of a turn
+    springs = [spring.stiffness for spring in system.structure.springs()]
+    given = [float(constant.value) for constant in springs]
+    load = 0.0 if omega else 1.0
+
+    def between(first: float, last: float) -> tuple[tuple[Any, float, float], ...]:
+        return tuple((k, max(own, first), max(own, last)) for k, own in zip(springs, given, strict=True))
+
+    q = Growth(0.0).begin(system)
+    Growth(0.0).set(system, 0.0)
+    system.set_state(q)
+    stiff = float(
+        system.tangent(1.0, 0.0, 0.0)[0].norm(norm_type=3)
+    )  # the largest sum of a row: far above that of a turn
     try:
-        for constant, own in zip(constants, given, strict=True):
-            constant.value = max(own, held)
-        q = raised(system, omega, newton).q
-        for constant, own in zip(constants, given, strict=True):
-            constant.value = own
-        return balance(system, omega, 1.0, q, newton)
+        start = raised(system, Growth(omega, load=(0.0, load), springs=between(stiff, stiff)), newton)
+        turn = float(
+            system.comm.allreduce(np.max(np.abs(start.q[system.structure.hinged_unknowns()]), initial=0.0), MPI.MAX)
+        )
+        soft = min(1.0, turn / LET_GO) * stiff
+        start = raised(system, Growth(omega, (1.0, 1.0), (load, load), between(soft, 0.0), start), newton)
     except ComputationError:
-        return None
+        return Growth(omega)
     finally:
-        for constant, own in zip(constants, given, strict=True):
+        for constant, own in zip(springs, given, strict=True):
             constant.value = own
+    return Growth(omega, (1.0, 1.0), (load, 1.0), start=start)
 
 
-def counted(system: System, omega: float, share: float, q: Array, newton: Newton) -> Array:
+def counted(system: System, growth: Growth, share: float, q: Array, newton: Newton) -> Array:
     """Return a balanced state, where its rotations are large counted from a shape near it and balanced again.
 
     Raises:
@@ -145,24 +209,23 @@ def counted(system: System, omega: float, share: float, q: Array, newton: Newton
     turns = system.structure.turns
     if turns is None or not turns.is_due(q):
         return q
-    return balance(system, omega, share, recounted(system, q)[0], newton)
+    return balance(system, growth, share, recounted(system, q)[0], newton)
 
 
 def balance(
-    system: System, omega: float, share: float, guess: Array, newton: Newton, *, looked_at: bool = True
+    system: System, growth: Growth, share: float, guess: Array, newton: Newton, *, looked_at: bool = True
 ) -> Array:
-    """Solve F(q, 0, 0) = 0 by Newton's method with loads, base acceleration and omega² multiplied by share.
+    """Solve F(q, 0, 0) = 0 by Newton's method at a share of speed squared and loads.
 
     Args:
         system: equations of motion, the hub held.
-        omega: speed, rad/s.
-        share: factor of the loads.
+        growth: what grows with the share.
+        share: of it.
         guess: where to start, a local dof array.
         newton: iteration control.
         looked_at: whether a state that is turned inside out is refused.
     """
-    motion = system.motion.at_speed(np.sqrt(share) * omega)
-    system.set_time(0.0, motion, share)
+    growth.set(system, share)
     q, dx = guess.copy(), Increment(system.V)
     before, followed = q.copy(), 0
 
@@ -178,8 +241,8 @@ def balance(
         return size
 
     if system.linear:
-        if not np.isfinite(increment()):
-            raise ComputationError("the stiffness is singular")
+        if not np.isfinite(increment()) or (system.structure.hinges and lost_digits(system, q) >= KNOWN):
+            raise ComputationError(f"no steady state at {growth.omega:g} rad/s: the stiffness is singular")
         newton.iterations += 1
     else:
         newton.solve(increment, lambda: system.size(q))

@@ -93,6 +93,8 @@ class Resultants:
     def _compile_rest(self, stiff: list[Any], soft: list[Any]) -> Any:
         """Return the form of K_rest, in a linear theory without what its pieces hold; None where it is empty."""
         m, du = self.model.mechanics, ufl.TrialFunction(self.V)
+        if self.system.linear and not soft:
+            return None
         inner = work.internal(replace(m, strains=soft), Variation(m.k)) if soft else 0
         if not self.system.linear:
             inner += sum(term for name, term in self.model.terms.items() if name != "internal")

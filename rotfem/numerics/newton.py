@@ -74,6 +74,10 @@ REACH = 0.5
 #: Correction, in these units, after which a root may be another than the one that was close to the start.
 FAR = 0.1
 
+#: How many times longer than any increment that the quadratic constant was found with one may be for it to be used: of
+#: increments that are far shorter it says nothing, as along an axis on which the equations are linear.
+KNOWN = 2.0
+
 #: Increment, in the units of the unknowns, below which growth is no matter of another root.
 STRAYS = 1e-3
 
@@ -105,6 +109,7 @@ class Newton:
     roundoff: float = 0.0
     foreseeing: bool = False
     _kappa: float = field(default=np.inf, repr=False)
+    _longest: float = field(default=0.0, repr=False)
 
     @classmethod
     def of(cls, settings: Any) -> Newton:
@@ -134,12 +139,13 @@ class Newton:
                 first = d
             if k == 2 and first > 0 and chord is None:
                 self._kappa = max(0.5 * self._kappa if np.isfinite(self._kappa) else 0.0, d / first**2)
+                self._longest = max(first, 0.5 * self._longest)
             if chord is not None:
                 enough = max(CHORD * self.tolerance, min(self.tolerance, SMALLEST))
                 if d <= enough or (d <= self.tolerance and d > 0.3 * previous):
                     return k
                 chord.judge(d, enough)
-            elif d <= self.tolerance or ((k == 1 or self.foreseeing) and 4 * self._kappa * d**2 <= self.tolerance):
+            elif d <= self.tolerance or ((k == 1 or self.foreseeing) and self._successor(d) <= self.tolerance):
                 return k
             stalled = stalled + 1 if d > 0.3 * previous and (chord is None or not chord.serves) else 0
             if chord is not None and chord.hopeless:
@@ -156,3 +162,7 @@ class Newton:
             f"Newton did not converge in {self.max_iterations} iterations: last increment {previous:.1e} (scaled), "
             f"wanted {self.tolerance:.0e}"
         )
+
+    def _successor(self, d: float) -> float:
+        """Return the most that the next increment after one of size d may be: anything, after a long one."""
+        return 4 * self._kappa * d**2 if d <= KNOWN * self._longest else np.inf

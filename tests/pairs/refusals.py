@@ -37,6 +37,29 @@ def but(factor: str, *levels: str) -> tuple[str, ...]:
 SCENE = "docs/scene.md"
 PLATES = ("plate", "mesh")
 FREE = ("torque", "controller")
+LINEAR = ("linear", "consistent_linear", "von_karman_linear")
+IN_PLANE = ("gravity", "tip", "span", "harmonic")
+#: What a hinge without a spring cannot meet at rest: loads that turn it, in theories in which it does not go to hang.
+#: Modes of a free hub, and the first speed of a Campbell diagram, are those at rest; a response is about no harmonic.
+AT_REST: tuple[Levels, ...] = tuple(
+    {**loaded, **asked}
+    for loaded in (
+        {"theory": ("second_order",), "structure": ("planar",), "loads": IN_PLANE},
+        {"theory": ("second_order",), "structure": ("spatial",), "loads": ("gravity", "tip")},
+        {"theory": ("reissner",), "structure": ("planar",), "loads": ("follower",)},
+    )
+    for asked in (
+        {"command": ("run",), "time": ("steady",), "motion": ("rest",)},
+        {"command": ("modes",), "motion": ("rest", *FREE)},
+        {"command": ("campbell",)},
+    )
+) + tuple(
+    {"theory": LINEAR, "command": ("run",), "time": ("steady",), "motion": ("rest",), **loaded}
+    for loaded in (
+        {"structure": ("planar",), "loads": (*IN_PLANE, "follower")},
+        {"structure": ("spatial",), "loads": ("tip", "weight")},
+    )
+)
 REFUSALS = (
     Refusal(
         {"structure": PLATES, "root": but("root", "clamped")},
@@ -127,5 +150,14 @@ REFUSALS = (
         r"loads: a frequency response needs a harmonic load",
         SCENE,
         "`rotfem response` needs a harmonic load",
+    ),
+    *(
+        Refusal(
+            {"root": ("hinge",), **choices},
+            r"nothing holds the root's hinge \(lag\): no steady state at 0 rad/s",
+            SCENE,
+            "a hinge without a spring at rest that a load turns",
+        )
+        for choices in AT_REST
     ),
 )

@@ -16,12 +16,11 @@ import pytest
 from tests.launch import MPIRUN, environment
 from tests.pairs.answers import answer, check_answer, check_same, columns_of
 from tests.pairs.covering import Levels, Row, covering, missing
-from tests.pairs.known import KNOWN, OPEN
 from tests.pairs.refusals import REFUSALS
 from tests.pairs.scenes import ACTIVE, LEVELS, as_toml, shuffled, tables_of
 
-#: What no row has: what is refused, and what is known to fail.
-CONFLICTS: list[Levels] = [*(refusal.choices for refusal in REFUSALS), *(failure.choices for failure in KNOWN)]
+#: What no row has.
+CONFLICTS: list[Levels] = [refusal.choices for refusal in REFUSALS]
 #: Seconds that rows of two processes may take each, compilation included, before one of them is taken to hang.
 PATIENCE = 180.0
 #: Error of an answer on two processes: of sums in another order and Newton's last increment, of adaptive steps, which
@@ -42,17 +41,10 @@ def rows_of(strength: int, seed: int) -> Iterator[Row]:
 def parameters(rows: Sequence[Row], before: str = "", marks: Sequence[Any] = ()) -> list[Any]:
     """Return rows as parameters of a test, those of two processes where there is mpirun."""
     ranked = [pytest.mark.mpi, pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")]
-
-    def marked(row: Row) -> list[Any]:
-        known = [pytest.mark.xfail(reason=failure.fails) for failure in OPEN if meets(row, failure.choices)]
-        return [*marks, *known, *(ranked if row["ranks"] == "2" else [])]
-
-    return [pytest.param(row, id=before + name_of(row), marks=marked(row)) for row in rows]
-
-
-def meets(row: Row, choices: Levels) -> bool:
-    """Return whether a row has one of the levels of every factor."""
-    return all(row[factor] in levels for factor, levels in choices.items())
+    return [
+        pytest.param(row, id=before + name_of(row), marks=[*marks, *(ranked if row["ranks"] == "2" else [])])
+        for row in rows
+    ]
 
 
 class Trial:
