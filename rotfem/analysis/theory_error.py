@@ -16,6 +16,9 @@ what is of first order in Δq and ΔΓ is a linear equation for the error Δq of
 with K the tangent at q, and G = ∫ N D²Γ_1 the stress stiffness, which the theory has in its own forces. It is Newton's
 first correction but for the forces C ΔΓ·DΔΓ, which the correction itself relaxes (of a bent line that is not
 foreshortened, the membrane force). Forces on the masses are kept. What these terms do to a frequency is not in it.
+
+A history that begins undeformed has no error at first, and masses keep one from growing: a constant r moves a mass m
+that nothing holds by r t²/2m in the time t. So K + 2M/t² is in the place of K, which bounds what a hinge does at rest.
 """
 
 from __future__ import annotations
@@ -136,12 +139,13 @@ class TheoryCheck:
             return False
         return richest().holds_for(kind) and kind in stiffened().prestress
 
-    def of_state(self, q: Array, tips: Array | None = None) -> TheoryError:
+    def of_state(self, q: Array, tips: Array | None = None, time: float = np.inf) -> TheoryError:
         """Return the error of the displacements of a state, whose time is set.
 
         Args:
             q: the state, a local dof array.
             tips: sizes that the components of the tip have (m, rad), (components,); those of the state if None.
+            time: that the error has had to grow (s); of an equilibrium it is all there.
         """
         if not self.known:
             return self._as(0.0, "its strains are exact" if self.theory.exact else "there is none to compare it with")
@@ -153,13 +157,13 @@ class TheoryCheck:
         small = neglected * np.max(tips[resolved], initial=0.0) <= REPORTED * np.min(tips[resolved], initial=np.inf)
         if small:
             return self._as(neglected, f"the largest rotation is {rotation:.2g}")
-        return self._computed(q, tips, resolved, rotation)
+        return self._computed(q, tips, resolved, rotation, time)
 
-    def _computed(self, q: Array, tips: Array, resolved: Array, rotation: float) -> TheoryError:
+    def _computed(self, q: Array, tips: Array, resolved: Array, rotation: float, time: float) -> TheoryError:
         """Return the error by the correction Δq of a state."""
         system, model = self.system, self.system.model
         r = self._residual(q)
-        K, state = system.matrix(1.0, 0.0, 0.0, 1.0), r.duplicate()
+        K, state = system.matrix(1.0, 0.0, 2.0 / time**2, 1.0), r.duplicate()
         stress = state.duplicate()
         state.array[:] = q[: r.getLocalSize()]
         self._stress_stiffness(q).mult(state, stress)
@@ -276,17 +280,19 @@ class Farthest:
         if size > MORE * self.seen[0]:
             self.seen = (size, t, np.array(q))
 
-    def error(self, system: Any, tips: Array | None = None) -> TheoryError | None:
+    def error(self, system: Any, tips: Array | None, from_rest: bool) -> TheoryError | None:
         """Return the error of a theory there; None where that fails. State and time of its system stay.
 
         Args:
             system: of the theory, on the mesh of the motion.
             tips: largest size of every component of the tip in the motion (m, rad); those of the state if None.
+            from_rest: whether the motion began undeformed, without an error.
         """
         check = TheoryCheck(system.held)
         if not check.known:
             return check.of_state(system.held.zeros())
-        return self._there(system.held, partial(check.of_state, tips=tips))
+        time = self.seen[1] if from_rest else np.inf
+        return self._there(system.held, partial(check.of_state, tips=tips, time=time))
 
     def lost_digits(self) -> float | None:
         """Return what round-off of the stiffness may have done there, relative; None where that cannot be said."""

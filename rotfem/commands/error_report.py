@@ -118,9 +118,11 @@ class RunErrors:
             return None
         names, moves = self._names, self._moves
         tips = np.array([np.max(np.abs(self.history[f"tip_{name}"])) for name in names])
+        initial = self.scene.initial
+        from_rest = self.scene.time is not None and initial.state == "undeformed" and initial.first is None
         richer = richer_problem(self.problem)
         if richer is None:
-            return self.farthest.error(self.system, tips)
+            return self.farthest.error(self.system, tips, from_rest)
         if not self.wanted:
             return None
         try:
@@ -132,7 +134,7 @@ class RunErrors:
         system, apart, components = found
         if self.shape is not None and self._buckles(system):
             return TheoryError(1.0, "it is above a buckling load that it does not see", self.problem.theory.name)
-        base = self.farthest.error(system, tips)
+        base = self.farthest.error(system, tips, from_rest)
         if base is None:
             return None
         sizes = tips[moves]

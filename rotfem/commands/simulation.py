@@ -323,8 +323,7 @@ class Simulation:
 
 def of_active_unknowns(scene: Scene, problem: Problem) -> Problem:
     """Return the problem of a history without the unknowns that symmetry keeps at zero."""
-    model, initial = scene.model, scene.initial
-    undisturbed = not initial.moves and initial.tip_displacement is None
-    if scene.time is None or model.all_unknowns or model.reduced or not undisturbed:
+    model = scene.model
+    if scene.time is None or model.all_unknowns or model.reduced or scene.initial.first is not None:
         return problem
     return problem.replace(inactive=inactive_unknowns(problem))
