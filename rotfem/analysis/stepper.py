@@ -107,7 +107,7 @@ class Stepper(StageSolver):
         q, v = state.q + h * state.v + 0.5 * h * h * state.a, state.v + h * state.a
         given = state.given
         if given is not None:
-            given = given + np.array([0.0, self.system.hub.torque.impulse(state.t, end), 0.0])
+            given = given + np.array([0.0, self.system.row.impulse(state.t, end), 0.0])
         return state.changed(t=end, q=q, v=v, given=given)
 
     def struck(self, state: State, h: float) -> State:

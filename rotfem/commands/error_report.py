@@ -22,7 +22,7 @@ from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.coarser import by_itself, on_other_mesh
+from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.discretisation import HistoryErrors, error_by_cells, error_of_shape, richer_problem
 from rotfem.refinement.distance import COLUMNS, OUTPUTS, largest, tip
 from rotfem.refinement.estimate import ErrorEstimate, percent
@@ -159,7 +159,7 @@ class RunErrors:
                 return None
             apart = _relative(companion.difference[0], self._scale)
             return companion.system, apart, np.array(companion.components or ())
-        system = compile_system(by_itself(richer), self.system.comm, moving=self.scene.time is not None)
+        system = compile_system(richer.replace(outputs={}), self.system.comm, moving=self.scene.time is not None)
         if self.reduced is not None:
             response = self.reduced.response
             there = reduced_response(system, response.times, self.start(system).q, accuracy_of(self.scene))

@@ -95,7 +95,7 @@ def hub_values(system: Any, state: State) -> dict[str, float]:
     if system.hub is None:
         return {}
     work, impulse = (0.0, 0.0) if state.given is None else map(float, state.given[:2])
-    own = {"torque": system.hub.torque.at(state.t, after=True), "hub_kinetic": system.row.kinetic()}
+    own = {"torque": system.row.torque(state.t, after=True), "hub_kinetic": system.row.kinetic()}
     return {**own, "angular_momentum": system.row.angular_momentum(), "impulse": impulse, "work": work}
 
 

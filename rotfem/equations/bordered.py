@@ -105,7 +105,7 @@ class BorderedSystem:
 
     def driven(self, t: float) -> Array:
         """Return all that is prescribed at time t (s), the torque last (see `System.driven`)."""
-        return np.append(self.inner.driven(t), self.hub.torque.at(t))
+        return np.append(self.inner.driven(t), self.row.torque(t))
 
     def leave_out(self, effects: Any) -> None:
         """Switch effects off, all others on, and put the hub back to its start."""
@@ -247,7 +247,7 @@ class BorderedSystem:
         for state in (old, new):
             self.set_time(state.t)
             self.set_state(state.q, state.v, state.a)
-            mean += 0.5 * torque.at(state.t)
+            mean += 0.5 * self.row.torque(state.t)
         return float((new.t - old.t) * mean)
 
     def moment(self, state: Any) -> float:

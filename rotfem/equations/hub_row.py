@@ -43,7 +43,6 @@ class HubRow:
         there = {name: form for name, form in wanted.items() if form is not None}
         self._forms = dict(zip(there, forms.together(list(there.values()), once), strict=True))
         self._vector = compat.create_vector(system.V)
-        self.hub.torque.attach(self._seen)
 
     def of_twin(self, system: System) -> HubRow:
         """Return the same equation of the structure's twin (see `System.twin`)."""
@@ -76,7 +75,16 @@ class HubRow:
         """Return I_R psi'' + c psi' + (work in the turn) − M(t), N·m."""
         _, speed, rate = self.angle.values
         own = self.hub.inertia * rate + self.hub.damping * speed
-        return float(own + self.work() - self.hub.torque.at(t))
+        return float(own + self.work() - self.torque(t))
+
+    def torque(self, t: float, after: bool = False) -> float:
+        """Return M at time t (s) and the state, N·m; after a jump there if so wanted."""
+        return self.hub.torque.on(t, self._seen, after)
+
+    def impulse(self, start: float, end: float) -> float:
+        """Return ∫ M dt from start to end (s), N·m·s; of a controller at the state."""
+        torque = self.hub.torque
+        return self.torque(end) * (end - start) if torque.controlled else torque.impulse(start, end)
 
     def _seen(self) -> tuple[float, float, dict[str, float]]:
         """Return psi (rad), psi' (rad/s) and the tip at the state, by the names of its components."""
@@ -86,7 +94,7 @@ class HubRow:
 
     def torque_slope(self, c_k: float, c_v: float) -> float:
         """Return −∂M/∂psi c_k − ∂M/∂psi' c_v of a torque that answers to the motion; 0 of others."""
-        by_angle, by_speed = self.hub.torque.slopes(self.system.time)
+        by_angle, by_speed = self.hub.torque.slopes(self.system.time, self._seen)
         return -c_k * by_angle - c_v * by_speed
 
     def work(self) -> float:

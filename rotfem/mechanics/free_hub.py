@@ -16,6 +16,9 @@ ROUNDING = 1e-14
 Array = npt.NDArray[np.float64]
 Rows = tuple[tuple[float, ...], ...]
 
+#: psi (rad), psi' (rad/s), and the tip by the names of its components.
+Seen = tuple[float, float, Mapping[str, float]]
+
 
 @dataclass(frozen=True)
 class Torque:
@@ -80,10 +83,11 @@ class Torque:
         """Return M(t): the limit from the left, or from the right with `after` (they differ at a jump)."""
         return float(self.many(np.array([t]), after)[0])
 
-    def attach(self, state: Callable[[], tuple[float, float, Mapping[str, float]]]) -> None:
-        """Do nothing: it does not answer to the state of the motion."""
+    def on(self, t: float, state: Callable[[], Seen], after: bool = False) -> float:
+        """Return M at time t (s): a state, psi (rad), psi' (rad/s) and the tip, does not change it."""
+        return self.at(t, after)
 
-    def slopes(self, t: float) -> tuple[float, float]:
+    def slopes(self, t: float, state: Callable[[], Seen]) -> tuple[float, float]:
         """Return ∂M/∂psi and ∂M/∂psi': it does not depend on them."""
         return 0.0, 0.0
 
@@ -115,7 +119,7 @@ SLIGHT = 1e-6
 
 @dataclass(frozen=True)
 class ControlledTorque(Torque):
-    """A torque that answers to the motion.
+    """A torque that answers to the motion; none where no state of it is given.
 
     Attributes:
         controller: what gives it.
@@ -124,27 +128,14 @@ class ControlledTorque(Torque):
     controlled: ClassVar[bool] = True
 
     controller: Controller = field(kw_only=True)
-    _state: list[Callable[[], tuple[float, float, Mapping[str, float]]]] = field(default_factory=list, init=False)
 
-    def attach(self, state: Callable[[], tuple[float, float, Mapping[str, float]]]) -> None:
-        """Say where psi (rad), psi' (rad/s) and the tip are read."""
-        self._state[:] = [state]
+    def on(self, t: float, state: Callable[[], Seen], after: bool = False) -> float:
+        """Return M at time t (s) and a state."""
+        return self.controller(t, *state())
 
-    def at(self, t: float, after: bool = False) -> float:
-        """Return M at time t (s) and the state that is read; 0 where none is."""
-        return self.controller(t, *self._state[0]()) if self._state else 0.0
-
-    def many(self, t: Array, after: bool = False) -> Array:
-        """Return M at times (n,), shape (n,), and the state that is read."""
-        return np.array([self.at(float(s)) for s in t])
-
-    def impulse(self, start: float, end: float) -> float:
-        """Return M times the time from start to end (s), at the state that is read."""
-        return self.at(end) * (end - start)
-
-    def slopes(self, t: float) -> tuple[float, float]:
-        """Return ∂M/∂psi and ∂M/∂psi' at time t (s) and the state that is read."""
-        psi, speed, tip = self._state[0]()
+    def slopes(self, t: float, state: Callable[[], Seen]) -> tuple[float, float]:
+        """Return ∂M/∂psi and ∂M/∂psi' at time t (s) and a state."""
+        psi, speed, tip = state()
         here = self.controller(t, psi, speed, tip)
         by_angle = self.controller(t, psi + SLIGHT, speed, tip) - here
         return by_angle / SLIGHT, (self.controller(t, psi, speed + SLIGHT, tip) - here) / SLIGHT

@@ -3,21 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import InputError
 from rotfem.mechanics.problem import Problem
-
-
-def by_itself(problem: Problem) -> Problem:
-    """Return a problem for a system beside another one's: without its outputs, with a hub that nobody else reads."""
-    hub = problem.motion.hub
-    if hub is None:
-        return problem.replace(outputs={})
-    own = replace(hub, torque=replace(hub.torque))  # a controller reads the state of one system
-    return problem.replace(outputs={}, motion=replace(problem.motion, hub=own))
 
 
 def like(system: Any, problem: Problem, moving: bool = True) -> Any:
@@ -48,7 +38,7 @@ def on_other_mesh(problem: Problem, system: Any, moving: bool = True) -> tuple[A
         system: the problem's system on its own mesh.
         moving: whether the other one will be stepped in time.
     """
-    problem = by_itself(problem)
+    problem = problem.replace(outputs={})
     nodes = system.V.dofmap.index_map.size_global
     cells = system.structure.mesh.topology.index_map(system.structure.mesh.topology.dim).size_global
     for mesh, ratio in _meshes(problem, cells):

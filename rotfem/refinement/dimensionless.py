@@ -82,8 +82,8 @@ def _turning(case: Case, system: Any) -> tuple[Array, Array]:
     times = np.linspace(0.0, max(end, motion.settled), SAMPLES + 1)
     if motion.hub is None:
         return np.array([motion.speed(t) for t in times]), np.array([motion.rate(t) for t in times])
-    rates = np.array([motion.hub.torque.at(t) for t in times]) / system.row.rest_inertia()
-    return motion.hub.speed + np.cumsum(rates * np.diff(times, prepend=0.0)), rates
+    speeds = motion.hub.rigid_speeds(np.asarray(times), system.row.rest_inertia())
+    return speeds, np.gradient(speeds, times) if end else np.zeros(len(times))
 
 
 def _radius(structure: Any) -> float | None:

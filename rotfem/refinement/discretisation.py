@@ -24,7 +24,7 @@ from rotfem.errors import ComputationError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.theories import compared
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.coarser import by_itself, on_other_mesh
+from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.companion import Companion
 from rotfem.refinement.distance import Output, tip
 
@@ -113,7 +113,9 @@ class HistoryErrors:
         if scheme.order > CERTAIN:
             self.order = Companion(system.twin(), same, scheme, newton, output=output)
         if richer is not None:
-            self.theory = Companion(compile_system(by_itself(richer), system.comm), same, scheme, newton, doubles=False)
+            self.theory = Companion(
+                compile_system(richer.replace(outputs={}), system.comm), same, scheme, newton, doubles=False
+            )
         others = (None if self.mesh is None else self.mesh[0], self.order, self.theory)
         further = [companion for companion in others if companion is not None]
         self.steps = Companion(same, system, scheme, newton, further=further, output=output)

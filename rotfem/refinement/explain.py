@@ -32,7 +32,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.theories import Theory, theories
 from rotfem.numerics.eigenproblem import ZERO, Pencil
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.coarser import by_itself, on_other_mesh
+from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.companion import Companion
 from rotfem.refinement.discretisation import HistoryErrors, error_by_cells
 from rotfem.refinement.distance import distance, tip
@@ -277,7 +277,7 @@ class Explanation:
         if not self._others:
             off = set(self.effects) - set(self.own)
             for change in self.changes:
-                problem, without = by_itself(self.problem).replace(mesh=mesh), off
+                problem, without = self.problem.replace(outputs={}, mesh=mesh), off
                 if change.kind == "effect":
                     without = off ^ {change.name}
                 else:

@@ -19,7 +19,7 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.refinement.carrier import interpolation
-from rotfem.refinement.coarser import by_itself, on_other_mesh
+from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.discretisation import error_by_cells
 
 Array = npt.NDArray[Any]
@@ -86,7 +86,7 @@ class FrequencyErrors:
             system, ratio = other
             problem, error = own.problem.replace(mesh=system.model.problem.mesh), partial(error_by_cells, ratio=ratio)
         else:
-            problem = by_itself(self.richer)
+            problem = self.richer.replace(outputs={})
         there = ModalAnalysis(problem, own.about, own.newton, own.comm, system)
         there.past_limits = own.past_limits
         nodes = own.system.V.tabulate_dof_coordinates()
