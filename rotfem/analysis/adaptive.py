@@ -13,6 +13,7 @@ from rotfem.analysis.error_measure import ErrorMeasure
 from rotfem.analysis.fixed_steps import Steps, fixed_steps
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stepper import Stepper, seen
+from rotfem.analysis.switching import watched_switches
 from rotfem.analysis.time_grid import LEAST, Leg, TimeGrid
 from rotfem.errors import ComputationError
 from rotfem.mechanics.courses import SAME, View
@@ -96,7 +97,7 @@ class AdaptiveSteps:
             ComputationError: a step failed, or would have to be shorter than allowed, or there are too many.
         """
         state, wanted, stepper, allowed = self.state, self.wanted, self.stepper, self.allowed
-        least = self.cells.step
+        least, switches = self.cells.step, watched_switches(stepper.system)
         began = state.t
         for number in range(1, MOST_STEPS + 1):
             if state.t >= self.end:
@@ -124,6 +125,8 @@ class AdaptiveSteps:
             factor = min(factor, max(SAFETY * allowed / h, SHRINK))
             if h >= wanted or factor < 1.0:
                 wanted = min(self.longest, h if KEEP[0] <= factor <= KEEP[1] else h * factor)
+            if switches is not None:
+                switches.passed(number, start, new)
             if stepper.watch is not None:
                 stepper.watch(start, new, Leg(stop, h, lands, averaged, drifts, plain=False))
             following = self._next(new.t, wanted, least)[1] if new.t < self.end else h

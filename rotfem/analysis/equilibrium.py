@@ -20,6 +20,7 @@ from rotfem.analysis.load_steps import (
     raised,
     richest_advice,
 )
+from rotfem.analysis.theory_error import KNOWN, rounded_compliance
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError, InputError
@@ -76,12 +77,28 @@ def steady_state(
             return balance(system, growth, 1.0, system.zeros(), newton)
         return _grown(system, growth, newton, past_limits, notes)
     except ComputationError as error:
+        if not (loose or system.linear) and _compliance_lost(system, omega):
+            lost = "round-off decides, as axial or shear stiffness outweighs what bends beyond its digits"
+            advice = "stiffnesses closer to each other, or fewer elements"
+            raise ComputationError(f"{error.what}; {lost}", error.time, advice) from error
         if not loose or growth.start is not None:
             raise
         raise ComputationError(
             f"nothing holds the root's hinge ({', '.join(loose)}): {error.what}",
             advice=f"structure.root.{loose[0]}_stiffness, a speed whose tension holds it, or {less(system)}",
         ) from error
+
+
+def _compliance_lost(system: Any, omega: float) -> bool:
+    """Return whether round-off of the stiffness is all of what the load does to the structure at rest."""
+    system.count_rotations_from(None)
+    system.set_time(0.0, system.motion.at_speed(omega))
+    system.set_state(system.zeros())
+    K, load = system.matrix(1.0, 0.0, 0.0, 1.0), system.residual()
+    try:
+        return rounded_compliance(system, K, Increment(system.V).solve(DirectSolver(K), load).copy()) >= KNOWN
+    except ComputationError:
+        return False
 
 
 def _grown(system: Any, growth: Growth, newton: Newton, past_limits: bool, notes: list[str]) -> Array:

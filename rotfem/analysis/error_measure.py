@@ -2,13 +2,14 @@
 
 A vibration of frequency ω and amplitude A has a local error of C (ωh)ᵐ A in every step. N such steps add up to
 N C (ωh)ᵐ A, but never to much more than the vibration itself: what is small need not be resolved. With filters
-F(τ) = (M + τ² K)⁻¹ M, which leave a vibration 1/(1 + τ²ω²), the size of the error is the larger of
+F(τ) = (M + τ C + τ² K)⁻¹ M, which leave a vibration 1/(1 + τ²ω²), the size of the error is the larger of
 
     N F(τ₁) … F(τ_k) e    and    F(h) e,    N C (h/τ)ᵐ = 2,
 
 the τ such that N e is left where it is below 2 A, and about 2 A beyond; what is not resolved at all has an e of up to
 (ωh)² A, of which F(h) leaves A, once: it is damped, or hardly moved. Stiff axial motions, whose e is the largest there
-is, thus count with their amplitude.
+is, thus count with their amplitude. So do motions that strong damping C stops within the step: without C their e, of
+h² a at the start, would be taken for an error (as of any stiff component: Hairer & Wanner 1996, eq. (IV.8.20)).
 """
 
 from __future__ import annotations
@@ -87,7 +88,7 @@ class ErrorMeasure:
         inner.set_time(0.0, inner.model.problem.motion)  # of a free hub the speed it starts with, not that of now
         inner.set_state(inner.zeros())
         self._mass = self._mass or inner.matrix(0.0, 0.0, 1.0, 0.0)
-        made = {tau: DirectSolver(inner.matrix((tau * h) ** 2, 0.0, 1.0, 1.0)) for tau in {lost, *times}}
+        made = {tau: DirectSolver(inner.matrix((tau * h) ** 2, tau * h, 1.0, 1.0)) for tau in {lost, *times}}
         return [[made[tau] for tau in times], [made[lost]]]
 
     def _through(self, error: Array, filters: list[DirectSolver]) -> Array:

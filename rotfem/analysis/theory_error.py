@@ -328,7 +328,11 @@ def lost_digits(system: Any, q: Array) -> float:
     if not system.linear:
         return 0.0
     system.set_state(q)
-    K = system.matrix(1.0, 0.0, 0.0, 1.0)
+    return rounded_compliance(system, system.matrix(1.0, 0.0, 0.0, 1.0), q)
+
+
+def rounded_compliance(system: Any, K: Any, q: Array) -> float:
+    """Return |qᵀ δK q| / qᵀ K q of a displacement q, with a bound of the round-off δK of a stiffness."""
     pencil = Pencil(K, K, K)
     X = q[: K.getLocalSize()[0], None].astype(complex)
     local = float(np.real(np.sum(X * pencil.apply(K, X))))

@@ -16,6 +16,7 @@ from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import stability_of
 from rotfem.analysis.stepper import Stepper
+from rotfem.analysis.switching import SMOOTHER, watched_switches
 from rotfem.analysis.theory_error import said_of
 from rotfem.analysis.time_loop import March, Steps
 from rotfem.commands import monitor
@@ -87,6 +88,7 @@ class Simulation:
         self.stepper: Stepper | None = None
         self.companions: HistoryErrors | None = None
         self.rows: RowTimes | None = None
+        self.last: State | None = None
         self.reduced: ReducedHistory | None = None
         self.shape: Array | None = None
 
@@ -196,6 +198,7 @@ class Simulation:
         if (why := self.scene.limits.refusal("steps", steps)) is not None:
             raise ComputationError(f"the motion {why}", time=state.t)
         self.monitor.step(state)
+        self.last = state
         rows = [state]
         if self.rows is not None and state.t > 0.0:
             rows = self.rows.taken()
@@ -254,9 +257,19 @@ class Simulation:
         return self.record.result(found, history)
 
     def _with_cause(self, error: ComputationError) -> ComputationError:
-        """Return a failure, with what was wrong before it as its cause if something was."""
+        """Return a failure, with what was wrong before it as its cause if something was.
+
+        Raises:
+            InputError: a term of a user cannot be computed with at rest.
+        """
         if self.stepper is None:
             return error
+        if self.log.steps == 0:
+            self.system.held.model.check_smooth()
+        switches, step = watched_switches(self.system), self.scene.time and self.scene.time.step
+        if switches is not None and step and self.last is not None and switches.ahead(self.last, step):
+            what = f"{error.what}; the torque jumps there, so that the equations of a step may have no solution"
+            return ComputationError(what, error.time, SMOOTHER)
         return monitor.with_cause(error, self.system, self.record.history.arrays(), self.rows is not None)
 
     def _said_of_steps(self, history: dict[str, Array], failure: ComputationError | None) -> list[str]:

@@ -11,8 +11,10 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 
+from rotfem.errors import InputError
 from rotfem.mechanics import work
 from rotfem.mechanics.bodies import Strain
 from rotfem.mechanics.effects import INERTIA, INTERNAL, LOADS, Effect
@@ -108,6 +110,39 @@ class Model:
         self.mechanics: Mechanics = self._mechanics()
         self.terms = self.work(Variation(self.structure.k))
         self._stretch: Any = None
+
+    def at_rest(self, form: Any, undeformed: bool = False) -> dict[str, Any]:
+        """Return a form and its derivatives at v = a = 0 (see `rotfem.numerics.forms.at_rest`).
+
+        Raises:
+            InputError: a term of a user has none there.
+        """
+        try:
+            return forms.at_rest(form, *self.structure.k.functions[:3], undeformed)
+        except ValueError:  # of UFL, for a division by zero
+            self.check_smooth()
+            raise
+
+    def check_smooth(self) -> None:
+        """Refuse terms of a user whose derivative to the velocities does not exist where these are zero, as of |v| v.
+
+        Raises:
+            InputError: names the term.
+        """
+        for name in (name for name, effect in self.acting.items() if callable(effect.work)):
+            try:
+                C = forms.at_rest(self.terms[name], *self.structure.k.functions[:3], undeformed=True)["C"]
+            except ValueError:
+                C = None
+            if C is None or not (C.empty() or self._is_finite(C)):
+                why = "has no derivative to the velocities at rest; smooth it: |v| as ufl.sqrt(inner(v, v) + eps**2)"
+                raise InputError("terms" if name in self.problem.terms else "model.effects", name, why)
+
+    def _is_finite(self, form: Any) -> bool:
+        """Return whether the matrix of a form has finite numbers only, on all processes."""
+        A = fem_petsc.assemble_matrix(forms.form(form, once=True))
+        A.assemble()
+        return bool(np.isfinite(A.norm()))
 
     @property
     def fixed(self) -> bool:

@@ -90,7 +90,7 @@ class NonlinearSystem(System):
 
     @cached_property
     def _at_rest(self) -> dict[str, Any]:
-        return forms.at_rest(self._residual_form, self.q, self.v, self.a)
+        return self.model.at_rest(self._residual_form)
 
     @cached_property
     def _parts(self) -> dict[str, Any]:

@@ -316,14 +316,15 @@ class Pieces:
         for kind in self.at_rest:
             self._decompose(kind)
         self._set_switches(model.switches)
+        if self.not_polynomial:
+            model.check_smooth()
         self._geometric = self.geometric(ufl.TestFunction(self.V), ufl.TrialFunction(self.V), self.prestressed)
         if not isinstance(self._geometric, int):
             self._prestress()
 
     def _forms_at_rest(self) -> dict[str, Any]:
         """Return f, K, C and M at q = v = a = 0 as UFL forms; those that vanish are left out."""
-        q, v, a, _ = self.structure.k.functions
-        at_rest = forms.at_rest(self.model.residual, q, v, a, undeformed=True)
+        at_rest = self.model.at_rest(self.model.residual, undeformed=True)
         return {kind: form for kind, form in at_rest.items() if not form.empty()}
 
     def _zero_constants(self) -> None:

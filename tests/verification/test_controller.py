@@ -51,6 +51,40 @@ def test_momentum_is_the_impulse_of_what_the_tip_asks_for() -> None:
     assert np.ptp(found["torque"]) > 50.0
 
 
+def relay(below: float, above: float, wanted: float) -> Any:
+    """Return the scene of a hub whose torque jumps at a speed (rad/s), from one value (N·m) to another."""
+    return {
+        "structure": {"type": "planar_beam", "length": L, "section": SECTION},
+        "motion": {
+            "type": "torque",
+            "hub_inertia": HUB,
+            "function": lambda t, psi, psi_dot, tip: below if psi_dot < wanted else above,
+        },
+        "model": {"theory": "consistent_linear"},
+        "mesh": {"elements": 1},
+        "output": {"error": False},
+    }
+
+
+def test_a_relay_that_holds_the_hub_at_its_jump_has_no_steps() -> None:
+    """I Ω̇ = ±M at Ω₀ holds Ω = Ω₀ (Filippov): what steps would follow is said, and when."""
+    M, wanted = 400.0, 0.5
+    with pytest.raises(rotfem.ComputationError, match="sliding mode") as failure:
+        rotfem.run({**relay(M, -M, wanted), "time": {"end": 4.0, "tolerance": 1e-3}})
+    assert failure.value.time == pytest.approx(wanted * INERTIA / M, rel=0.05)
+    with pytest.raises(rotfem.ComputationError, match="the torque jumps there"):
+        rotfem.run({**relay(M, -M, wanted), "time": {"end": 4.0, "step": 0.05}})
+
+
+def test_a_relay_that_is_passed_is_no_hindrance() -> None:
+    """I Ω̇ = M, then 3M/2: two straight lines, but for the vibration (0.08 rad/s) that the sudden start leaves."""
+    M, wanted = 400.0, 0.5
+    found = rotfem.run({**relay(M, 1.5 * M, wanted), "time": {"end": 1.0, "tolerance": 1e-2}}).history
+    when = wanted * INERTIA / M
+    exact = wanted + np.where(found["t"] < when, 1.0, 1.5) * M / INERTIA * (found["t"] - when)
+    np.testing.assert_allclose(found["psi_dot"], exact, rtol=0, atol=0.1)
+
+
 @pytest.mark.parametrize(
     ("function", "words"),
     [

@@ -235,6 +235,21 @@ def test_names_that_a_call_cannot_take(extension: Callable[[str], ModuleType]) -
         rotfem.run(beam(), terms={"internal": lambda m, delta: 0})
 
 
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+@pytest.mark.parametrize(
+    "motion", [{"type": "constant", "speed": 0.0}, {"type": "spin_up", "speed": 3.0, "duration": 1.0}]
+)
+def test_a_term_without_a_derivative_at_rest_is_refused(motion: dict[str, Any], theory: str) -> None:
+    """|v| has none where v = 0: without a spin UFL divides by zero, at the start of one the numbers are not finite."""
+
+    def quadratic(m: Any, delta: Any) -> Any:
+        v = [(m.velocity(body), body) for body in m.positions()]
+        return sum(0.05 * ufl.sqrt(ufl.inner(x, x)) * ufl.inner(x, delta.of(body)) * body.measure for x, body in v)
+
+    with pytest.raises(SceneError, match='terms = "air": has no derivative to the velocities at rest'):
+        rotfem.run(beam({"motion": motion, "model.theory": theory}), terms={"air": quadratic})
+
+
 @pytest.mark.parametrize("constants", [None, ("w",), ("w", "w")])
 def test_linear_theories_refuse_what_is_no_polynomial_of_the_speed(constants: tuple[str, ...] | None) -> None:
     """Quadratic drag c |v| v: |w| w is odd as w, and 1 at 1 as w and w²; linear drag with a wrong declaration."""
