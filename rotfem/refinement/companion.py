@@ -15,7 +15,6 @@ import numpy as np
 
 from rotfem.analysis.dense_output import between
 from rotfem.analysis.fixed_steps import started, travel
-from rotfem.analysis.roots import check_root
 from rotfem.analysis.schemes import Array, Scheme, Stage, State
 from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.time_grid import Leg
@@ -23,9 +22,6 @@ from rotfem.errors import ComputationError
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.carrier import carrier
 from rotfem.refinement.distance import Output, tip
-
-#: Part of the difference to which a companion is solved: an estimate has two digits.
-DIGITS = 1e-2
 
 
 @dataclass
@@ -81,8 +77,6 @@ class FollowingStepper(Stepper):
     def solve(self, stage: Stage, state: State) -> None:
         """Solve a stage by Newton's method alone: what cannot be solved so is not known."""
         self._iterate(stage, state)
-        if self.newton.strayed:
-            check_root(self.system, stage, state)
 
     def _feeds(self, new: State, state: State) -> bool:
         return False
@@ -142,7 +136,6 @@ class Companion:
         output: Output = tip,
     ):
         self.system, self.followed, self.doubles, self.output = system, followed, doubles, output
-        self.tolerance = newton.tolerance
         system.held.plain = True
         own = Newton(newton.tolerance, newton.max_iterations, foreseeing=True)
         self.stepper = FollowingStepper(system, scheme, own, carrier(followed, system))
@@ -223,7 +216,7 @@ class Companion:
         self._compare(step.steps[-1][1])
 
     def _compare(self, there: State) -> None:
-        """Take note of the distance of the outputs; that of tips says how well the next step is to be solved."""
+        """Take note of the distance of the outputs."""
         assert self.state is not None
         apart = self.output(self.system, self.state) - self.output(self.followed, there)
         size = float(np.linalg.norm(apart))
@@ -232,6 +225,3 @@ class Companion:
         self.components = tuple(float(x) for x in np.maximum(before, np.abs(apart)))
         if size > self.difference[0]:
             self.difference = size, there.t
-        sizes = [c.difference[0] for c in (self, *self.further)] if self.output is tip else [0.0]
-        part = DIGITS * min(sizes) / self.system.structure.length
-        self.stepper.newton.tolerance = max(self.tolerance, part)
