@@ -32,10 +32,10 @@ CAPABILITIES = {
     """,
     "reduced models": "analysis.reduced commands.reduced_history",
     "time integration": """
-        analysis.time analysis.adaptive analysis.alpha_family analysis.dense_output
-        analysis.end_acceleration analysis.energy_conserving analysis.esdirk analysis.first_motion
-        analysis.fixed_steps analysis.patience analysis.time_grid
-        analysis.radau analysis.roots analysis.schemes analysis.stage_solver analysis.stepper
+        analysis.time analysis.march analysis.alpha_family analysis.dense_output
+        analysis.dense_output analysis.energy_conserving analysis.esdirk analysis.first_motion
+        analysis.march analysis.stepper analysis.time_grid
+        analysis.radau analysis.roots analysis.schemes analysis.stepper analysis.stepper
         analysis.turning mechanics.courses
     """,
     "loads": """

@@ -24,7 +24,7 @@ import numpy as np
 
 from rotfem import ComputationError
 from rotfem.analysis.equilibrium import static_tip_shape
-from rotfem.analysis.time_loop import March, Steps
+from rotfem.analysis.march import March, Steps
 from rotfem.commands.problem import Problem
 from rotfem.numerics.newton import Newton
 from rotfem.registry import schemes

@@ -29,7 +29,7 @@ from mpi4py import MPI
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.equations.stations import StationChanges
 from rotfem.errors import ComputationError
-from rotfem.numerics.complex_solver import ComplexSolver
+from rotfem.numerics.linear import ComplexSolver
 from rotfem.numerics.projection import summed
 from rotfem.structures.root_reaction import along_axis
 

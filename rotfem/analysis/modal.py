@@ -26,7 +26,7 @@ from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.kept_digits import KeptDigits
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.functionals import Functionals
-from rotfem.equations.modes_at_rest import family_products, massed
+from rotfem.equations.modal_damping import family_products, massed
 from rotfem.errors import InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.work import kinetic_parts

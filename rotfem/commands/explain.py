@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from rotfem.analysis.time_loop import Steps
+from rotfem.analysis.march import Steps
 from rotfem.commands.loads import held
 from rotfem.commands.modes import modes
 from rotfem.commands.problem import Problem, first_motion, scheme_of

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.results.stations import StationHistory
+from rotfem.results.run import StationHistory
 from rotfem.results.xdmf import chain, write_xdmf
 from rotfem.structures.paraview import MOST, writer
 

@@ -18,8 +18,8 @@ from rotfem.errors import OutputError, SceneError, Stopped
 from rotfem.refinement.refine import Setting
 from rotfem.results.checkpoint_file import read_checkpoint, write_checkpoint
 from rotfem.results.files import CHECKPOINT
-from rotfem.results.live import LiveTable
 from rotfem.results.result_set import ResultSet, read_summary
+from rotfem.results.run import LiveTable
 from rotfem.scene import Scene
 
 #: Bits of what ranks tell each other after a step.

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rotfem.analysis.end_acceleration import end_acceleration
+from rotfem.analysis.dense_output import end_acceleration
 from rotfem.analysis.schemes import Array, State
 from rotfem.analysis.stability import Stability, stability_of
 from rotfem.errors import InputError

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability
 from rotfem.analysis.theory_error import Farthest
-from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION
 from rotfem.errors import ComputationError
 from rotfem.mechanics.theories import Theory, richest, theories
 

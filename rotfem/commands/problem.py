@@ -10,9 +10,9 @@ from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.first_motion import FirstMotion
+from rotfem.analysis.march import March, Steps
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import Array, Scheme, State
-from rotfem.analysis.time_loop import March, Steps
 from rotfem.commands.loads import checked, loads_of
 from rotfem.commands.mode_tables import mode_tables
 from rotfem.commands.moment import Moment, first_shape

@@ -15,8 +15,7 @@ from rotfem.commands.monitor import check_finite
 from rotfem.equations.plate_resultants import PlateResultants
 from rotfem.equations.stations import Stations
 from rotfem.errors import InputError
-from rotfem.results.run import RunResult, Table
-from rotfem.results.stations import StationHistory
+from rotfem.results.run import RunResult, StationHistory, Table
 from rotfem.scene.output import OutputTable
 from rotfem.structures.paraview import Snapshots
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.critical_speed import critical_speed_within
-from rotfem.analysis.fixed_steps import Steps, grid
+from rotfem.analysis.march import Steps, grid
 from rotfem.analysis.reduced.energies import ReducedEnergies
 from rotfem.analysis.reduced.foreshortened import Foreshortened, recover
 from rotfem.analysis.reduced.response import ACCURACY, Response, reduced_response

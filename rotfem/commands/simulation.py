@@ -13,12 +13,12 @@ from mpi4py import MPI
 from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.dense_output import RowTimes
 from rotfem.analysis.equilibrium import steady_state
+from rotfem.analysis.march import March, Steps
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import stability_of
 from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.switching import SMOOTHER, watched_switches
 from rotfem.analysis.theory_error import said_of
-from rotfem.analysis.time_loop import March, Steps
 from rotfem.commands import monitor
 from rotfem.commands.checkpoint import Log, Parts
 from rotfem.commands.error_report import RunErrors, output_of

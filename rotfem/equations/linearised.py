@@ -12,8 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.errors import ComputationError
-from rotfem.numerics.complex_solver import ComplexSolver
-from rotfem.numerics.linear import DirectSolver, Increment, combine
+from rotfem.numerics.linear import ComplexSolver, DirectSolver, Increment, combine
 
 Array = npt.NDArray[Any]
 

@@ -29,7 +29,7 @@ from rotfem.equations.modal_damping import EFFECT as DAMPING
 from rotfem.equations.model import Model
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
-from rotfem.numerics.assembly import SAME, Assembler
+from rotfem.numerics.forms import SAME, Assembler
 from rotfem.numerics.linear import DirectSolver, held, set_diagonal
 from rotfem.structures.root_reaction import RootReaction
 

@@ -1,4 +1,4 @@
-"""Finite rotations by their rotation vector θ, as UFL expressions: Rodrigues' formula and its tangent map.
+"""Finite rotations by their rotation vector θ, as UFL expressions and arrays: Rodrigues' formula, its tangent map.
 
 With s = |θ|², A = sin|θ|/|θ|, B = (1 − cos|θ|)/s and C = (|θ| − sin|θ|)/|θ|³ (Cardona & Géradin 1988, section 2),
 
@@ -7,6 +7,9 @@ With s = |θ|², A = sin|θ|/|θ|, B = (1 − cos|θ|)/s and C = (|θ| − sin|�
     k   = θ' + B θ×θ' + C θ×(θ×θ') = Λ K      axial vector of Λ' Λᵀ, components along the fixed axes
 
 K(θ') is one-to-one up to |θ| = 2π, where A = B = 0 takes away every change of θ across θ.
+
+Λ = exp(θ). The two angles of a plate are those of `rotfem.mechanics.mindlin`, t = R_2(−alpha_1) R_1(alpha_2) a_3. A
+rotation has many vectors and a director many pairs of angles: the way back takes those nearest to a guess.
 """
 
 from __future__ import annotations
@@ -15,6 +18,8 @@ from dataclasses import dataclass, field
 from math import factorial, pi
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 import ufl
 from ufl import cross
 
@@ -87,3 +92,147 @@ class Turn:
         """Return v + first θ×v + second θ×(θ×v)."""
         turned = cross(self.theta, v)
         return v + first * turned + second * cross(self.theta, turned)
+
+
+Array = npt.NDArray[np.float64]
+
+#: |θ|² below which the factors are power series, and how many terms of them.
+SERIES_UP_TO, TERMS = 1.0, 10
+
+#: Sine of the angle from the pole of a plate's angles below which the first of them is that of the guess.
+AT_POLE = 1e-8
+
+#: |θ| below which a rotation vector has the direction of the guess.
+NO_TURN = 1e-12
+
+
+# --- rotation vectors -------------------------------------------------------------------------------------------------
+
+
+def rotations(theta: Array) -> Array:
+    """Return Λ(θ), shape (…, 3, 3), of rotation vectors (…, 3) in rad."""
+    a, b, *_ = _factors(np.sum(theta * theta, axis=-1))
+    spin = _skew(theta)
+    return np.eye(3) + a[..., None, None] * spin + b[..., None, None] * (spin @ spin)
+
+
+def material_curvature(theta: Array, dtheta: Array) -> Array:
+    """Return axial(Λᵀ Λ') (…, 3), components along the fixed axes, of θ and θ' (1/m)."""
+    _, b, c, *_ = _factors(np.sum(theta * theta, axis=-1))
+    turned = np.cross(theta, dtheta)
+    return np.asarray(dtheta - b[..., None] * turned + c[..., None] * np.cross(theta, turned))
+
+
+def spins(theta: Array, v: Array, a: Array) -> tuple[Array, Array]:
+    """Return angular velocity ω = axial(Λ̇ Λᵀ) and ω̇ (…, 3), fixed axes, of θ, θ̇ = v (rad/s) and θ̈ = a (rad/s²)."""
+    s, rate = np.sum(theta * theta, axis=-1), 2 * np.sum(theta * v, axis=-1)
+    _, b, c, db, dc = (factor[..., None] for factor in _factors(s))
+    rate = rate[..., None]
+    first, second = np.cross(theta, v), np.cross(theta, np.cross(theta, v))
+    w = v + b * first + c * second
+    dw = a + b * np.cross(theta, a) + c * np.cross(theta, np.cross(theta, a))
+    dw += db * rate * first + dc * rate * second + c * np.cross(v, first)
+    return w, dw
+
+
+def turned_vectors(theta: Array, turn: Array) -> Array:
+    """Return by how much rotation vectors (…, 3), rad, change in a small turn (3,), fixed axes: T⁻¹(θ) δφ.
+
+    Of ω = T(θ) θ̇ (see `spins`): T⁻¹(θ) δφ = δφ − ½ θ×δφ + (1 − ½|θ| cot ½|θ|)/|θ|² θ×(θ×δφ).
+    """
+    a, b, *_ = (factor[..., None] for factor in _factors(np.sum(theta * theta, axis=-1)))
+    s = np.sum(theta * theta, axis=-1)[..., None]
+    across = np.where(s > NO_TURN, (1 - a / (2 * b)) / np.maximum(s, NO_TURN), 1 / 12)
+    first = np.cross(theta, turn)
+    return np.asarray(turn - first / 2 + across * np.cross(theta, first))
+
+
+def rotation_vectors(Lambda: Array, guess: Array) -> Array:
+    """Return rotation vectors (…, 3), rad, of matrices (…, 3, 3): of all that they have those nearest to a guess."""
+    quaternion = _quaternions(Lambda)
+    part = np.linalg.norm(quaternion[..., 1:], axis=-1)
+    angle = 2 * np.arctan2(part, quaternion[..., 0])
+    size = np.linalg.norm(guess, axis=-1)
+    along = np.where(size[..., None] > 0.0, guess / np.where(size, size, 1.0)[..., None], np.eye(3)[0])
+    turned = part > NO_TURN / 2
+    axis = np.where(turned[..., None], quaternion[..., 1:] / np.where(turned, part, 1.0)[..., None], along)
+    whole = np.round((np.sum(axis * guess, axis=-1) - angle) / (2 * np.pi))
+    return np.asarray((angle + 2 * np.pi * whole)[..., None] * axis)
+
+
+def _factors(s: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Return A, B, C of `rotfem.mechanics.rotations.factors`, dB/ds and dC/ds for s = |θ|²."""
+    small = s < SERIES_UP_TO
+    z = np.where(small, s, 0.0)
+    b, c, db, dc = (np.zeros_like(s) for _ in range(4))
+    for k in range(TERMS, -1, -1):
+        b, c = 1 / factorial(2 * k + 2) - z * b, 1 / factorial(2 * k + 3) - z * c
+        db, dc = (-(k + 1) / factorial(2 * k + 4) - z * db, -(k + 1) / factorial(2 * k + 5) - z * dc)
+    big = np.where(small, 1.0, s)
+    size = np.sqrt(big)
+    a, cosine = np.sin(size) / size, np.cos(size)
+    B, C = (1 - cosine) / big, (1 - a) / big
+    b, c = np.where(small, b, B), np.where(small, c, C)
+    db = np.where(small, db, (a / 2 - B) / big)
+    dc = np.where(small, dc, ((a - cosine) / (2 * big) - C) / big)
+    return 1 - s * c, b, c, db, dc
+
+
+def _skew(v: Array) -> Array:
+    """Return the matrices of v×, shape (…, 3, 3)."""
+    out = np.zeros((*v.shape, 3))
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    return out - np.swapaxes(out, -1, -2)
+
+
+def _quaternions(Lambda: Array) -> Array:
+    """Return unit quaternions (…, 4), the scalar first and not negative; of the four formulas the best conditioned."""
+    d = np.diagonal(Lambda, axis1=-2, axis2=-1)
+    trace = np.sum(d, axis=-1)
+    L = Lambda
+    differences = np.stack([L[..., 2, 1] - L[..., 1, 2], L[..., 0, 2] - L[..., 2, 0], L[..., 1, 0] - L[..., 0, 1]], -1)
+    products = L + np.swapaxes(L, -1, -2) + np.zeros_like(L)
+    for i in range(3):
+        products[..., i, i] = 1 - trace + 2 * d[..., i]
+    candidates = np.empty((*trace.shape, 4, 4))  # each row 4 q_i q
+    candidates[..., 0, 0], candidates[..., 0, 1:] = 1 + trace, differences
+    candidates[..., 1:, 0], candidates[..., 1:, 1:] = differences, products
+    best = np.argmax(np.diagonal(candidates, axis1=-2, axis2=-1), axis=-1)
+    q = np.take_along_axis(candidates, best[..., None, None], axis=-2)[..., 0, :]
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.where(q[..., :1] < 0, -q, q)
+
+
+# --- the two angles of a plate ----------------------------------------------------------------------------------------
+
+
+def triads(alpha: Array) -> Array:
+    """Return (t_1, t_2, t) of angles (…, 2) in rad as columns, shape (…, 3, 3): `rotfem.mechanics.mindlin.triad`."""
+    c1, s1, c2, s2 = np.cos(alpha[..., 0]), np.sin(alpha[..., 0]), np.cos(alpha[..., 1]), np.sin(alpha[..., 1])
+    rows = [[c1, -s1 * s2, -s1 * c2], [np.zeros_like(c1), c2, -s2], [s1, c1 * s2, c1 * c2]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def tilts(alpha: Array, v: Array, a: Array) -> tuple[Array, Array]:
+    """Return −t_γ·ṫ (rad/s) and −t_γ·ẗ (rad/s²), (…, 2): rates of angles that are counted from the triad of alpha.
+
+    Args:
+        alpha: angles (…, 2), rad.
+        v: their rates, rad/s.
+        a: their second rates, rad/s².
+    """
+    c2, s2 = np.cos(alpha[..., 1]), np.sin(alpha[..., 1])
+    first = np.stack([c2 * v[..., 0], v[..., 1]], axis=-1)
+    second = [c2 * a[..., 0] - 2 * s2 * v[..., 0] * v[..., 1], a[..., 1] + s2 * c2 * v[..., 0] ** 2]
+    return first, np.stack(second, axis=-1)
+
+
+def tilt_angles(t: Array, guess: Array) -> Array:
+    """Return the angles (…, 2), rad, of directors (…, 3): of all that they have those nearest to a guess."""
+    across = np.hypot(t[..., 0], t[..., 2])
+    first = np.where(across > AT_POLE, np.arctan2(-t[..., 0], t[..., 2]), guess[..., 0])
+    second = np.arctan2(-t[..., 1], across)
+    pairs = np.stack([np.stack([first, second], -1), np.stack([first + np.pi, np.pi - second], -1)])
+    pairs = pairs + 2 * np.pi * np.round((guess - pairs) / (2 * np.pi))
+    distance = np.sum((pairs - guess) ** 2, axis=-1)
+    return np.where((distance[0] <= distance[1])[..., None], pairs[0], pairs[1])

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from rotfem.analysis.dense_output import between
-from rotfem.analysis.fixed_steps import started, travel
+from rotfem.analysis.march import started, travel
 from rotfem.analysis.schemes import Array, Scheme, Stage, State
 from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.time_grid import Leg

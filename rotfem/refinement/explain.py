@@ -23,9 +23,9 @@ from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady, static_tip_shape, steady_state
 from rotfem.analysis.first_motion import FirstMotion
+from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION, March, Steps
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import Scheme, State
-from rotfem.analysis.time_loop import LARGEST_LINEAR_DEFLECTION, March, Steps
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem

@@ -35,7 +35,7 @@ from rotfem.results.files import (
     read_csv,
     write_text,
 )
-from rotfem.results.live import LiveTable
+from rotfem.results.run import LiveTable
 from rotfem.version import __version__
 
 if TYPE_CHECKING:

@@ -2,24 +2,93 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
+import h5py
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.results.files import csv_text, json_text
+from rotfem.errors import OutputError
+from rotfem.results.columns import described
+from rotfem.results.files import csv_text, json_text, line, write_text
 from rotfem.results.frames import Variable, dataset, frame, nodes_of
 from rotfem.results.result import Result
-from rotfem.results.stations import StationHistory
 
 if TYPE_CHECKING:
     import pandas
     import xarray
     from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class StationHistory:
+    """What a beam has at its stations, over time.
+
+    Attributes:
+        t: times, (n,), s.
+        x: positions of the stations, (m,), m.
+        values: quantity ↦ its values, (n, m), in axes of the turned section; unknowns in those of the frame.
+        format: of its file, "csv" or "hdf5".
+    """
+
+    t: Array
+    x: Array
+    values: dict[str, Array]
+    format: str = "csv"
+
+    def __getitem__(self, name: str) -> Array:
+        """Return a quantity at all times and stations, (n, m).
+
+        Raises:
+            KeyError: there is none of that name.
+        """
+        if name not in self.values:
+            raise KeyError(f"no quantity {name!r} at the stations; there are {', '.join(self.values)}")
+        return self.values[name]
+
+    def columns(self) -> dict[str, Array]:
+        """Return t, x and all quantities as columns, a row for each time and station."""
+        n, m = len(self.t), len(self.x)
+        out = {"t": np.repeat(self.t, m), "x": np.tile(self.x, n)}
+        return out | {name: values.ravel() for name, values in self.values.items()}
+
+    def text(self) -> str:
+        """Return the columns as CSV."""
+        return csv_text(self.columns())
+
+    def write_hdf5(self, path: Path) -> Path:
+        """Write t, x and the quantities as HDF5 datasets with their units; return the path.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        try:
+            with h5py.File(path, "w") as file:
+                for name, values in {"t": self.t, "x": self.x, **self.values}.items():
+                    data = file.create_dataset(name, data=values, compression="gzip" if values.ndim > 1 else None)
+                    data.attrs["long_name"], data.attrs["units"] = described(name)
+        except OSError as error:
+            raise OutputError(path, str(error).splitlines()[0]) from None
+        return path
+
+    def figure(self, title: str) -> Figure:
+        """Return every quantity along the beam at the last time, and of a motion the range it has had."""
+        from rotfem.results.plots import stacked
+
+        last = {"x": self.x, **{name: values[-1] for name, values in self.values.items()}}
+        figure = stacked(last, "x", list(self.values), title)
+        if len(self.t) > 1:
+            for axis, values in zip(figure.axes, self.values.values(), strict=True):
+                axis.fill_between(self.x, values.min(axis=0), values.max(axis=0), alpha=0.2, lw=0.0)
+            figure.axes[0].set_title(f"{title}, t = {self.t[-1]:.6g} s, and the range over time", fontsize=9)
+        return figure
+
 
 Array = npt.NDArray[np.float64]
 
@@ -161,3 +230,61 @@ class RunResult(Result):
             name: (("node",), values) for name, values in self.shape.items() if name not in nodes
         }
         return dataset({**over, **along}, {"t": (("t",), self.t), **nodes}, self._attributes())
+
+
+#: Seconds from one time that rows are written to the next.
+INTERVAL = 1.0
+
+
+class LiveTable:
+    """CSV file of a table that grows: what is new is written once a second, by one call of the system.
+
+    A disk that is full is no end: lines that fit are there, and the others are tried again the next time.
+
+    Args:
+        path: the file; one that is there is replaced.
+        table: the table, with the rows it starts with.
+
+    Attributes:
+        rows: how many rows are on disk.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+
+    def __init__(self, path: Path, table: Table):
+        self.path, self.table, self.rows = path, table, len(table)
+        self._size = len(write_text(path, csv_text(table.arrays())).read_bytes())
+        self._written, self._busy = monotonic(), False
+
+    def update(self) -> None:
+        """Write the rows that are new, if `INTERVAL` has passed since that was done."""
+        if monotonic() - self._written >= INTERVAL:
+            self.flush()
+
+    def flush(self) -> bool:
+        """Write the rows that are new; return whether all are on disk. May be called by a signal at any time."""
+        if self._busy:
+            return False
+        self._busy = True
+        try:
+            return self._append()
+        finally:
+            self._busy = False
+
+    def _append(self) -> bool:
+        self._written = monotonic()
+        data = "".join(map(line, self.table.rows(self.rows))).encode()
+        if not data:
+            return True
+        try:
+            descriptor = os.open(self.path, os.O_WRONLY | os.O_NOFOLLOW)
+            try:
+                whole = data[: os.pwrite(descriptor, data, self._size)].rfind(b"\n") + 1
+                os.ftruncate(descriptor, self._size + whole)  # no line is left torn
+            finally:
+                os.close(descriptor)
+        except OSError:
+            return False
+        self._size, self.rows = self._size + whole, self.rows + data.count(b"\n", 0, whole)
+        return whole == len(data)

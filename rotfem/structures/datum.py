@@ -23,7 +23,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from rotfem.errors import ComputationError
-from rotfem.mechanics import turned_arrays as turned
+from rotfem.mechanics import rotations as turned
 from rotfem.mechanics.problem import Problem
 
 Array = npt.NDArray[np.float64]

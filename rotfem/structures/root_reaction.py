@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from dolfinx import mesh as dolfinx_mesh
 
-from rotfem.mechanics.turned_arrays import turned_vectors
+from rotfem.mechanics.rotations import turned_vectors
 
 if TYPE_CHECKING:
     from rotfem.structures.structure import Structure

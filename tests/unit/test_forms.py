@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 from rotfem.equations.functionals import Functionals
 from rotfem.numerics import forms
-from rotfem.numerics.assembly import SAME, Assembler
+from rotfem.numerics.forms import SAME, Assembler
 
 
 @pytest.fixture(scope="module")

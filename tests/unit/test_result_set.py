@@ -15,9 +15,8 @@ import pytest
 from rotfem.errors import OutputError
 from rotfem.results import ModesResult, RunResult
 from rotfem.results.files import csv_text, read_csv
-from rotfem.results.live import LiveTable
 from rotfem.results.result_set import NAME, OURS, FolderLock, ResultSet, read_summary, said_of
-from rotfem.results.run import Table
+from rotfem.results.run import LiveTable, Table
 
 ROOT = Path(__file__).resolve().parents[2]
 

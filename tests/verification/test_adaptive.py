@@ -101,7 +101,7 @@ def test_a_late_pulse_is_met() -> None:
 
 def test_work_without_end_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """More steps than a march may take: an error that says what to do, with the history until then."""
-    monkeypatch.setattr("rotfem.analysis.adaptive.MOST_STEPS", 50)
+    monkeypatch.setattr("rotfem.analysis.march.MOST_STEPS", 50)
     with pytest.raises(rotfem.ComputationError, match="50 steps have not reached the end") as caught:
         moved("tip release", tolerance=1e-4)
     assert len(caught.value.result.history["t"]) > 10  # type: ignore[attr-defined]
@@ -128,8 +128,8 @@ def test_jumps_denser_than_steps_act_by_their_mean() -> None:
 
 def test_a_pace_that_reaches_no_end_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     """A hub held at a speed by a switch slides on its jump in ever shorter steps: said when the pace is known."""
-    monkeypatch.setattr("rotfem.analysis.adaptive.PACE", 100)
-    monkeypatch.setattr("rotfem.analysis.adaptive.MOST_STEPS", 1000)
+    monkeypatch.setattr("rotfem.analysis.march.PACE", 100)
+    monkeypatch.setattr("rotfem.analysis.march.MOST_STEPS", 1000)
     switch = {
         "type": "torque",
         "hub_inertia": 50.0,

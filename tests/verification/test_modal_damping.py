@@ -12,10 +12,10 @@ import scipy.linalg as sl
 from scipy.io import mmread
 
 from rotfem import InputError, Problem, SceneError, campbell, modes, run
+from rotfem.analysis.march import March, Steps
 from rotfem.analysis.reduced_basis import ReducedAnalysis
 from rotfem.analysis.sensitivity import sensitivities
 from rotfem.analysis.state_space import state_space, write_matrices
-from rotfem.analysis.time_loop import March, Steps
 from rotfem.commands.response import response
 from rotfem.errors import ComputationError
 from rotfem.numerics.newton import Newton

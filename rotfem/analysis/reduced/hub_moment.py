@@ -1,7 +1,7 @@
 """The work of a structure in a rigid turn of its free hub, to second order in the coordinates of a basis.
 
 It is a polynomial in q, v and a and in the constants of frame and loads. Its derivatives at rest are read from the
-hub's row (`rotfem.equations.hub_row`) in the directions of the basis, one constant at a time:
+hub's row (`rotfem.equations.bordered`) in the directions of the basis, one constant at a time:
 
     G = g + g_q·q + g_v·v + g_a·a + ½ q·Q q + ½ v·U v + v·W q + a·A q.
 
