@@ -18,7 +18,7 @@ class Problem(NamedTuple):
 
     Attributes:
         key: dotted path of the key, e.g. `structure.length`; empty if the whole file is meant.
-        value: what the scene holds there; None if the key is absent or has no value worth showing.
+        value: what the scene holds there; None if the key is absent or has no value that can be shown.
         allowed: what is wrong and what would be right.
     """
 

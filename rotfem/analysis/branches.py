@@ -95,8 +95,8 @@ def correlation(a: Spinning, b: Spinning) -> tuple[Array, Array]:
     """Return the squared correlations of the modes at two speeds, shape (m_a, m_b): 1 for equal modes, 0 for different.
 
     That of two modes is |y_i^H [(λ_i + μ_j) M + C] x_j|², scaled. Both pencils serve in turn and the mean is taken, so
-    the two speeds are treated alike. The second array is this. In the first, modes with one frequency are not told
-    apart, for any combination of them is a mode, too: what counts is how much of the other is in the space they span,
+    the two speeds are treated alike. The second array is this. In the first, modes with one frequency are not
+    distinguished, for any combination of them is a mode too: what counts is how much of the other is in their span,
     the trace of the product of both projections by the smaller dimension.
     """
     ya, yb, xa, xb = a.pairs.left, b.pairs.left, a.pairs.right, b.pairs.right

@@ -36,8 +36,8 @@ class RowTimes:
         interval: from one row to the next, s.
         end: last time, s.
         order: of the scheme that steps.
-        further: who else is told of the steps; None if nobody.
-        passed: rows there are already, beside that at t = 0.
+        further: a further observer of the steps; None without one.
+        passed: rows there are already, without that at t = 0.
     """
 
     def __init__(self, interval: float, end: float, order: int, further: Watch | None = None, passed: int = 0):

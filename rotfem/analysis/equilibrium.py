@@ -57,7 +57,7 @@ def steady_state(
         newton: iteration control.
         start: first guess, the equilibrium at a nearby speed; the whole load is then applied at once.
         past_limits: whether the path is followed past maxima of the load.
-        notes: receives what there is to be said of the path.
+        notes: receives remarks on the path.
 
     Raises:
         ComputationError: no equilibrium was reached; says how far the load got.
@@ -183,7 +183,7 @@ def _shares(shares: list[float]) -> str:
 
 
 def _at_limit(system: Any, growth: Growth, path: LoadPath) -> ComputationError:
-    """Return what is said of a path with a maximum of the load."""
+    """Return the warning of a path with a maximum of the load."""
     return ComputationError(
         f"no steady state at {growth.omega:g} rad/s to which a growing load leads: it has a maximum, a limit point, at "
         f"{growth.where(path.limits[0])}, where the structure snaps",

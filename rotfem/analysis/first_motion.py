@@ -44,7 +44,7 @@ class FirstMotion:
     velocity: Sequence[Sequence[float]] | None = None
 
     def beside(self, q: Array | None, analysis: ModalAnalysis, newton: Newton) -> tuple[Array | None, Array]:
-        """Return (q, q̇) at t = 0, local dof arrays, beside the state that the history starts from.
+        """Return (q, q̇) at t = 0, local dof arrays, about the state that the history starts from.
 
         Args:
             q: that state; None where it is undeformed.

@@ -8,7 +8,7 @@ solved at every frequency (the direct response), or from the pairs of the pencil
 
     q̂ = Σ_j x_j y_j^H f̂ / (n_j (iω − λ_j)),   n_j = y_j^H (2 λ_j M + C) x_j,
 
-over some λ_j and their conjugates, with the static answer of all others beside (the modal response).
+over some λ_j and their conjugates, with the static response of all others added (the modal response).
 
 With y = G_K q + G_C q̇ + G_M q̈ + d f of small motions x e^{st}, the complex amplitude of an output is
 
@@ -87,7 +87,7 @@ Array = npt.NDArray[Any]
 #: Points about a peak, in half its width at 1/√2 of its height.
 ABOUT_PEAK = np.array([-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0])
 
-#: Damping ratio below which a mode has none, and the distance from its frequency at which its peak is then looked at.
+#: Damping ratio below which a mode has none, and the distance from its frequency at which its peak is then sampled.
 UNDAMPED = 1e-8
 BESIDE = 1e-3
 
@@ -95,7 +95,7 @@ BESIDE = 1e-3
 #: factorised: that of the structure alone would be singular at its resonances.
 BRAKED = 0.05
 
-#: Frequencies, as parts of the lowest one of a free hub's vibrating modes, at which its rigid turn is told.
+#: Frequencies, as parts of the lowest one of a free hub's vibrating modes, at which its rigid turn is reported.
 BELOW = np.array([0.2, 0.4, 0.6])
 
 

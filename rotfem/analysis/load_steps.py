@@ -20,7 +20,7 @@ from rotfem.structures.datum import BeyondReach
 
 Array = npt.NDArray[np.float64]
 
-#: Newton iterations after which the stresses of the last correction are worth compiling a tangent with.
+#: Newton iterations after which the stresses of the last correction pay the compilation of a tangent.
 SOON = 4
 
 #: A continuation that must cut its steps below this share of the whole has met a limit point.

@@ -4,9 +4,9 @@ A fixed step is taken in legs where breakpoints of what is prescribed lie in it.
 
 At a kink of what is prescribed the memory of a scheme goes on along another line than it came.
 Generalised-α keeps an acceleration that stands for an instant θ h before the start of the next step, θ = α_f − α_m.
-Where the accelerations jump there, it jumps with them; where their rate jumps by Δȧ, it is off by θ h Δȧ, and
-velocities are off by θ² h² Δȧ/2 from then on. Over steps of one length that adds up to an error of the order of the
-scheme. Where a step is gone in legs, short ones beside long ones, it does not: a blow of two short legs has up to eight
+Where the accelerations jump there, it jumps with them; where their rate jumps by Δȧ, its error is θ h Δȧ, and that of
+velocities θ² h² Δȧ/2 from then on. Over steps of one length that adds up to an error of the order of the
+scheme. Where a step is taken in legs, short and long ones, it does not: a blow of two short legs has up to eight
 times its impulse with ρ∞ = 0. So the memory is put on the line that the accelerations take after the kink.
 """
 
@@ -219,7 +219,7 @@ class March:
         yield from steps(self.stepper, state, self.steps)
 
 
-#: Safety factor, smallest change, changes not worth a new factorisation, smallest relative scale.
+#: Safety factor, smallest change, changes that need no new factorisation, smallest relative scale.
 SAFETY, SHRINK, KEEP, FLOOR = 0.9, 0.2, (0.9, 1.25), 1e-6
 
 #: Local errors are estimates: the tolerance is divided by this.

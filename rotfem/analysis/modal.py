@@ -43,7 +43,7 @@ def with_overdamped(names: list[str], values: Array, energies: tuple[Array, Arra
     Args:
         names: "kind n" of every mode, in the order of the undamped frequencies of the shapes.
         values: λ, 1/s.
-        energies: x^H M x and x^H K x of every mode, over all ranks; a negative K tells of an instability.
+        energies: x^H M x and x^H K x of every mode, over all ranks; a negative K shows an instability.
     """
     mass, stiffness = (np.real(e) for e in energies)
     over = (values.imag == 0.0) & (values.real < 0.0) & (stiffness > 0.0) & (mass > 0.0)
@@ -205,7 +205,7 @@ class ModalAnalysis:
         free: whether the hub is free, so that its angle is one more unknown.
         past_limits: whether the path to an equilibrium is followed past maxima of the load.
         estimates: whether the error by the mesh is wanted.
-        notes: what there is to be said of these paths.
+        notes: remarks on these paths.
     """
 
     def __init__(

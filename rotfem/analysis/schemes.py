@@ -268,7 +268,7 @@ class Scheme(ABC):
 
 
 class Watch(Protocol):
-    """Who is told of the steps of a march."""
+    """An observer of the steps of a march."""
 
     def __call__(self, old: State, new: State, leg: Any) -> None:
         """Take note of a step from an old to a new state, over a leg of the time grid (see `time_grid.Leg`)."""

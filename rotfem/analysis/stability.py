@@ -28,7 +28,7 @@ from rotfem.numerics.inertia import negative_eigenvalues, surely_negative, symme
 
 Array = npt.NDArray[np.float64]
 
-#: Eigenvalues that are looked at where none can be counted, and the most that are looked at where they can.
+#: Number of eigenvalues computed where none can be counted, and at most where they can.
 FIRST, MOST = 8, 64
 
 
@@ -63,7 +63,7 @@ class Stability:
         return self.stable is True and bool(self.negative)
 
     def warning(self) -> str:
-        """Return what is to be said of it; empty of one that is plainly stable."""
+        """Return a warning; empty for an equilibrium that is plainly stable."""
         if self.held_by_spin:
             return (
                 "the equilibrium is no minimum of the energy (negative eigenvalues of the stiffness: "
@@ -141,7 +141,7 @@ def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Sta
     Args:
         pencil: M, C, K.
         negative: number of negative eigenvalues of a symmetric K; None where it says nothing.
-        target: where to aim, beside the zero eigenvalue of a free hub (1/s).
+        target: shift, away from the zero eigenvalue of a free hub (1/s).
     """
     count = FIRST if negative is None else max(FIRST, 2 * negative + 2)
     held = negative is not None and not symmetric(pencil.C)  # by gyroscopic forces, which are all that can

@@ -74,7 +74,7 @@ class StageSolver:
         #: Matrices, and the stage that they are about.
         self._linearised: Any = None
         self._about: Stage | None = None
-        #: Whether Newton's way is a long one, so that tangents that know where it came from are worth compiling.
+        #: Whether Newton's way is a long one, so that tangents that know where it came from pay their compilation.
         self._far = False
         #: Whether a step was hard to solve, and whether the scheme keeps the balance of energy by itself.
         self._hard = self._balanced = False
@@ -277,7 +277,7 @@ class Stepper(StageSolver):
         trust: in the scheme, where others may stand in for it.
         pace: length of the next adaptive step (s), largest displacement so far (scaled), and length that the errors so
             far allow (s); None before the first.
-        watch: told of every step that counts; None tells nobody.
+        watch: an observer of every step that counts; None without one.
     """
 
     def __init__(self, system: Any, scheme: Scheme, newton: Newton):
@@ -347,7 +347,7 @@ class Stepper(StageSolver):
         Args:
             state: where the step starts.
             h: length of the step, s.
-            end: its last instant, where state.t + h must not be off by a rounding (a jump, that is before it).
+            end: its last instant, where state.t + h must not have a rounding error (a jump, that is before it).
 
         Raises:
             ComputationError: Newton failed; the given state is untouched.

@@ -295,7 +295,7 @@ class Farthest:
         return self._there(system.held, partial(check.of_state, tips=tips, time=time))
 
     def lost_digits(self) -> float | None:
-        """Return what round-off of the stiffness may have done there, relative; None where that cannot be said."""
+        """Return what round-off of the stiffness may have done there, relative; None where that is unknown."""
         return self._there(self.system.held, partial(lost_digits, self.system.held))
 
     def _there(self, system: Any, of_state: Callable[[Array], T]) -> T | None:
@@ -317,7 +317,7 @@ class Farthest:
 def lost_digits(system: Any, q: Array) -> float:
     """Return a bound of the relative error that round-off of K makes in a state of a linear theory; 0 of others.
 
-    K is summed once, and what rounding did to it stays: the work of its forces on a displacement q is off by up to
+    K is summed once, and what rounding did to it stays: the work of its forces on a displacement q is in error by up to
     |qᵀ δK q|, and so is, relative to qᵀ K q, the compliance. Nonlinear theories evaluate their forces at every state
     from strains, whose round-off is another one each time.
 
@@ -341,7 +341,7 @@ def rounded_compliance(system: Any, K: Any, q: Array) -> float:
 
 
 def said_of(bound: float) -> str:
-    """Return what is to be said of an error bound; empty of one that is small."""
+    """Return a warning of an error bound; empty of one that is small."""
     if not bound > DIGITS:
         return ""
     how = f"by up to {100 * bound:.2g} %" if bound < KNOWN else "beyond recognition"

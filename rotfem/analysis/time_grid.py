@@ -5,7 +5,7 @@ jumps, bisection finds the instant; where it is far off a straight line within a
 between which it is nearly straight. What is narrower than the distance of two samples is not seen: there `breakpoints`
 say where it is.
 
-A step with a breakpoint inside is taken in legs from one to the next. Where there are more than legs are worth, those
+A step with a breakpoint inside is taken in legs from one to the next. Where there are too many of them, those
 that matter least are passed, and the legs that pass them see the courses averaged (see `rotfem.mechanics.courses`), as
 do legs that are as short as LEAST: a ramp of a microsecond is a blow.
 """
@@ -55,7 +55,7 @@ BENDS, PARTS, REFINEMENTS = 20, 8, 6
 #: Part of the first change of a slope that is left at a kink, refinements at least, and round-off of a value.
 SLOPE_LEFT, SURE, ROUND_OFF = 0.4, 3, 4e-16
 
-#: Part of the largest value by which a function is off a straight line in a step that has to be gone in parts.
+#: Part of the largest value by which a function differs from a straight line in a step that has to be taken in parts.
 FAST = 5e-2
 
 

@@ -1,4 +1,4 @@
-"""An accuracy that a scene asks for: the setting to begin with, its keys, and what is said of how it was met."""
+"""An accuracy that a scene asks for: the setting to begin with, its keys, and how it was met."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ def identity(scene: Scene, terms: Mapping[str, Any], outputs: Mapping[str, Any])
 
 
 def told(scene: Any) -> Any:
-    """Return the tables of a scene as a file tells them, without those that nothing computed depends on."""
+    """Return the tables of a scene as a file has them, without those that nothing computed depends on."""
     tables = json.loads(json.dumps(scene, default=str))
     return {k: v for k, v in tables.items() if k not in ("name", "limits")} if isinstance(tables, dict) else tables
 
@@ -442,7 +442,7 @@ def record_of(name: str) -> Any:
 
 
 def suits(value: Any, hint: Any) -> bool:
-    """Return whether a value is of the type that a field of a record is said to have."""
+    """Return whether a value is of the declared type of a field of a record."""
     kind, of = get_origin(hint) or hint, get_args(hint)
     if kind is Any:
         return True

@@ -164,7 +164,9 @@ def check(todo: Job) -> None:
 @command(computes=False)
 def explain(
     todo: Job,
-    check: Annotated[bool, typer.Option("--check", help="run the full models too: truth beside the estimates")] = False,
+    check: Annotated[
+        bool, typer.Option("--check", help="run the full models too: true changes next to the estimates")
+    ] = False,
 ) -> None:
     """Say which effects and which theory SCENE calls for, and what each of them changes."""
     from rotfem.commands.explain import explain as estimate
@@ -228,7 +230,8 @@ def import_(
         str | None, typer.Option("--format", metavar="NAME", help="format, if the file does not say")
     ] = None,
     overrides: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="scene key beside the file, repeatable")
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="scene key in addition to the file, repeatable"),
     ] = None,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False,

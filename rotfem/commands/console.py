@@ -33,7 +33,7 @@ MISSING = "FEniCSx is not here (there is no module {}); see docs/installation.md
 
 
 def missing() -> str:
-    """Return what is to be said where a module of FEniCSx is missing; empty where none is."""
+    """Return the message where a module of FEniCSx is missing; empty where none is."""
     names = ("mpi4py", "petsc4py", "slepc4py", "dolfinx")
     return next((MISSING.format(name) for name in names if find_spec(name) is None), "")
 

@@ -1,4 +1,4 @@
-"""What the commands report of the error of their results: its contributions, and when they are worth a warning."""
+"""What the commands report of the error of their results: its contributions, and when a warning is due."""
 
 from __future__ import annotations
 

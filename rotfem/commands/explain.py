@@ -57,7 +57,7 @@ def explain(
 
     Args:
         scene: scene, path of a scene file, or nested tables.
-        check: also run the full models of every row, so that the true change stands beside the estimate.
+        check: also run the full models of every row, so that the true change stands next to the estimate.
         comm: MPI communicator; every rank gets the whole result.
         progress: called with the share of the work done, between 0 and 1.
         terms: further terms of the residual by name, in every model, (mechanics, variation) ↦ UFL form.

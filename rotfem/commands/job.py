@@ -62,7 +62,7 @@ class Job:
         results: folder where its results go.
         session: who speaks.
         plots: whether figures are wanted.
-        hint: what tells advice; None where none is wanted.
+        hint: receives advice; None where none is wanted.
     """
 
     scene: Scene

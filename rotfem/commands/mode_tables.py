@@ -15,17 +15,17 @@ from rotfem.refinement.frequencies import FrequencyErrors
 Array = npt.NDArray[Any]
 
 
-#: Relative error that round-off may cause in a frequency before it is said.
+#: Relative error that round-off may cause in a frequency before it is reported.
 RELIABLE = 1e-4
 
 
-#: Relative error that the mesh may cause in a frequency before it is said.
+#: Relative error that the mesh may cause in a frequency before it is reported.
 RESOLVED = 0.02
 
 
 @dataclass(frozen=True)
 class ModeTables:
-    """What is said of the modes at one speed.
+    """Rows and warnings of the modes at one speed.
 
     Attributes:
         spinning: equilibrium and the eigenpairs kept.
@@ -115,17 +115,17 @@ def instabilities(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def doubtful(rows: list[dict[str, Any]]) -> list[str]:
-    """Return warnings of frequencies that round-off or the mesh may have put off."""
+    """Return warnings of frequencies that round-off or the mesh may have changed."""
     return [*unreliable(rows), *coarse(rows)]
 
 
 def coarse(rows: list[dict[str, Any]]) -> list[str]:
-    """Return a warning if the mesh may have put frequencies off by more than RESOLVED of them."""
+    """Return a warning if the mesh may have changed frequencies by more than RESOLVED of them."""
     found = {row["label"]: row["mesh_error"] for row in rows if (row.get("mesh_error") or 0.0) > RESOLVED}
     if not found:
         return []
     listed = ", ".join(f"{label} by about {100 * error:.2g} %" for label, error in found.items())
-    return [f"coarse: the mesh may have put off {listed} (mesh_error); more mesh.elements, or a higher mesh.degree"]
+    return [f"coarse: the mesh may have changed {listed} (mesh_error); more mesh.elements, or a higher mesh.degree"]
 
 
 def unreliable(rows: list[dict[str, Any]]) -> list[str]:

@@ -21,16 +21,16 @@ from rotfem.mechanics.theories import Theory, richest, theories
 
 Array = npt.NDArray[np.float64]
 
-#: Growth of the Jacobi integral, relative to the energy that goes to and fro, that is said.
+#: Growth of the Jacobi integral, relative to the energy exchanged, that is reported.
 GROWN = 0.02
 
 #: Part of the energies that round-off may make of them.
 ROUND_OFF = 1e-9
 
-#: Angular momentum from nowhere, relative to the largest that there was or was given, that is said.
+#: Angular momentum from nowhere, relative to the largest that there was or was given, that is reported.
 TURNED = 0.01
 
-#: Rows from which on a growth can be told from a fluctuation.
+#: Rows from which on a growth can be distinguished from a fluctuation.
 FEWEST = 20
 
 

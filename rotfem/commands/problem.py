@@ -186,7 +186,7 @@ def check_steps(end: float, step: float | None, tolerance: float | None, scheme:
 
 
 def first_motion(scene: Scene) -> FirstMotion | None:
-    """Return what the history of a scene starts with beside its first state; None where it starts at rest."""
+    """Return what the history of a scene starts with in addition to its first state; None where it starts at rest."""
     said = scene.initial
     if not said.moves:
         return None

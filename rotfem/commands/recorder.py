@@ -174,7 +174,7 @@ class Recorder:
 
     Args:
         system: equations of motion.
-        output: what is recorded beside what always is, of it the stations.
+        output: what is recorded in addition to what always is, of it the stations.
 
     Attributes:
         history: rows so far.

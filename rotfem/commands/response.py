@@ -39,10 +39,10 @@ from rotfem.units import quantity
 
 Array = npt.NDArray[Any]
 
-#: Frequencies of a response if nothing is said, and the part beyond the highest mode asked for that they reach to.
+#: Default number of frequencies of a response, and the part beyond the highest mode asked for that they reach to.
 NUMBER, BEYOND = 200, 1.2
 
-#: Median difference of the direct response and that by modes above which it is said that more modes are needed; the
+#: Median difference of the direct response and that by modes above which a warning asks for more modes; the
 #: largest one is found between peaks, where what modes do cancels and little is left to be relative to.
 NOTABLE = 1e-2
 

@@ -144,7 +144,7 @@ class Simulation:
             log.warnings.append(said)
 
     def _by_reduced_model(self, progress: Progress) -> bool:
-        """Record the history of a reduced model; return whether one serves, which is said where it does not."""
+        """Record the history of a reduced model; return whether one serves; a warning says where it does not."""
         self.keeper.start(self._parts())
         with self.keeper.interrupts():
             self.reduced = reduced_history(

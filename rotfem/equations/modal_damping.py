@@ -110,7 +110,7 @@ def family_products(system: Any, X: Array, MX: Array) -> dict[str, Array]:
 
     Args:
         system: equations of motion of a structure.
-        X: owned unknowns, (n, m); what is behind those of the structure is left aside.
+        X: owned unknowns, (n, m); those behind the structure's are ignored.
         MX: M X.
     """
     structure, bs = system.structure, system.V.dofmap.index_map_bs

@@ -244,8 +244,8 @@ class Piece:
 class PolynomialCheck:
     """Compares a term at constants of no special size with what its pieces make of them.
 
-    The pieces are found with constants that are 0, 1 and −1, where a polynomial of second degree is told by its values;
-    c|v|v has values there too, but is none.
+    The pieces are found with constants that are 0, 1 and −1, which determine a polynomial of second degree by its
+    values; c|v|v has values there too, but is none.
 
     Args:
         pieces: where the term is assembled; its switches are set.

@@ -1,7 +1,7 @@
 """Section forces, strains and unknowns at stations along a beam, where a state is written into its system.
 
-Stresses of finite elements are best at the Gauss points that also keep locking away: of elements of degree k they are
-off by O(h^(k+1)) there, and by O(h^k) elsewhere (Barlow, Int. J. Numer. Meth. Eng. 10 (1976) 243). So a station has the
+Stresses of finite elements are best at the Gauss points that also keep locking away: of elements of degree k the
+errors are O(h^(k+1)) there and O(h^k) elsewhere (Barlow, Int. J. Numer. Meth. Eng. 10 (1976) 243). A station has the
 value of the polynomial through the Gauss points of its cell and the nearest one on either side, of degree k + 1, and
 with it the order of the points. It does not reach over places where the section, the axis or a point load may make the
 forces jump; a station there has what is on its outer side, the tip what is on its inner one.

@@ -59,7 +59,7 @@ class Course:
         knots: times (s) between which it is smooth, increasing.
         marks: further times (s) between which it is nearly straight, where it is known to be fast.
         many: the same of an array of times, shape (n, components); made of `at` if None.
-        looks: times (s) at which it is looked at to see whether a step resolves it, but not landed on.
+        looks: times (s) at which it is sampled to see whether a step resolves it, but not landed on.
         samples: times (n,) and values (n, components) of a function that has been sampled, nearly straight between;
             jumps are two times; None of anything else.
         data: what has been made of its values at knots and marks (`rotfem.analysis.time_grid`); None before.
@@ -185,7 +185,7 @@ def _watched_motion(motion: Motion, see: Callable[[Course], Callable[[float], An
 
 
 def _watched_pitch(pitch: Pitch, see: Callable[[Course], Callable[[float], Any]]) -> Pitch:
-    """Return a pitch as it is seen; of a function the acceleration is looked at, where all that is fast shows most."""
+    """Return a pitch as it is seen; of a function the acceleration is sampled, which shows fast changes most."""
     none, changes = np.empty(0), dict[str, Any]()
     for name, (key, at) in zip(("angle", "rate", "acceleration"), pitch.courses.items(), strict=True):
         course = Course(key, at, _times(pitch.knots), none, known=pitch.known or name == "rate")

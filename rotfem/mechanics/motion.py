@@ -90,7 +90,8 @@ class Motion:
         base_knots: times (s) between which a_o is linear; None if that is not known.
         settled: time (s) from which on Omega stays as it is, 0 if that is not known.
         hub: what turns freely where the rotation is an unknown; its speed is then only that of the start.
-        pitch: turn of the frame beside that of the hub (see `rotfem.mechanics.pitch`); None: the frame is the hub's.
+        pitch: turn of the frame in addition to that of the hub (see `rotfem.mechanics.pitch`); None: the frame is the
+            hub's.
     """
 
     speed: Scalar
@@ -162,7 +163,7 @@ class Motion:
             angle: t (s) ↦ psi (rad); a quadrature of the speed if None.
             axis: direction of the angular velocity.
             breakpoints: times (s) between which the function is smooth, which steps then land on; where None, it is
-                looked at for them before a march.
+                sampled for them before a march.
             cell: length of time (s) in which these differences have one step, as some steps of a march.
             more: further attributes of the motion.
         """

@@ -59,7 +59,7 @@ class Pitch:
         axis: unit vector e along the blade at its root, the same in both frames.
         root: position of the root, m, the same in both frames.
         knots: times (s) at which the acceleration may jump.
-        known: whether these are all; a function has to be looked at.
+        known: whether these are all; a function has to be sampled.
         start: θ(0), rad.
     """
 

@@ -135,7 +135,7 @@ class RitzPairs:
     Args:
         matrices: M, C, K.
         start: first directions, columns of owned unknowns.
-        target: where K + σ C + σ² M is factorised, 0 or beside the zero eigenvalue of a free hub.
+        target: where K + σ C + σ² M is factorised, 0, or away from the zero eigenvalue of a free hub.
         fast: whether the fast eigenvalues of overdamped modes are wanted.
 
     Attributes:

@@ -88,7 +88,7 @@ def _by_probes(A: Any, sign: float) -> tuple[float, float]:
 #: Units of round-off in an entry of an assembled matrix, in those of √(K_ii K_jj): sums over quadrature points.
 ROUNDED = 2 * float(np.finfo(np.float64).eps)
 
-#: Largest bound that is told; what is above it is not known at all.
+#: Largest bound that is reported; above it the value is unknown.
 LARGEST = 1e6
 
 #: What is left of the residual's part once it is taken off: at most this times its square, of isolated modes.
@@ -226,7 +226,7 @@ class Eigenpairs:
         right: x, shape (n_local, m), complex.
         left: y, shape (n_local, m), complex.
         errors: normwise backward errors, shape (m,).
-        bounds: how far λ can be off by round-off, relative to |λ|, shape (m,) (see `rotfem.numerics.eigenproblem`).
+        bounds: bound of the error of λ by round-off, relative to |λ|, shape (m,) (see `rotfem.numerics.eigenproblem`).
     """
 
     values: Array
@@ -265,7 +265,7 @@ class Pencil:
         #: Scale of the unknowns, powers of two (None: that of the diagonal), and whether a factor needs pivots.
         self.unknowns: Any = None
         self.pivots = False
-        #: Whether fast eigenvalues of overdamped modes are told too, and whether pairs that are off are refused.
+        #: Whether fast eigenvalues of overdamped modes are returned too, and whether inaccurate pairs are refused.
         self._fast = self._judged = True
         #: Time of factorisations, s.
         self.factored = 0.0
@@ -312,7 +312,7 @@ class Pencil:
 
         Args:
             count: number of pairs; of conjugate ones, one counts.
-            target: where to aim, beside zero where zero is an eigenvalue (1/s).
+            target: shift, away from zero where zero is an eigenvalue (1/s).
 
         Raises:
             ComputationError: the solver did not converge, or a pair's backward error is above BACKWARD_TOLERANCE.
@@ -363,7 +363,7 @@ class Pencil:
             left = matched(values, *self._right(M, C, K, count, target)[:2])
         pairs = self._checked(values, (right, left), errors, small)
         values = pairs.values
-        # Of ± pairs of real eigenvalues of a conservative pencil, the growing one tells all.
+        # Of ± pairs of real eigenvalues of a conservative pencil, the growing one determines both.
         telling = (values.real >= 0.0) | (not self.conservative)
         upper = np.flatnonzero((values.imag > 0.0) | ((values.imag == 0.0) & telling))
         order = upper[np.argsort(np.abs(values[upper]), kind="stable")]
@@ -430,7 +430,7 @@ class Pencil:
             pep.setUp()
             self.factored += perf_counter() - started
             if self.unit is None and target == 0.0:
-                # P(0) = K is factorised in any unit of time, so what the factor tells of it costs nothing more.
+                # P(0) = K is factorised in any unit of time, so the inertia of its factor costs nothing more.
                 lowest = least_frequency(M, K, st.getKSP())
                 self.unit = scaled = float(power_of_two(2 * count * lowest)) if lowest > 0.0 else 1.0
                 C.scale(scaled)

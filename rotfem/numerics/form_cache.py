@@ -1,9 +1,9 @@
 """The cache of compiled forms: a folder that only the user can write to, with an index of the libraries in it.
 
-A library is code, so it is loaded only if nobody else can write to its folder, and if it has the SHA-256 that the index
-of the folder holds for it. What is missing, damaged or unknown there is compiled anew. FFCx generates and compiles the
-code, with options that are all given here: it and dolfinx would else read some from files of the current folder.
-Neither searches the cache: FFCx would wait for what a killed process left, and load whatever it finds.
+A library is code, so it is loaded only if no other user can write to its folder, and if it has the SHA-256 that the
+index of the folder holds for it. What is missing, damaged or unknown there is compiled anew. FFCx generates and
+compiles the code, with options that are all given here: it and dolfinx would else read some from files of the current
+folder. Neither searches the cache: FFCx would wait for what a killed process left, and load whatever it finds.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ def unusable() -> str:
         path = home()
         path.mkdir(mode=0o700, parents=True, exist_ok=True)
         return unsafe(path)
-    except (OSError, RuntimeError):  # RuntimeError: nobody knows where the user's files are
+    except (OSError, RuntimeError):  # RuntimeError: the user's folder is unknown
         return "cannot be written"
 
 

@@ -53,8 +53,8 @@ def negative_eigenvalues(A: Any) -> int:
 def surely_negative(K: Any) -> int | None:
     """Return how many eigenvalues of a stiffness are negative whatever rounding did to it; None where none are counted.
 
-    An entry is off by ROUNDED √(K_ii K_jj) at most (`rotfem.numerics.eigenproblem`), so K is by no more than the part
-    ROWS · ROUNDED of its diagonal: with that added no eigenvalue that exact arithmetic has positive is negative.
+    The error of an entry is at most ROUNDED √(K_ii K_jj) (`rotfem.numerics.eigenproblem`), so that of K is at
+    most ROWS · ROUNDED of its diagonal: with that added no eigenvalue that exact arithmetic has positive is negative.
     """
     if not symmetric(K):
         return None

@@ -96,7 +96,7 @@ def use_direct_solver(ksp: Any, size: int, symmetric: bool = False, pivots: bool
 
 
 class DirectSolver:
-    """LU factorisation of a matrix that keeps its pattern; the factor is renewed only when told.
+    """LU factorisation of a matrix that keeps its pattern; the factor is renewed on request only.
 
     Args:
         A: assembled PETSc matrix, or `PlusLowRank`, of which the sparse part is factorised.

@@ -45,7 +45,7 @@ def carrier(of: Any, to: Any) -> Callable[[Array], Array] | None:
 def interpolation(V: Any, points: Array) -> Any:
     """Return a sparse matrix from values at the nodes of a space to those at points (n, 3) of its mesh, on one process.
 
-    None where a point is not in the mesh, as beside curved edges that another mesh has cut.
+    None where a point is not in the mesh, as at curved edges that another mesh has cut.
     """
     mesh, element = V.mesh, V.element.basix_element
     padding = CLOSE * float(np.ptp(mesh.geometry.x, axis=0).max())

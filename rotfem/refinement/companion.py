@@ -121,7 +121,7 @@ class Companion:
         state: reached; None before `begin`.
         difference: largest distance of the two outputs so far, and when, s.
         components: largest difference of every component of them.
-        doubled: time gone in doubled steps, s.
+        doubled: time taken in doubled steps, s.
         sound: whether all its steps could be solved.
     """
 

@@ -7,7 +7,7 @@ Let u_h be the tip's displacement in steps of length h of a scheme of order p. I
 (Richardson's extrapolation; Hairer, Nørsett & Wanner 1993, section II.4), and likewise in the size of the cells. The
 order of a scheme above 2 may be reduced by stiff components (Hairer & Wanner 1996, section IV.15), so that it is
 observed, 2^p = |u_2h − u_4h| / |u_h − u_2h|. Elements converge at least with order 2. Beyond ASYMPTOTIC, or where no
-order is known, the error is said to be the difference itself. What cannot be computed is unknown.
+order is known, the error reported is the difference itself. What cannot be computed is unknown.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ ASYMPTOTIC = 0.05
 #: Order of a scheme up to which it is that of all motions, and lowest order of elements.
 CERTAIN, OF_ELEMENTS = 2, 2
 
-#: Part of a history that must have been gone in doubled steps for their difference to stand for the whole.
+#: Part of a history that must have been taken in doubled steps for their difference to stand for the whole.
 MOST_OF_IT = 0.5
 
 #: Shape and velocities at t = 0 of a system, local dof arrays; None where it is undeformed, or at rest.

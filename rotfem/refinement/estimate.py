@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-#: Sum of the shares above which it is said, where no accuracy was asked for.
+#: Sum of the contributions above which it is reported, where no accuracy was asked for.
 NOTICED = 0.01
 
 #: What the shares are called in text.

@@ -1,4 +1,4 @@
-"""What every effect and every theory changes: answers with one less, or with another theory, beside the own one.
+"""What every effect and every theory changes: answers with one less, or another theory, against the scene's own.
 
 A history is marched once, with the companions that know its error (`rotfem.refinement.discretisation`). The one on half
 the cells, in steps of twice the length, is followed by one more companion for every model that differs by one effect or
@@ -44,10 +44,10 @@ T = TypeVar("T")
 #: Names of the outputs that models are compared by.
 HISTORY, STEADY, MODES = "history", "steady", "modes"
 
-#: Factor within which a change is known; a relative change that nobody would call negligible; one that is large.
+#: Factor within which a change is known; a relative change that is not negligible; one that is large.
 SAFETY, NOTICEABLE, LARGE = 3.0, 1e-2, 1e-1
 
-#: Changes below are not told from none: Newton's increments, and round-off of eigenvalues.
+#: Changes below are not distinguished from none: Newton's increments, and round-off of eigenvalues.
 RESOLVED = 1e-8
 
 #: Distance of two histories, relative to the largest displacement, from which steps are too long to compare models in:
@@ -68,7 +68,7 @@ class Case:
         scheme: time-stepping scheme of the history.
         tip_displacement: u_2 (m) of the tip of the static shape it starts from, or None.
         from_steady: whether it starts from the equilibrium at its speed.
-        first: the mode or the velocities it starts with beside that; None where it starts at rest.
+        first: the mode or the velocities it starts with in addition; None where it starts at rest.
         mode_count: number of modes that are wanted.
         about: the state that modes are about: "steady" or "undeformed".
         newton: iteration control, of which everything takes its own.

@@ -24,7 +24,7 @@ from rotfem.refinement.discretisation import error_by_cells
 
 Array = npt.NDArray[Any]
 
-#: Modes beside those wanted that are computed on a coarser mesh, where they may come in another order.
+#: Modes in addition to those wanted that are computed on a coarser mesh, where they may come in another order.
 SPARE = 4
 
 

@@ -201,7 +201,7 @@ class CampbellResult(Result):
     def to_xarray(self) -> xarray.Dataset:
         """Return the numbers of campbell.csv over `speed` (rad/s) and `branch`, whose coordinate are the labels.
 
-        NaN where a branch is lost; `refined` tells the speeds that were not asked for.
+        NaN where a branch is lost; `refined` marks the speeds that were not asked for.
 
         Raises:
             ImportError: xarray is not installed.

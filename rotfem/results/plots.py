@@ -295,7 +295,7 @@ ROUND_OFF = 1e-9
 
 
 def explain_figure(result: ExplainResult) -> Figure:
-    """Return a bar for every effect and theory: relative change of each output, truth as a mark beside the estimate."""
+    """Return a bar for every effect and theory: relative change of each output; a mark is the true change."""
     rows, outputs = result.rows, result.summary["outputs"]
     figure = Figure(figsize=(8, 0.45 * len(rows) + 1.4))
     axis = figure.add_subplot()

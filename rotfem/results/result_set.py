@@ -52,7 +52,7 @@ _held: dict[str, tuple[int, int]] = {}
 class FolderLock:
     """Lock on a result folder. A process may hold it several times over; another one is refused.
 
-    What a killed process leaves of it is a file that nobody holds, and no obstacle.
+    What a killed process leaves of it is a file that no process holds, and no obstacle.
 
     Args:
         folder: the folder; it must be there.

@@ -1,7 +1,7 @@
 """Hints at the start of a computation: settings that will disappoint, seen beforehand. No dolfinx in it.
 
 Frequencies are those of a uniform Euler–Bernoulli cantilever and rod with the mean section, raised by the spin; what is
-said of them is rounded to what that is good for.
+reported of them is rounded to its accuracy.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from rotfem.listeners import Hint
 from rotfem.registry import theories
 from rotfem.scene.scene import Scene
 
-#: Steps a period, below which the first mode's frequency is off by more than 1 %, and those to be advised.
+#: Steps a period, below which the error of the first mode's frequency is more than 1 %, and those to be advised.
 FEW_STEPS, GOOD_STEPS = 18, 40
 
 #: Nodes a half wave, below which a mode is not resolved to 1 %.

@@ -12,7 +12,7 @@ from rotfem.scene.values import Array, evaluate
 if TYPE_CHECKING:
     from rotfem.scene.beams import SpatialBeamStructure
 
-#: What is told as doubtful: pretwist (rad), ratio of a property from row to row, of radii of gyration of stiffness and
+#: What is doubtful: pretwist (rad), ratio of a property from row to row, of radii of gyration of stiffness and
 #: mass, and distance of a centre in radii of gyration.
 LARGE_TWIST, LARGE_STEP, UNLIKE, OUTSIDE = 2.0, 30.0, 10.0, 4.0
 

@@ -156,7 +156,7 @@ def check_first_state(model: Model, initial: Initial, accuracy: float | None) ->
 
 
 def check_accuracy(model: Model, output: OutputTable, accuracy: float | None) -> None:
-    """Refuse what an accuracy cannot stand beside: a tolerance of the model, which it has in it, and no estimates.
+    """Refuse what an accuracy excludes: a tolerance of the model, which it has in it, and no estimates.
 
     Raises:
         PydanticCustomError: there are both, or the frame or the output has no estimate of errors.

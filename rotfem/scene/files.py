@@ -27,7 +27,7 @@ PATIENCE = 10.0
 
 _PIECE = 1 << 20
 
-#: Files that a scene which is being read consists of; None where nobody asks.
+#: Files that a scene which is being read consists of; None where they are not recorded.
 _read: ContextVar[list[Path] | None] = ContextVar("read", default=None)
 
 
@@ -76,7 +76,7 @@ def read_bytes(path: Path, most: int) -> bytes:
     """
     note(path)
     try:
-        # A pipe that nobody writes to would stop here.
+        # A pipe without a writer would block here.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except FileNotFoundError:
         raise Unreadable("no such file") from None

@@ -56,7 +56,7 @@ class Limits(SceneModel):
 
 
 def limits_of(tables: object) -> Limits:
-    """Return the limits of a scene's tables; where those are wrong, which is said elsewhere, the usual ones."""
+    """Return the limits of a scene's tables; where those are wrong, which is reported elsewhere, the usual ones."""
     given = tables.get("limits") if isinstance(tables, dict) else None
     try:
         return Limits.model_validate({} if given is None else given)

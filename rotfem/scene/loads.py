@@ -310,7 +310,7 @@ def _check_moment(key: str, structure: Any, moment: Load) -> None:
         if not isinstance(moment, SpanMoment):
             why = "is not available on a plate: at a point it turns the director without limit as the mesh is refined"
         raise problem(key, None, why)
-    # A function is looked at where it is called; its moment of a planar beam may have one component or three.
+    # A function is checked where it is called; its moment of a planar beam may have one component or three.
     sizes = {len(vector) for vector in moment.vectors}
     if structure.is_planar and sizes - {1}:
         raise problem(key, None, "must have one component, about axis 3, for a planar_beam")

@@ -1,4 +1,4 @@
-"""The [output] table: what is recorded beside what always is, and in which units numbers are shown."""
+"""The [output] table: what is recorded in addition to what always is, and in which units numbers are shown."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ class OutputTable(SceneModel):
     """The [output] table.
 
     Attributes:
-        quantities: names of registered outputs, to be computed beside what is always recorded; and of what beams have
-            at their stations, all of it if none is named.
+        quantities: names of registered outputs, to be computed in addition to what is always recorded; and of what
+            beams have at their stations, all of it if none is named.
         stations: positions along a beam (m) where section forces, strains and unknowns are recorded; a number of them
             from end to end.
         every: rows of history.csv from one record of the stations to the next.

@@ -21,9 +21,9 @@ STEPS = 8
 #: Cosine of the smallest angle to direction 3 that the line may have: section axis 2 is across both.
 STEEPEST = 1 - 1e-6
 
-#: Smallest speed that a spline may have over the lengths of its chords, and looks between two points: near 1 where they
-#: follow each other, 0.7 at a corner of 90° without a kink, through 0 where the line turns back.
-SLOWEST, LOOKS = 0.05, 64
+#: Smallest speed that a spline may have over the lengths of its chords, and samples between two points: near 1 where
+#: they follow each other, 0.7 at a corner of 90° without a kink, through 0 where the line turns back.
+SLOWEST, SAMPLES = 0.05, 64
 
 
 def as_line(value: Any) -> Matrix:
@@ -104,16 +104,16 @@ class ReferenceLine:
 
     @property
     def slowest(self) -> float:
-        """Smallest speed |dr/ds| of the splines over the lengths s of their chords, by looks between all points."""
+        """Smallest speed |dr/ds| of the splines over the lengths s of their chords, sampled between all points."""
         speeds = []
         for _, spline in self._pieces:
-            looks = np.linspace(spline.x[:-1], spline.x[1:], LOOKS + 1)
-            speeds.append(np.min(np.linalg.norm(spline(looks, 1), axis=-1)))
+            samples = np.linspace(spline.x[:-1], spline.x[1:], SAMPLES + 1)
+            speeds.append(np.min(np.linalg.norm(spline(samples, 1), axis=-1)))
         return float(np.min(speeds))
 
     @property
     def steepest(self) -> float:
-        """Largest |t·e₃| of the unit tangent t, by looks at all points and between."""
+        """Largest |t·e₃| of the unit tangent t, sampled at all points and between."""
         x = np.linspace(0.0, self.length, 8 * len(self.rows) + 1)
         return float(np.max(np.abs(self.at(x)[1][:, 2])))
 

@@ -36,7 +36,7 @@ class HarmonicAngle(Harmonic):
 
 
 class PitchAngle(SceneModel):
-    """The pitch over time: one of value, table and function, and harmonics beside it or alone.
+    """The pitch over time: one of value, table and function, and harmonics in addition or alone.
 
     In a scene it may be written without its table: a number is a value, [[t, angle], …] or the path of a CSV file a
     table.

@@ -108,7 +108,7 @@ class Scene(SceneModel):
         time: time interval and scheme, or None.
         modes: what modes to compute.
         solver: settings of Newton's method.
-        output: what to compute beside what is always recorded.
+        output: what to compute in addition to what is always recorded.
         limits: how much may be asked for.
         extensions: Python files that register what the scene names.
         accuracy: error that is wanted, relative to the largest displacement of the tip, or to each frequency; theory,

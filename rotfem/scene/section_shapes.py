@@ -17,7 +17,7 @@ from rotfem.registry import Registry, register
 from rotfem.registry import shapes as registered
 from rotfem.scene.values import Array
 
-#: Keys of a section that has a shape, beside its dimensions.
+#: Keys of a section that has a shape, in addition to its dimensions.
 MATERIAL_AND_SHAPE = ("E", "nu", "rho", "shape")
 
 # tanh(nπa/2b)/n⁵ falls so fast that the terms left out are below 1e-9 of the sum.

@@ -15,7 +15,7 @@ from rotfem.scene.values import Array, Matrix, SceneModel, as_padded_vector3, pr
 
 
 def arguments(function: Callable[..., Any]) -> int:
-    """Return how many arguments a function must be given; 1 where that cannot be told."""
+    """Return how many arguments a function must be given; 1 where that is unknown."""
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):

@@ -77,7 +77,7 @@ def as_names(value: Any, registry: Registry[Any] | Named, others: str = "") -> t
     Args:
         value: a list of names.
         registry: what they name: effects or outputs.
-        others: what is allowed beside a list, for the error message.
+        others: what is allowed instead of a list, for the error message.
 
     Raises:
         PydanticCustomError: it is not a list, or has something in it that is not registered, or is there twice.
@@ -273,7 +273,7 @@ def rows_of(table: Array) -> Matrix:
 
 
 def _quick_rows(value: Sequence[Sequence[Any]]) -> Matrix | None:
-    """Return a table of good numbers as a tuple of rows; None where it has to be looked at entry by entry."""
+    """Return a table of good numbers as a tuple of rows; None where every entry has to be checked."""
     if set(map(len, value)) != {len(value[0])} or not set(map(type, itertools.chain(*value))) <= {int, float}:
         return None
     try:

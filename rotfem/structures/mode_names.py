@@ -22,7 +22,7 @@ def sign_changes(y: npt.NDArray[np.float64], noise: float = NODE_NOISE) -> int:
     return int(np.count_nonzero(np.diff(np.sign(y))))
 
 
-#: Stations along a plate at which its cross lines are looked at, and highest polynomial across.
+#: Stations along a plate at which its cross lines are sampled, and highest polynomial across.
 STATIONS, ACROSS = 24, 4
 
 #: Stations around a disk, and gap in the angles of the clamp (rad) up to which the plate counts as a disk.

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 Array = npt.NDArray[Any]
 
-#: Positions in a cell are told apart in steps of this part of its size.
+#: Positions in a cell are distinguished in steps of this part of its size.
 PART = 1e-6
 
 

@@ -208,11 +208,11 @@ class Plate(Structure):
     is_flat = True
     prestressing: ClassVar = ("membrane",)
     stiff: ClassVar = ("shear",)
-    #: Frequencies of the exact theory at constant speeds are off by a tenth to all of that.
+    #: The error of frequencies of the exact theory at constant speeds is a tenth to all of that.
     stretched: ClassVar = (3.5, 6.0)
     #: Conjugates of the tip's components: inputs of the state-space model.
     tip_inputs = ("tip_force_1", "tip_force_2", "tip_force_3", "tip_moment_alpha1", "tip_moment_alpha2")
-    #: Mode families: the components whose kinetic energy counts, and the one whose shape is looked at.
+    #: Mode families: the components whose kinetic energy counts, and the one whose shape is examined.
     families: ClassVar = {"bending": ((2, 3, 4), 2), "in-plane": ((0, 1), 1)}
 
     def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):

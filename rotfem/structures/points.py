@@ -109,7 +109,7 @@ class Points:
 
 
 class _Digits(np.ndarray):  # type: ignore[type-arg]
-    """An array by all digits of which UFL tells forms apart; the text of one that is long is cut short."""
+    """An array by all digits of which UFL distinguishes forms; the text of one that is long is cut short."""
 
     @property
     def ufl_signature(self) -> str:

@@ -19,7 +19,7 @@ from rotfem.commands.cost.settings import Setting
 from rotfem.commands.signals import held_back
 from rotfem.errors import SceneError
 
-#: Time of a study (s) where nothing is said.
+#: Default time of a study, s.
 DEFAULT_QUICK, DEFAULT_FULL = 120.0, 1200.0
 
 #: Part of the free memory that one computation may be predicted to need.

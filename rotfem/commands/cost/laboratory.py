@@ -64,7 +64,7 @@ class Prediction:
     def _steps(self, setting: Setting, near: Setting) -> float:
         """Return the ratio of the numbers of stages of two histories; of adaptive steps (tolerance)^(-1/p) are needed.
 
-        It is 1 outside histories, and where nothing tells how fixed steps compare with adaptive ones.
+        It is 1 outside histories, and where nothing shows how fixed steps compare with adaptive ones.
         """
         scheme, other = scheme_of(setting), scheme_of(near)
         if scheme is None or other is None:

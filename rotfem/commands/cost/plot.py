@@ -13,7 +13,7 @@ from rotfem.commands.cost.result import CostResult, judged, mesh_name
 #: A marker a scheme, or, where there are none, a degree.
 MARKERS = "osD^Pv*X<>"
 
-#: Size of a letter beside a point, and how far it stands above the line through it, in parts of the axes.
+#: Size of a letter next to a point, and how far it stands above the line through it, in parts of the axes.
 NAME_SIZE, ABOVE = (0.0085, 0.026), 0.013
 
 #: What an output's error is relative to.
@@ -74,7 +74,7 @@ def _kind(row: dict[str, Any]) -> str:
 
 
 def _names(axis: Any, done: list[dict[str, Any]], chosen: dict[str, Any] | None) -> None:
-    """Write mesh and step beside the points, the front first, on a side where there is room, or not at all."""
+    """Write mesh and step next to the points, the front first, on a side where there is room, or not at all."""
     width, height = NAME_SIZE
     taken = [tuple(_place(axis, row)) for row in done]
     boxes = [(x - 0.008, y - 0.012, x + 0.008, y + 0.012) for x, y in taken]

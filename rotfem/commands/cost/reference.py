@@ -200,7 +200,7 @@ class Refinement:
 def beside(known: Reference, there: Samples, here: Samples, each: bool) -> Reference:
     """Return the reference of a theory from that of another, and the outputs of both for one setting.
 
-    The errors of the setting are nearly the same in both: their difference is off by the product of it with the error.
+    The errors of the setting are nearly the same in both: the error of their difference is its product with the error.
 
     Args:
         known: the other's.

@@ -58,7 +58,7 @@ class Setting:
     every: int = 1
 
     def key(self) -> dict[str, Any]:
-        """Return what tells settings apart, JSON-able."""
+        """Return what identifies the setting, JSON-able."""
         elements = list(self.elements) if isinstance(self.elements, tuple) else self.elements
         return {**asdict(self), "elements": elements}
 
@@ -70,7 +70,7 @@ class Setting:
         if self.scheme is None or scene.time is None:
             return out
         out |= {"time.step": self.step, "time.tolerance": self.tolerance, "time.output_every": self.every}
-        out["time.scheme"] = self.scheme  # said or not: the default of fixed and of adaptive steps is not the same
+        out["time.scheme"] = self.scheme  # given or not: the default of fixed and of adaptive steps is not the same
         if self.tolerance is None:
             out |= {"time.max_step": None, "time.min_step": None}
         if self.scheme != scene.time.scheme:

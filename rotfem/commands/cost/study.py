@@ -56,7 +56,7 @@ RECORD = "cost.jsonl"
 #: What a setting does not have outside a history.
 STILL: dict[str, Any] = {"scheme": None, "step": None, "tolerance": None, "every": 1}
 
-#: Part of the accuracy that references may be off by: the rest is left to the settings that are judged by them.
+#: Part of the accuracy that the error of references may be: the rest is left to the settings that are judged by them.
 CERTAIN = 1 / 4
 
 #: Uncertainty (relative) below which no reference is refined: the increments at which Newton stops are not far below.

@@ -22,7 +22,7 @@ SETTINGS = ("damping", "root")
 
 @dataclass(frozen=True)
 class Asked:
-    """What a scene says of a blade beside its file.
+    """What a scene gives of a blade in addition to its file.
 
     Attributes:
         structure: the table [structure] as it is given, without its section.

@@ -59,7 +59,7 @@ POSITIVE = (
     "K66",
 )
 
-#: Part by which the last r may differ from the arc length of the line, and from which on that is said. Both describe
+#: Part by which the last r may differ from the arc length of the line, above which that is reported. Both describe
 #: one blade; r often counts along its straight axis, which is shorter than a prebent line.
 LONGER, SAID = 1e-2, 1e-6
 
@@ -220,7 +220,7 @@ def _products(table: dict[str, Array]) -> dict[str, Array]:
 def _with_rows_between(table: dict[str, Array]) -> dict[str, Array]:
     """Return columns with so many rows between theirs that products which are linear there are right to PRODUCT.
 
-    Columns are linear between rows, so a product of two, linear between n parts, is off by 1/n² of what it is by one.
+    Columns are linear between rows, so a product of two, linear between n parts, has 1/n² of the error of one part.
     """
     r = table["r"]
     ends, middle = _products(table), _products({name: (c[1:] + c[:-1]) / 2 for name, c in table.items()})

@@ -140,7 +140,7 @@ def from_file(path: Path, regions: Sequence[str], comm: MPI.Comm) -> PlateGrid:
             compat.extract(gmsh.model)
         except BadMesh as error:
             why = str(error)
-        except Exception as error:  # the others wait for rank 0: whatever happens there must be told
+        except Exception as error:  # the others wait for rank 0: whatever happens there must reach them
             why = f"cannot be used as the mesh of a plate ({type(error).__name__}: {' '.join(str(error).split())})"
     why, groups = comm.bcast((why, groups))
     try:
