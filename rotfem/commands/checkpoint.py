@@ -46,7 +46,7 @@ OF_LOG, OF_MONITOR = ("steps", "warnings", "resumed"), ("since",)
 _STEPPER = ("system", "newton", "patience", "scheme", "trust", "watch", "_linearised", "_about")
 APART = {
     "Stepper": _STEPPER,
-    "FollowingStepper": (*_STEPPER, "followed", "carried", "last", "_before"),
+    "FollowingStepper": (*_STEPPER, "followed", "carried", "differences", "_there"),
     "Companion": ("system", "followed", "output", "stepper", "further", "state", "waiting"),
 }
 
@@ -356,7 +356,7 @@ class Memory:
                 "state": own.packed(companion.state and companion.state.changed(given=None, inner=())),
                 "given": companion.state and companion.state.given,
                 "waiting": self.packing.packed(companion.waiting),
-                "last": own.packed(companion.stepper.last),
+                "differences": own.packed(companion.stepper.differences),
                 "factored": own.packed(companion.system.held.factored),
                 "known": plain(companion),
                 "stepper": of_stepper(companion.stepper, own),
@@ -367,14 +367,14 @@ class Memory:
     def _put_back_companions(self, trees: list[Tree]) -> None:
         for (companion, own), tree in zip(self._companions(), trees, strict=True):
             state, waiting = own.unpacked(tree["state"]), self.packing.unpacked(tree["waiting"])
-            stepper, last = companion.stepper, own.unpacked(tree["last"])
+            stepper, differences = companion.stepper, own.unpacked(tree["differences"])
             alike(plain(companion), tree["known"], "known")
             if not suits(state, State | None) or not suits(tuple(waiting), tuple[Followed | None, Followed | None]):
                 raise TypeError("companions")
             for end in (end for step in waiting if step is not None for pair in step.steps for end in pair):
                 check_motion(self.run.system, vars(end))
-            alike(None if last is None else (0.0, companion.system.zeros()), last, "last")
-            companion.state, companion.waiting, stepper.last = state, waiting, last
+            alike([(0.0, companion.system.zeros())] * min(len(differences), 2), differences, "differences")
+            companion.state, companion.waiting, stepper.differences = state, waiting, differences
             vars(companion).update(tree["known"])
             if state is not None:
                 state.given = tree["given"]

@@ -158,7 +158,7 @@ class RunErrors:
             if companion is None or not companion.sound or not self.companions.steps.sound:
                 return None
             apart = _relative(companion.difference[0], self._scale)
-            return companion.system, apart, np.array(companion.components or ())
+            return companion.system, apart, np.array(companion.components)
         system = compile_system(richer.replace(outputs={}), self.system.comm, moving=self.scene.time is not None)
         if self.reduced is not None:
             response = self.reduced.response

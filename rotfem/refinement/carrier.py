@@ -33,13 +33,10 @@ def carrier(of: Any, to: Any) -> Callable[[Array], Array] | None:
     weights = interpolation(here.V, nodes)
     if weights is None:
         return None
-    size, block = len(here.zeros()), here.structure.size
-
-    def carried(q: Array) -> Array:
-        inner: Array = (weights @ q[:size].reshape(-1, block)).ravel()
-        return np.append(inner, q[size:])
-
-    return carried
+    further = len(of.zeros()) - len(here.zeros())  # the angle of a free hub
+    carrying = scipy.sparse.kron(weights, np.eye(here.structure.size))
+    carrying = scipy.sparse.block_diag((carrying, np.eye(further))).tocsr() if further else carrying.tocsr()
+    return lambda q: np.asarray(carrying @ q)
 
 
 def interpolation(V: Any, points: Array) -> Any:

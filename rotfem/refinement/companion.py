@@ -8,7 +8,9 @@ guess of a step is the motion that it follows plus the difference so far: mostly
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
+from math import isfinite, sqrt
 from typing import Any
 
 import numpy as np
@@ -37,6 +39,16 @@ class Followed:
     steps: tuple[tuple[State, State], ...]
 
     @property
+    def start(self) -> State:
+        """State that the first starts from."""
+        return self.steps[0][0]
+
+    @property
+    def end(self) -> State:
+        """State that the last ends in."""
+        return self.steps[-1][1]
+
+    @property
     def doubled(self) -> bool:
         """Whether there are two."""
         return len(self.steps) > 1
@@ -53,26 +65,22 @@ class Followed:
         return old.q if t <= old.t else new.q if t >= new.t else between(old, new, [t], order)[0].q
 
 
-def moved(state: State) -> State:
-    """Return a copy of a state that knows its motion alone."""
-    return state.changed(memory=None, given=None, inner=())
-
-
 class FollowingStepper(Stepper):
     """Stepper whose first guess is a motion that it follows plus the difference so far.
 
     Attributes:
         followed: over the next step; None where there is no such guess.
-        last: start of the last step, s, and the difference there; None where it is not known.
         carried: makes q of the motion that is followed one on its own mesh; None where nothing does.
+        differences: (t, difference) at the ends of the last two steps, s.
     """
 
     def __init__(self, system: Any, scheme: Scheme, newton: Newton, carried: Callable[[Array], Array] | None):
         super().__init__(system, scheme, newton)
         self.followed: Followed | None = None
         self.carried = carried
-        self._before: tuple[float, Array] | None = None
-        self.last: tuple[float, Array] | None = None
+        self.differences: list[tuple[float, Array]] = []
+        #: q followed, carried to its own mesh, at the end of the step.
+        self._there: Array | None = None
 
     def solve(self, stage: Stage, state: State) -> None:
         """Solve a stage by Newton's method alone: what cannot be solved so is not known."""
@@ -83,26 +91,35 @@ class FollowingStepper(Stepper):
 
     def predicted(self, stage: Stage, state: State) -> Array:
         """Return q followed, plus the difference at the start of the step, growing as over the step before."""
-        if self.followed is None or self.carried is None:
+        step = self.followed
+        if step is None or self.carried is None or state.datum is not step.end.datum:
             return super().predicted(stage, state)
-        difference = self._difference(state)
-        guess = self.carried(self.followed.at(stage.t, self.scheme.order)) + difference
-        if self._before is not None:
-            t, before = self._before
-            guess += (stage.t - state.t) / (state.t - t) * (difference - before)
+        there = self._there if stage.t >= step.end.t else None
+        t, difference = self.differences[-1]
+        guess = np.add(self.carried(step.at(stage.t, self.scheme.order)) if there is None else there, difference)
+        if len(self.differences) > 1:
+            before, other = self.differences[0]
+            guess += (stage.t - t) / (t - before) * (difference - other)
         return guess
 
     def follow(self, step: Followed, state: State) -> None:
         """Take a step as the one that is followed from a state."""
-        same = all(s.datum is state.datum for pair in step.steps for s in pair)
-        again = self.last is not None and self.last[0] == state.t  # a step that was interrupted
-        self._before, self.followed = self.last if same and not again else None, step if same else None
-        self.last = (state.t, self._difference(state)) if same else None
+        self.followed = self._there = None
+        if self.system.solved_at_once or self.carried is None:
+            return
+        if any(s.datum is not state.datum for pair in step.steps for s in pair):
+            self.differences = []
+            return
+        self.followed, self._there = step, self.carried(step.end.q)
+        if not self.differences:
+            self.differences = [(state.t, state.q - self.carried(step.start.q))]
 
-    def _difference(self, state: State) -> Array:
-        assert self.followed is not None
-        assert self.carried is not None
-        return np.asarray(state.q - self.carried(self.followed.at(state.t, self.scheme.order)))
+    def arrived(self, state: State) -> None:
+        """Take note of the difference at the end of the step that was followed."""
+        if self.followed is None or self._there is None or state.datum is not self.followed.end.datum:
+            self.differences = []
+        else:
+            self.differences = [*self.differences[-1:], (state.t, state.q - self._there)]
 
 
 class Companion:
@@ -142,7 +159,7 @@ class Companion:
         self.further, self.stepper.watch = list(further), self._passed_on
         self.state: State | None = None
         self.difference, self.doubled, self.sound = (0.0, 0.0), 0.0, True
-        self.components: tuple[float, ...] | None = None
+        self.components: tuple[float, ...] = (0.0,)
         #: Steps taken note of: those that may be doubled with the next, and those whose way on is not known yet.
         self.waiting: list[Followed | None] = [None, None]
 
@@ -163,7 +180,7 @@ class Companion:
         """Take note of a step of the march that is followed, and take all those whose way on is known by it."""
         if not self.sound:
             return
-        step, (single, _) = Followed(leg, ((moved(old), moved(new)),)), self.waiting
+        step, (single, _) = Followed(leg, ((copy(old), copy(new)),)), self.waiting
         if single is not None:
             self.waiting[0] = None
             if single.leg.doubles(leg):
@@ -202,8 +219,7 @@ class Companion:
             self.sound = False
             return
         stepper, start = self.stepper, self.state
-        if not self.system.solved_at_once and stepper.carried is not None:
-            stepper.follow(step, start)
+        stepper.follow(step, start)
         try:
             if start.t == 0.0:
                 start = started(stepper, start, step.leg)
@@ -212,16 +228,16 @@ class Companion:
         except ComputationError:
             self.sound = False
             return
+        stepper.arrived(self.state)
         self.doubled += step.leg.length if step.doubled else 0.0
-        self._compare(step.steps[-1][1])
+        self._compare(step.end)
 
     def _compare(self, there: State) -> None:
         """Take note of the distance of the outputs."""
         assert self.state is not None
         apart = self.output(self.system, self.state) - self.output(self.followed, there)
-        size = float(np.linalg.norm(apart))
-        self.sound = bool(np.isfinite(size))
-        before = np.zeros(len(apart)) if self.components is None else self.components
-        self.components = tuple(float(x) for x in np.maximum(before, np.abs(apart)))
+        size = sqrt(apart @ apart)
+        self.sound = isfinite(size)
+        self.components = tuple(np.maximum(self.components, np.abs(apart)).tolist())
         if size > self.difference[0]:
             self.difference = size, there.t
