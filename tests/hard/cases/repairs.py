@@ -1,0 +1,107 @@
+"""Cases that led to a repair: errors that grow with the time, strong damping, equilibria that there are none of."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from tests.hard.case import Case
+
+LENGTH, EI, MASS = 10.0, 1.4e4, 1.2
+SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": EI, "mass_per_length": MASS}
+FIRST = 3.516015 * np.sqrt(EI / MASS) / LENGTH**2  # rad/s, of the clamped-free beam
+
+
+def beam(speed: float = 0.0, **tables: Any) -> dict[str, Any]:
+    """Return the scene of a beam at a constant speed (rad/s); `section`, `damping` and `root` are of the structure."""
+    own = {name: tables.pop(name) for name in ("damping", "root") if name in tables}
+    section = SECTION | tables.pop("section", {})
+    structure = {"type": "planar_beam", "length": LENGTH, "section": section, **own}
+    return {"structure": structure, "motion": {"type": "constant", "speed": float(speed)}, **tables}
+
+
+def creeping(relaxation: float, end: float) -> dict[str, Any]:
+    """Return the scene of a beam of Kelvin–Voigt material (relaxation time, s) under 5 N from t = 0 on."""
+    return beam(
+        damping={"kelvin_voigt": relaxation},
+        loads={"tip_force": [0.0, 5.0]},
+        initial={"state": "undeformed"},
+        time={"end": end, "tolerance": 1e-4},
+    )
+
+
+def crept(relaxation: float) -> Any:
+    """Return what reads u₂ over F L³/3EI (1 − exp(−t/η)), at the last row."""
+
+    def value(result: Any) -> float:
+        t = float(result.history["t"][-1])
+        return float(result.history["tip_u2"][-1] / (5.0 * LENGTH**3 / (3 * EI) * (1 - np.exp(-t / relaxation))))
+
+    return value
+
+
+def released(theory: str, displacement: float, end: float) -> dict[str, Any]:
+    """Return the scene of a beam at a third of its first frequency, let go from a tip displacement (m)."""
+    return beam(
+        FIRST / 3,
+        model={"theory": theory},
+        initial={"tip_displacement": displacement},
+        mesh={"elements": 4},
+        time={"end": end, "step": 0.01},
+    )
+
+
+CASES = [
+    Case(
+        "errors that grow as a phase",
+        f"{theory}, {displacement:g} m for {end:g} s at ω₁/3",
+        released(theory, displacement, end),
+        value=lambda result: result.summary.get("error", {}).get("model", 0.0),
+        reference=reference,
+        tolerance=tolerance,
+        source=source,
+        expected="warned",
+        words=f'model.theory = "{theory}" is o',
+    )
+    for theory, displacement, end, reference, tolerance, source in (
+        ("linear", 0.05, 10.0, 1.888, 0.1, "reissner in the same steps"),
+        ("second_order", 0.5, 30.0, 0.1775, 0.2, "reissner in the same steps"),
+    )
+]
+CASES += [
+    Case(
+        "stiff damping",
+        f"Kelvin–Voigt {relaxation:g} s, adaptive steps for {end:g} s",
+        creeping(relaxation, end),
+        value=crept(relaxation),
+        reference=1.0,
+        tolerance=1e-3,  # shear is 4e-4, the deflection 1 % of the length
+        source="q + η q̇ = F/k",
+        nightly=relaxation == 10.0,
+    )
+    for relaxation, end in ((10.0, 100.0), (1e4, 10.0), (1e4, 1e5))
+]
+CASES += [
+    Case(
+        "no equilibrium",
+        "EI 1e6 : 1e-6 along the span",
+        beam(section={"EI": [[0, 1e6], [5, 1e6], [5.0001, 1e-6], [10, 1e-6]]}, loads={"tip_force": [0.0, 1e-9]}),
+        expected="failed",
+        words="round-off decides",
+        source="EA/EI h⁻² is beyond 16 digits",
+    ),
+    Case(
+        "no equilibrium",
+        "a lag hinge at the axis under a force across, consistent_linear",
+        beam(
+            3.0,
+            root={"lag_stiffness": 0.0},
+            loads={"tip_force": [0.0, 5.0]},
+            model={"theory": "consistent_linear"},
+        ),
+        expected="failed",
+        words="nothing holds the root's hinge",
+        source="no moment about the axis",
+    ),
+]
