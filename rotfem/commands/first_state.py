@@ -56,34 +56,31 @@ def hints_of_start(scene: Scene, problem: Problem) -> list[str]:
     return [f'{what}; initial.state = "undeformed" lets them act all at once at t = 0']
 
 
-def first_state(scene: Scene, problem: Problem, system: Any) -> Start:
+def first_state(scene: Scene, problem: Problem, system: Any, judged: bool = True) -> Start:
     """Return what the history of a scene starts from.
 
     Args:
         scene: what is run.
         problem: its problem, with the model and the mesh in use.
         system: the equations of motion of that.
+        judged: whether stability is wanted; a companion starts from what its run starts from.
 
     Raises:
-        ComputationError: there is no static shape, or no stable equilibrium.
+        ComputationError: there is no static shape, or no equilibrium, or an unstable one.
     """
-    start, motion = _shape(scene, problem, system), first_motion(scene)
+    start, motion = _shape(scene, problem, system, judged), first_motion(scene)
     if motion is not None:
         analysis = ModalAnalysis(problem, scene.initial.state, comm=system.comm, system=system)
         start.q, start.v = motion.beside(start.q, analysis, Newton.of(scene.solver))
     return start
 
 
-def _shape(scene: Scene, problem: Problem, system: Any) -> Start:
-    """Return a start at rest.
-
-    Raises:
-        ComputationError: there is no static shape, or no stable equilibrium.
-    """
+def _shape(scene: Scene, problem: Problem, system: Any, judged: bool) -> Start:
+    """Return a start at rest (see `first_state`)."""
     initial, solver = scene.initial, scene.solver
     if initial.state == "steady":
-        return _equilibrium(scene, problem, system)
-    start = Start(stability=stability_ahead(system, Newton.of(solver)))
+        return _equilibrium(scene, problem, system, judged)
+    start = Start(stability=stability_ahead(system, Newton.of(solver)) if judged else None)
     if start.stability is not None and (said := start.stability.warning()):
         start.warnings.append(f"what constant conditions hold in balance: {said}")
     if initial.tip_displacement is not None:
@@ -91,12 +88,8 @@ def _shape(scene: Scene, problem: Problem, system: Any) -> Start:
     return start
 
 
-def _equilibrium(scene: Scene, problem: Problem, system: Any) -> Start:
-    """Return the equilibrium under the speed, loads and pitch of t = 0; undeformed where nothing acts then.
-
-    Raises:
-        ComputationError: there is none, or an unstable one.
-    """
+def _equilibrium(scene: Scene, problem: Problem, system: Any, judged: bool) -> Start:
+    """Return the equilibrium under the speed, loads and pitch of t = 0 (see `first_state`); undeformed without any."""
     solver, start, speed = scene.solver, Start(), problem.motion.speed(0.0)
     if problem.frame == "inertial":
         system = compile_system(problem.replace(frame="rotating"), system.comm, moving=False)
@@ -107,7 +100,10 @@ def _equilibrium(scene: Scene, problem: Problem, system: Any) -> Start:
         return steady_state(system, speed, Newton.of(solver), past_limits=solver.past_limits, notes=notes)
 
     try:
-        start.q, whole = found(system, start.warnings), with_all_unknowns(system)
+        start.q = found(system, start.warnings)
+        if not judged:
+            return start
+        whole = with_all_unknowns(system)
         start.stability = stability_of(whole, start.q if whole is system else found(whole, []), speed)
     except ComputationError as error:
         raise ComputationError(f"no equilibrium to start from: {error.what}", advice=WITHOUT) from error

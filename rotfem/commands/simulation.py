@@ -181,7 +181,8 @@ class Simulation:
     def _start(self, system: Any) -> Start:
         """Return what the history starts from in a system, which may be of another mesh or theory."""
         there = system.model.problem
-        return first_state(self.scene, self.problem.replace(mesh=there.mesh, theory=there.theory), system)
+        problem = self.problem.replace(mesh=there.mesh, theory=there.theory)
+        return first_state(self.scene, problem, system, judged=system is self.system)
 
     def _start_there(self, system: Any) -> tuple[Array | None, Array | None]:
         """Return the shape and the velocities that a companion starts from."""

@@ -10,6 +10,8 @@ from itertools import combinations, product
 Row = dict[str, str]
 #: Factor ↦ some of its levels; of a conflict those that no row may have all at once.
 Levels = Mapping[str, Collection[str]]
+#: Factors with the levels chosen.
+Chosen = frozenset[tuple[str, str]]
 
 
 def met(conflict: Levels, row: Row) -> bool:
@@ -29,11 +31,17 @@ def completed(chosen: Row, levels: Levels, conflicts: Sequence[Levels]) -> Row |
 
 
 def covering(
-    strength: int, shuffled: Callable[[random.Random], Levels], active: Levels, conflicts: Sequence[Levels], seed: int
+    strength: int,
+    shuffled: Callable[[random.Random], Levels],
+    active: Levels,
+    conflicts: Sequence[Levels],
+    seed: int,
+    also: Sequence[Levels] = (),
 ) -> Iterator[tuple[Row, int]]:
     """Yield rows until every set of so many choices that can occur has, with how many new ones each row has.
 
-    Greedily: of several random rows with one of the sets that are left, the one with most of them.
+    Greedily: of several random rows with one of the sets that are left, the one with most of them. Source of arrays
+    with larger sets of some factors: Cohen, Gibbons, Mugridge & Colbourn, ICSE 2003, p. 38 (variable strength).
 
     Args:
         strength: choices in a set: 2 of pairs, 3 of triples.
@@ -41,46 +49,54 @@ def covering(
         active: command ↦ factors that it makes use of; a set of choices counts only where all of its have a use.
         conflicts: what no row may have.
         seed: of the random numbers.
+        also: factors and levels of which every row of choices is wanted as well.
     """
     rng = random.Random(seed)
-    every = shuffled(rng)
-    choices = {factor: [(factor, level) for level in levels] for factor, levels in every.items()}
-    sets = [chosen for pools in combinations(choices.values(), strength) for chosen in product(*pools)]
+    sets = sets_wanted(strength, shuffled(rng), also)
     rng.shuffle(sets)
+    sets.sort(key=len, reverse=True)
     left = set(sets)
     for wanted in sets:
         if wanted not in left:
             continue
         barred = [*conflicts, idle(wanted, active)]
         rows = (completed(dict(wanted), shuffled(rng), barred) for _ in range(12))
-        found = [(row, left.intersection(sets_of(row, strength, active))) for row in rows if row is not None]
+        found = [(row, left.intersection(sets_of(row, strength, active, also))) for row in rows if row is not None]
         row, new = max(found, key=lambda pair: len(pair[1]), default=(None, {wanted}))
         left -= new
         if row is not None:
             yield row, len(new)
 
 
-def sets_of(row: Row, strength: int, active: Levels) -> Iterator[tuple[tuple[str, str], ...]]:
-    """Return the sets of so many choices that a row has and makes use of."""
-    return combinations([(f, level) for f, level in row.items() if f in active[row["command"]]], strength)
+def sets_wanted(strength: int, every: Levels, also: Sequence[Levels]) -> list[Chosen]:
+    """Return the sets of so many choices, and those of some factors, whether they can occur or not."""
+    pools = [*combinations(every.items(), strength), *(box.items() for box in also)]
+    each = (product(*([(factor, level) for level in levels] for factor, levels in pool)) for pool in pools)
+    return [frozenset(chosen) for sets in each for chosen in sets]
 
 
-def idle(chosen: Sequence[tuple[str, str]], active: Levels) -> Levels:
+def sets_of(row: Row, strength: int, active: Levels, also: Sequence[Levels]) -> Iterator[Chosen]:
+    """Return the sets of so many choices that a row has and makes use of, and those of some factors."""
+    used = [(factor, level) for factor, level in row.items() if factor in active[row["command"]]]
+    yield from map(frozenset, combinations(used, strength))
+    yield from (frozenset((factor, row[factor]) for factor in box) for box in also)
+
+
+def idle(chosen: Chosen, active: Levels) -> Levels:
     """Return as a conflict the commands that make no use of all of these choices."""
     return {"command": [c for c, used in active.items() if not {factor for factor, _ in chosen} <= {*used}]}
 
 
 def missing(
-    rows: Sequence[Row], strength: int, every: Levels, active: Levels, conflicts: Sequence[Levels]
+    rows: Sequence[Row],
+    strength: int,
+    every: Levels,
+    active: Levels,
+    conflicts: Sequence[Levels],
+    also: Sequence[Levels] = (),
 ) -> list[str]:
-    """Return the sets of so many choices that could occur together and are in none of the rows."""
-    there = {frozenset(chosen) for row in rows for chosen in sets_of(row, strength, active)}
-    out = []
-    for factors in combinations(every, strength):
-        for levels in product(*(every[factor] for factor in factors)):
-            chosen = tuple(zip(factors, levels, strict=True))
-            if frozenset(chosen) in there:
-                continue
-            if completed(dict(chosen), every, [*conflicts, idle(chosen, active)]) is not None:
-                out.append(", ".join(f"{factor} = {level}" for factor, level in chosen))
-    return out
+    """Return the sets of choices that are wanted, could occur together, and are in none of the rows."""
+    there = {chosen for row in rows for chosen in sets_of(row, strength, active, also)}
+    absent = [chosen for chosen in sets_wanted(strength, every, also) if chosen not in there]
+    possible = [x for x in absent if completed(dict(x), every, [*conflicts, idle(x, active)]) is not None]
+    return [", ".join(f"{factor} = {level}" for factor, level in sorted(chosen)) for chosen in possible]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tests.pairs.covering import Levels
-from tests.pairs.scenes import LEVELS
+from tests.pairs.scenes import HISTORIES, LEVELS, LINEAR
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,6 @@ def but(factor: str, *levels: str) -> tuple[str, ...]:
 SCENE = "docs/scene.md"
 PLATES = ("plate", "mesh")
 FREE = ("torque", "controller")
-LINEAR = ("linear", "consistent_linear", "von_karman_linear")
 IN_PLANE = ("gravity", "tip", "span", "harmonic")
 #: What a hinge without a spring cannot meet at rest: loads that turn it, in theories in which it does not go to hang.
 #: Modes of a free hub, and the first speed of a Campbell diagram, are those at rest; a response is about no harmonic.
@@ -160,4 +159,20 @@ REFUSALS = (
         )
         for choices in AT_REST
     ),
+)
+
+#: What leaves no unknown out: no row of these has any that symmetry keeps at zero.
+ACROSS = ("weight", "span", "harmonic", "pressure")
+WHOLE: tuple[Levels, ...] = tuple(
+    {"unknowns": ("left out",), **choices}
+    for choices in (
+        {"structure": ("planar",)},
+        {"damping": ("modal",)},
+        {"root": ("pitch",)},
+        {"time": but("time", *HISTORIES)},
+        {"loads": ("follower", "function")},
+        {"structure": ("spatial",), "loads": ACROSS},
+        {"structure": PLATES, "loads": ACROSS, "motion": but("motion", "rest")},
+        {"structure": PLATES, "loads": ACROSS, "theory": but("theory", *LINEAR)},
+    )
 )

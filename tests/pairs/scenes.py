@@ -50,6 +50,8 @@ LEVELS: dict[str, dict[str, float]] = {
         "steady": 3,
     },
     "output": {"plain": 2, "stations": 2, "fields": 1, "error off": 2},
+    # Of a history: as many as there are, or without those that symmetry keeps at zero, which other choices decide.
+    "unknowns": {"any": 3, "left out": 1},
     "checkpoint": {"no": 4, "resumed": 1},
     "ranks": {"1": 8, "2": 1},
 }
@@ -64,6 +66,19 @@ ACTIVE: Levels = {
     **dict.fromkeys(("modes", "campbell", "response"), _LINEARISED),
     "check": _STRUCTURE,
 }
+
+LINEAR = ("linear", "consistent_linear", "von_karman_linear")
+HISTORIES = ("generalised_alpha", "newmark", "esdirk4", "radau5", "energy_conserving", "tolerance")
+#: What pairs are not enough for: rotations that are counted afresh within a step, of some unknowns only.
+ALSO: list[Levels] = [
+    {
+        "unknowns": ("left out",),
+        "structure": ("spatial",),
+        "theory": ("second_order", "von_karman", "reissner"),
+        "time": HISTORIES,
+    },
+    {"unknowns": ("left out",), "structure": ("plate", "mesh"), "time": HISTORIES},
+]
 
 #: Time that is computed (s), and the number of fixed steps.
 END, STEPS = 0.12, 6

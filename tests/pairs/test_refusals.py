@@ -12,14 +12,14 @@ from rotfem.errors import ComputationError, InputError
 from tests.launch import ROOT
 from tests.pairs.answers import answer
 from tests.pairs.covering import Levels, Row, completed
-from tests.pairs.refusals import REFUSALS, Refusal
+from tests.pairs.refusals import REFUSALS, WHOLE, Refusal
 from tests.pairs.scenes import LEVELS, PLAIN, as_toml, tables_of
 
 
 def rows_with(choices: Levels) -> list[Row]:
     """Return the plainest rows with these choices that nothing else is said against."""
     levels = {factor: sorted(LEVELS[factor], key=lambda level: level != PLAIN[factor]) for factor in PLAIN}
-    others = [listed.choices for listed in REFUSALS if listed.choices != choices]
+    others = [listed.choices for listed in REFUSALS if listed.choices != choices] + [*WHOLE]
     meetings = (dict(zip(choices, chosen, strict=True)) for chosen in product(*choices.values()))
     rows = (completed(meeting, levels, others) for meeting in meetings)
     return [row for row in rows if row is not None]

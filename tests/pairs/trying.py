@@ -16,11 +16,11 @@ import pytest
 from tests.launch import MPIRUN, environment
 from tests.pairs.answers import answer, check_answer, check_same, columns_of
 from tests.pairs.covering import Levels, Row, covering, missing
-from tests.pairs.refusals import REFUSALS
-from tests.pairs.scenes import ACTIVE, LEVELS, as_toml, shuffled, tables_of
+from tests.pairs.refusals import REFUSALS, WHOLE
+from tests.pairs.scenes import ACTIVE, ALSO, LEVELS, as_toml, shuffled, tables_of
 
 #: What no row has.
-CONFLICTS: list[Levels] = [refusal.choices for refusal in REFUSALS]
+CONFLICTS: list[Levels] = [*(refusal.choices for refusal in REFUSALS), *WHOLE]
 #: Seconds that rows of two processes may take each, compilation included, before one of them is taken to hang.
 PATIENCE = 180.0
 #: Error of an answer on two processes: of sums in another order and Newton's last increment, of adaptive steps, which
@@ -35,7 +35,7 @@ def name_of(row: Row) -> str:
 
 def rows_of(strength: int, seed: int) -> Iterator[Row]:
     """Return rows with every set of so many choices that can occur together."""
-    return (row for row, _ in covering(strength, shuffled, ACTIVE, CONFLICTS, seed))
+    return (row for row, _ in covering(strength, shuffled, ACTIVE, CONFLICTS, seed, ALSO))
 
 
 def parameters(rows: Sequence[Row], before: str = "", marks: Sequence[Any] = ()) -> list[Any]:
@@ -80,7 +80,7 @@ class Trial:
         """See that every set of so many choices that can occur together was in a row that has been computed."""
         if len(self.done) < len(self.rows):
             pytest.skip(f"{len(self.done)} of {len(self.rows)} rows were computed")
-        assert missing(self.done, strength, LEVELS, ACTIVE, CONFLICTS) == []
+        assert missing(self.done, strength, LEVELS, ACTIVE, CONFLICTS, ALSO) == []
 
     def _check_ranks(self, row: Row, result: Any) -> None:
         if self._ranked is None:
