@@ -117,7 +117,8 @@ def check_parts(path: Path, tree: Tree) -> None:
         raise damaged(path, ", ".join(sorted(map(str, wrong))))
     try:
         json.dumps([tree["identity"], tree["versions"]["rotfem"]])
-        if not any(tree["every"][name] > 0.0 for name in ("seconds", "steps") if tree["every"][name] is not None):
+        every = [tree["every"][name] for name in ("seconds", "steps") if tree["every"][name] is not None]
+        if len(every) != 1 or not every[0] > 0.0:
             raise ValueError("every")
         if (settings := tree["settings"]) is not None:
             known = {name: settings[name] for name in ("elements", "scheme")}
