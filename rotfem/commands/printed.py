@@ -187,7 +187,8 @@ def explain_report(summary: dict[str, Any], folder: Path) -> list[str]:
         what = "theory " if row["kind"] == "theory" else what
         cells = ""
         for name in outputs:
-            cells += f"{size_of_change(row['estimate'][name], summary['resolution']):>10}"
+            below = "<" if name in row.get("bounds", ()) else ""
+            cells += f"{below + size_of_change(row['estimate'][name], summary['resolution']):>10}"
             cells += f"{row.get('truth', {}).get(name, nan):>10.1e}" if checked else ""
         lines.append(f"{what + row['name']:<26}{cells}  {row['verdict']}: {row['why']}")
     lines += choice_report(summary)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from math import isfinite, sqrt
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -139,8 +139,11 @@ class Companion:
         difference: largest distance of the two outputs so far, and when, s.
         components: largest difference of every component of them.
         doubled: time taken in doubled steps, s.
-        sound: whether all its steps could be solved.
+        sound: whether all its steps could be solved, and it is no farther away than the limit.
+        limit: largest distance up to which it goes on.
     """
+
+    limit: float = float(np.finfo(float).max)
 
     def __init__(
         self,
@@ -237,7 +240,7 @@ class Companion:
         assert self.state is not None
         apart = self.output(self.system, self.state) - self.output(self.followed, there)
         size = sqrt(apart @ apart)
-        self.sound = isfinite(size)
+        self.sound = size <= self.limit  # not where it is no number
         self.components = tuple(np.maximum(self.components, np.abs(apart)).tolist())
         if size > self.difference[0]:
             self.difference = size, there.t

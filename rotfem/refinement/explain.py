@@ -13,7 +13,7 @@ too. How well the change is known follows from the errors of the two answers, wh
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -30,11 +30,10 @@ from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.theories import Theory, theories
-from rotfem.numerics.eigenproblem import ZERO, Pencil
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.companion import Companion
-from rotfem.refinement.discretisation import HistoryErrors, error_by_cells
+from rotfem.refinement.discretisation import ASYMPTOTIC, HistoryErrors, error_by_cells
 from rotfem.refinement.distance import distance, tip
 from rotfem.structures.symmetry import inactive_unknowns
 
@@ -53,6 +52,12 @@ RESOLVED = 1e-8
 #: Distance of two histories, relative to the largest displacement, from which steps are too long to compare models in:
 #: a sine that is late by a twelfth of its period is as far from itself.
 FAR = 0.5
+
+#: Largest distance of two tips over the length of the structure: each is displaced by twice the length at most.
+FARTHEST = 4.0
+
+#: How names of modes end that are gone at once, as overdamped ones have two eigenvalues.
+FAST = ", fast"
 
 #: Times at which the speed of a free hub is sampled.
 HUB_SAMPLES = 2001
@@ -125,24 +130,17 @@ class Case:
         return plainly(system, lambda: first.beside(q, modal, self.newton()))
 
     def eigenvalues(self, system: Any, speed: float) -> Array:
-        """Return λ of the wanted modes at a speed (rad/s), without those of a rigid body.
+        """Return λ of the wanted modes at a speed (rad/s): no rigid body, of an overdamped mode the slow one.
 
         Raises:
             ComputationError: no equilibrium, or eigenpairs not to be trusted.
         """
-        held, count = system.held, self.mode_count
-        if self.about == "undeformed" or held.linear:
-            held.set_time(0.0, held.motion.at_speed(speed))
-            held.set_state(held.zeros())
-        else:
-            self.equilibrium(held, speed)
-        matrices = held.mass_damping_stiffness()
-        pencil = Pencil(*matrices)
-        if system.hub is None:
-            return pencil.lasting(count)
-        values = Pencil(*system.with_hub(matrices)).lasting(count, pencil.scale())
-        flexible: Array = np.abs(values) > ZERO * np.median(np.abs(values))
-        return values[flexible][: count - int(not flexible.all())]
+        analysis = ModalAnalysis(system.model.problem, self.about, self.newton(), system.comm, system)
+        analysis.past_limits = self.past_limits
+        spinning = plainly(system, lambda: analysis.at(speed, self.mode_count))
+        names = analysis.names(spinning)[: self.mode_count - int(spinning.rigid)]
+        lasting = [not name.endswith(FAST) for name in names]
+        return np.asarray(spinning.pairs.values[: len(names)][lasting])
 
 
 def plainly(system: Any, compute: Callable[[], T]) -> T:
@@ -171,6 +169,7 @@ class Change:
         estimate: output ↦ relative change; infinite where the other model fails, None where nothing is known.
         notes: output ↦ why a model fails.
         truth: output ↦ relative change on the case's own mesh and steps, where it was computed.
+        bounds: outputs whose change is only known to be below the estimate.
     """
 
     kind: str
@@ -179,6 +178,17 @@ class Change:
     estimate: dict[str, float | None] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
     truth: dict[str, float] = field(default_factory=dict)
+    bounds: list[str] = field(default_factory=list)
+
+    def settle(self, output: str, rough: float | None, fine: float | None) -> None:
+        """Take the change of an output from two computations of it; the finer one alone where the other is unknown."""
+        self.estimate[output] = fine
+        if rough is None or fine is None:
+            return
+        smaller, larger = sorted((rough, fine))
+        if larger > SAFETY * smaller:
+            self.estimate[output] = larger
+            self.bounds.append(output)
 
     @property
     def worst(self) -> float:
@@ -198,7 +208,8 @@ class Change:
         """Return it as a dictionary fit for JSON."""
         row: dict[str, Any] = {"kind": self.kind, "name": self.name, "included": self.included}
         row |= {"estimate": self.estimate, "worst": self.worst, "verdict": self.verdict}
-        return row | ({"notes": self.notes} if self.notes else {}) | ({"truth": self.truth} if self.truth else {})
+        more = {"notes": self.notes, "truth": self.truth, "bounds": self.bounds}
+        return row | {name: value for name, value in more.items() if value}
 
 
 class Explanation:
@@ -242,7 +253,7 @@ class Explanation:
         self.changes = [Change("effect", name, name in self.own) for name in self.effects]
         self.changes += [Change("theory", t.name, False) for t in self.theories if t is not problem.theory]
         self.steps, self.mesh = Change("discretisation", "", True), Change("discretisation", "", True)
-        self._others: list[Any] = []
+        self._others: dict[str, Any] = {}
 
     def all(self) -> list[Change]:
         """Return every effect there are data for, then every other theory, the steps of a history, and the mesh."""
@@ -272,23 +283,24 @@ class Explanation:
         other = on_other_mesh(self.problem, self.system, self.moving)
         return other if other is not None else (self.system, 1.0)
 
-    def _variants(self, mesh: Any) -> list[Any]:
-        """Return the systems of all changes on a mesh; None of a theory that cannot have all terms."""
-        if not self._others:
-            off = set(self.effects) - set(self.own)
-            for change in self.changes:
-                problem, without = self.problem.replace(outputs={}, mesh=mesh), off
-                if change.kind == "effect":
-                    without = off ^ {change.name}
-                else:
-                    problem = problem.replace(theory=change.name)
-                try:
-                    self._others.append(self._compiled(problem, self.system.comm, without))
-                except InputError as error:
-                    self._others.append(None)
-                    change.notes |= dict.fromkeys(self.wanted, str(error))
-                    change.estimate |= dict.fromkeys(self.wanted, np.inf)
-        return self._others
+    def _variants(self, mesh: Any, changes: Sequence[Change]) -> list[Any]:
+        """Return the systems of changes on a mesh; None of a theory that cannot have all terms."""
+        off = set(self.effects) - set(self.own)
+        for change in changes:
+            if change.name in self._others:
+                continue
+            problem, without = self.problem.replace(mesh=mesh), off
+            if change.kind == "effect":
+                without = off ^ {change.name}
+            else:
+                problem = problem.replace(theory=change.name)
+            try:
+                self._others[change.name] = self._compiled(problem, self.system.comm, without)
+            except InputError as error:
+                self._others[change.name] = None
+                change.notes |= dict.fromkeys(self.wanted, str(error))
+                change.estimate |= dict.fromkeys(self.wanted, np.inf)
+        return [self._others[change.name] for change in changes]
 
     def _reached(self) -> float:
         """Return the speed of the modes: the final one, of a free hub the largest with a rigid structure; rad/s."""
@@ -305,68 +317,79 @@ class Explanation:
     def _history(self) -> tuple[Any, float]:
         """March the own model with its companions, and write what they say; return a system on half the cells.
 
-        Where steps of twice the length fail or lead far away, the models are marched once more in the case's own.
+        Where steps of twice the length fail, or their error is beyond the asymptotic range, models are marched again in
+        the case's own steps. A change that is not the same in both within a factor of SAFETY is below the larger one.
         """
         case, system, newton = self.case, self.system, self.case.newton()
         assert case.scheme is not None
         try:
             errors = HistoryErrors(self.problem, system, case.scheme, newton, case.start)
             own, ratio = errors.mesh if errors.mesh is not None and errors.mesh[1] > 1.0 else (errors.steps, 1.0)
-            others = self._march(errors, own, newton)
-            known = errors.errors(self.scale)
-            if not own.sound or errors.steps.difference[0] + own.difference[0] > FAR * self.scale:
+            rough = self._march(errors.steps, own, newton, self.changes)
+            known, apart = errors.errors(self.scale), errors.steps.difference[0] + own.difference[0]
+            if not own.sound or apart > FAR * self.scale:
+                rough = dict.fromkeys(rough)
+            of_doubt = [c for c in self.changes if not (rough[c.name] or 0.0) >= LARGE]
+            fine: dict[str, float | None] = {}
+            if of_doubt and (not own.sound or apart > ASYMPTOTIC * self.scale):
                 own = Companion(own.system, system, case.scheme, newton, doubles=False)
                 own.begin(*case.start(own.system))
-                others = self._march(own, own, newton)
-                own.finish()
+                fine = self._march(own, own, newton, of_doubt)
+                if not own.sound or (known["time"] or 0.0) > FAR:
+                    fine = dict.fromkeys(fine)
         except ComputationError as error:
             self._fails(HISTORY, error.what)
             return self._coarser()
         self.mesh.estimate[HISTORY] = known["space"]
         self.steps.estimate = {**dict.fromkeys(self.wanted, 0.0), HISTORY: known["time"]}
-        for change, other in zip(self.changes, others, strict=True):
-            if other is not None:
-                resolved = own.sound and other.sound and not (known["time"] or 0.0) > FAR
-                change.estimate[HISTORY] = self._between(other, resolved, change)
+        for change in self.changes:
+            change.settle(HISTORY, rough[change.name], fine.get(change.name, rough[change.name]))
         return own.system, ratio
 
-    def _march(self, watch: Any, own: Companion, newton: Newton) -> list[Companion | None]:
-        """March the own model to the end, and return companions of all changes.
+    def _march(
+        self, first: Companion, own: Companion, newton: Newton, changes: Sequence[Change]
+    ) -> dict[str, float | None]:
+        """March the own model to the end, and return the name of each change ↦ its size; None where that is unknown.
 
         Args:
-            watch: of its steps.
-            own: companion of the own model, which passes its steps on to them.
+            first: companion that follows it.
+            own: companion of the own model, which passes its steps on to those of the changes.
             newton: iteration control.
+            changes: those that are wanted.
         """
-        case, system, others = self.case, self.system, self._following(own)
+        case, system, others = self.case, self.system, self._following(own, changes)
         assert case.scheme is not None
         assert case.steps is not None
         march = March(system, case.scheme, case.steps, newton, *case.start(system))
-        march.stepper.watch = watch
+        march.stepper.watch = first
         for state in march:
             self.size = max(self.size, float(system.size(state.q)))
             if system.linear and not self.size <= LARGEST_LINEAR_DEFLECTION:
                 raise ComputationError(f"it diverges at t = {state.t:.4g} s")
             self.scale = max(self.scale, float(np.linalg.norm(tip(system, state))))
-        return others
+        first.finish()
+        out: dict[str, float | None] = {}
+        for change, other in zip(changes, others, strict=True):
+            size, at = (np.inf, 0.0) if other is None else other.difference
+            out[change.name] = float(size / self.scale if self.scale > 0.0 else np.inf * size) if size > 0.0 else 0.0
+            if other is None:
+                continue
+            if size > other.limit:
+                change.notes[HISTORY], out[change.name] = f"it diverges at t = {at:.4g} s", float(np.inf)
+            elif not other.sound and size < LARGE * self.scale:
+                out[change.name] = None
+        return out
 
-    def _between(self, other: Companion, resolved: bool, change: Change) -> float | None:
-        """Return the change of a history; None where it is not resolved, unless it is large."""
-        size = other.difference[0]
-        if other.system.linear and not size <= LARGEST_LINEAR_DEFLECTION * other.system.structure.length:
-            change.notes[HISTORY] = "it diverges"
-            return float(np.inf)
-        relative = size / self.scale if size > 0.0 and self.scale > 0.0 else np.inf if size > 0.0 else 0.0
-        return float(relative) if resolved or relative >= LARGE else None
-
-    def _following(self, own: Companion) -> list[Companion | None]:
-        """Return companions of all changes that follow that of the own model, which passes its steps on to them."""
+    def _following(self, own: Companion, changes: Sequence[Change]) -> list[Companion | None]:
+        """Return companions of changes that follow that of the own model, which passes its steps on to them."""
         out: list[Companion | None] = []
-        for system in self._variants(own.system.model.problem.mesh):
+        for system in self._variants(own.system.model.problem.mesh, changes):
             if system is None:
                 out.append(None)
                 continue
             companion = Companion(system, own.system, own.stepper.scheme, own.stepper.newton, doubles=False)
+            largest = LARGEST_LINEAR_DEFLECTION if system.linear else FARTHEST
+            companion.limit = largest * system.structure.length
             try:
                 companion.begin(*self.case.start(system))
             except ComputationError:
@@ -416,7 +439,7 @@ class Explanation:
         self.mesh.estimate[name] = error_by_cells(measure(own, other), ratio) if coarse is not self.system else None
         level = other if ratio > 1.0 else own
         mesh = (coarse if ratio > 1.0 else self.system).model.problem.mesh
-        for change, system in zip(self.changes, self._variants(mesh), strict=True):
+        for change, system in zip(self.changes, self._variants(mesh, self.changes), strict=True):
             if system is None:
                 continue
             try:

@@ -27,9 +27,11 @@ class ExplainResult(Result):
 
     Attributes:
         summary: scene, dimensionless groups, changes, warnings, timings; JSON-able.
-        rows: one dictionary an effect and a theory: `kind`, `name`, `included`, `why`, `estimate` (output ↦ relative
-            change; below `summary["resolution"]` it says no more than that it is), `worst`, `verdict`; with a check
-            `truth` (output ↦ relative change of the full models).
+        rows: one dictionary an effect, a theory, and steps and mesh: `kind`, `name`, `included`, `why`, `estimate`
+            (output ↦ relative change; None where it is unknown, below `summary["resolution"]` round-off), `worst`,
+            `verdict`; `bounds`,
+            outputs whose change is only known to be below the estimate; with a check `truth` (output ↦ relative change
+            of the full models).
     """
 
     rows: list[Row]
@@ -46,7 +48,7 @@ class ExplainResult(Result):
 
     @property
     def verdicts(self) -> dict[str, str]:
-        """Effect or theory ↦ "negligible", "noticeable" or "large": how much it changes the outputs."""
+        """Effect or theory ↦ "negligible", "noticeable", "large" or "unknown": how much it changes the outputs."""
         return {row["name"]: row["verdict"] for row in self.rows}
 
     @property

@@ -299,12 +299,13 @@ def explain_figure(result: ExplainResult) -> Figure:
     rows, outputs = result.rows, result.summary["outputs"]
     figure = Figure(figsize=(8, 0.45 * len(rows) + 1.4))
     axis = figure.add_subplot()
-    shown = [v for row in rows for v in row["estimate"].values() if ROUND_OFF < v < np.inf]
+    shown = [v for row in rows for v in row["estimate"].values() if v and ROUND_OFF < v < np.inf]
     left, right = 10 ** np.floor(np.log10(min([*shown, 1e-2]))) / 3, 3 * max([*shown, 1.0])
     height = 0.8 / max(len(outputs), 1)
     for j, output in enumerate(outputs):
         for i, row in enumerate(rows):
-            value, at = row["estimate"].get(output, 0.0), i + (j - (len(outputs) - 1) / 2) * height
+            known, at = row["estimate"].get(output, 0.0), i + (j - (len(outputs) - 1) / 2) * height
+            value = left if known is None else known
             axis.barh(
                 at,
                 float(np.clip(value, left, right)) - left,
@@ -313,6 +314,8 @@ def explain_figure(result: ExplainResult) -> Figure:
                 color=f"C{j}",
                 label=output if i == 0 else None,
             )
+            if known is None:
+                axis.annotate("unknown", (left, at), (3, -3), textcoords="offset points", fontsize=8)
             if not np.isfinite(value):
                 axis.annotate("fails", (right, at), (-3, -3), textcoords="offset points", fontsize=8, ha="right")
             if output in row.get("truth", {}) and np.isfinite(row["truth"][output]):

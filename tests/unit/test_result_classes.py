@@ -92,6 +92,8 @@ def explained() -> ExplainResult:
         | {"estimate": {"steady": 0.0, "modes": 0.02}, "worst": 0.02, "truth": {"steady": 0.0, "modes": 0.021}},
         {"kind": "theory", "name": "linear", "included": False, "why": "not good enough", "verdict": "large"}
         | {"estimate": {"steady": np.inf, "modes": 0.5}, "worst": np.inf},
+        {"kind": "discretisation", "name": "mesh.elements", "included": True, "why": "unknown", "verdict": "unknown"}
+        | {"estimate": {"steady": None, "modes": 1e-5}, "worst": 1e-5, "bounds": ["modes"]},
     ]
     return ExplainResult(summary(command="explain", outputs=["steady", "modes"], groups={}, resolution=1e-4), rows)
 
@@ -196,7 +198,7 @@ def test_what_changes_the_outputs() -> None:
     assert list(result.effects) == ["coriolis"]
     assert list(result.theories) == ["linear"]
     assert result.effects["coriolis"]["worst"] == 0.02
-    assert result.verdicts == {"coriolis": "noticeable", "linear": "large"}
+    assert result.verdicts == {"coriolis": "noticeable", "linear": "large", "mesh.elements": "unknown"}
     assert result.outputs == ["steady", "modes"]
 
 
