@@ -12,7 +12,7 @@ None of them saves much: a step here is mostly Python and a solve of 93 unknowns
 another: of a thick beam at high speed (slenderness 30, 12 in units of √(EI/A_ρL⁴)) the first frequency in the plane is
 12.7 % too high without the Coriolis force. That is the number of this demo.
 
-The picture in the README is this demo's, saved with --figure docs/figures/dropped_effects.png.
+The picture in docs/commands.md is this demo's, saved with --figure docs/figures/dropped_effects.png.
 """
 
 from __future__ import annotations

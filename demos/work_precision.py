@@ -7,7 +7,7 @@ is a floor that no refinement gets under: 3 % for the consistent linear theory, 
 which it does not have. A step of half the length costs twice the time and is four times as exact, until the mesh
 counts: two elements of degree 2 stop at 9e-4, two of degree 3 at 6e-5.
 
-Without a figure only a few settings are computed. The picture in the README is this demo's, saved with
+Without a figure only a few settings are computed. The picture in docs/commands.md is this demo's, saved with
 --figure docs/figures/work_precision.png; that takes some minutes.
 """
 
