@@ -11,13 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.equilibrium import steady_state
-from rotfem.analysis.reduced.response import reduced_response
-from rotfem.analysis.reduced.tips import largest as largest_of
+from rotfem.analysis.reduced.response import Response, reduced_response
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability, stability_of
 from rotfem.analysis.theory_error import RESOLVED, Farthest, TheoryError
 from rotfem.commands.first_state import Start
-from rotfem.commands.reduced_history import ReducedHistory, accuracy_of
+from rotfem.commands.reduced_history import accuracy_of
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
@@ -32,6 +31,9 @@ Array = npt.NDArray[np.float64]
 
 #: Contribution to an error below which no warning is given, and the part of it that advised steps aim at.
 WANTED, AIM = 0.01, 0.5
+
+#: What the error of a theory is estimated by where its foreshortening is computed.
+OF_FORESHORTENING = "its foreshortening, which is given back, changes it by that"
 
 #: What the contributions are called that a warning says to be unknown.
 UNKNOWN = {"time": "steps", "space": "mesh", "model": "theory"}
@@ -67,7 +69,7 @@ class RunErrors:
     farthest: Farthest
     stability: Stability | None
     shape: Array | None
-    reduced: ReducedHistory | None
+    reduced: Response | None
     companions: HistoryErrors | None
     stepper: Any
     start: Callable[[Any], Start]
@@ -99,8 +101,8 @@ class RunErrors:
         shares: dict[str, float | None] = {"time": None, "space": None}
         found: dict[str, Any] = {"scale": scale}
         if self.reduced is not None:
-            response = self.reduced.response
-            shares = {"time": response.time_error + response.projection_error, "space": self._space_of_reduced(scale)}
+            time = self.reduced.time_error + self.reduced.basis_error
+            shares = {"time": time, "space": self._space_of_reduced(scale)}
         elif self.shape is not None:
             space = error_of_shape(self.problem, self.system, self.shape, self._resting, OUTPUTS[of])
             shares = {"time": 0.0, "space": space}
@@ -112,8 +114,8 @@ class RunErrors:
     @cached_property
     def theory(self) -> TheoryError | None:
         """Error of the theory; None where it is unknown, not wanted, or nothing was computed."""
-        if self.reduced is not None and self.reduced.foreshortened is not None:
-            return self.reduced.foreshortened.theory_error()
+        if self.reduced is not None and self.reduced.foreshortening is not None:
+            return TheoryError(self.reduced.foreshortening, OF_FORESHORTENING, self.problem.theory.name)
         if not len(self.history["t"]):
             return None
         names, moves = self._names, self._moves
@@ -161,7 +163,7 @@ class RunErrors:
             return companion.system, apart, np.array(companion.components)
         system = compile_system(richer.replace(outputs={}), self.system.comm, moving=self.scene.time is not None)
         if self.reduced is not None:
-            response = self.reduced.response
+            response = self.reduced
             there = reduced_response(system, response.times, self.start(system).q, accuracy_of(self.scene))
             differences = (there.tips - response.tips)[:, self._moves]
             return system, _relative(largest(differences), self._scale), np.abs(differences).max(axis=0)
@@ -189,12 +191,13 @@ class RunErrors:
             return 0.0  # nothing moves it, on no mesh
         if self.reduced is None or other is None:
             return None
-        (system, ratio), own = other, self.reduced.response
+        (system, ratio), own = other, self.reduced
         try:
-            there = reduced_response(system, own.times, self.start(system).q, accuracy_of(self.scene))
+            start, bent = self.start(system).q, own.manifold is not None
+            there = reduced_response(system, own.times, start, accuracy_of(self.scene), bent)
         except ComputationError:
             return None
-        return error_by_cells(largest_of(own.model, there.tips - own.tips) / scale, ratio)
+        return error_by_cells(own.model.largest(there.tips - own.tips) / scale, ratio)
 
     def warnings(self, error: ErrorEstimate) -> list[str]:
         """Return what is to be known of an error; nothing where it is small, asked for, or reported already."""

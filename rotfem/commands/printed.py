@@ -50,7 +50,7 @@ def reduced_report(summary: dict[str, Any]) -> str:
     """Return the line that a run prints of its reduced model."""
     model, time = summary["reduced"], summary["timings"]
     return (
-        f"reduced model of {model['vectors']} vectors, {model['method']} in {model['steps']} steps, "
+        f"reduced model of {model['vectors']} vectors in {model['steps']} steps, "
         f"{time['total']:.2f} s (compile {time['compile']:.2f}, reduce {time['reduce']:.2f}); "
         f"errors: basis {model['projection_error']:.1e}, time {model['time_error']:.1e}"
     )

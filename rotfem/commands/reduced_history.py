@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,10 +9,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.critical_speed import critical_speed_within
 from rotfem.analysis.march import Steps, grid
-from rotfem.analysis.reduced.energies import ReducedEnergies
-from rotfem.analysis.reduced.foreshortened import Foreshortened, recover
 from rotfem.analysis.reduced.response import ACCURACY, Response, reduced_response
-from rotfem.analysis.reduced.root_forces import root_forces
 from rotfem.analysis.schemes import State
 from rotfem.commands.checkpoint import Log
 from rotfem.commands.monitor import Monitor
@@ -32,27 +28,9 @@ ROWS = 1000
 ENERGIES = ("kinetic", "strain", "jacobi")
 
 
-@dataclass
-class ReducedHistory:
-    """The history of a run by a reduced model.
-
-    Attributes:
-        response: its coordinates.
-        foreshortened: what they move the structure back; None where that is not wanted.
-    """
-
-    response: Response
-    foreshortened: Foreshortened | None
-
-    def summary(self) -> dict[str, Any]:
-        """Return what a summary has of it."""
-        out = self.response.summary()
-        return out if self.foreshortened is None else {**out, "foreshortening": self.foreshortened.summary()}
-
-
 def reduced_history(
     scene: Scene, system: Any, start: Array | None, record: Recorder, monitor: Monitor, log: Log, alone: bool
-) -> ReducedHistory | None:
+) -> Response | None:
     """Record the history of a reduced model; return None if none serves, which is noted.
 
     Args:
@@ -68,23 +46,18 @@ def reduced_history(
         ComputationError: it failed.
     """
     accuracy = accuracy_of(scene)
-    response = reduced_response(system, times_of(scene.time), start, accuracy)
-    if response.projection_error > accuracy:
-        what = f"the reduced model of {response.model.size} vectors is off by {response.projection_error:.2g}"
+    response = reduced_response(system, times_of(scene.time), start, accuracy, scene.model.foreshortening)
+    error = max(response.basis_error, response.time_error)
+    if error > accuracy:
+        what = f"the reduced model of {response.model.size} vectors is in error by {error:.2g}"
         if alone:  # a full system of this theory costs as much as one of a richer theory
             raise ComputationError(what)
         log.warnings.append(f"{what}, more than model.reduced allows ({accuracy:.2g}); the full system was used")
         return None
-    log.steps = response.trajectory.steps
+    log.steps = response.solution.steps
     monitor.critical = critical_speed_within(system, response.model.V[response.model.owned])
-    done = ReducedHistory(response, recover(response) if scene.model.foreshortening else None)
-    Rows(done, record, monitor).record()
-    if response.time_error > accuracy:
-        log.warnings.append(
-            f"the steps of the reduced model leave an error of {response.time_error:.2g}, more than model.reduced "
-            f"allows ({accuracy:.2g})"
-        )
-    return done
+    Rows(response, record, monitor).record()
+    return response
 
 
 def accuracy_of(scene: Scene) -> float:
@@ -107,30 +80,32 @@ def times_of(time: Any) -> Array:
 class Rows:
     """Rows and fields of a run, from a response.
 
+    Energies and forces at the root are those of the linear theory; tip and fields have the foreshortening, if that is
+    wanted.
+
     Args:
-        history: that of a reduced model.
+        response: history of a reduced model.
         record: takes the rows.
         monitor: sees the states.
     """
 
-    def __init__(self, history: ReducedHistory, record: Recorder, monitor: Monitor):
-        self.response, self.foreshortened = history.response, history.foreshortened
-        self.rows, self.monitor, self.system = record, monitor, record.system
+    def __init__(self, response: Response, record: Recorder, monitor: Monitor):
+        self.response, self.rows, self.monitor, self.system = response, record, monitor, record.system
+        self.factors, self.turn = response.factors(), response.turn
+        if self.system.hub is None:  # the response has no angle where nothing depends on it
+            self.turn[:, 0] = [self.system.motion.angle(float(t)) for t in response.times]
 
     def record(self) -> None:
-        """Add all rows to the run's history, and look at states of it as a march does."""
+        """Add all rows to the run's history, and check states of it as a march does."""
         response, times = self.response, self.response.times
         kept = set(range(0, len(times), stride(len(times)))) | {len(times) - 1}
-        tips = response.tips if self.foreshortened is None else self.foreshortened.tips
-        turn, a = self._turn(), response.accelerations()
-        root, energies = self._root(a, turn[1], turn[2]), self._energies(turn[1], a)
-        tips, root = (self._in_hub_axes(values) for values in (tips, root))
-        columns = np.column_stack([times, *turn[:2], tips, *energies[:3], root, *energies[3:]])
+        energies = self._energies()
+        tips, root = (self._in_hub_axes(values) for values in (response.tips, self._root()))
+        columns = np.column_stack([times, *self.turn.T[:2], tips, *energies[:3], root, *energies[3:]])
         for i, values in enumerate(columns):
-            row = [float(value) for value in values]
-            record = self.rows
+            row, record = [float(value) for value in values], self.rows
             wanted = record.needs_state
-            state = self._state(i, a, turn) if i in kept or wanted else None
+            state = self._state(i) if i in kept or wanted else None
             if state is not None:
                 self.monitor.step(state)
                 self.monitor.farthest(state.q, state.t)
@@ -138,24 +113,15 @@ class Rows:
             row += record.also(float(times[i]))
             record.add(row, self._shown(state, i) if i in kept else None)
 
-    def _turn(self) -> tuple[Array, Array, Array]:
-        """Return angle, speed and its rate of the frame in all rows, rad, rad/s, rad/s²."""
-        drive, t = self.response.solution.drive, self.response.times
-        if self.system.hub is not None:
-            return drive.angle(t), drive.speed(t), drive.rate(t)
-        motion = self.system.motion
-        return np.array([motion.angle(float(x)) for x in t]), drive.speed(t), drive.rate(t)
-
-    def _root(self, a: Array, speed: Array, rate: Array) -> Array:
+    def _root(self) -> Array:
         """Return the columns of force and moment at the root; the moment about a free hub's axis by its equation."""
         response, hub, root = self.response, self.system.hub, self.system.root
-        states = {"K": response.q, "C": response.v, "M": a}
-        out = root_forces(response.model, response.factors(), states)
+        out = response.model.root_forces(self.factors, *response.states)
         if hub is None or not self.system.row.coupled:
             return out
         arms, turn = along_axis(root.names, root.place, self.system.motion.axis)
-        torque = hub.torque.many(response.times, after=True)
-        moment = torque - hub.damping * speed - hub.inertia * rate
+        _, speed, rate = self.turn.T
+        moment = hub.torque.many(response.times, after=True) - hub.damping * speed - hub.inertia * rate
         return np.asarray(out + (moment - out @ arms)[:, None] * turn)
 
     def _in_hub_axes(self, values: Array) -> Array:
@@ -165,44 +131,45 @@ class Rows:
             return values
         return np.array([pitch.in_hub_axes(row, float(t)) for row, t in zip(values, self.response.times, strict=True)])
 
-    def _energies(self, speed: Array, a: Array) -> list[Array]:
+    def _energies(self) -> list[Array]:
         """Return the columns of energies and the pitch, and of a free hub those of its own."""
-        response, hub, pitch = self.response, self.system.hub, self.system.motion.pitch
+        response, hub, pitch, speed = self.response, self.system.hub, self.system.motion.pitch, self.turn[:, 1]
         if pitch is not None:  # the frame turns about any axis, and its origin moves: as the full system has them
-            columns = np.array([self._energies_of(i, a) for i in range(len(response.times))]).T
+            columns = np.array([self._energies_of(i) for i in range(len(response.times))]).T
             return [*columns, np.array([pitch.angle(float(t)) for t in response.times])]
-        energies = ReducedEnergies(response.model)
-        found = energies(response.factors(), speed, response.q, response.v)
+        q, v, _ = response.states
+        found = response.model.energies(self.factors, speed, q, v)
         out = [found[name] for name in ENERGIES]
         if hub is None:
             return out
         coupled = float(self.system.row.coupled)
-        momentum = hub.inertia * speed + energies.momentum(speed, coupled * response.q, coupled * response.v)
-        given = response.solution.given()
+        momentum = response.model.energies(self.factors, speed, coupled * q, coupled * v)["momentum"]
+        given = response.equations.given(response.solution, response.times)
         torque = hub.torque.many(response.times, after=True)
-        return [*out, torque, 0.5 * hub.inertia * speed**2, momentum, given["impulse"], given["work"]]
+        own = 0.5 * hub.inertia * speed**2, hub.inertia * speed + momentum
+        return [*out, torque, *own, given["impulse"], given["work"]]
 
     def _shown(self, state: State | None, i: int) -> State | None:
-        """Return a state as fields show it: with its foreshortening if that is given back."""
-        if state is None or self.foreshortened is None:
+        """Return a state as fields show it: with its foreshortening if that is wanted."""
+        if state is None or self.response.manifold is None:
             return state
         q = state.q.copy()
-        q[: len(self.response.model.V)] = self.foreshortened.manifold.shape(self.foreshortened.q[i])
+        q[: len(self.response.model.V)] = self.response.shape(i)
         return state.changed(q=q)
 
-    def _state(self, i: int, a: Array, turn: tuple[Array, Array, Array]) -> State:
+    def _state(self, i: int) -> State:
         """Return the state of a row; of a free hub its angle comes last."""
-        response, V = self.response, self.response.model.V
-        parts = [V @ x[i] for x in (response.q, response.v, a)]
+        response = self.response
+        parts = [response.model.V @ x[i] for x in response.states]
         if self.system.hub is not None:
-            parts = [np.append(x, angle[i]) for x, angle in zip(parts, turn, strict=True)]
+            parts = [np.append(x, angle) for x, angle in zip(parts, self.turn[i], strict=True)]
         return State(float(response.times[i]), *parts)
 
-    def _energies_of(self, i: int, a: Array) -> list[float]:
+    def _energies_of(self, i: int) -> list[float]:
         """Return the energies of a row as the full system has them."""
-        response, V, t = self.response, self.response.model.V, float(self.response.times[i])
-        self.system.set_time(t)
-        self.system.set_state(*(V @ x[i] for x in (response.q, response.v, a)))
+        response = self.response
+        self.system.set_time(float(response.times[i]))
+        self.system.set_state(*(response.model.V @ x[i] for x in response.states))
         energies = self.system.energies()
         return [energies[name] for name in ENERGIES]
 

@@ -14,6 +14,7 @@ from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.dense_output import RowTimes
 from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.march import March, Steps
+from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import stability_of
 from rotfem.analysis.stepper import Stepper
@@ -29,7 +30,7 @@ from rotfem.commands.loads import held
 from rotfem.commands.monitor import Monitor
 from rotfem.commands.problem import scheme_of
 from rotfem.commands.recorder import Recorder
-from rotfem.commands.reduced_history import ReducedHistory, reduced_history
+from rotfem.commands.reduced_history import reduced_history
 from rotfem.commands.summary import summary, timings
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, Stopped
@@ -89,7 +90,7 @@ class Simulation:
         self.companions: HistoryErrors | None = None
         self.rows: RowTimes | None = None
         self.last: State | None = None
-        self.reduced: ReducedHistory | None = None
+        self.reduced: Response | None = None
         self.shape: Array | None = None
 
     def advise(self, hint: Hint | None) -> None:
@@ -300,7 +301,7 @@ class Simulation:
         space, mesh = system.V.dofmap, system.structure.mesh
         parts = {"compile": self.compiled, **(system.seconds if stepper else {})}
         if self.reduced is not None:
-            parts["reduce"] = self.reduced.response.seconds["wall"]
+            parts["reduce"] = self.reduced.seconds["wall"]
         before = {"before": log.elapsed} if log.resumed else {}
         out = {
             **summary("run", scene, system.comm),

@@ -109,12 +109,6 @@ class AffineStiffness(System, ABC):
             self._increment = Increment(self.V)
         return -self._increment.solve(self.material_solver, self._load)
 
-    def scale_stiffness(self, strains: float, prestress: float) -> None:
-        """Multiply the stiffness of the strains and the geometric one by factors, until effects are switched."""
-        of = [strains if p.kind == "K" and INTERNAL.name in p.of else 1.0 for p in self.pieces]
-        self._weights *= [prestress if PRESTRESS in p.of else f for f, p in zip(of, self.pieces, strict=True)]
-        self._coefficients = None
-
     @property
     def material(self) -> Any:
         """Stiffness of the strains alone, clamped rows 1."""

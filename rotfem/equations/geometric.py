@@ -1,11 +1,7 @@
-"""The geometric stiffness ∫ σ⁰·D²Γ: what the forces of a loaded state do in further displacements.
-
-And what the stiff strains have of third order in displacements, which the forces of a linear structure work on.
-"""
+"""The geometric stiffness ∫ σ⁰·D²Γ, and the work of linear forces in second-order strains."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import ufl
@@ -40,7 +36,7 @@ def geometric_stiffness(model: Model, state: tuple[Any, Any], u: Any, w: Any, th
     return 0 if isinstance(out, int) or expand_derivatives(out).empty() else out
 
 
-def second_order_work(model: Model, displacements: Sequence[Any], test: Any) -> Any:
+def second_order_work(model: Model, displacements: tuple[Any, Any], test: Any) -> Any:
     """Return ∫ N(δq)·D²Γ[a, b] at rest, a UFL form, with all exact strains Γ and the forces N of a linear theory.
 
     Args:
@@ -48,50 +44,11 @@ def second_order_work(model: Model, displacements: Sequence[Any], test: Any) -> 
         displacements: a and b, functions of the unknowns.
         test: δq.
     """
-    return _work_of(model, test, lambda strain, at: _along(strain, at, *displacements))
-
-
-def third_order_work(model: Model, displacements: Sequence[Any], test: Any) -> Any:
-    """Return ∫ N(δq)·(D³Γ[a, b, c] + D²Γ[d, e]) at rest, a UFL form, with all exact strains Γ.
-
-    Args:
-        model: of a linear theory, whose forces N are.
-        displacements: a, b, c, d and e, functions of the unknowns.
-        test: δq.
-    """
-    first, second = displacements[:3], displacements[3:]
-    return _work_of(model, test, lambda strain, at: _along(strain, at, *first) + _along(strain, at, *second))
-
-
-def fourth_order_work(model: Model, displacements: Sequence[Any], test: Any) -> Any:
-    """Return ∫ N(δq)·Γ₄, a UFL form: what is of fourth order in x of the exact strains Γ[x + y + z] at rest.
-
-    Args:
-        model: of a linear theory, whose forces N are.
-        displacements: x, and y and z that are of second and third order in it, functions of the unknowns.
-        test: δq.
-    """
-    x, y, z = displacements
-
-    def fourth(strain: Any, at: Any) -> Any:
-        mixed = _along(strain, at, x, x, y) / 2 + _along(strain, at, y, y) / 2 + _along(strain, at, x, z)
-        return _along(strain, at, x, x, x, x) / 24 + mixed
-
-    return _work_of(model, test, fourth)
-
-
-def _along(strain: Any, q: Any, *directions: Any) -> Any:
-    for direction in directions:
-        strain = ufl.derivative(strain, q, direction)
-    return strain
-
-
-def _work_of(model: Model, test: Any, change: Callable[[Any, Any], Any]) -> Any:
-    """Return the work of the forces of δq in a change at rest of all exact strains, (Γ, q) ↦ change."""
     s, out = model.structure, 0
     q, exact = s.k.functions[0], {strain.name: strain.value for strain in model.strains(richest().measures(s.type))}
     for strain in model.mechanics.strains:
         force = strain.force(ufl.replace(strain.value, {q: test}))
-        at_rest = forms.first_branches(exact[strain.name])
-        out += ufl.inner(force, forms.without(change(at_rest, q), q)) * strain.measure
+        at_rest = forms.first_branches(exact[strain.name])  # at rest the other branches of its rotations divide by zero
+        second = ufl.derivative(ufl.derivative(at_rest, q, displacements[0]), q, displacements[1])
+        out += ufl.inner(force, forms.without(second, q)) * strain.measure
     return out

@@ -208,8 +208,6 @@ class Plate(Structure):
     is_flat = True
     prestressing: ClassVar = ("membrane",)
     stiff: ClassVar = ("shear",)
-    #: The error of frequencies of the exact theory at constant speeds is a tenth to all of that.
-    stretched: ClassVar = (3.5, 6.0)
     #: Conjugates of the tip's components: inputs of the state-space model.
     tip_inputs = ("tip_force_1", "tip_force_2", "tip_force_3", "tip_moment_alpha1", "tip_moment_alpha2")
     #: Mode families: the components whose kinetic energy counts, and the one whose shape is examined.

@@ -58,10 +58,6 @@ class Structure(LoadsOfStructure):
     prestressing: ClassVar[tuple[str, ...]]
     #: What makes geometric stiffness unless a problem says it: "axial" forces, or "all" forces and moments.
     prestress: ClassVar[str] = "axial"
-    #: By how many times its mean stretch linear theories have the stiffness of bending, and the geometric one, off:
-    #: where a line is stretched by e, its curvature is κ/(1 + e) and N turns it by w'/(1 + e); e is a tenth more where
-    #: it bends.
-    stretched: ClassVar[tuple[float, float]] = (2.2, 1.1)
     #: Strains whose stiffness may outweigh that of the others by so much that round-off of it spoils them.
     stiff: ClassVar[tuple[str, ...]] = ()
 

@@ -1,4 +1,4 @@
-"""Reduced linear models: the full march's history, exact propagators, batched collocation, and what they refuse."""
+"""Reduced linear models: exact integration in modal coordinates, the full march's history, foreshortening, refusals."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from rotfem import SceneError, explain, modes, run
-from rotfem.analysis.reduced.collocation import collocate
-from rotfem.analysis.reduced.propagator import Propagator, cubics, functions
+from rotfem import SceneError, explain, run
+from rotfem.analysis.reduced import response
+from rotfem.analysis.reduced.solution import Solution, functions
+from rotfem.commands.problem import Problem
 from rotfem.scene import Scene
-from rotfem.structures.planar_beam import PlanarBeam
 from tests.beams import STRUCTURE
 
 Array = npt.NDArray[np.float64]
@@ -26,12 +26,35 @@ GUST = {
 }
 
 
-def plainly(begin: Array, end: Array, shares: Array) -> Array:
-    return begin[:, None] + (end - begin)[:, None] * shares
+class Oscillators:
+    """M a + C(t) v + K(t) q + f(t) = 0 with prescribed matrices.
+
+    Args:
+        operators: times (n,) ↦ M, C, K (n, m, m) and f (n, m).
+        constant: whether the matrices are.
+    """
+
+    def __init__(self, operators: Callable[[Array], tuple[Array, Array, Array, Array]], constant: bool):
+        self.operators, self.constant = operators, constant
+
+    def within(self, begin: Array, end: Array, shares: Array) -> Array:
+        return np.asarray(begin[:, None] + (end - begin)[:, None] * shares)
+
+    def reference(self, t: float, y: Array, v: Array) -> tuple[Array, Array, Array]:
+        M, C, K, _ = self.operators(np.array([t]))
+        return M[0], C[0], K[0]
+
+    def at(self, t: Array) -> Callable[[Array, Array, Array], Array]:
+        *matrices, f = self.operators(t)
+
+        def residual(q: Array, v: Array, a: Array) -> Array:
+            return np.asarray(f + sum(np.einsum("nij,nj->ni", A, x) for A, x in zip(matrices, (a, v, q), strict=True)))
+
+        return residual
 
 
-def test_collocation_is_of_fifth_order() -> None:
-    """q = (sin t, cos 2t) solves the equations whose force is made of it; the error falls by 32 with half the step."""
+def test_solution_is_of_fourth_order_with_matrices_that_change() -> None:
+    """q = (sin t, cos 2t) solves the equations whose force is made of it; a cubic in each step leaves h⁴ at least."""
     rng = np.random.default_rng(3)
     A, B = rng.standard_normal((2, 2, 2))
 
@@ -47,49 +70,37 @@ def test_collocation_is_of_fifth_order() -> None:
         f = -np.einsum("nij,nj->ni", M, a) - np.einsum("nij,nj->ni", C, v) - np.einsum("nij,nj->ni", K, q)
         return M, C, K, f
 
-    errors, between = [], []
-    for n in (300, 600):  # more than one batch
-        q, v, _ = exact(np.zeros(1))
-        steps = collocate(operators, plainly, np.linspace(0.0, 30.0, n + 1), q[0], v[0])
-        t = np.linspace(0.0, 30.0, 1001)
-        errors.append(np.abs(steps.q[-1] - exact(np.array([30.0]))[0][0]).max())
-        between.append(np.abs(steps.at(t)[0] - exact(t)[0]).max())
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(5.0, abs=0.3)
-    assert between[1] < 1e-7  # between the steps too
+    t, errors = np.linspace(0.0, 30.0, 1001), []
+    start = [x[0] for x in exact(np.zeros(1))[:2]]
+    for n in (40, 80):
+        found = Solution(Oscillators(operators, constant=False), np.linspace(0.0, 30.0, n + 1), *start).at(t)
+        errors.append([np.abs(x - y).max() for x, y in zip(found, exact(t), strict=True)])
+    orders = np.log2(np.array(errors[0]) / errors[1])
+    assert np.all(orders[:2] > 3.8)
+    assert errors[1][0] < 1e-5
+    assert errors[1][2] < 1e-2  # accelerations too
 
 
-def test_answers_to_forces_that_follow_from_a_solution_are_those_to_the_same_forces_given() -> None:
-    """q̈ + q̇/5 + 4q = cos t, and the answers to q² and to q̇ q̈, by the same steps: to round-off, in two batches."""
-    from rotfem.analysis.reduced.collocation import NODES, answered
+@pytest.mark.parametrize("damping", [0.3, 20.0, 40.0], ids=["light", "critical", "heavy"])
+def test_solution_is_exact_for_a_ramp_on_an_oscillator(damping: float) -> None:
+    """M q̈ + C q̇ + K q = F t from rest, over steps much longer than a period; modes are dependent at C² = 4 K M."""
+    m, c, k, F = 2.0, damping, 50.0, 7.0
+    ends = np.array([0.0, 3.0, 3.5, 10.0, 40.0])
 
     def operators(t: Array) -> tuple[Array, Array, Array, Array]:
         one = np.ones((len(t), 1, 1))
-        return one, 0.2 * one, 4 * one, -np.cos(t)[:, None]
+        return m * one, c * one, k * one, -F * t[:, None]
 
-    ends, rest, start = np.linspace(0.0, 30.0, 301), np.zeros(1), np.array([0.3])
-    steps, answers = answered(operators, plainly, ends, start, rest, lambda t, q, v, a: [-(q**2), -v * a])
-    alone = collocate(operators, plainly, ends, start, rest)
-    np.testing.assert_array_equal(steps.q, alone.q)
-    q, v, a = alone.nodes()
-    assert q.shape[1] == len(NODES)
-    for answer, forces in zip(answers, (-(q**2), -v * a), strict=True):
-        given = collocate(operators, plainly, ends, rest, rest, forces)
-        np.testing.assert_allclose(answer.q, given.q, atol=1e-13)
-
-
-def test_propagator_is_exact_for_a_ramp_on_a_damped_oscillator() -> None:
-    """M q̈ + C q̇ + K q = F t from rest, over intervals much longer than a period."""
-    m, c, k, F = 2.0, 0.3, 50.0, 7.0
-    grid = np.array([0.0, 3.0, 3.5, 10.0, 40.0])
-    within, coefficients, off = cubics(lambda t: -F * t[:, None], plainly, grid)
-    assert off < 1e-12
-    assert np.array_equal(within, grid)
-    q, _ = Propagator(*(np.array([[x]]) for x in (m, c, k))).solve(grid, coefficients, np.zeros(1), np.zeros(1))
-    decay, omega = c / (2 * m), np.sqrt(k / m - (c / (2 * m)) ** 2)
+    t, rest = np.linspace(0.0, 40.0, 101), np.zeros(1)
+    q, v, a = (x[:, 0] for x in Solution(Oscillators(operators, constant=True), ends, rest, rest).at(t))
+    roots = np.roots([m, c, k]).astype(complex)
+    if damping == 20.0:
+        roots = roots + np.array([1e-6, -1e-6])
     lag = F * c / k**2
-    a, b = lag, (decay * lag - F / k) / omega
-    exact = F * grid / k - lag + np.exp(-decay * grid) * (a * np.cos(omega * grid) + b * np.sin(omega * grid))
-    np.testing.assert_allclose(q[:, 0], exact, rtol=1e-11, atol=1e-13)
+    parts = np.linalg.solve([[1.0, 1.0], roots], [lag, -F / k])
+    exact = F * t / k - lag + (np.exp(np.outer(t, roots)) @ parts).real
+    np.testing.assert_allclose(q, exact, atol=1e-9 if damping == 20.0 else 1e-11)
+    np.testing.assert_allclose(m * a + c * v + k * q, F * t, atol=1e-8)
 
 
 def test_phi_functions_agree_where_their_two_formulas_meet() -> None:
@@ -98,6 +109,38 @@ def test_phi_functions_agree_where_their_two_formulas_meet() -> None:
     inside, outside = (functions(np.asarray(z * r), 3)[3] for r in (1 - 1e-9, 1 + 1e-9))
     np.testing.assert_allclose(inside, outside, atol=1e-9)
     assert functions(np.zeros(1, dtype=complex), 3)[3][0] == pytest.approx(1 / 6, rel=1e-14)
+
+
+def test_free_vibration_at_constant_speed_keeps_its_jacobi_integral(spin_up: MakeScene) -> None:
+    """T2 + V − T0 of an undamped beam at constant speed, by steps as long as they come: to round-off."""
+    scene = spin_up(
+        {"model.theory": "consistent_linear", "model.reduced": 1e-4, "initial": {"tip_displacement": 0.2}},
+        time={"end": 40.0, "step": 0.1},
+        motion={"type": "constant", "speed": 3.0},
+        mesh={"elements": 6},
+    )
+    jacobi = run(scene).history["jacobi"]
+    assert np.ptp(jacobi) < 1e-9 * np.abs(run(scene).history["strain"]).max()
+
+
+def test_a_basis_of_all_unknowns_is_the_full_system(spin_up: MakeScene) -> None:
+    """It grows by what the residual shows to lack until nothing lacks, and then solves the full equations."""
+    scene = spin_up({"model.theory": "consistent_linear"}, mesh={"elements": 1}, loads={"tip_force": GUST})
+    system, times = Problem.of(scene).system(), np.linspace(0.0, 4.0, 41)
+    growth = response.Growth(system, times, None)
+    sizes, lacking = [], []
+    while True:
+        equations = growth.equations()
+        solution, states = growth.solved(equations, growth.longest() / 32)
+        factors = growth.excitation.factors(response.after(times), equations.turn(times))
+        residual = growth.model.residuals(factors, *states)
+        sizes.append(growth.model.size)
+        lacking.append(np.linalg.norm(residual, axis=0).max() / np.linalg.norm(growth.model.loads, axis=1).max())
+        if growth.model.grow(growth._lacking(equations, solution, states), 2) == 0:
+            break
+    assert sizes[-1] == 9  # three nodes that move, three unknowns each
+    assert sizes == sorted(sizes)
+    assert lacking[-1] < 1e-9 < 1e-3 < lacking[0]
 
 
 def extrapolated(scene: Scene) -> dict[str, Array]:
@@ -120,7 +163,6 @@ def test_reduced_spin_up_is_that_of_the_full_march(spin_up: MakeScene, theory: s
     speed = {"type": "spin_up", "speed": 2.0, "duration": 5.0}
     scene = spin_up({"model.theory": theory, "model.reduced": 1e-8}, time=time, motion=speed, mesh={"elements": 6})
     reduced, full = run(scene), extrapolated(scene)
-    assert reduced.summary["reduced"]["method"] == "collocation"
     assert reduced.summary["warnings"] == run(scene.replace({"model.reduced": None})).summary["warnings"]
     assert list(reduced.history) == list(full)
     assert np.array_equal(reduced.t, full["t"])
@@ -140,7 +182,6 @@ def test_reduced_history_at_constant_speed_is_exact(spin_up: MakeScene) -> None:
         mesh={"elements": 6},
     )
     reduced, full = run(scene), extrapolated(scene)
-    assert reduced.summary["reduced"]["method"] == "exact exponential"
     for name in ("tip_u2", "tip_alpha", "strain"):
         assert difference(reduced.history, full, name) < 2e-5, name
 
@@ -155,91 +196,79 @@ def test_a_reduced_model_needs_a_linear_theory(spin_up: MakeScene) -> None:
             spin_up({"model.theory": "linear", "model.reduced": wrong})
 
 
-def one_vector(growth: Any) -> None:
-    """Begin with the static answer to one load."""
-    growth.model.grow(growth.model.solve(growth._solvers[0], growth._loads()[0])[:, None])
-
-
 def test_the_basis_is_checked(spin_up: MakeScene, monkeypatch: pytest.MonkeyPatch) -> None:
     """A basis that may not grow is seen to be too small, and the full system is used and said."""
-    from rotfem.analysis.reduced import response
-
     monkeypatch.setattr(response, "MOST", 1)
     changes: dict[str, Any] = {"model.theory": "consistent_linear", "model.reduced": True}
     scene = spin_up(changes, time={"end": 1.0, "step": 0.02}, mesh={"elements": 4}, loads={"tip_force": GUST})
-    monkeypatch.setattr(
-        response.Growth,
-        "_begin",
-        lambda self: self.model.grow(self.model.solve(self._solvers[0], self._loads()[:1].T)),
-    )
     result = run(scene)
     assert "reduced" not in result.summary
     assert any("the full system was used" in warning for warning in result.summary["warnings"])
     assert np.array_equal(result.history["tip_u2"], run(scene.replace({"model.reduced": None})).history["tip_u2"])
 
 
-def test_foreshortening_brings_the_spin_up_near_reissner(spin_up: MakeScene) -> None:
-    """From 3.3e-2 to 2.2e-5 of the largest displacement, and the estimate of what is left is not less than that.
+def distance(result: Any, exact: Any) -> float:
+    """Return the largest distance of the tips, relative to the largest displacement."""
+    names = [name for name in ("tip_u1", "tip_u2", "tip_u3") if name in exact.history]
+    found, truth = (np.stack([x.history[name] for name in names]) for x in (result, exact))
+    return float(np.linalg.norm(found - truth, axis=0).max() / np.linalg.norm(truth, axis=0).max())
 
-    In the second order alone it is 1.1e-3.
-    """
+
+def test_foreshortening_brings_the_spin_up_near_reissner(spin_up: MakeScene) -> None:
+    """From 3.3e-2 to 1.1e-3 of the largest displacement; the error given is the difference that it makes, not less."""
     time = {"end": 20.0, "step": 0.01, "output_every": 10}
     changes: dict[str, Any] = {"model.theory": "consistent_linear", "model.reduced": True, "model.foreshortening": True}
     exact, scene = run(spin_up(time=time | {"scheme": "radau5"})), spin_up(changes, time=time)
     given, linear = run(scene), run(scene.replace({"model.foreshortening": None}))
-
-    def off(result: Any) -> float:
-        u = [np.stack([x.history["tip_u1"], x.history["tip_u2"]]) for x in (result, exact)]
-        return float(np.linalg.norm(u[0] - u[1], axis=0).max() / np.linalg.norm(u[1], axis=0).max())
-
-    assert off(linear) == pytest.approx(3.3e-2, rel=0.02)
-    assert off(given) < 4e-5
-    assert off(given) < given.summary["theory_error"]["estimate"] < 10 * off(given)
+    assert distance(linear, exact) == pytest.approx(3.3e-2, rel=0.02)
+    assert distance(given, exact) < 1.5e-3
+    assert given.summary["theory_error"]["estimate"] == pytest.approx(distance(linear, given), rel=0.02)
     assert given.shape["u1"][-1] == pytest.approx(given.history["tip_u1"][-1], rel=1e-12)  # summed in another order
     with pytest.raises(SceneError, match="model.foreshortening = true: needs reduced = true"):
         scene.replace({"model.reduced": None})
 
 
-def test_a_blow_at_speed_is_followed_to_the_third_order(spin_up: MakeScene) -> None:
-    """A tip that moves by 14 % of the length, at 4 rad/s: what is left is 5e-4, of fifth order, and told as 4e-3.
+@pytest.mark.parametrize("structure", ["planar_beam", "spatial_beam"])
+def test_foreshortening_is_of_second_order(structure: str) -> None:
+    """At a quarter of the load the relative error falls by 4 linearly, and by 16 with the foreshortening."""
+    tube = {"shape": "tube", "outer_radius": 0.012, "inner_radius": 0.010, "E": 7e9, "nu": 0.33, "rho": 1600.0}
+    off: dict[bool, list[float]] = {False: [], True: []}
+    for load in (16.0, 4.0):
+        rows = [[0, 0, 0, 0], [0.1, 0, load, 0], [0.2, 0, -load / 2, load], [0.4, 0, 0, -load]]
+        scene: dict[str, Any] = {
+            "structure": {"type": structure, "length": 0.8, "section": tube},
+            "mesh": {"elements": 4},
+            "motion": {"type": "constant", "speed": 0.0},
+            "loads": {"tip_force": {"table": [row if structure == "spatial_beam" else row[:3] for row in rows]}},
+            "time": {"end": 0.4, "step": 2e-3, "scheme": "radau5"},
+            "output": {"error": False},
+        }
+        exact = run(scene)
+        for bent, errors in off.items():
+            model = {"theory": "consistent_linear", "reduced": 1e-6, "foreshortening": bent}
+            errors.append(distance(run(scene | {"model": model}), exact))
+    assert off[False][0] / off[False][1] == pytest.approx(4.0, rel=0.15)
+    assert off[True][0] / off[True][1] == pytest.approx(16.0, rel=0.3)
 
-    In the second order alone it is 6e-3; without what the centrifugal force does in displacements of fourth order 2e-2.
-    """
-    table = [[0.0, 0.0, 0.0], [0.5, 0.0, 30.0], [1.0, 0.0, -30.0], [1.5, 0.0, 0.0], [4.0, 0.0, 0.0]]
-    loads, time = {"tip_force": {"kind": "dead", "table": table}}, {"end": 4.0, "step": 0.01}
-    changes: dict[str, Any] = {"motion": {"type": "constant", "speed": 4.0}, "loads": loads, "mesh.elements": 8}
-    model = {"model.theory": "consistent_linear", "model.reduced": 1e-4, "model.foreshortening": True}
-    exact = run(spin_up(changes, time={**time, "step": 0.0025, "output_every": 4, "scheme": "esdirk4"}))
-    given = run(spin_up(changes | model, time=time))
-    u = [np.stack([x.history["tip_u1"], x.history["tip_u2"]]) for x in (given, exact)]
-    off = float(np.linalg.norm(u[0] - u[1], axis=0).max() / np.linalg.norm(u[1], axis=0).max())
-    assert off < 1.5e-3
-    assert off / 2 < given.summary["theory_error"]["estimate"] < 15 * off
 
-
-def test_effects_are_as_large_as_the_full_models_say(spin_up: MakeScene) -> None:
-    """Each left out of reissner, against the reduced model of the linear theory."""
-    from rotfem.analysis.reduced.effect_sizes import effect_sizes
-    from rotfem.analysis.reduced.response import reduced_response
-    from rotfem.commands.problem import Problem
-
-    scene = spin_up({"mesh.elements": 6})
-    problem = Problem.of(scene)
-    times = np.linspace(0.0, 20.0, 501)
-    linear = problem.replace(theory="consistent_linear")
-    sizes = effect_sizes(reduced_response(linear.system(), times))
-
-    def tips(effects: tuple[str, ...]) -> Array:
-        moments = problem.replace(effects=effects).march(end=20.0, step=0.02)
-        return np.array([[moment.tip["u1"], moment.tip["u2"]] for moment in moments])
-
-    names = problem.effective_effects()
-    assert set(sizes) == set(names) == {"coriolis", "centrifugal", "euler", "rotary_inertia"}
-    whole = tips(names)
-    for name, size in sizes.items():
-        change = tips(tuple(n for n in names if n != name)) - whole
-        truth = float(np.linalg.norm(change, axis=1).max() / np.linalg.norm(whole, axis=1).max())
-        assert size == pytest.approx(truth, rel=0.15), name
+def test_what_stretch_does_is_in_the_second_order() -> None:
+    """A line of small EA that spins up, and is struck: the stretch lowers its frequencies; linearly it is 6e-2 away."""
+    ramp = [[float(t), float(4.0 * (t / 5) ** 2 * (3 - 2 * t / 5))] for t in np.linspace(0.0, 5.0, 26)]
+    section = {"EA": 2.8e5, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
+    force = [[0, 0, 0], [6.0, 0, 0], [6.4, 0, 3.0], [6.7, 0, -2.0], [7.5, 0, 1.0], [8.0, 0, 0]]
+    scene: dict[str, Any] = {
+        "structure": {"type": "planar_beam", "length": 10.0, "section": section},
+        "mesh": {"elements": 6},
+        "motion": {"type": "table", "table": [*ramp, [15.0, 4.0]]},
+        "loads": {"tip_force": {"kind": "dead", "table": force}},
+        "time": {"end": 15.0, "step": 0.02},
+        "output": {"error": False},
+    }
+    exact = run(scene | {"time": scene["time"] | {"scheme": "radau5"}})
+    model = {"theory": "consistent_linear", "reduced": 1e-4, "foreshortening": True}
+    given, linear = (run(scene | {"model": model | {"foreshortening": bent}}) for bent in (True, False))
+    assert distance(given, exact) < 0.4 * distance(linear, exact)
+    assert given.summary["theory_error"]["estimate"] > 0.9 * distance(linear, exact)
 
 
 def test_nothing_moves_where_nothing_drives(spin_up: MakeScene) -> None:
@@ -254,21 +283,6 @@ def test_nothing_moves_where_nothing_drives(spin_up: MakeScene) -> None:
     assert np.array_equal(result.history["tip_u2"], np.zeros(11))
 
 
-def test_stretch_makes_frequencies_lower_by_what_it_is_said_to() -> None:
-    """ω² of bending falls by 2ē where speed adds little to it, ē the mean of N/EA; its law has a tenth more."""
-    section = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
-    structure = {"type": "planar_beam", "length": 10.0, "section": section}
-    scene = {"structure": structure, "motion": {"type": "constant", "speed": 1.0}, "mesh": {"elements": 6}}
-    squares = [
-        np.abs(modes(Scene.from_dict(scene | {"model": {"theory": theory}, "modes": {"count": 3}})).eigenvalues) ** 2
-        for theory in ("consistent_linear", "reissner")
-    ]
-    stretch = 1.2 * 1.0**2 * 10.0**2 / 3 / 2.8e7
-    off = (squares[0] - squares[1])[:3] / squares[0][:3] / stretch
-    law, _ = PlanarBeam.stretched
-    assert np.all((0.85 * law < off) & (off < law))
-
-
 @pytest.mark.parametrize(
     "motion",
     [
@@ -278,7 +292,7 @@ def test_stretch_makes_frequencies_lower_by_what_it_is_said_to() -> None:
     ids=["prescribed", "free hub"],
 )
 def test_what_nothing_moves_stays_where_it_is(spin_up: MakeScene, motion: dict[str, Any]) -> None:
-    """A basis without columns; of a free hub, which that says nothing of, the full system has the history."""
+    """A basis without columns, of a prescribed motion and of a free hub."""
     scene = spin_up({"accuracy": 1e-3}, motion=motion, time={"end": 0.5, "step": 0.05})
     result = run(scene)
     assert result.summary["accuracy"]["met"]
@@ -286,7 +300,7 @@ def test_what_nothing_moves_stays_where_it_is(spin_up: MakeScene, motion: dict[s
     given = {"theory": "consistent_linear", "reduced": True, "foreshortening": True}
     other = run(scene.replace({"accuracy": None, "model": given}))
     assert not np.any(other.history["tip_u1"])
-    assert ("reduced" in other.summary) == (motion["type"] == "spin_up")
+    assert other.summary["reduced"]["vectors"] == 0
     assert all(row["estimate"].get("history", 0.0) == 0.0 for row in explain(scene.replace({"accuracy": None})).rows)
 
 

@@ -1,36 +1,45 @@
-"""A linear theory between the columns of a basis: V (n, m) with q = V η, and every piece as a small matrix."""
+"""A linear theory in a basis of few shapes: q = V η, and every piece of its equations as a small matrix.
+
+The projected equations are those of the structure between the columns of V (Qu 2004, Model Order Reduction Techniques,
+chapter 2),
+
+    Vᵀ(M V η̈ + C V η̇ + K V η + f) = 0,    M, C, K, f = Σ cₚ(t) (piece p),
+
+with VᵀK₀V = 1, K₀ the stiffness of the strains. The energies follow from the same pieces: T = ½ q̇·M q̇ + T1 + T0, where
+the centrifugal force is ∂T0/∂q and that of Euler's acceleration Ω̇ d(∂T1/∂q̇)/dΩ.
+"""
 
 from __future__ import annotations
 
-from copy import copy
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import ufl
 from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
 
 from rotfem.equations.pieces import PRESTRESS
+from rotfem.numerics import compat, forms
 from rotfem.numerics.eigenproblem import is_symmetric
 from rotfem.numerics.linear import MIDDLE, DirectSolver, combine
 from rotfem.numerics.projection import orthonormal, summed, times
 
 Array = npt.NDArray[np.float64]
-
-#: Condition of the masses from which some motion has none to speak of: its frequency is 3e4 times the lowest.
-SINGULAR = 1e9
 Index = npt.NDArray[np.int64]
 
-#: Part of its energy that a shape must have beside those of the basis, to be told from round-off: what a solution with
-#: a stiffness of condition 1e8 is off, squared.
-BESIDE = 1e-15
+#: Part of its energy that a column must have outside the basis to be distinguished from round-off: the error of a
+#: solution with a stiffness of condition 1e8, squared.
+INDEPENDENT = 1e-15
 
 
 class ReducedModel:
-    """Pieces of a linear theory in a basis that is orthonormal in strain energy, V·K₀V = 1, and can grow.
+    """Pieces of a linear theory in a basis that is orthonormal in strain energy and can grow.
 
     Args:
         system: equations of a linear theory, the hub held.
-        active: numbers of the pieces that are ever there.
+        active: numbers of the pieces with a factor that is ever other than zero.
 
     Attributes:
         V: basis, local dof arrays with their ghosts, shape (n, m).
@@ -44,98 +53,76 @@ class ReducedModel:
         self.owned = slice(0, space.index_map.size_local * space.index_map_bs)
         pieces = [(int(i), system.pieces[int(i)]) for i in active]
         self.kinds = {kind: [i for i, p in pieces if p.kind == kind] for kind in "MCKf"}
-        self.V: Array = np.empty((len(system.zeros()), 0))
-        owned = self.V[self.owned]
-        self._products = {i: owned for kind in "MCK" for i in self.kinds[kind]}
-        self._strained = owned
         loads = [system.pieces[i].operator.array[self.owned] for i in self.kinds["f"]]
-        self._loads = np.array(loads).reshape(len(loads), self.owned.stop)
-        self.small: dict[str, Array] = {kind: np.empty((len(self.kinds[kind]), 0, 0)) for kind in "MCK"}
-        self.small["f"] = np.empty((len(self.kinds["f"]), 0))
-        self._ghosted = fem.Function(system.V)
+        self.loads: Array = np.array(loads).reshape(len(loads), self.owned.stop)
+        self._take(np.empty((len(system.zeros()), 0)))
 
     @property
     def size(self) -> int:
         """Number of columns."""
         return self.V.shape[1]
 
-    def energy_product(self, X: Array) -> Array:
-        """Return K₀ X of owned rows: forces of the strains."""
-        return times(self.system.material, X)
+    # --- the basis ---------------------------------------------------------------------------------------------------
 
-    def energies(self, X: Array) -> Array:
-        """Return twice the strain energy of each column (owned rows)."""
-        return np.asarray(summed(self.comm, np.einsum("ij,ij->j", X, self.energy_product(X))))
-
-    def grow(self, columns: Array, most: int | None = None, least: float = 0.0) -> int:
-        """Add to the basis what columns span beside it, those with the largest energy first; return how many.
+    def grow(self, columns: Array, most: int | None = None) -> int:
+        """Add to the basis what columns span outside it, shapes of largest strain energy first; return how many.
 
         Args:
             columns: local dof arrays, shape (n, k).
             most: number of shapes that are added; all if None.
-            least: twice the strain energy that a shape has to have beside the basis.
         """
         X, V = columns[self.owned], self.V[self.owned]
-        whole = self.energies(X)
+        whole = np.asarray(summed(self.comm, np.einsum("ij,ij->j", X, self._strained(X))))
         for _ in range(2):
-            X = X - V @ summed(self.comm, self._strained.T @ X)
-        gram = summed(self.comm, X.T @ self.energy_product(X))
+            X = X - V @ summed(self.comm, self._strained(V).T @ X)
+        gram = summed(self.comm, X.T @ self._strained(X))
         energies, turns = np.linalg.eigh(0.5 * (gram + gram.T))
-        keep = np.flatnonzero(energies > max(least, BESIDE * float(whole.max(initial=0.0))))[::-1][:most]
+        keep = np.flatnonzero(energies > INDEPENDENT * float(whole.max(initial=0.0)))[::-1][:most]
         if not len(keep):
             return 0
-        X = X @ (turns[:, keep] / np.sqrt(energies[keep]))
-        new = orthonormal(self.comm, X - V @ summed(self.comm, self._strained.T @ X), self.energy_product)
-        self._append(new)
-        return new.shape[1]
+        new = np.hstack([V, X @ (turns[:, keep] / np.sqrt(energies[keep]))])
+        self._take(self._with_ghosts(orthonormal(self.comm, new, self._strained)))
+        return len(keep)
 
-    def _append(self, new: Array) -> None:
-        self.V = np.hstack([self.V, self._with_ghosts(new)])
-        self._strained = np.hstack([self._strained, self.energy_product(new)])
-        V = self.V[self.owned]
-        for i, old in self._products.items():
-            self._products[i] = np.hstack([old, times(self.system.pieces[i].operator, new)])
-        m = self.size
+    def _take(self, V: Array) -> None:
+        """Take a basis (n, m), and project all pieces on it."""
+        self.V, owned, m = V, V[self.owned], V.shape[1]
+        matrices = [i for kind in "MCK" for i in self.kinds[kind]]
+        self._products = {i: times(self.system.pieces[i].operator, owned) if m else owned for i in matrices}
+        self.small: dict[str, Array] = {"f": np.asarray(summed(self.comm, self.loads @ owned))}
         for kind in "MCK":
-            projected = [summed(self.comm, V.T @ self._products[i]) for i in self.kinds[kind]]
-            self.small[kind] = np.array(projected).reshape(-1, m, m)
-        self.small["f"] = np.asarray(summed(self.comm, self._loads @ V))
+            projected = [summed(self.comm, owned.T @ self._products[i]) for i in self.kinds[kind]]
+            self.small[kind] = np.array(projected).reshape(len(projected), m, m)
+
+    def _strained(self, X: Array) -> Array:
+        """Return K₀ X of owned rows, forces of the strains."""
+        return times(self.system.material, X) if X.shape[1] else X
 
     def _with_ghosts(self, columns: Array) -> Array:
         """Return local dof arrays (n, k) of columns of owned rows."""
         if self.comm.size == 1:
             return columns
-        out, function = np.empty((len(self.V), columns.shape[1])), self._ghosted.x
+        function = fem.Function(self.system.V)
+        out = np.empty((len(function.x.array), columns.shape[1]))
         for column, x in zip(out.T, columns.T, strict=True):
-            function.array[self.owned] = x
-            function.scatter_forward()
-            column[:] = function.array
+            function.x.array[self.owned] = x
+            function.x.scatter_forward()
+            column[:] = function.x.array
         return out
 
-    def turned(self, turns: Array) -> ReducedModel:
-        """Return the model in fewer columns V T, from orthonormal columns T (m, k) of coordinates."""
-        out = copy(self)
-        out.V, out._strained = self.V @ turns, self._strained @ turns
-        out._products = {i: product @ turns for i, product in self._products.items()}
-        out.small = {kind: turns.T @ self.small[kind] @ turns for kind in "MCK"}
-        out.small["f"] = self.small["f"] @ turns
-        return out
+    def coordinates(self, shape: Array) -> Array:
+        """Return the coordinates (m,) of a shape (local dof array) in the span of the basis."""
+        return np.asarray(summed(self.comm, self._strained(self.V[self.owned]).T @ shape[self.owned]))
+
+    # --- the equations -----------------------------------------------------------------------------------------------
 
     def operators(self, c: Array) -> tuple[Array, Array, Array, Array]:
         """Return M, C, K (n, m, m) and f (n, m) from the factors of all pieces (n, pieces)."""
         M, C, K = (np.asarray(np.tensordot(c[:, self.kinds[k]], self.small[k], 1)) for k in "MCK")
         return M, C, K, c[:, self.kinds["f"]] @ self.small["f"]
 
-    def accelerations(self, c: Array, q: Array, v: Array) -> Array:
-        """Return the accelerations (n, m) that keep the reduced equations at coordinates and rates (n, m)."""
-        M, C, K, f = self.operators(c)
-        force = f + np.einsum("nij,nj->ni", C, v) + np.einsum("nij,nj->ni", K, q)
-        if self.size and np.linalg.cond(M[0]) > SINGULAR:  # what has no mass has no force of inertia either
-            return np.asarray(-np.einsum("nij,nj->ni", np.linalg.pinv(M, 1 / SINGULAR, hermitian=True), force))
-        return -np.linalg.solve(M, force[:, :, None])[:, :, 0]
-
     def residuals(self, c: Array, q: Array, v: Array, a: Array) -> Array:
-        """Return M a + C v + K q + f of the full system at k instants, owned rows (n, k).
+        """Return M V a + C V v + K V q + f of the full system at k instants, owned rows (n, k).
 
         Args:
             c: factors of all pieces, (k, pieces).
@@ -143,20 +130,11 @@ class ReducedModel:
             v: rates.
             a: accelerations.
         """
-        out = (c[:, self.kinds["f"]] @ self._loads).T
+        out = (c[:, self.kinds["f"]] @ self.loads).T
         for kind, x in (("M", a), ("C", v), ("K", q)):
             for i in self.kinds[kind]:
                 out += self._products[i] @ (c[:, i, None] * x).T
         return np.asarray(out)
-
-    def forces(self, kind: str, c: Array) -> Array:
-        """Return M V, C V or K V of the full system from the factors of all pieces (pieces,), owned rows (n, m)."""
-        zero = np.zeros_like(self.V[self.owned])
-        return np.asarray(sum((c[i] * self._products[i] for i in self.kinds[kind]), zero))
-
-    def product(self, number: int) -> Array:
-        """Return the matrix of a piece times V, owned rows (n, m)."""
-        return self._products[number]
 
     def stiffness(self, c: Array) -> DirectSolver:
         """Return a solver with the stiffness of the full system, from the factors of all pieces (pieces,)."""
@@ -174,10 +152,94 @@ class ReducedModel:
         """Return the solutions (local dof arrays (n, k)) with right-hand sides of owned rows, (n, k)."""
         return self._with_ghosts(solver.solve_all(right))
 
-    def load(self, c: Array) -> Array:
-        """Return f of the full system, owned rows."""
-        return np.asarray(c[self.kinds["f"]] @ self._loads)
+    # --- outputs -----------------------------------------------------------------------------------------------------
 
-    def coordinates(self, shape: Array) -> Array:
-        """Return the coordinates (m,) of a shape (local dof array) in the span of the basis."""
-        return np.asarray(summed(self.comm, self.energy_product(self.V[self.owned]).T @ shape[self.owned]))
+    def tips(self, shapes: Array | None = None) -> Array:
+        """Return the unknowns at the tip of shapes, local dof arrays (n, m), or of the basis; (components, m)."""
+        shapes = self.V if shapes is None else shapes
+        columns = [self.system.structure.tip_values(column.copy()) for column in shapes.T]
+        return np.array(columns).reshape(shapes.shape[1], len(self.system.structure.components)).T
+
+    def largest(self, tips: Array) -> float:
+        """Return the largest length of displacement vectors of the tip (n, components), m."""
+        moves = [name.startswith("u") for name in self.system.structure.components]
+        return float(np.linalg.norm(tips[:, moves], axis=1).max(initial=0.0))
+
+    def root_forces(self, c: Array, q: Array, v: Array, a: Array) -> Array:
+        """Return what the hub does in the unit motions of the clamp (see `RootReaction`), shape (n, motions).
+
+        Args:
+            c: factors of all pieces, (n, pieces).
+            q: coordinates, (n, m).
+            v: rates.
+            a: accelerations.
+        """
+        pieces, V = self.system.pieces, self.V[self.owned]
+        parts = [pieces[i].at_root for i in self.kinds["f"]]
+        constant = np.array(parts).reshape(len(parts), len(self.system.root.names))
+        out: Array = c[:, self.kinds["f"]] @ np.asarray(summed(self.comm, constant))
+        for kind, x in (("K", q), ("C", v), ("M", a)):
+            for i in self.kinds[kind]:
+                out += c[:, [i]] * (x @ np.asarray(summed(self.comm, V.T @ pieces[i].at_root)))
+        return out
+
+    def energies(self, c: Array, speed: Array, q: Array, v: Array) -> dict[str, Array]:
+        """Return `kinetic` and `strain` energy, `jacobi` integral (n,), J, and angular `momentum`, kg·m²/s.
+
+        Args:
+            c: factors of all pieces, (n, pieces).
+            speed: of the frame about its axis, rad/s.
+            q: coordinates, (n, m).
+            v: rates.
+        """
+        M, _, K, f = self.operators(c)
+        moving = 0.5 * np.einsum("ni,nij,nj->n", v, M, v)
+        jacobi = moving + 0.5 * np.einsum("ni,nij,nj->n", q, K, q) + np.einsum("ni,ni->n", f, q)
+        (load, stiffness), (slope, coupling), inertia = self._of_spin
+        T0 = inertia - q @ load - 0.5 * np.einsum("ni,ij,nj->n", q, stiffness, q)
+        T1 = v @ slope + np.einsum("ni,ij,nj->n", v, coupling, q)
+        return {
+            "kinetic": moving + speed * T1 + speed**2 * T0,
+            "strain": 0.5 * np.einsum("ni,ni->n", q, q),
+            "jacobi": jacobi - inertia * speed**2,
+            "momentum": 2 * speed * T0 + T1,
+        }
+
+    @cached_property
+    def _of_spin(self) -> tuple[tuple[Array, Array], tuple[Array, Array], float]:
+        """T0 and T1 at unit speed: −∂T0/∂q and −∂²T0/∂q² at rest, ∂T1/∂v and ∂²T1/∂v∂q there, T0 undeformed."""
+        names, zero = self.system.model.energies(), (np.zeros(self.size), np.zeros((self.size,) * 2))
+        of_T0 = self._pieces_of("centrifugal", 2) if "T0" in names else zero
+        inertia = self.system.rest_inertia if "T0" in names else 0.0
+        return of_T0, self._slopes_of(names["T1"]) if "T1" in names else zero, inertia
+
+    def _pieces_of(self, effect: str, degree: int) -> tuple[Array, Array]:
+        """Return f (m,) and K (m, m) of an effect at unit speed or rate about the axis, without prestress."""
+        axis, out = self.system.motion.axis, (np.zeros(self.size), np.zeros((self.size,) * 2))
+        components = axis[2:] if self.system.structure.planar else axis
+        for kind, sum_ in zip("fK", out, strict=True):
+            for place, i in enumerate(self.kinds[kind]):
+                piece = self.system.pieces[i]
+                if effect in piece.of and PRESTRESS not in piece.of and len(piece.key) == degree:
+                    sum_ += np.prod([components[j] for _, j in piece.key]) * self.small[kind][place]
+        return out
+
+    def _slopes_of(self, T1: Any) -> tuple[Array, Array]:
+        """Return ∂T1/∂v at q = 0 (m,) and ∂²T1/∂v∂q (m, m) at unit speed; T1 is linear in v and quadratic in all."""
+        if "euler" in self.system.model.effects:
+            return self._pieces_of("euler", 1)
+        system, k, spin = self.system, self.system.structure.k, self.system.model.frame.constants["w"]
+        form, kept = forms.form(ufl.derivative(T1, k.v, k.dq)), spin.value.copy()
+        spin.value[...] = system.motion.axis[-spin.value.size :]
+
+        def slope(q: Array) -> Array:
+            system.set_state(q)
+            b = compat.create_vector(system.V)
+            fem_petsc.assemble_vector(b, form)
+            b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
+            return np.asarray(summed(self.comm, self.V[self.owned].T @ b.array[self.owned]))
+
+        at_rest = slope(system.zeros())
+        coupling = np.array([slope(x) - at_rest for x in self.V.T]).reshape(self.size, self.size).T
+        spin.value[...] = kept
+        return at_rest, coupling

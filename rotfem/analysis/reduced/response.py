@@ -1,41 +1,41 @@
-"""The history of a linear theory by a reduced model whose basis grows until nothing that it lacks is seen any more.
+"""The history of a linear theory by a reduced model, in a basis and in steps that are refined until nothing changes.
 
-What the basis V lacks is seen in the residual r = M V η̈ + C V η̇ + K V η + f of the full system, which the reduced
-equations make orthogonal to V. K⁻¹ r is the static answer to it: an estimate of the error of V η where what is lacking
-is stiff, and the shapes that lack. So the basis starts from the static answers to what drives the system, and grows by
-the answers to residuals at some instants, those of most energy first. The change of the history with the last shapes is
-an estimate that sees what is not stiff, too.
+What the basis V lacks is in the residual r = M V η̈ + C V η̇ + K V η + f of the full system, which the reduced equations
+make orthogonal to V. Its static solution K⁻¹ r is what the basis grows by, at those instants of the history where the
+accelerations are largest, shapes of most energy first (a greedy basis, Quarteroni, Manzoni & Negri 2016, chapter 7).
+The error by the basis is the difference that the last shapes have made, that by the steps the difference between the
+steps and those of half the length, that of the linear theory the difference that its foreshortening makes.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.reduced.drive import Drive
-from rotfem.analysis.reduced.free_hub import free_solution
+from rotfem.analysis.reduced.equations import Excitation, HeldEquations
+from rotfem.analysis.reduced.hub import FreeHubEquations, rigid_turn
+from rotfem.analysis.reduced.manifold import Manifold
 from rotfem.analysis.reduced.model import ReducedModel
-from rotfem.analysis.reduced.refinement import refined
-from rotfem.analysis.reduced.solution import Solution, Trajectory, after, nothing
-from rotfem.analysis.reduced.tips import largest, tips_of
+from rotfem.analysis.reduced.solution import Solution, States, cut
 
 Array = npt.NDArray[np.float64]
 
-#: Rounds in which a basis may grow, shapes that one adds, and most columns.
-ROUNDS, ADDED, MOST = 12, 6, 60
+#: Shapes that a round adds to the basis, most columns, and instants at which the residual is taken.
+ADDED, MOST, INSTANTS = 6, 60, 24
 
-#: Columns from which a basis is wide, and the part of an accuracy by which a shape hardly moves.
-WIDE, NEGLIGIBLE = 24, 0.01
-
-#: Instants at which the full system's residual is looked at, and rows of which these are chosen.
-INSTANTS, CHOSEN_OF = 24, 600
+#: Rows of which these instants are chosen.
+CHOSEN_OF = 600
 
 #: Independent loads, relative to the largest, and most of them.
 INDEPENDENT, LOADS = 1e-9, 8
+
+#: Fewest steps in a history, and how often they are halved.
+FEWEST, HALVINGS = 32, 8
 
 #: Accuracy that is asked for if none is.
 ACCURACY = 1e-5
@@ -47,217 +47,206 @@ class Response:
 
     Attributes:
         model: the basis and its small matrices.
-        solution: how it is solved in time.
-        trajectory: coordinates and rates in the rows.
-        projection_error, time_error: estimates, relative to the largest displacement of the tip.
-        met: whether both are within what was asked for.
+        equations: of the linear theory.
+        times: of the rows, s.
+        solution: of the linear equations.
+        states: coordinates, rates and accelerations in the rows, (n, m) each.
+        basis_error, time_error: relative to the largest displacement of the tip.
         rounds: solutions until the basis was large enough.
-        seconds: of processor and clock, what all of it took, compilation apart.
+        seconds: of processor and clock, what all of it took, compilation excluded.
+        manifold: on which it is foreshortened; None where the theory's own displacements are wanted.
+        bent: coordinates (n, m) of the motion on it.
+        foreshortening: largest difference that it makes at the tip, relative.
     """
 
     model: ReducedModel
+    equations: Any
+    times: Array
     solution: Solution
-    trajectory: Trajectory
-    projection_error: float
+    states: States
+    basis_error: float
     time_error: float
-    met: bool
     rounds: int
     seconds: dict[str, float]
-
-    @property
-    def times(self) -> Array:
-        """Times of the rows, s."""
-        return self.solution.times
-
-    @property
-    def q(self) -> Array:
-        """Coordinates in the rows, (n, m)."""
-        return self.trajectory.q
-
-    @property
-    def v(self) -> Array:
-        """Rates of the coordinates in the rows, (n, m)."""
-        return self.trajectory.v
+    manifold: Manifold | None = None
+    bent: Array | None = None
+    foreshortening: float | None = None
 
     @property
     def tips(self) -> Array:
         """The unknowns at the tip in all rows, (n, components)."""
-        return self.q @ tips_of(self.model).T
+        if self.manifold is not None and self.bent is not None:
+            return self.manifold.tip(self.bent)
+        return self.states[0] @ self.model.tips().T
 
-    def accelerations(self) -> Array:
-        """Return the accelerations of the coordinates in all rows, (n, m)."""
-        return self.model.accelerations(self.factors(), self.q, self.v)
+    @property
+    def turn(self) -> Array:
+        """Angle (rad), speed and its rate of the frame in all rows, (n, 3)."""
+        return np.asarray(self.equations.turn(self.times, self.solution))
 
     def factors(self) -> Array:
         """Return the factors of all pieces in all rows, just after what jumps there, (n, pieces)."""
-        return self.solution.drive.factors(after(self.times))
+        return np.asarray(self.equations.excitation.factors(after(self.times), self.turn))
+
+    def shape(self, i: int) -> Array:
+        """Return the displacement in a row, a local dof array."""
+        if self.manifold is not None and self.bent is not None:
+            return self.manifold.shape(self.bent[i])
+        return np.asarray(self.model.V @ self.states[0][i])
 
     def summary(self) -> dict[str, Any]:
         """Return what a summary says of it."""
-        return {
+        out = {
             "vectors": self.model.size,
             "rounds": self.rounds,
-            "method": "exact exponential" if self.trajectory.exact else "collocation",
-            "steps": self.trajectory.steps,
-            "projection_error": self.projection_error,
+            "steps": self.solution.steps,
+            "projection_error": self.basis_error,
             "time_error": self.time_error,
             "seconds": self.seconds,
         }
+        if self.manifold is not None:
+            out["foreshortening"] = {"shapes": self.manifold.shapes.shape[1], "error": self.foreshortening}
+        return out
+
+
+def after(times: Array) -> Array:
+    """Return times just after those given, where signals have what follows a jump."""
+    return np.asarray(times * (1 + 1e-12))
 
 
 def reduced_response(
-    system: Any, times: Array, start: Array | None = None, accuracy: float = ACCURACY, parts: int | None = None
+    system: Any,
+    times: Array,
+    start: Array | None = None,
+    accuracy: float = ACCURACY,
+    foreshortening: bool = False,
 ) -> Response:
-    """Return the history of a linear theory by a reduced model.
+    """Return the history of a linear theory by a reduced model, from rest in the turning frame.
 
     Args:
-        system: compiled equations of a linear theory, its hub held or free.
-        times: times of the rows, the first 0, s.
-        start: shape at t = 0, at rest in the turning frame, local dof array; undeformed if None.
-        accuracy: error of basis and time, relative to the largest displacement of the tip, each.
-        parts: of each first step of a collocation, whose error is then infinite; as the accuracy asks for if None.
+        system: equations of a linear theory, bordered if its hub is free.
+        times: of the rows, the first the start, s.
+        start: shape at the start, local dof array; undeformed if None.
+        accuracy: of the tip, relative to its largest displacement, by the basis and by the steps.
+        foreshortening: whether the motion is also computed with its foreshortening.
 
     Raises:
-        ComputationError: the stiffness is singular, or the history not finite.
+        ComputationError: the stiffness is singular, or no motion is found.
     """
-    began = process_time(), perf_counter()
-    solution = Solution(Drive(system, times), times) if system.hub is None else free_solution(system, times)
-    growth = Growth(ReducedModel(system.held, solution.active), solution, start)
-    path, projection = growth.narrow(*growth.grow(accuracy), accuracy)
-    path, error = refined(growth, path, accuracy, parts)
-    seconds = {"cpu": process_time() - began[0], "wall": perf_counter() - began[1]}
-    met = projection <= accuracy and error <= accuracy
-    return Response(growth.model, solution, path, projection, error, met, growth.rounds, seconds)
+    return Growth(system, times, start).response(accuracy, foreshortening)
 
 
 class Growth:
-    """A basis that grows with what the full system's residual says it lacks.
+    """A basis that grows with what the full system's residual shows it to lack, and the equations in it.
 
     Args:
-        model: the reduced model, its basis empty.
-        solution: of the history.
-        start: shape at t = 0, local dof array; None where undeformed.
+        system: equations of a linear theory.
+        times: of the rows, s.
+        start: shape at the start, local dof array; None where undeformed.
     """
 
-    def __init__(self, model: ReducedModel, solution: Solution, start: Array | None):
-        self.model, self.solution, self.start = model, solution, start
-        self.drive = drive = solution.drive
-        self.rounds = 0
-        looks = drive.looks()
-        self._factors = drive.factors(looks)
-        # a motion that begins at rest has the stiffness of the strains there, whose factor is known
-        looks = np.append(looks, drive.within(drive.knots[:1], drive.knots[1:2], np.zeros(1)))
-        speeds = np.abs(drive.speed(looks))
-        ends = [int(speeds.argmax()), int(speeds.argmin())][: 1 if solution.constant else 2]
-        self._speeds = speeds[ends]
-        self._solvers = [model.stiffness(factors) for factors in drive.factors(looks[ends])]
-        self._begin()
-
-    def _begin(self) -> None:
-        """Take the static answers to what drives the system at the extreme speeds, their inertia's, and the start."""
-        model = self.model
-        columns: list[Array] = [] if self.start is None or not np.any(self.start) else [self.start]
-        loads = self._loads().T
-        answers = [model.solve(solver, loads).T for solver in self._solvers]
-        columns += [answer for of_load in zip(*answers, strict=True) for answer in of_load]
-        if columns:
-            model.grow(np.array(columns).T)
-        for kind in "MC":
-            strongest = int(np.argmax(np.abs(self._factors[:, model.kinds[kind]]).sum(axis=1)))
-            forces = model.forces(kind, self._factors[strongest])
-            if forces.size:
-                model.grow(model.solve(self._solvers[0], forces))
+    def __init__(self, system: Any, times: Array, start: Array | None):
+        self.began = process_time(), perf_counter()
+        self.system, self.times, self.start = system, times, start
+        self.excitation = excitation = Excitation(system.held, times)
+        samples = np.append(after(times[:1]), excitation.samples())
+        free = system.hub is not None
+        turn = rigid_turn(system, samples) if free else excitation.turn(samples)
+        self._factors = excitation.factors(samples, turn)
+        # of a free hub, whose motion is not known yet, at any speed and rate
+        found = excitation.factors(samples, np.ones_like(turn)) if free else self._factors
+        self.model = ReducedModel(system.held, np.flatnonzero(np.abs(found).max(axis=0) > 0.0))
+        speeds = np.abs(turn[:, 1])
+        ends = sorted({int(speeds.argmin()), int(speeds.argmax())}) if np.ptp(speeds) > 0.0 else [0]
+        self._speeds, self._solvers = speeds[ends], [self.model.stiffness(self._factors[k]) for k in ends]
+        columns = [] if start is None or not np.any(start) else [start[:, None]]
+        columns += [self.model.solve(solver, self._loads()) for solver in self._solvers]
+        self.model.grow(np.hstack(columns))
+        self._longest = 0.0
 
     def _loads(self) -> Array:
-        """Return the independent loads of the history, owned rows, (k, n)."""
+        """Return the independent loads of the history, owned rows, (n, k)."""
         model, numbers = self.model, self.model.kinds["f"]
-        if not numbers:
-            return np.empty((0, model.owned.stop))
         norms = np.array([float(model.system.pieces[i].operator.norm()) for i in numbers])
         _, sizes, parts = np.linalg.svd(self._factors[:, numbers] * norms, full_matrices=False)
-        parts = parts[sizes > INDEPENDENT * max(sizes[0], 1e-300)][:LOADS]
-        c = np.zeros((len(parts), self._factors.shape[1]))
-        c[:, numbers] = parts / norms
-        return np.array([model.load(row) for row in c]).reshape(len(c), model.owned.stop)
+        parts = parts[sizes > INDEPENDENT * max(sizes.max(initial=0.0), 1e-300)][:LOADS]
+        return np.asarray((parts / norms @ model.loads).T)
 
-    # --- rounds ------------------------------------------------------------------------------------------------------
+    def equations(self) -> HeldEquations:
+        """Return the equations in the basis that is there."""
+        if self.system.hub is None:
+            return HeldEquations(self.model, self.excitation)
+        return FreeHubEquations(self.model, self.excitation, self.system)
 
-    def grow(self, accuracy: float) -> tuple[Trajectory, float]:
-        """Return the history in a basis large enough, and the estimate of what it lacks.
+    def solved(self, equations: HeldEquations, longest: float) -> tuple[Solution, States]:
+        """Return the solution by steps no longer than this (s), and the states of the structure in the rows."""
+        solution = Solution(equations, cut(self.excitation.knots, longest), *equations.start(self.start))
+        return solution, equations.coordinates(solution, self.times)
 
-        Raises:
-            ComputationError: the stiffness is singular, or the history not finite.
-        """
-        model, lacking, error = self.model, np.inf, np.inf
-        before: Array | None = None
-        if model.size == 0:
-            # where nothing moves a structure its free hub may turn yet, of which there is no history
-            return nothing(len(self.solution.times)), 0.0 if self.solution.hub is None else np.inf
+    def response(self, accuracy: float, foreshortening: bool) -> Response:
+        """Return the history in a basis and in steps that an accuracy asks for (see `reduced_response`)."""
+        rounds, basis_error, before = 0, np.inf, None
         while True:
-            self.rounds += 1
-            path = self.solve()
-            tips: Array = path.q @ tips_of(model).T
-            size = largest(model, tips)
-            if size == 0.0:
-                return path, 0.0
-            answers = self._answers(path)
-            last, lacking = lacking, largest(model, np.array([model.system.tip(x, 0.0) for x in answers])) / size
+            rounds += 1
+            equations, longest = self.equations(), self.longest()
+            solution, states = self.solved(equations, longest)
+            tips = self._tips(states)
             if before is not None:
-                change = largest(model, tips - before) / size
-                error = max(lacking, change * min(1.0, lacking / max(last, 1e-300)))
-                if error <= accuracy or self.rounds == ROUNDS:
-                    return path, error
+                basis_error = self._difference(tips, before)
+            if basis_error <= accuracy or self.model.size >= MOST:
+                break
             before = tips
-            energy = float(np.max(np.einsum("ij,ij->i", path.q, path.q)))
-            least = (NEGLIGIBLE * accuracy) ** 2 * energy
-            if model.size >= MOST or model.grow(answers.T, ADDED, least) == 0:
-                return path, lacking if not np.isfinite(error) else error
+            if self.model.grow(self._lacking(equations, solution, states), ADDED) == 0:
+                basis_error = 0.0
+                break
+        time_error = 0.0
+        for _ in range(HALVINGS if self.model.size else 0):
+            longest /= 2
+            solution, states = self.solved(equations, longest)
+            tips, before = self._tips(states), tips
+            time_error = self._difference(tips, before)
+            if time_error <= accuracy:
+                break
+        out = Response(
+            self.model, equations, self.times, solution, states, basis_error, time_error, rounds, {"cpu": 0.0}
+        )
+        if foreshortening:
+            manifold = Manifold(self.model, states[0])
+            beside = copy(equations)
+            beside.further = equations.second_order(manifold, solution)
+            bent = self.solved(beside, longest)[1][0]
+            found = manifold.tip(bent)
+            difference = self.model.largest(found - tips) / max(self.model.largest(found), 1e-300)
+            out = replace(out, manifold=manifold, bent=bent, foreshortening=difference)
+        began, now = self.began, (process_time(), perf_counter())
+        return replace(out, seconds={"cpu": now[0] - began[0], "wall": now[1] - began[1]})
 
-    def narrow(self, path: Trajectory, error: float, accuracy: float) -> tuple[Trajectory, float]:
-        """Take what hardly moves out of a wide basis that is to be solved in by many steps.
+    def _tips(self, states: States) -> Array:
+        return np.asarray(states[0] @ self.model.tips().T)
 
-        Args:
-            path: the history in the basis that is there.
-            error: estimate of what that lacks.
-            accuracy: of the tip, relative.
+    def _difference(self, tips: Array, before: Array) -> float:
+        """Return the largest difference of the tips in all rows, relative to the largest displacement."""
+        change = self.model.largest(tips - before)
+        return change / self.model.largest(tips) if change > 0.0 else 0.0
 
-        Returns:
-            History and estimate.
-        """
-        wide, moved = self.model, path.q @ tips_of(self.model).T
-        size = largest(wide, moved)
-        if path.exact or wide.size < WIDE or self.solution.hub is not None or error > accuracy or not size > 0.0:
-            return path, error
-        turns = np.linalg.svd(path.q, full_matrices=False)[2].T
-        most = np.abs(path.q @ turns).max(axis=0)
-        self.model = wide.turned(turns[:, most > NEGLIGIBLE * accuracy * most.max()])
-        narrow = self.solve()
-        off = error + largest(wide, narrow.q @ tips_of(self.model).T - moved) / size
-        if off <= accuracy:
-            return narrow, off
-        self.model = wide
-        return path, error
+    def longest(self) -> float:
+        """Return the length of first steps, s: of a radian of the slowest vibration in the middle of the history."""
+        last = float(self.times[-1] - self.times[0]) / FEWEST
+        if self.model.size == 0:
+            return last
+        M, _, K, _ = self.model.operators(self._factors[len(self._factors) // 2][None, :])
+        squares = np.abs(np.linalg.eigvals(np.linalg.solve(K[0], M[0])))  # 1/omega², also of what has no mass
+        return min(last, float(np.sqrt(squares.max())))
 
-    def solve(self) -> Trajectory:
-        """Return the history in the basis that is there."""
-        model = self.model
-        rest: Array = np.zeros(model.size)
-        return self.solution.solve(model, rest if self.start is None else model.coordinates(self.start), rest)
-
-    def _answers(self, path: Trajectory) -> Array:
-        """Return the static answers to the residual at instants of the history, local dof arrays (k, n)."""
-        model, times = self.model, self.solution.times
-        rows = np.unique(np.linspace(0, len(times) - 1, CHOSEN_OF).astype(int))
-        t = after(times[rows])
-        c, q, v = self.drive.factors(t), path.q[rows], path.v[rows]
-        a = model.accelerations(c, q, v)
-        strength = np.linalg.norm(a, axis=1)
-        windows = np.array_split(np.arange(len(rows)), min(INSTANTS, len(rows)))
-        chosen = [int(w[np.argmax(strength[w])]) for w in windows]
-        speeds = np.abs(self.drive.speed(t[chosen]))
-        nearest = np.argmin(np.abs(self._speeds - speeds[:, None]), axis=1)
-        residuals = model.residuals(*(x[chosen] for x in (c, q, v, a)))
-        out = np.empty((len(chosen), len(model.V)))
-        for number, solver in enumerate(self._solvers):
-            out[nearest == number] = -model.solve(solver, residuals[:, nearest == number]).T
-        return out
+    def _lacking(self, equations: HeldEquations, solution: Solution, states: States) -> Array:
+        """Return the static solutions K⁻¹ r at instants of the history, local dof arrays (n, k)."""
+        rows = np.unique(np.linspace(0, len(self.times) - 1, CHOSEN_OF).astype(int))
+        strength = np.linalg.norm(states[2][rows], axis=1)
+        parts = np.array_split(np.arange(len(rows)), min(INSTANTS, len(rows)))
+        chosen = rows[[int(part[np.argmax(strength[part])]) for part in parts]]
+        turn = equations.turn(after(self.times[chosen]), solution)
+        factors = self.excitation.factors(after(self.times[chosen]), turn)
+        residuals = self.model.residuals(factors, *(x[chosen] for x in states))
+        nearest = np.argmin(np.abs(self._speeds - np.abs(turn[:, 1:2])), axis=1)
+        found = [self.model.solve(s, residuals[:, nearest == k]) for k, s in enumerate(self._solvers)]
+        return np.hstack(found)

@@ -1,229 +1,251 @@
-"""How a reduced model is solved in time: exactly where its matrices are constant, by batched collocation elsewhere."""
+"""Solution in time of the equations of a reduced model, by exact integration in modal coordinates.
+
+Equations r(t, y, ẏ, ÿ) = 0 of few unknowns are those of a reference with constant matrices M, C, K and the rest g,
+
+    M(ÿ − g) + C ẏ + K y = 0,    g = ÿ + M⁻¹(C ẏ + K y − r),    r(t, y, ẏ, ÿ) = 0.
+
+With x = (y, ẏ), ẋ = A x + (0, g) and A = X Λ X⁻¹, the modal coordinates z = X⁻¹x of a step of length h from t follow
+
+    z(t + τh) = e^{λτh} z(t) + Σ_d τh τᵈ d! φ_{d+1}(λτh) g_d,    g(t + τh) = Σ_{d=0..3} g_d τᵈ,
+
+where φ_{d+1}(z) = (φ_d(z) − 1/d!)/z and φ_0 = exp (Hochbruck & Ostermann 2010, Exponential integrators, eq. 2.11). It
+is exact for vibrations of any frequency. g goes through its values at the four Lobatto nodes of the step. These are
+found by
+
+    g ← g − M⁻¹ r(t, y, ẏ, ÿ)
+
+for all nodes of a window of steps at once, Picard's iteration. It converges the quicker the shorter the window and the
+nearer the reference, which is that of the middle of the window (section 2.2 there). With constant matrices and no
+other terms in r its first iterate is the solution.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from math import factorial
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
+import scipy.linalg
 
-from rotfem.analysis.reduced.collocation import NODES, Lacking, Operators, answered, batches, collocate
-from rotfem.analysis.reduced.drive import Drive
-from rotfem.analysis.reduced.model import ReducedModel
-from rotfem.analysis.reduced.propagator import Propagator, cubics
-from rotfem.analysis.reduced.vibrations import Vibrations
 from rotfem.errors import ComputationError
 
 Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
+Complex = npt.NDArray[np.complex128]
 
-#: Relative change of a factor that is none.
-SAME = 1e-12
+#: Nodes of Lobatto in a step, and from values there to coefficients of powers.
+NODES = np.array([0.0, 0.5 * (1 - np.sqrt(0.2)), 0.5 * (1 + np.sqrt(0.2)), 1.0])
+CUBIC = np.linalg.inv(np.vander(NODES, increasing=True))
 
-#: Length of a first step times the lowest frequency, and fewest steps in a history.
-LONG, FEWEST = 1.0, 32
+#: |z| below which φ is summed as its power series, and the terms of that: 1/20! is round-off.
+NEAR, TERMS = 1.0, 20
+
+#: Digits to which lengths agree that are the same but for rounding.
+ALIKE = 12
+
+#: Condition of the eigenvectors from which half the digits are lost; the reference then has 9/10 of the damping.
+DEPENDENT, LESS = 1e8, 0.9
+
+#: Part of the largest mass below which a mass is round-off of the projection.
+MASSLESS = 1e-14
+
+#: Iterations in a window, relative change of its states that ends them, and steps in the first one.
+ITERATIONS, CLOSE, WINDOW = 16, 1e-10, 64
+
+#: States (n, m) at the times asked for: coordinates, rates, accelerations.
+States = tuple[Array, Array, Array]
 
 
-@dataclass(frozen=True)
-class Trajectory:
-    """Coordinates and rates (n, m) at the times of a history.
+class Equations(Protocol):
+    """Equations r(t, y, ẏ, ÿ) = 0 of few unknowns."""
+
+    @property
+    def constant(self) -> bool:
+        """Whether r is linear with constant matrices."""
+
+    def within(self, begin: Array, end: Array, shares: Array) -> Array:
+        """Return the times (n, shares) at these shares of intervals, on the right side of their ends, s."""
+
+    def reference(self, t: float, y: Array, v: Array) -> tuple[Array, Array, Array]:
+        """Return M, C, K (m, m) at a time (s), coordinates and rates (m,)."""
+
+    def at(self, t: Array) -> Callable[[Array, Array, Array], Array]:
+        """Return r (n, m) at times (n,) as a function of coordinates, rates and accelerations (n, m)."""
+
+
+class Modes:
+    """The reference in modal coordinates.
+
+    Args:
+        M, C, K: its matrices, (m, m).
 
     Attributes:
-        q, v: coordinates and rates.
-        steps: number of steps or intervals.
-        exact: whether the solution is exact but for the cubics that stand for what drives it.
-        at: (t (n,)) ↦ coordinates and rates (n, m) at other times (s), increasing.
+        values: λ, (p,).
+        out: X, from modal coordinates to coordinates and rates, (2m, p).
+        into: its inverse.
     """
 
-    q: Array
-    v: Array
-    steps: int
-    exact: bool
-    at: Callable[[Array], tuple[Array, Array]]
+    def __init__(self, M: Array, C: Array, K: Array):
+        m = len(M)
+        self.M = M + MASSLESS * np.abs(np.diag(M)).max() * np.eye(m)
+        # in undamped modes S, and in units in which rates are as large as coordinates
+        squares, S = scipy.linalg.eigh(0.5 * (K + K.T), 0.5 * (self.M + self.M.T))
+        w = np.sqrt(np.maximum(np.abs(squares), np.finfo(float).eps * np.abs(squares).max()))
+        stiff, damped = (np.linalg.solve(S, np.linalg.solve(self.M, A @ S)) for A in (K, C))
+        for part in (1.0, LESS):
+            A = np.block([[np.zeros((m, m)), np.diag(w)], [-stiff / w, -part * damped]])
+            self.values, vectors = np.linalg.eig(A)
+            if np.linalg.cond(vectors) < DEPENDENT:
+                break
+        self.out: Complex = np.vstack([S / w @ vectors[:m], S @ vectors[m:]])
+        self.into: Complex = np.asarray(np.linalg.inv(self.out))
+
+    def weights(self, s: Array) -> tuple[Complex, list[Complex]]:
+        """Return e^{λs} and s^{d+1} d! φ_{d+1}(λs), d = 0 … 3, at times s (n,) from the start of a step, (n, p)."""
+        digits = np.round(s / max(s.max(initial=0.0), 1e-300), ALIKE)
+        _, one, same = np.unique(digits, return_index=True, return_inverse=True)
+        t = s[one, None]
+        phi = functions(t * self.values, len(NODES))
+        return phi[0][same], [(t ** (d + 1) * factorial(d) * phi[d + 1])[same] for d in range(len(NODES))]
+
+
+def functions(z: Complex, most: int) -> list[Complex]:
+    """Return φ_0 … φ_most at the entries of an array."""
+    near = np.abs(z) < NEAR
+    safe, small = np.where(near, 1.0, z), np.where(near, z, 0.0)
+    out = [np.exp(z)]
+    for k in range(most):
+        series = sum(small**j / factorial(j + k + 1) for j in range(TERMS))
+        out.append(np.where(near, series, (out[k] - 1 / factorial(k)) / safe))
+    return out
+
+
+class Window:
+    """The solution over the steps of a window.
+
+    Args:
+        equations: that are solved.
+        ends: of the steps, s.
+        x: coordinates and rates at the start, (2m,).
+
+    Attributes:
+        end: coordinates and rates at the end, (2m,).
+        converged: whether it was found.
+        iterations: how many were needed.
+    """
+
+    def __init__(self, equations: Equations, ends: Array, x: Array):
+        m, h = len(x) // 2, np.diff(ends)
+        self.ends, self._powers = ends, h[:, None] ** -np.arange(len(NODES))
+        self._modes = modes = Modes(*equations.reference(0.5 * float(ends[0] + ends[-1]), x[:m], x[m:]))
+        residual = equations.at(equations.within(ends[:-1], ends[1:], NODES).ravel())
+        weights = [modes.weights(share * h) for share in NODES]
+        self._g: Array = np.zeros((len(h), len(NODES), m))
+        self._z: Complex = np.empty((len(ends), 2 * m), dtype=complex)
+        self._z[0] = modes.into @ x
+        before: Array = np.full((len(h) * len(NODES), m), np.nan)
+        self.converged = False
+        for self.iterations in range(1, ITERATIONS + 1):
+            c = self._coefficients(slice(None))
+            growth, added = weights[-1][0], _sum(weights[-1][1], c)
+            for k in range(len(h)):
+                self._z[k + 1] = growth[k] * self._z[k] + added[k]
+            z = np.stack([e * self._z[:-1] + _sum(by_power, c) for e, by_power in weights], axis=1)
+            y, v, a = self._states(z.reshape(-1, 2 * m), self._g.reshape(-1, m))
+            if not np.all(np.isfinite(a)):
+                break
+            if np.abs(y - before).max(initial=0.0) <= CLOSE * np.abs(y).max(initial=0.0):
+                self.converged = True
+                break
+            before = y
+            self._g -= np.linalg.solve(modes.M, residual(y, v, a).T).T.reshape(self._g.shape)
+        self.end: Array = (modes.out @ self._z[-1]).real
+
+    def at(self, t: Array, slow: bool = False) -> States:
+        """Return coordinates, rates and accelerations (n, m) at times within the window (n,), s; `slow`: see above."""
+        i = np.clip(np.searchsorted(self.ends, t, side="right") - 1, 0, len(self.ends) - 2)
+        s, c, values = t - self.ends[i], self._coefficients(i), self._modes.values
+        growth, by_power = self._modes.weights(s)
+        z = growth * self._z[i] + _sum(by_power, c)
+        powers = s[:, None] ** np.arange(len(NODES))
+        if slow:
+            fast = np.abs(values) * (self.ends[i + 1] - self.ends[i])[:, None] > np.pi
+            rates = np.arange(1, len(NODES)) * powers[:, :-1]
+            static = -np.einsum("nd,ndp->np", powers, c) / values
+            z = np.where(fast, static - np.einsum("nd,ndp->np", rates, c[:, 1:]) / values**2, z)
+        g = np.einsum("nd,ndj,njm->nm", powers, CUBIC * self._powers[i][:, :, None], self._g[i])
+        return self._states(z, g)
+
+    def _coefficients(self, steps: slice | npt.NDArray[np.int64]) -> Complex:
+        """Return the modal coefficients of the powers of time from the starts of steps, (n, 4, p)."""
+        m = self._g.shape[2]
+        c = np.einsum("dj,njm->ndm", CUBIC, self._g[steps]) * self._powers[steps][:, :, None]
+        return np.asarray(c @ self._modes.into[:, m:].T)
+
+    def _states(self, z: Complex, g: Array) -> States:
+        """Return coordinates, rates and accelerations (n, m) of modal coordinates (n, p) under g (n, m)."""
+        m = g.shape[1]
+        x, rates = (z @ self._modes.out.T).real, ((z * self._modes.values) @ self._modes.out[m:].T).real
+        return x[:, :m], x[:, m:], rates + g
+
+
+def _sum(by_power: list[Complex], c: Complex) -> Complex:
+    return np.asarray(sum(w * c[:, d] for d, w in enumerate(by_power)))
 
 
 class Solution:
-    """Solves reduced models of one history, which differ in their bases.
+    """The solution over steps, window by window.
 
     Args:
-        drive: what is prescribed.
-        times: times at which the history is wanted, the first its start, s.
+        equations: that are solved.
+        ends: of the steps, the first the start, s.
+        y: coordinates at the start, (m,).
+        v: rates there.
 
-    Attributes:
-        active: numbers of the pieces that are ever there.
-        parts: in how many parts each of the first steps is cut.
-        constant: whether the matrices are constant.
-        vibrations: those of the history, once its steps are chosen and where they are known.
-        off: relative error of the cubics that stand for the forces, of an exact solution.
+    Raises:
+        ComputationError: the iteration converges in no window, or to nothing finite.
     """
 
-    def __init__(self, drive: Drive, times: Array):
-        self.drive, self.times = drive, times
-        self.parts = 1
-        self.off = 0.0
-        self.vibrations: Vibrations | None = None
-        looks = drive.factors(drive.looks())
-        self.active: Index = drive.active()
-        kinds = np.array([p.kind for p in drive.system.pieces])
-        matrices = looks[:, kinds != "f"]
-        self.constant = bool(np.all(np.ptp(matrices, axis=0) <= SAME * np.abs(matrices).max(axis=0, initial=0.0)))
-        self._looks = looks
-        self._loads = np.flatnonzero(kinds == "f")
-        self._steps: Array | None = None
-
-    def solve(self, model: ReducedModel, q: Array, v: Array) -> Trajectory:
-        """Return the history of a model from coordinates and rates (m,).
-
-        Raises:
-            ComputationError: it is not finite.
-        """
-        if model.size == 0:
-            return nothing(len(self.times))
-        path = self._exact(model, q, v) if self.constant else None
-        path = path or self._collocated(model, q, v)
-        if not np.all(np.isfinite(path.q)):
-            raise ComputationError("the solution of the reduced model is not finite")
-        return path
-
-    def _cubics(self, times: Array) -> tuple[Array, Array]:
-        """Return a grid that has these times, and coefficients of all loads' factors between its times."""
-        grid = np.union1d(self.drive.knots, times)
-        grid, coefficients, self.off = cubics(lambda t: self.drive.factors(t)[:, self._loads], self.drive.within, grid)
-        return grid, coefficients
-
-    @cached_property
-    def _at_rows(self) -> tuple[Array, Array]:
-        return self._cubics(self.times)
-
-    def _exact(self, model: ReducedModel, q: Array, v: Array) -> Trajectory | None:
-        """Return the exact solution; None where modal coordinates lose too many digits."""
-        M, C, K, _ = model.operators(self._looks[:1])
-        try:
-            propagator = Propagator(M[0], C[0], K[0])
-        except ComputationError:
-            return None
-        wanted = np.searchsorted(self._loads, model.kinds["f"])
-
-        def solved(times: Array, cubes: tuple[Array, Array]) -> tuple[Array, Array]:
-            grid, coefficients = cubes
-            x, rates = propagator.solve(grid, coefficients[:, :, wanted] @ model.small["f"], q, v)
-            rows = np.searchsorted(grid, times)
-            return x[rows], rates[rows]
-
-        here = self._at_rows
-        return Trajectory(*solved(self.times, here), len(here[0]) - 1, True, lambda t: solved(t, self._cubics(t)))
-
-    def _collocated(self, model: ReducedModel, q: Array, v: Array) -> Trajectory:
-        ends = self.ends(model)
-        steps = collocate(self._operators(model), self.drive.within, ends, q, v)
-        return Trajectory(*steps.at(self.times), len(ends) - 1, False, steps.at)
-
-    def given(self) -> dict[str, Array]:
-        """Return what a free hub was given in the rows (see `FreeSolution`); nothing where none is free."""
-        return {}
+    def __init__(self, equations: Equations, ends: Array, y: Array, v: Array):
+        self.ends, self._windows, x = ends, list[Window](), np.concatenate([y, v])
+        n = len(ends) - 1 if len(y) else 0
+        first, width = 0, n if equations.constant else WINDOW
+        while first < n:
+            window = Window(equations, ends[first : first + width + 1], x)
+            if window.converged:
+                self._windows.append(window)
+                x, first = window.end, first + width
+                width = 2 * width if window.iterations <= ITERATIONS // 2 else width
+            elif width == 1:
+                raise ComputationError("the motion of the reduced model was not found", time=float(ends[first]))
+            else:
+                width = min(width, n - first) // 2
 
     @property
-    def hub(self) -> Any:
-        """The solution with its free hub (see `FreeSolution`); None where none is free."""
-        return None
+    def steps(self) -> int:
+        """Number of steps."""
+        return len(self.ends) - 1
 
-    def again(self, longer: int = 1) -> Solution:
-        """Return a solution of equations with effects switched off or on, by steps so many times as long."""
-        other = Solution(self.drive, self.times)
-        other.parts, other._steps = -(-self.parts // longer), self._steps
-        return other
-
-    def answered(self, model: ReducedModel, q: Array, v: Array, lacking: Lacking) -> tuple[Trajectory, list[Array]]:
-        """Return the history by collocation, and in its rows (n, m) the answers of the model from rest to other forces.
+    def at(self, t: Array, slow: bool = False) -> States:
+        """Return coordinates, rates and accelerations (n, m) at increasing times (n,), s; of a jump those after it.
 
         Args:
-            model: the reduced model.
-            q: coordinates at the start, (m,).
-            v: rates at the start, (m,).
-            lacking: of the history, f in M a + C v + K q + f = 0.
-
-        Raises:
-            ComputationError: they are not finite.
+            t: times.
+            slow: with vibrations of which a step has more than half a period in their quasi-static place
+                z = −g/λ − ġ/λ²: the polynomials in the steps do not resolve products of them.
         """
-        ends = self.ends(model)
-        steps, answers = answered(self._operators(model), self.drive.within, ends, q, v, lacking)
-        found = [answer.at(self.times)[0] for answer in answers]
-        path = Trajectory(*steps.at(self.times), len(ends) - 1, False, steps.at)
-        if not all(np.all(np.isfinite(x)) for x in (path.q, *found)):
-            raise ComputationError("the solution of the reduced model is not finite")
-        return path, found
-
-    def rounds(
-        self, model: ReducedModel, start: tuple[Array, Array], lacking: Lacking, number: int
-    ) -> tuple[Trajectory, list[Array]]:
-        """Return the history by collocation, and in its rows (n, m) the answers to forces, of more rounds of the last.
-
-        Forces are those of the history in the first round, and with the last answer so far in all others.
-
-        Args:
-            model: the reduced model.
-            start: coordinates and rates at the start, (m,).
-            lacking: see `answered`.
-            number: how many rounds.
-        """
-        ends, operators, rest = self.ends(model), self._operators(model), np.zeros(model.size)
-        steps, answers = answered(operators, self.drive.within, ends, *start, lacking)
-        for _ in range(number - 1):
-            moved, f = steps.plus(answers[-1]), []
-            for part, t, h in batches(self.drive.within, ends):
-                state = (x.reshape(-1, model.size) for x in moved.nodes(part))
-                f.append(lacking(t.ravel(), *state)[-1].reshape(len(h), len(NODES), -1))
-            answers.append(collocate(operators, self.drive.within, ends, rest, rest, np.concatenate(f)))
-        found = [answer.at(self.times)[0] for answer in answers]
-        return Trajectory(*steps.at(self.times), len(ends) - 1, False, steps.at), found
-
-    def _operators(self, model: ReducedModel) -> Operators:
-        return lambda t: model.operators(self.drive.factors(t))
-
-    def ends(self, model: ReducedModel, longer: int = 1) -> Array:
-        """Return the ends of the steps of a collocation, s, or of steps so many times as long."""
-        if self._steps is None:
-            self._steps = self._first_steps(model)
-        return cut(self._steps, np.full(len(self._steps) - 1, -(-self.parts // longer)))
-
-    def vibrating(self, vibrations: Vibrations, parts: int) -> float:
-        """Return what the steps put vibrations off (m) if each of the first ones is cut in so many parts."""
-        return 0.0 if self._steps is None else vibrations.off(self._steps, parts)
-
-    def of_longer(self, longer: int) -> float:
-        """Return what steps so many times as long put vibrations off, m; infinite where that is not known."""
-        known = self.vibrations is not None and self.parts >= longer
-        return self.vibrating(self.vibrations, -(-self.parts // longer)) if known and self.vibrations else np.inf
-
-    def _first_steps(self, model: ReducedModel) -> Array:
-        """Return the ends of steps that land on all knots and resolve the lowest vibration."""
-        middle = self._looks[len(self._looks) // 2][None, :]
-        M, _, K, _ = model.operators(middle)
-        squares = np.abs(np.linalg.eigvals(np.linalg.solve(M[0], K[0])))
-        knots = self.drive.knots
-        slowest = LONG / np.sqrt(squares.min()) if squares.size else np.inf  # nothing may move
-        longest = min(slowest, (knots[-1] - knots[0]) / FEWEST)
-        return cut(knots, np.ceil(np.diff(knots) / longest * (1 - 1e-9)).astype(int))
+        none: Array = np.zeros((len(t), 0))
+        if not self._windows:
+            return none, none, none
+        number = np.searchsorted([window.ends[0] for window in self._windows[1:]], t, side="right")
+        found = [window.at(t[number == k], slow) for k, window in enumerate(self._windows)]
+        y, v, a = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        return y, v, a
 
 
-def nothing(rows: int) -> Trajectory:
-    """Return the history of a basis without columns."""
-    none = np.zeros((rows, 0))
-    return Trajectory(none, none, 0, True, lambda t: (np.zeros((len(t), 0)), np.zeros((len(t), 0))))
-
-
-def cut(times: Array, parts: Index) -> Array:
-    """Return times with each interval cut in so many equal parts, shape (sum of parts + 1,)."""
-    begin = np.repeat(times[:-1], parts)
-    lengths = np.repeat(np.diff(times) / parts, parts)
-    first = np.cumsum(parts) - parts
-    number = np.arange(len(begin)) - np.repeat(first, parts)
-    return np.append(begin + number * lengths, times[-1])
-
-
-def after(times: Array) -> Array:
-    """Return times just after those given, where they have what follows a jump."""
-    return np.asarray(times * (1 + 1e-12))
+def cut(times: Array, longest: float) -> Array:
+    """Return times with each interval cut into as few equal parts as are no longer than this, s."""
+    parts = np.maximum(1, np.ceil(np.diff(times) / longest * (1 - 1e-9))).astype(int)
+    pieces = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(times[:-1], times[1:], parts, strict=True)]
+    return np.append(np.concatenate(pieces), times[-1])
