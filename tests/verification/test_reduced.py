@@ -131,7 +131,7 @@ def test_a_basis_of_all_unknowns_is_the_full_system(spin_up: MakeScene) -> None:
     sizes, lacking = [], []
     while True:
         equations = growth.equations()
-        solution, states = growth.solved(equations, growth.longest() / 32)
+        solution, states = growth.solved(equations, 1e-3)
         factors = growth.excitation.factors(response.after(times), equations.turn(times))
         residual = growth.model.residuals(factors, *states)
         sizes.append(growth.model.size)

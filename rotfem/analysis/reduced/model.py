@@ -64,12 +64,13 @@ class ReducedModel:
 
     # --- the basis ---------------------------------------------------------------------------------------------------
 
-    def grow(self, columns: Array, most: int | None = None) -> int:
+    def grow(self, columns: Array, most: int | None = None, least: float = 0.0) -> int:
         """Add to the basis what columns span outside it, shapes of largest strain energy first; return how many.
 
         Args:
             columns: local dof arrays, shape (n, k).
             most: number of shapes that are added; all if None.
+            least: twice the strain energy that a shape must have outside the basis.
         """
         X, V = columns[self.owned], self.V[self.owned]
         whole = np.asarray(summed(self.comm, np.einsum("ij,ij->j", X, self._strained(X))))
@@ -77,7 +78,7 @@ class ReducedModel:
             X = X - V @ summed(self.comm, self._strained(V).T @ X)
         gram = summed(self.comm, X.T @ self._strained(X))
         energies, turns = np.linalg.eigh(0.5 * (gram + gram.T))
-        keep = np.flatnonzero(energies > INDEPENDENT * float(whole.max(initial=0.0)))[::-1][:most]
+        keep = np.flatnonzero(energies > max(least, INDEPENDENT * float(whole.max(initial=0.0))))[::-1][:most]
         if not len(keep):
             return 0
         new = np.hstack([V, X @ (turns[:, keep] / np.sqrt(energies[keep]))])

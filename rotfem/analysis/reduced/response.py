@@ -28,14 +28,17 @@ Array = npt.NDArray[np.float64]
 #: Shapes that a round adds to the basis, most columns, and instants at which the residual is taken.
 ADDED, MOST, INSTANTS = 6, 60, 24
 
+#: Part of an accuracy below which the amplitude of a shape is of no account.
+NEGLIGIBLE = 0.01
+
 #: Rows of which these instants are chosen.
 CHOSEN_OF = 600
 
 #: Independent loads, relative to the largest, and most of them.
 INDEPENDENT, LOADS = 1e-9, 8
 
-#: Fewest steps in a history, and how often they are halved.
-FEWEST, HALVINGS = 32, 8
+#: Steps in a history at first, and how often they are halved at most.
+FIRST, HALVINGS = 64, 10
 
 #: Accuracy that is asked for if none is.
 ACCURACY = 1e-5
@@ -162,7 +165,6 @@ class Growth:
         columns = [] if start is None or not np.any(start) else [start[:, None]]
         columns += [self.model.solve(solver, self._loads()) for solver in self._solvers]
         self.model.grow(np.hstack(columns))
-        self._longest = 0.0
 
     def _loads(self) -> Array:
         """Return the independent loads of the history, owned rows, (n, k)."""
@@ -186,9 +188,10 @@ class Growth:
     def response(self, accuracy: float, foreshortening: bool) -> Response:
         """Return the history in a basis and in steps that an accuracy asks for (see `reduced_response`)."""
         rounds, basis_error, before = 0, np.inf, None
+        longest = float(self.times[-1] - self.times[0]) / FIRST
         while True:
             rounds += 1
-            equations, longest = self.equations(), self.longest()
+            equations = self.equations()
             solution, states = self.solved(equations, longest)
             tips = self._tips(states)
             if before is not None:
@@ -196,8 +199,10 @@ class Growth:
             if basis_error <= accuracy or self.model.size >= MOST:
                 break
             before = tips
-            if self.model.grow(self._lacking(equations, solution, states), ADDED) == 0:
-                basis_error = 0.0
+            negligible = NEGLIGIBLE * accuracy
+            energy = float(np.einsum("ni,ni->n", states[0], states[0]).max(initial=0.0))
+            if self.model.grow(self._lacking(equations, solution, states), ADDED, negligible**2 * energy) == 0:
+                basis_error = negligible if self.model.size else 0.0
                 break
         time_error = 0.0
         for _ in range(HALVINGS if self.model.size else 0):
@@ -228,15 +233,6 @@ class Growth:
         """Return the largest difference of the tips in all rows, relative to the largest displacement."""
         change = self.model.largest(tips - before)
         return change / self.model.largest(tips) if change > 0.0 else 0.0
-
-    def longest(self) -> float:
-        """Return the length of first steps, s: of a radian of the slowest vibration in the middle of the history."""
-        last = float(self.times[-1] - self.times[0]) / FEWEST
-        if self.model.size == 0:
-            return last
-        M, _, K, _ = self.model.operators(self._factors[len(self._factors) // 2][None, :])
-        squares = np.abs(np.linalg.eigvals(np.linalg.solve(K[0], M[0])))  # 1/omega², also of what has no mass
-        return min(last, float(np.sqrt(squares.max())))
 
     def _lacking(self, equations: HeldEquations, solution: Solution, states: States) -> Array:
         """Return the static solutions K⁻¹ r at instants of the history, local dof arrays (n, k)."""

@@ -50,8 +50,11 @@ DEPENDENT, LESS = 1e8, 0.9
 #: Part of the largest mass below which a mass is round-off of the projection.
 MASSLESS = 1e-14
 
-#: Iterations in a window, relative change of its states that ends them, and steps in the first one.
-ITERATIONS, CLOSE, WINDOW = 16, 1e-10, 64
+#: Iterations in a window, and relative change of its states that ends them.
+ITERATIONS, CLOSE = 16, 1e-10
+
+#: Steps in the first window where matrices change, and at most: memory is that of their weights.
+WINDOW, LARGEST = 64, 1024
 
 #: States (n, m) at the times asked for: coordinates, rates, accelerations.
 States = tuple[Array, Array, Array]
@@ -210,13 +213,13 @@ class Solution:
     def __init__(self, equations: Equations, ends: Array, y: Array, v: Array):
         self.ends, self._windows, x = ends, list[Window](), np.concatenate([y, v])
         n = len(ends) - 1 if len(y) else 0
-        first, width = 0, n if equations.constant else WINDOW
+        first, width = 0, LARGEST if equations.constant else WINDOW
         while first < n:
             window = Window(equations, ends[first : first + width + 1], x)
             if window.converged:
                 self._windows.append(window)
                 x, first = window.end, first + width
-                width = 2 * width if window.iterations <= ITERATIONS // 2 else width
+                width = min(2 * width, LARGEST) if window.iterations <= ITERATIONS // 2 else width
             elif width == 1:
                 raise ComputationError("the motion of the reduced model was not found", time=float(ends[first]))
             else:
