@@ -45,9 +45,9 @@ def test_reduced_history_is_that_of_one_process(tmp_path: Path, kind: str) -> No
     assert all("reduced" in json.loads(result.stdout) for result in done)
     serial, parallel = (read_csv(tmp_path / f"r{n}" / "history.csv") for n in (1, 2))
     assert list(serial) == list(parallel)
-    for column, values in serial.items():  # sums in another order make another basis of the same span
+    for column, values in serial.items():  # sums in another order make a basis that may end one vector earlier
         scale = float(np.max(np.abs(values)))
-        digits = 2e-5 if column.startswith("root_") else 1e-6  # of forces the least vectors of the basis count
+        digits = 1e-3 if column.startswith("root_") else 1e-5  # what is asked for; forces count the least vectors
         np.testing.assert_allclose(parallel[column], values, rtol=0, atol=digits * scale, err_msg=column)
 
 
