@@ -1,8 +1,8 @@
 """Reduced models on a free hub: its angle ψ is one more unknown, and its equation one more.
 
 The work of the structure in a rigid turn of the hub is a polynomial in η, η̇ and η̈ and in the constants of frame and
-loads. Its derivatives at rest are read from the hub's row (`rotfem.equations.bordered`) along the basis, one constant at
-a time,
+loads. Its derivatives at rest are read from the hub's row (`rotfem.equations.bordered`) along the basis, one constant
+at a time,
 
     G = g + g_q·η + g_v·η̇ + g_a·η̈ + ½ η·Q η + ½ η̇·U η̇ + η̇·W η + η̈·A η,    I ψ̈ + c ψ̇ + G = M(t),
 
