@@ -154,25 +154,26 @@ def check_answer(row: Row, result: Any, folder: Path) -> None:
     if row["time"] != "accuracy":  # whose rows are between its steps
         check_balance(row, columns)
     check_energy(row, columns)
-    without = row["output"] == "error off"
-    if row["checkpoint"] != "no":  # with the errors of one of them, which must not change the motion
-        changes = {"checkpoint": "no", "output": "plain" if without or row["time"] == "accuracy" else "error off"}
-        same_motion(row, changes, columns, folder, 1e-9, "resumed and whole")
-    elif without:
-        same_motion(row, {"output": "plain"}, columns, folder, 0.0, "errors estimated and not")
+    resumed, without = row["checkpoint"] != "no", row["output"] == "error off"
+    if resumed or without:
+        other = columns_of(run({**row, "checkpoint": "no"}, with_errors(row, folder, without), folder))
+        digits, what = (1e-9, "resumed and whole") if resumed else (0.0, "errors estimated and not")
+        check_same(columns, other, digits, what, ("history", "shape"))
     if row["unknowns"] == "left out":
         assert result.summary["left_out"]
-        tables = tables_of({**row, "output": "error off"}, folder)
+        tables = with_errors(row, folder, False)
         tables["model"]["all_unknowns"] = True
         every = columns_of(rotfem.run(tables))
-        digits = 1e-3 if "tolerance" in tables["time"] else 1e-6
+        digits = 1e-3 if row["time"] == "tolerance" else 1e-6
         check_same(every, {**every, **columns}, digits, "all unknowns and few", ("history",))
 
 
-def same_motion(row: Row, changes: Row, columns: Columns, folder: Path, digits: float, what: str) -> None:
-    """See that a row of other choices has the same history."""
-    other = columns_of(answer({**row, **changes}, folder))
-    check_same(columns, other, digits, what, ("history", "shape"))
+def with_errors(row: Row, folder: Path, estimated: bool) -> Tables:
+    """Return the tables of a row, its errors estimated or not, which must change no motion; an accuracy needs them."""
+    tables = tables_of(row, folder)
+    if row["time"] != "accuracy":
+        tables["output"] = {**tables.get("output", {}), "error": estimated}
+    return tables
 
 
 def check_balance(row: Row, columns: Columns) -> None:

@@ -121,8 +121,10 @@ def tables_of(row: Row, folder: Path) -> Tables:
     }
     if row["loads"] != "none":
         tables["loads"] = loads_of(row)
-    # Spin holds a hinge in theories that have its stiffness; else there is no equilibrium to start from.
-    if row["root"] == "hinge" and (row["motion"] not in ("constant", "table") or row["theory"] == "linear"):
+    # Spin holds a hinge in theories that have its stiffness; else there is no equilibrium to start from. A follower in
+    # the plane, -F alpha along the axis, works on what the Coriolis force makes of the bending: undamped, that grows.
+    loose = row["root"] == "hinge" and (row["motion"] not in ("constant", "table") or row["theory"] == "linear")
+    if loose or (row["loads"] == "follower" and row["damping"] == "none"):
         tables["initial"] = {"state": "undeformed"}
     if row["time"] == "accuracy":
         tables |= {"accuracy": 0.5, "time": {"end": END}}
