@@ -241,6 +241,42 @@ class Eigenpairs:
         return Eigenpairs(self.values[index], *vectors, self.errors[index], self.bounds[index])
 
 
+def basis_of(wanted: int, unknowns: int) -> int:
+    """Return how many vectors the basis of SLEPc's solver has for so many eigenvalues of 2n, n the unknowns."""
+    return min(max(3 * wanted, wanted + 20), 2 * unknowns)
+
+
+def dense(A: Any) -> Array:
+    """Return a PETSc matrix of one process as an array."""
+    indptr, indices, data = A.getValuesCSR()
+    return np.asarray(csr_array((data, indices, indptr), shape=A.getSize()).toarray())
+
+
+def dense_pairs(M: Array, C: Array, K: Array, wanted: int, target: float) -> tuple[Array, Array, Array]:
+    """Return (λ, x, backward error) of the eigenvalues of a small pencil that are nearest to a target.
+
+    With λ = σ + 1/μ and P = σ²M + σC + K the pencil is μ²P + μ(2σM + C) + M, in first order an eigenproblem for μ of
+    (μx, x). Those of unknowns without a mass, μ = 0, are left out. A Krylov space that is to be the whole space breaks
+    down before it is.
+
+    Raises:
+        ComputationError: P is singular.
+    """
+    n, P = len(K), target**2 * M + target * C + K
+    try:
+        right_hand = np.linalg.solve(P, np.hstack([-(2 * target * M + C), -M]))
+    except np.linalg.LinAlgError:
+        raise ComputationError("the stiffness is singular") from None
+    mu, vectors = np.linalg.eig(np.vstack([right_hand, np.eye(n, 2 * n)]))
+    finite = 2 * int(np.count_nonzero(np.any(M != 0.0, axis=1)))
+    nearest = np.argsort(-np.abs(mu), kind="stable")[: min(wanted, finite)]
+    values, X = target + 1 / mu[nearest], vectors[n:, nearest]
+    X = X / np.linalg.norm(X, axis=0)
+    sizes = [np.linalg.norm(A) for A in (M, C, K)]
+    residual = np.linalg.norm(M @ X * values**2 + C @ X * values + K @ X, axis=0)
+    return values, X, residual / (np.abs(values) ** 2 * sizes[0] + np.abs(values) * sizes[1] + sizes[2])
+
+
 class Pencil:
     """M, C and K of small motions about an equilibrium (PETSc matrices, clamped unknowns 0, 0 and 1).
 
@@ -419,6 +455,8 @@ class Pencil:
         """Return (λ, x, backward error) nearest to the target, of balanced matrices."""
         n = K.getSize()[0]
         wanted = min(2 * count + 2, 2 * n - 2)
+        if self.comm.size == 1 and basis_of(wanted, n) == 2 * n:
+            return dense_pairs(dense(M), dense(C), dense(K), wanted, target)
         symmetric = target == 0.0 and self.conservative
         pep = self._solver(M, C, K, wanted, target)
         st = pep.getST()
@@ -453,7 +491,7 @@ class Pencil:
         pep.setOperators([K, C, M])
         pep.setProblemType(SLEPc.PEP.ProblemType.GENERAL)
         pep.setType(SLEPc.PEP.Type.TOAR)
-        pep.setDimensions(wanted, min(max(3 * wanted, wanted + 20), 2 * K.getSize()[0]))
+        pep.setDimensions(wanted, basis_of(wanted, K.getSize()[0]))
         pep.setTarget(target)
         pep.setWhichEigenpairs(SLEPc.PEP.Which.TARGET_MAGNITUDE)
         pep.setTolerances(1e-11, 300)

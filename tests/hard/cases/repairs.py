@@ -105,3 +105,37 @@ CASES += [
         source="no moment about the axis",
     ),
 ]
+CASES += [
+    Case(
+        "damping by mode",
+        "a blade on a flap spring, 2 elements",
+        {
+            "structure": {
+                "type": "spatial_beam",
+                "length": 2.0,
+                "hub_radius": 0.2,
+                "tip_mass": 0.3,
+                "pretwist": [[0, 0.3], [2, -0.1]],
+                "section": {
+                    "EA": 1e8,
+                    "GA2": 1e8,
+                    "GA3": 1e8,
+                    "GJ": 1e3,
+                    "EI2": 1e3,
+                    "EI3": 1e3,
+                    "mass_per_length": 1.0,
+                },
+                "root": {"flap_stiffness": 5.0},
+                "damping": {"modal": 0.01},
+            },
+            "motion": {"type": "constant", "speed": 0.0},
+            "mesh": {"elements": 2},
+            "modes": {"count": 4},
+        },
+        command="modes",
+        value=lambda result: [row["damping"] for row in result.rows],
+        reference=[0.01] * 4,
+        tolerance=1e-5,
+        source="the ratio that is given",
+    )
+]
