@@ -141,14 +141,11 @@ def _check_moving(structure: AnyStructure, motion: Motion, initial: Initial) -> 
         raise problem("initial.velocity", None, "the third component must be 0 for a planar_beam")
 
 
-def check_first_state(model: Model, initial: Initial, accuracy: float | None) -> None:
+def check_first_state(model: Model, initial: Initial) -> None:
     """Refuse a mode or velocities to start with where the history is one that starts at rest."""
     if not initial.moves:
         return
     key, value = ("initial.mode", initial.mode) if initial.mode is not None else ("initial.velocity", None)
-    for name, given in (("accuracy", accuracy), ("model.tolerance", model.tolerance)):
-        if given is not None:
-            raise problem(key, value, f"cannot be combined with {name}, whose trials start at rest")
     if model.reduced:
         raise problem(key, value, "cannot be combined with model.reduced, which starts at rest")
     if model.frame == "inertial":
@@ -159,13 +156,11 @@ def check_accuracy(model: Model, output: OutputTable, accuracy: float | None) ->
     """Refuse what an accuracy excludes: a tolerance of the model, which it has in it, and no estimates.
 
     Raises:
-        PydanticCustomError: there are both, or the frame or the output has no estimate of errors.
+        PydanticCustomError: there are both, or errors are not estimated.
     """
     if accuracy is not None and model.tolerance is not None:
         reason = "cannot be combined with accuracy, which allows the model a share of its own"
         raise problem("model.tolerance", model.tolerance, reason)
-    if accuracy is not None and model.frame == "inertial":
-        raise problem("model.frame", model.frame, "cannot be combined with accuracy; the rotating frame is as true")
     if accuracy is not None and not output.error:
         raise problem("output.error", False, "cannot be combined with accuracy, which is met by what is estimated")
 

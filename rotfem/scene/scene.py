@@ -314,7 +314,7 @@ class Scene(SceneModel):
         check_limits(self.limits, self.time, self.modes)
         check_accuracy(self.model, self.output, self.accuracy)
         check_budget(self.accuracy, self.accuracy_budget)
-        check_first_state(self.model, self.initial, self.accuracy)
+        check_first_state(self.model, self.initial)
         self.output.check(self.structure.type, self.structure.length)
         return self
 

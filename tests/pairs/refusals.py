@@ -115,12 +115,6 @@ REFUSALS = (
         'A free hub (`type = "torque"`) needs a constant pitch',
     ),
     Refusal(
-        {"time": ("accuracy",), "frame": ("inertial",)},
-        r"model\.frame.*cannot be combined with accuracy",
-        SCENE,
-        "without damping by mode and without an `accuracy`",
-    ),
-    Refusal(
         {"time": ("accuracy",), "output": ("error off",)},
         r"output\.error.*cannot be combined with accuracy",
         SCENE,
