@@ -141,9 +141,11 @@ class Companion:
         doubled: time taken in doubled steps, s.
         sound: whether all its steps could be solved, and it is no farther away than the limit.
         limit: largest distance up to which it goes on.
+        part: of the difference so far to which its steps are solved, where that is more than the tolerance.
     """
 
     limit: float = float(np.finfo(float).max)
+    part: float = 0.0
 
     def __init__(
         self,
@@ -244,3 +246,5 @@ class Companion:
         self.components = tuple(np.maximum(self.components, np.abs(apart)).tolist())
         if size > self.difference[0]:
             self.difference = size, there.t
+            least = self.part * size / self.system.structure.length
+            self.stepper.newton.tolerance = max(self.stepper.newton.tolerance, least)

@@ -53,6 +53,9 @@ RESOLVED = 1e-8
 #: a sine that is late by a twelfth of its period is as far from itself.
 FAR = 0.5
 
+#: Part of a change to which steps are solved: it is shown with two digits.
+DIGITS = 1e-2
+
 #: Largest distance of two tips over the length of the structure: each is displaced by twice the length at most.
 FARTHEST = 4.0
 
@@ -389,7 +392,7 @@ class Explanation:
                 continue
             companion = Companion(system, own.system, own.stepper.scheme, own.stepper.newton, doubles=False)
             largest = LARGEST_LINEAR_DEFLECTION if system.linear else FARTHEST
-            companion.limit = largest * system.structure.length
+            companion.limit, companion.part = largest * system.structure.length, DIGITS
             try:
                 companion.begin(*self.case.start(system))
             except ComputationError:
