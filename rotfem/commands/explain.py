@@ -36,7 +36,7 @@ FINE = {"negligible": "fine enough", "noticeable": "off by {:.1%}", "large": "to
 FINER = 4
 
 #: The same where nothing is known, of models and of steps or mesh.
-UNKNOWN = ("nothing is known of it: steps of twice the length fail", "the error is unknown")
+UNKNOWN = ("these steps do not show it", "the error is unknown")
 
 #: What the notes of a check are marked with, and where its Newton's method stops: small differences are wanted.
 FULL, INCREMENT = " of the full model", 1e-10
@@ -140,13 +140,13 @@ def why(item: Change, own: Theory) -> str:
         own: theory of the model.
     """
     failed = "".join(f"; {name}: {text}" for name, text in item.notes.items() if FULL not in name)
+    if item.verdict == "unknown":
+        return UNKNOWN[item.kind == "discretisation"] + failed
     if item.kind == "effect":
         reason = Effect.registry[item.name].reasons[0]
         if not item.included:
             reason += ", but it is not in model.effects"
         return f"{reason}; {NEEDED[item.verdict].format(item.worst)}{failed}"
-    if item.verdict == "unknown":
-        return UNKNOWN[item.kind == "discretisation"] + failed
     if item.kind == "discretisation":
         return FINE[item.verdict].format(item.worst)
     poorer = Theory.registry[item.name].rank < own.rank

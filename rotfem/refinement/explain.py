@@ -256,6 +256,7 @@ class Explanation:
         self.changes = [Change("effect", name, name in self.own) for name in self.effects]
         self.changes += [Change("theory", t.name, False) for t in self.theories if t is not problem.theory]
         self.steps, self.mesh = Change("discretisation", "", True), Change("discretisation", "", True)
+        self.steps.estimate = dict.fromkeys(self.wanted, 0.0)
         self._others: dict[str, Any] = {}
 
     def all(self) -> list[Change]:
@@ -327,7 +328,7 @@ class Explanation:
         assert case.scheme is not None
         try:
             errors = HistoryErrors(self.problem, system, case.scheme, newton, case.start)
-            own, ratio = errors.mesh if errors.mesh is not None and errors.mesh[1] > 1.0 else (errors.steps, 1.0)
+            own = errors.mesh[0] if errors.mesh is not None and errors.mesh[1] > 1.0 else errors.steps
             rough = self._march(errors.steps, own, newton, self.changes)
             known, apart = errors.errors(self.scale), errors.steps.difference[0] + own.difference[0]
             if not own.sound or apart > FAR * self.scale:
@@ -344,10 +345,10 @@ class Explanation:
             self._fails(HISTORY, error.what)
             return self._coarser()
         self.mesh.estimate[HISTORY] = known["space"]
-        self.steps.estimate = {**dict.fromkeys(self.wanted, 0.0), HISTORY: known["time"]}
+        self.steps.estimate[HISTORY] = known["time"]
         for change in self.changes:
             change.settle(HISTORY, rough[change.name], fine.get(change.name, rough[change.name]))
-        return own.system, ratio
+        return (self.system, 1.0) if errors.mesh is None else (errors.mesh[0].system, errors.mesh[1])
 
     def _march(
         self, first: Companion, own: Companion, newton: Newton, changes: Sequence[Change]
@@ -456,6 +457,8 @@ class Explanation:
         for change in self.changes:
             change.estimate[name], change.notes[name] = np.inf, what
         self.mesh.estimate[name] = None
+        if name == HISTORY:
+            self.steps.estimate[name] = None
 
 
 def modes_change(of: Array, to: Array) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 import ufl
 
 import rotfem
+from rotfem.commands.printed import explain_report
 from rotfem.commands.problem import Problem
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.system import System
@@ -405,6 +407,26 @@ def test_gravity_that_turns_leaves_the_modes() -> None:
     found = rotfem.explain(scene(ALL, changes)).summary
     assert found["outputs"] == ["modes"]
     assert any("gravity turns in the rotating frame: taken as at t = 0" in line for line in found["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("changes", "shown"),
+    [({"time": {"end": 0.02, "step": 0.01}}, "unknown"), ({"model.theory": "linear", "motion.speed": 9.0}, "inf")],
+    ids=["two steps", "diverges"],
+)
+def test_what_is_not_known_is_reported(changes: dict[str, Any], shown: str, tmp_path: Path) -> None:
+    result = rotfem.explain(scene(SPIN_UP, changes))
+    coriolis = next(line for line in explain_report(result.summary, tmp_path) if line.startswith("without coriolis"))
+    assert coriolis.split()[2] == shown
+    assert all(set(row["estimate"]) == {HISTORY, MODES} for row in result.rows)
+    assert '"estimate"' in result.files()["explain.json"]
+    result.drawings()["explain.png"]()
+
+
+def test_one_element_is_compared_with_two() -> None:
+    rows = rows_of(scene(SPIN_UP, {"mesh.elements": 1, "modes.count": 2}))
+    assert rows["mesh.elements"]["estimate"][HISTORY] > rows["time.step"]["estimate"][HISTORY]
+    assert rows["euler"]["estimate"][HISTORY] == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_failing_eigenproblem_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
