@@ -257,7 +257,7 @@ class Explanation:
         self.changes += [Change("theory", t.name, False) for t in self.theories if t is not problem.theory]
         self.steps, self.mesh = Change("discretisation", "", True), Change("discretisation", "", True)
         self.steps.estimate = dict.fromkeys(self.wanted, 0.0)
-        self._others: dict[str, Any] = {}
+        self._others: dict[tuple[str, str], Any] = {}
 
     def all(self) -> list[Change]:
         """Return every effect there are data for, then every other theory, the steps of a history, and the mesh."""
@@ -291,7 +291,7 @@ class Explanation:
         """Return the systems of changes on a mesh; None of a theory that cannot have all terms."""
         off = set(self.effects) - set(self.own)
         for change in changes:
-            if change.name in self._others:
+            if (change.name, repr(mesh)) in self._others:
                 continue
             problem, without = self.problem.replace(mesh=mesh), off
             if change.kind == "effect":
@@ -299,12 +299,12 @@ class Explanation:
             else:
                 problem = problem.replace(theory=change.name)
             try:
-                self._others[change.name] = self._compiled(problem, self.system.comm, without)
+                self._others[change.name, repr(mesh)] = self._compiled(problem, self.system.comm, without)
             except InputError as error:
-                self._others[change.name] = None
+                self._others[change.name, repr(mesh)] = None
                 change.notes |= dict.fromkeys(self.wanted, str(error))
                 change.estimate |= dict.fromkeys(self.wanted, np.inf)
-        return [self._others[change.name] for change in changes]
+        return [self._others[change.name, repr(mesh)] for change in changes]
 
     def _reached(self) -> float:
         """Return the speed of the modes: the final one, of a free hub the largest with a rigid structure; rad/s."""
@@ -423,7 +423,9 @@ class Explanation:
         coarse: Any,
         ratio: float,
     ) -> None:
-        """Write the changes of an output that needs no history.
+        """Write the changes of an output that needs no history, on half the cells.
+
+        Where these are in error by what nobody would call negligible, they are computed on all cells as well.
 
         Args:
             name: of the output.
@@ -440,16 +442,38 @@ class Explanation:
             return
         if name == MODES:
             self.values = own
-        self.mesh.estimate[name] = error_by_cells(measure(own, other), ratio) if coarse is not self.system else None
-        level = other if ratio > 1.0 else own
-        mesh = (coarse if ratio > 1.0 else self.system).model.problem.mesh
-        for change, system in zip(self.changes, self._variants(mesh, self.changes), strict=True):
+        apart = measure(own, other)
+        self.mesh.estimate[name] = error_by_cells(apart, ratio) if coarse is not self.system else None
+        levels = [(own, self.system)]
+        if ratio > 1.0:
+            levels = [(other, coarse), *levels] if apart > NOTICEABLE else [(other, coarse)]
+        found = [self._measured(name, level, system, of, measure) for level, system in levels]
+        for change in self.changes:
+            if change.name in found[0]:
+                change.settle(name, found[0][change.name], found[-1][change.name])
+
+    def _measured(
+        self, name: str, own: Array, there: Any, of: Callable[[Any], Array], measure: Callable[[Array, Array], float]
+    ) -> dict[str, float]:
+        """Return the name of each change ↦ its size on a mesh (see `_compare`); infinite where a model fails.
+
+        Args:
+            name: of the output.
+            own: output of the own model on that mesh.
+            there: system of the own model there.
+            of: system ↦ its output.
+            measure: distance of two of them, relative to the first.
+        """
+        out = {}
+        systems = self._variants(there.model.problem.mesh, self.changes)
+        for change, system in zip(self.changes, systems, strict=True):
             if system is None:
                 continue
             try:
-                change.estimate[name] = measure(level, of(system))
+                out[change.name] = measure(own, of(system))
             except ComputationError as error:
-                change.estimate[name], change.notes[name] = np.inf, error.what
+                out[change.name], change.notes[name] = np.inf, error.what
+        return out
 
     def _fails(self, name: str, what: str) -> None:
         """Note that the own model has no such output."""

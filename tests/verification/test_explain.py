@@ -272,7 +272,7 @@ def test_rows_of_steps_and_mesh_are_the_errors_of_a_run(motion: dict[str, Any]) 
 def test_overdamped_modes_are_compared_by_their_slow_eigenvalues() -> None:
     """A hinge with a damper has a mode that does not vibrate. Its fast eigenvalue is the mesh's, 1e5 times as large.
 
-    What the effects change is what they change on twice the elements, where other modes come between.
+    What the effects change is what they change on more elements, where other modes come between.
     """
     root = {"lag_stiffness": 400.0, "lag_damping": 15.0, "hinge_offset": 0.2}
     section = {"E": 6.9e10, "nu": 0.3, "rho": 2766.0, "area": 7.3e-5, "second_moment": 8.22e-9}
@@ -280,7 +280,7 @@ def test_overdamped_modes_are_compared_by_their_slow_eigenvalues() -> None:
     scene = Scene.from_dict(
         {"structure": hinged, "motion": {"type": "constant", "speed": 7.0}, "mesh": {"elements": 8}}
     )
-    rows = [rotfem.explain(scene.replace({"mesh.elements": n})).rows for n in (8, 16)]
+    rows = [rotfem.explain(scene.replace({"mesh.elements": n})).rows for n in (6, 8)]
     for rough, fine in zip(*rows, strict=True):
         if rough["kind"] == "effect":
             assert rough["estimate"][MODES] == pytest.approx(fine["estimate"][MODES], rel=0.1, abs=2e-4), rough["name"]
