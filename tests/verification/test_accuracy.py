@@ -25,7 +25,7 @@ SPIN_UP = {"type": "spin_up", "speed": 6.0, "duration": 3.0}
 #: Motions of the planar beam: smooth, struck, and thrown by a free hub.
 SCENES: dict[str, dict[str, Any]] = {
     "spin-up": {"motion": SPIN_UP},
-    "small": {"motion": {**SPIN_UP, "speed": 0.6}},
+    "small": {"motion": {**SPIN_UP, "speed": 0.1}},
     "pulse": {
         "motion": {"type": "constant", "speed": 2.0},
         "loads": {"tip_force": {"table": [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.2, 0.0, 40.0], [1.4, 0.0, 0.0]]}},

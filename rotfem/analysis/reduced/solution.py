@@ -83,6 +83,9 @@ class Modes:
     Args:
         M, C, K: its matrices, (m, m).
 
+    Raises:
+        ComputationError: M is not positive definite, or a matrix not finite.
+
     Attributes:
         values: λ, (p,).
         out: X, from modal coordinates to coordinates and rates, (2m, p).
@@ -93,7 +96,10 @@ class Modes:
         m = len(M)
         self.M = M + MASSLESS * np.abs(np.diag(M)).max() * np.eye(m)
         # in undamped modes S, and in units in which rates are as large as coordinates
-        squares, S = scipy.linalg.eigh(0.5 * (K + K.T), 0.5 * (self.M + self.M.T))
+        try:
+            squares, S = scipy.linalg.eigh(0.5 * (K + K.T), 0.5 * (self.M + self.M.T))
+        except (np.linalg.LinAlgError, ValueError) as error:
+            raise ComputationError("the masses of the reduced model are not positive, or not finite") from error
         w = np.sqrt(np.maximum(np.abs(squares), np.finfo(float).eps * np.abs(squares).max()))
         stiff, damped = (np.linalg.solve(S, np.linalg.solve(self.M, A @ S)) for A in (K, C))
         for part in (1.0, LESS):
@@ -215,7 +221,8 @@ class Solution:
         n = len(ends) - 1 if len(y) else 0
         first, width = 0, LARGEST if equations.constant else WINDOW
         while first < n:
-            window = Window(equations, ends[first : first + width + 1], x)
+            with np.errstate(over="ignore", invalid="ignore"):  # what is not finite has not converged
+                window = Window(equations, ends[first : first + width + 1], x)
             if window.converged:
                 self._windows.append(window)
                 x, first = window.end, first + width
