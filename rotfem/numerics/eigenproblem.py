@@ -256,8 +256,8 @@ def dense_pairs(M: Array, C: Array, K: Array, wanted: int, target: float) -> tup
     """Return (λ, x, backward error) of the eigenvalues of a small pencil that are nearest to a target.
 
     With λ = σ + 1/μ and P = σ²M + σC + K the pencil is μ²P + μ(2σM + C) + M, in first order an eigenproblem for μ of
-    (μx, x). Those of unknowns without a mass, μ = 0, are left out. A Krylov space that is to be the whole space breaks
-    down before it is.
+    (μx, x). Those of unknowns without mass and damping, μ = 0, are left out. A Krylov space that is to be the whole
+    space breaks down before it is.
 
     Raises:
         ComputationError: P is singular.
@@ -268,13 +268,19 @@ def dense_pairs(M: Array, C: Array, K: Array, wanted: int, target: float) -> tup
     except np.linalg.LinAlgError:
         raise ComputationError("the stiffness is singular") from None
     mu, vectors = np.linalg.eig(np.vstack([right_hand, np.eye(n, 2 * n)]))
-    finite = 2 * int(np.count_nonzero(np.any(M != 0.0, axis=1)))
+    moves = np.any(M != 0.0, axis=1)
+    finite = 2 * np.count_nonzero(moves) + np.count_nonzero(np.any(C != 0.0, axis=1) & ~moves)
     nearest = np.argsort(-np.abs(mu), kind="stable")[: min(wanted, finite)]
-    values, X = target + 1 / mu[nearest], vectors[n:, nearest]
+    nearest = nearest[mu[nearest] != 0.0]
+    if not len(nearest):
+        raise ComputationError("the pencil has no finite eigenvalues")
+    values, X = target + 1 / mu[nearest].astype(complex), vectors[n:, nearest].astype(complex)
     X = X / np.linalg.norm(X, axis=0)
-    sizes = [np.linalg.norm(A) for A in (M, C, K)]
-    residual = np.linalg.norm(M @ X * values**2 + C @ X * values + K @ X, axis=0)
-    return values, X, residual / (np.abs(values) ** 2 * sizes[0] + np.abs(values) * sizes[1] + sizes[2])
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows has no small error
+        sizes = [np.linalg.norm(A) for A in (M, C, K)]
+        residual = np.linalg.norm(M @ X * values**2 + C @ X * values + K @ X, axis=0)
+        errors = residual / (np.abs(values) ** 2 * sizes[0] + np.abs(values) * sizes[1] + sizes[2])
+    return values, X, np.where(np.isfinite(errors), errors, 1.0)
 
 
 class Pencil:

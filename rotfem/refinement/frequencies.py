@@ -116,7 +116,7 @@ def _massed(analysis: ModalAnalysis, columns: Array) -> Array:
     held = analysis.system.held
     M = held.matrix(0.0, 0.0, 1.0, 0.0)
     x, b = M.createVecs()
-    out = np.empty_like(columns)
+    out = np.empty(columns.shape, dtype=complex)
     for j in range(columns.shape[1]):
         for part, unit in ((columns[:, j].real, 1.0), (columns[:, j].imag, 1j)):
             x.array[:] = part
