@@ -10,6 +10,7 @@ from petsc4py import PETSc
 from rotfem.errors import ComputationError
 from rotfem.numerics.eigenproblem import ROUNDED
 from rotfem.numerics.linear import SMALL
+from rotfem.numerics.low_rank import sparse_part
 
 #: What MUMPS needs to count pivots: a look-out for null ones, and the last front not left to ScaLAPACK.
 COUNTING = {24: 1, 13: 1}
@@ -23,7 +24,8 @@ ROUND_OFF = 1e-13
 
 
 def symmetric(A: Any) -> bool:
-    """Return whether a PETSc matrix is symmetric to round-off, whatever the units of its unknowns."""
+    """Return whether a PETSc matrix, or one with a part B Bᵀ, is symmetric to round-off, whatever its units."""
+    A = sparse_part(A)
     d = A.getDiagonal()
     d.array[:] = 1.0 / np.sqrt(np.where(d.array == 0.0, 1.0, np.abs(d.array)))
     scaled = A.copy()
