@@ -74,7 +74,7 @@ def test_every_mode_is_judged(more: dict[str, Any], motion: dict[str, Any]) -> N
     tables = {"structure": {**BEAM, **more}, "motion": motion, "model": {"theory": "consistent_linear"}}
     rows, fine = (modes({**tables, "mesh": {"elements": n}, "modes": {"count": 5}}).rows for n in (3, 24))
     exact = np.array([row["frequency"] for row in fine])
-    judged = [row for row in rows if row["stability"] != "neutral"]
+    judged = [row for row in rows if row["stability"] not in ("neutral", "unresolved")]  # nothing is known of those
     assert len(judged) >= 4
     errors = [np.abs(row["frequency"] / exact[exact > 0.0] - 1.0).min() for row in judged]
     assert max(errors) > 1e-2
