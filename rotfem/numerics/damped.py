@@ -146,15 +146,19 @@ class RitzPairs:
         self.matrices, self.target, self.fast = matrices, target, fast
         self.comm: MPI.Comm = matrices[2].comm.tompi4py()
         self.norms = np.array([A.norm(PETSc.NormType.INFINITY) for A in self.matrices])
-        P = matrices[2].copy()
-        for A, factor in ((matrices[1], target), (matrices[0], target**2)):
-            if factor != 0.0:
-                P.axpy(factor, sparse_part(A))  # near enough to find new directions
-        self._solver = DirectSolver(P)
-        self._x, self._b = P.createVecs()
+        self._solver = self._solver_at(target)
+        self._x, self._b = matrices[2].createVecs()
         self.V = np.zeros((self._x.getLocalSize(), 0))
         self._products = [self.V] * 3
         self.add(start)
+
+    def _solver_at(self, sigma: float) -> DirectSolver:
+        """Return a solver of K + σ C + σ² M, of C its sparse part: near enough to find new directions."""
+        P = self.matrices[2].copy()
+        for A, factor in ((self.matrices[1], sigma), (self.matrices[0], sigma**2)):
+            if factor != 0.0:
+                P.axpy(factor, sparse_part(A))
+        return DirectSolver(P)
 
     def _sum(self, local: Array) -> Array:
         return np.asarray(self.comm.allreduce(local) if self.comm.size > 1 else local)
@@ -208,15 +212,29 @@ class RitzPairs:
                     total[:, j] += factor * np.conj(self.values[j]) ** power * self._b.array
         return total
 
-    def grow(self) -> int:
-        """Add K⁻¹ times the residuals of pairs that are not done; return how many directions are new."""
-        open_pairs = self.errors > DONE
+    def grow(self, own: bool) -> int:
+        """Add directions for pairs that are not done; return how many are new.
+
+        They are K⁻¹ times the residuals: residual inverse iteration (Neumaier 1985), quick where λ is near the target.
+        A real λ of an overdamped pair may be far from it: its own are P(λ)⁻¹ P'(λ) x, Newton's method for P(λ) x = 0.
+
+        Args:
+            own: whether real pairs have their own.
+        """
+        M, C, _ = self.matrices
         columns = []
-        for residual in (self._residual[:, open_pairs], self._left_residual[:, open_pairs]):
-            for r in np.hstack([residual.real, residual.imag]).T:
-                self._b.array[:] = r
-                self._solver.solve(self._b, self._x)
-                columns.append(self._x.array.copy())
+        for i in np.flatnonzero(self.errors > DONE):
+            lam, solver = self.values[i], self._solver
+            sides = [self._residual[:, i], self._left_residual[:, i]]
+            if own and lam.imag == 0.0 and np.isfinite(lam.real):
+                solver = self._solver_at(float(lam.real))
+                vectors = np.stack([self.right[:, i].real, self.left[:, i].real], axis=1)
+                sides = list((2 * lam.real * times(M, vectors) + times(C, vectors)).T)
+            for r in sides:
+                for part in (r.real, r.imag):
+                    self._b.array[:] = part
+                    solver.solve(self._b, self._x)
+                    columns.append(self._x.array.copy())
         # by largest entries, whose squares may be no numbers any more; lengths are made one by `add`
         sizes = self._sum(np.array([np.abs(c).max(initial=0.0) for c in columns]))
         new = [c / size for c, size in zip(columns, sizes, strict=True) if 0.0 < size < np.inf]
@@ -237,9 +255,10 @@ def damped_pairs(
     """
     start = np.hstack([undamped.real, undamped.imag])
     ritz = RitzPairs(matrices, start, target, fast)
-    for _ in range(ROUNDS):
+    for number in range(ROUNDS):
         ritz.solve(count)
-        if float(np.max(ritz.errors)) <= DONE or ritz.V.shape[1] > COLUMNS or ritz.grow() == 0:
+        done = float(np.max(ritz.errors)) <= DONE or ritz.V.shape[1] > COLUMNS
+        if done or ritz.grow(own=number >= ROUNDS // 2) == 0:
             break
     ritz.solve(count)
     return ritz.values, ritz.right, ritz.left, ritz.errors

@@ -157,3 +157,15 @@ def test_damping_beyond_all_proportion(structure: dict[str, Any], rest: dict[str
     except ComputationError as failure:
         said = failure.what
     assert re.search("unreliable: round-off|backward error|eigenvalues", said)
+
+
+def test_a_damper_at_a_hinge_on_every_mesh() -> None:
+    """It makes one motion of the root overdamped, whose fast eigenvalue grows with the mesh and is far from the others.
+
+    The vibrations converge: cubic elements of 0.83 and 0.42 m, the fifth mode 2e-5 apart.
+    """
+    hinge = {**STRUCTURE, "hub_radius": 1.0, "root": {"lag_stiffness": 0.0, "lag_damping": 200.0}}
+    scene = {"structure": hinge, "motion": {"type": "constant", "speed": 20.0}, "modes": {"count": 5}}
+    found = [modes({**scene, "mesh": {"elements": n}}) for n in (12, 24)]
+    np.testing.assert_allclose(found[0].frequencies, found[1].frequencies, rtol=1e-4)
+    assert all(np.all(np.array([row["residual"] for row in r.summary["modes"]]) < 1e-8) for r in found)
