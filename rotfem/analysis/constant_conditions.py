@@ -33,7 +33,7 @@ def act_at_start(problem: Problem) -> bool:
     return motion.speed(0.0) != 0.0 or any(force.any() for force in forces)
 
 
-def stability_ahead(system: Any, newton: Newton) -> Stability | None:
+def constant_stability(system: Any, newton: Newton) -> Stability | None:
     """Return the stability of the equilibrium of constant conditions; None where there is none that is found at once.
 
     Args:

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from rotfem.analysis.schemes import Array, State, Watch
+from rotfem.analysis.schemes import Array, Observer, State
 
 #: Order of a scheme up to which accelerations are left out.
 LOW = 2
@@ -40,7 +40,7 @@ class RowTimes:
         passed: rows there are already, without that at t = 0.
     """
 
-    def __init__(self, interval: float, end: float, order: int, further: Watch | None = None, passed: int = 0):
+    def __init__(self, interval: float, end: float, order: int, further: Observer | None = None, passed: int = 0):
         self.interval, self.end, self.order, self.further = interval, end, order, further
         self._next, self._last = 1 + passed, int(np.ceil(end / interval - CLOSE))
         self._reached: list[State] = []

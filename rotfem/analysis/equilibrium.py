@@ -123,7 +123,7 @@ def _judged(system: Any, growth: Growth, newton: Newton, found: Raised, notes: l
     """
     if found.sure and not _has_descent(system):
         return found.q
-    system.count_rotations_from(found.datum)
+    system.count_rotations_from(found.reference)
     total = system.structure.total(found.q)
     path = _path(system, growth, newton, False, notes)
     if path is not None and path.limits:
@@ -131,7 +131,7 @@ def _judged(system: Any, growth: Growth, newton: Newton, found: Raised, notes: l
     if path is None or path.share < 1.0:
         if not found.sure:
             notes.append("whether this is the equilibrium that the growing load leads to, or another one, is not known")
-        system.count_rotations_from(found.datum)
+        system.count_rotations_from(found.reference)
         return balance(system, growth, 1.0, found.q, newton)
     if system.size(system.structure.total(path.q) - total) > SAME_STATE:
         notes.append("Newton met another equilibrium first; this is the one that the growing load leads to")

@@ -43,7 +43,7 @@ class FirstMotion:
     phase: float = 0.0
     velocity: Sequence[Sequence[float]] | None = None
 
-    def beside(self, q: Array | None, analysis: ModalAnalysis, newton: Newton) -> tuple[Array | None, Array]:
+    def about(self, q: Array | None, analysis: ModalAnalysis, newton: Newton) -> tuple[Array | None, Array]:
         """Return (q, q̇) at t = 0, local dof arrays, about the state that the history starts from.
 
         Args:
@@ -58,12 +58,12 @@ class FirstMotion:
         system = analysis.system.held
         if self.velocity is not None:
             return q, of_velocities(system, self.velocity)
-        course, patterns = self.of_mode(analysis)
+        signal, patterns = self.of_mode(analysis)
         state = system.zeros() if q is None else q
         if system.linear:
-            return state + course[0], course[1]
+            return state + signal[0], signal[1]
         try:
-            return in_mode(system, state, course, patterns, newton)
+            return in_mode(system, state, signal, patterns, newton)
         except ComputationError as error:
             what = f"no motion in mode {self.mode} with an amplitude of {self.amplitude:g} m: {error.what}"
             raise ComputationError(what, advice="a smaller initial.amplitude") from error
@@ -92,10 +92,10 @@ class FirstMotion:
         if abs(largest) <= STILL * system.size(np.abs(whole)) * structure.length:
             raise InputError("initial.mode", number, "does not move the tip, which initial.amplitude is of")
         factor = self.amplitude * np.exp(1j * self.phase)
-        course = np.array([(value**k * factor * whole / largest).real for k in range(4)])
+        signal = np.array([(value**k * factor * whole / largest).real for k in range(4)])
         shape, mass = (x / largest, analysis.mass_times(spinning)[:, number - 1] / largest)
         energies = summed(system.comm, np.array([shape.real @ mass.real, shape.imag @ mass.imag]))
-        return course, np.array([mass.real, mass.imag])[energies > PRESCRIBED * energies.sum()]
+        return signal, np.array([mass.real, mass.imag])[energies > PRESCRIBED * energies.sum()]
 
 
 def everywhere(system: Any, x: Array) -> Array:
@@ -105,7 +105,7 @@ def everywhere(system: Any, x: Array) -> Array:
     return np.array(system.q.x.array)
 
 
-def in_mode(system: Any, state: Array, course: Array, patterns: Array, newton: Newton) -> tuple[Array, Array]:
+def in_mode(system: Any, state: Array, signal: Array, patterns: Array, newton: Newton) -> tuple[Array, Array]:
     """Return (q, q̇) of the nonlinear motion that a mode is of, local dof arrays.
 
     The linear shape q₁ alone lacks what bending does to the structure in second order: its foreshortening, which the
@@ -119,14 +119,14 @@ def in_mode(system: Any, state: Array, course: Array, patterns: Array, newton: N
     Args:
         system: equations of motion, the hub held.
         state: q₀, with rotations as the system counts them.
-        course: q₁ and its rates, (4, n).
+        signal: q₁ and its rates, (4, n).
         patterns: b, owned unknowns (k, m).
         newton: iteration control.
 
     Raises:
         ComputationError: it was not found.
     """
-    shape, rate, acceleration, jerk = course
+    shape, rate, acceleration, jerk = signal
     n, motion = patterns.shape[1], system.motion.at_speed(system.motion.speed(0.0))
     system.set_time(0.0, motion)
     system.set_state(state)

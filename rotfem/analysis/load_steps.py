@@ -9,14 +9,14 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.theory_error import KNOWN, lost_digits
+from rotfem.analysis.theory_error import KNOWN, conditioning
 from rotfem.analysis.turning import reached, recounted
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.theories import richest
 from rotfem.numerics.linear import DirectSolver, Increment
 from rotfem.numerics.newton import REACH, Newton
-from rotfem.structures.datum import BeyondReach
+from rotfem.structures.reference_rotation import BeyondReach
 
 Array = npt.NDArray[np.float64]
 
@@ -52,12 +52,12 @@ class Raised:
 
     Attributes:
         q: the equilibrium at full load, a local dof array.
-        datum: what its rotations are counted from.
+        reference: what its rotations are counted from.
         sure: whether it is the one of the growing load; not, where Newton's method wandered to it.
     """
 
     q: Array
-    datum: Any
+    reference: Any
     sure: bool = True
 
 
@@ -101,7 +101,7 @@ class Growth:
 
     def begin(self, system: System) -> Array:
         """Return the equilibrium at s = 0, rotations counted as they were there."""
-        system.count_rotations_from(None if self.start is None else self.start.datum)
+        system.count_rotations_from(None if self.start is None else self.start.reference)
         return system.zeros() if self.start is None else self.start.q.copy()
 
     def where(self, share: float) -> str:
@@ -120,7 +120,7 @@ def raised(system: System, growth: Growth, newton: Newton) -> Raised:
         ComputationError: none was found; says how far the load got.
     """
     q, done, share = growth.begin(system), 0.0, 1.0
-    datum = system.datum
+    reference = system.reference
     other: Raised | None = None
     while done < 1.0:
         target = min(1.0, done + share)
@@ -134,11 +134,11 @@ def raised(system: System, growth: Growth, newton: Newton) -> Raised:
             failure, afresh = error.what, False
         else:
             if not wandered:
-                q, done, share, datum = new, target, 1.5 * share, system.datum
+                q, done, share, reference = new, target, 1.5 * share, system.reference
                 continue
             failure, afresh = "Newton's way was a long one", False
             if other is None and target == 1.0:
-                other = Raised(new, system.datum, False)
+                other = Raised(new, system.reference, False)
         share /= 2
         if share < SMALLEST_SHARE:
             if other is not None:
@@ -148,12 +148,12 @@ def raised(system: System, growth: Growth, newton: Newton) -> Raised:
                 f"{failure}",
                 advice=less(system),
             )
-        system.count_rotations_from(datum)
+        system.count_rotations_from(reference)
         if afresh:
             q, _ = recounted(system, q)
-            datum = system.datum
+            reference = system.reference
     system.structure.check_range(q)
-    return Raised(np.asarray(q), datum)
+    return Raised(np.asarray(q), reference)
 
 
 def on_hinges(system: System, omega: float, newton: Newton) -> Growth:
@@ -241,7 +241,7 @@ def balance(
         return size
 
     if system.linear:
-        if not np.isfinite(increment()) or (system.structure.hinges and lost_digits(system, q) >= KNOWN):
+        if not np.isfinite(increment()) or (system.structure.hinges and conditioning(system, q) >= KNOWN):
             raise ComputationError(f"no steady state at {growth.omega:g} rad/s: the stiffness is singular")
         newton.iterations += 1
     else:

@@ -25,7 +25,7 @@ from rotfem.analysis.stepper import STEADY, Stepper, seen
 from rotfem.analysis.switching import watched_switches
 from rotfem.analysis.time_grid import LEAST, Leg, TimeGrid
 from rotfem.errors import ComputationError
-from rotfem.mechanics.courses import SAME, View
+from rotfem.mechanics.time_signals import SAME, View
 from rotfem.numerics.newton import Newton
 
 #: Lag of a memory, in steps, up to which kinks between plain steps are left to the order of the scheme.
@@ -64,7 +64,7 @@ def fixed_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[State]
         ComputationError: a step failed, however short.
     """
     assert steps.step is not None
-    ahead, reached = TimeGrid(stepper.system.courses, *grid(steps), stepper.scheme.order), state.t
+    ahead, reached = TimeGrid(stepper.system.signals, *grid(steps), stepper.scheme.order), state.t
     legs = ((number, leg) for number, leg in ahead if leg.end > reached)
     wanted = None if steps.parts is None else set(np.cumsum(steps.parts).tolist())
     after: Leg | None
@@ -105,14 +105,14 @@ def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State
     if leg.drifts:
         state = stepper.drift(state, leg.length, leg.end)
         if leg.averaged:
-            state = stepper.struck(state, leg.length)
+            state = stepper.after_blow(state, leg.length)
     else:
         joined = after is not None and leg.joins(after)
         window = (leg.length, after.length if after is not None and joined else 0.0) if leg.averaged else None
         with seen(stepper.system, View(-1 if leg.lands else 0, window)):
             old, state = state, stepper.advance(state, leg.length, leg.end)
-    if stepper.watch is not None:
-        stepper.watch(before, state, leg)
+    if stepper.observer is not None:
+        stepper.observer(before, state, leg)
     if after is None:
         return state
     if old is not None and not after.drifts and after.length != leg.length:
@@ -164,7 +164,7 @@ def bent(stepper: Stepper, state: State, last: float, h: float) -> State:
     driven = np.array(parts(s.driven))
     if np.max(np.abs(driven.sum(axis=0)), initial=0.0) <= STEADY * np.max(np.abs(driven), initial=0.0):
         return state
-    s.count_rotations_from(state.datum)
+    s.count_rotations_from(state.reference)
     change = np.sum(parts(forces), axis=0)
     s.set_time(t)
     s.set_state(state.q, state.v, state.a)
@@ -236,7 +236,7 @@ SCOUTED, ALIKE, NOISE = (20, 40), 0.6, 10.0
 #: of the end.
 FIRST, LONGEST, SHORTEST, CELL = 1e-4, 1 / 20, 1e-9, 1 / 2000
 
-#: Most a course may be off a straight line over a step, as a part of its largest value.
+#: Most a signal may be off a straight line over a step, as a part of its largest value.
 BENT = 0.1
 
 #: Error, as a part of what is allowed, of a step that could not be solved, and halvings of one that is short already.
@@ -277,7 +277,7 @@ class AdaptiveSteps:
         self.shortest = steps.min_step or SHORTEST * self.end
         self.measure = ErrorMeasure(stepper.system, stepper.scheme, self.end)
         cells = np.append(np.arange(round(1 / CELL)) * (CELL * self.end), self.end)
-        self.cells = TimeGrid(stepper.system.courses, cells, CELL * self.end, fixed=False)
+        self.cells = TimeGrid(stepper.system.signals, cells, CELL * self.end, fixed=False)
         self.landings, self.dense = self.cells.landings()
         self.least = NOISE * stepper.newton.tolerance
         self.wanted, self.allowed = min(self.longest, FIRST * self.end), np.inf
@@ -326,8 +326,8 @@ class AdaptiveSteps:
                 wanted = min(self.longest, h if KEEP[0] <= factor <= KEEP[1] else h * factor)
             if switches is not None:
                 switches.passed(number, start, new)
-            if stepper.watch is not None:
-                stepper.watch(start, new, Leg(stop, h, lands, averaged, drifts, plain=False))
+            if stepper.observer is not None:
+                stepper.observer(start, new, Leg(stop, h, lands, averaged, drifts, plain=False))
             following = self._next(new.t, wanted, least)[1] if new.t < self.end else h
             if not drifts and following != h:
                 new = stepper.scheme.resized(new, start, following)
@@ -382,7 +382,7 @@ class AdaptiveSteps:
     def _drifted(self, start: State, h: float, stop: float, finish: View) -> tuple[State, float]:
         """Return the state after a step between two knots that is too short to be solved for, and no error."""
         new = self.stepper.drift(start, h, stop)
-        return (new if finish.window is None else self.stepper.struck(new, h)), 0.0
+        return (new if finish.window is None else self.stepper.after_blow(new, h)), 0.0
 
     def _next(self, t: float, wanted: float, least: float) -> tuple[float, float]:
         """Return end and length of a step from t that is about as long as wanted and steps over nothing.

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import steady_state
-from rotfem.analysis.kept_digits import KeptDigits
+from rotfem.analysis.mixed_modes import KeptDigits
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.functionals import Functionals
 from rotfem.equations.modal_damping import family_products, massed
@@ -176,7 +176,7 @@ class Spinning:
         pairs: eigenpairs, sorted by |λ|, one of each conjugate pair.
         clamped: M, C, K without the hub's unknown (the same pencil where the hub is not free).
         rigid: whether hub and structure can turn as a rigid body (λ = 0, not among the pairs).
-        datum: what the rotations of the equilibrium are counted from; None for the undeformed structure.
+        reference: what the rotations of the equilibrium are counted from; None for the undeformed structure.
     """
 
     speed: float
@@ -185,7 +185,7 @@ class Spinning:
     pairs: Eigenpairs
     clamped: Pencil
     rigid: bool = False
-    datum: Any = None
+    reference: Any = None
 
 
 class ModalAnalysis:
@@ -276,13 +276,13 @@ class ModalAnalysis:
             self.seconds[name] += span
         # A PETSc matrix must not outlive the mesh it was made on: their communicator goes with the mesh.
         clamped.owner = pencil.owner = self
-        finite, datum = massed(clamped.M), self.system.datum
+        finite, reference = massed(clamped.M), self.system.reference
         if not self.free:
             chosen = pairs.select(np.arange(len(pairs.values))[:finite])
-            return Spinning(speed, q, pencil, chosen, clamped, datum=datum)
+            return Spinning(speed, q, pencil, chosen, clamped, reference=reference)
         flexible = np.flatnonzero(np.abs(pairs.values) > ZERO * np.median(np.abs(pairs.values)))
         rigid = len(flexible) < len(pairs.values)
-        return Spinning(speed, q, pencil, pairs.select(flexible[:finite]), clamped, rigid, datum)
+        return Spinning(speed, q, pencil, pairs.select(flexible[:finite]), clamped, rigid, reference)
 
     def stiffness_sizes(self, K: Any) -> Array | None:
         """Return √ of what the entries of K are sums of, for each owned unknown; None where the diagonal says it.
@@ -316,7 +316,7 @@ class ModalAnalysis:
             s.set_state(zero := s.zeros())
             return np.asarray(zero)
         if start is not None:
-            s.count_rotations_from(start.datum)
+            s.count_rotations_from(start.reference)
         first = None if start is None else start.q
         return steady_state(s, speed, self.newton, first, self.past_limits, self.notes)
 

@@ -13,7 +13,7 @@ from rotfem.errors import ComputationError
 MORE_ENERGY = 0.03
 
 #: Energy above that of the start, relative to what is exchanged, from which steps that add to it are made in parts.
-FED = 0.003
+GAIN = 0.003
 
 
 def check_root(system: Any, stage: Stage, state: State) -> None:
@@ -41,7 +41,9 @@ def check_root(system: Any, stage: Stage, state: State) -> None:
         raise ComputationError(what, time=stage.t)
 
 
-def fed(system: Any, new: State, state: State, known: tuple[float, ...] | None) -> tuple[tuple[float, ...], bool]:
+def energy_gain(
+    system: Any, new: State, state: State, known: tuple[float, ...] | None
+) -> tuple[tuple[float, ...], bool]:
     """Return what is known of the energies, and whether a step raised an energy that is above what there can be.
 
     Nothing gives the motion energy. A scheme that does not resolve it may, a little in each step, which Newton's method
@@ -64,12 +66,12 @@ def fed(system: Any, new: State, state: State, known: tuple[float, ...] | None) 
         known = (first["jacobi"], *2 * (first["kinetic"],), *2 * (first["strain"],))
     assert known is not None
     now = energies(new)
-    datum, low_t, high_t, low_w, high_w = known
+    reference, low_t, high_t, low_w, high_w = known
     low_t, high_t = min(low_t, now["kinetic"]), max(high_t, now["kinetic"])
     low_w, high_w = min(low_w, now["strain"]), max(high_w, now["strain"])
-    too_much = now["jacobi"] - datum > FED * max(high_t - low_t, high_w - low_w)
-    feeds = too_much and now["jacobi"] > (first or energies(state))["jacobi"]
-    return (datum, low_t, high_t, low_w, high_w), feeds
+    too_much = now["jacobi"] - reference > GAIN * max(high_t - low_t, high_w - low_w)
+    gains = too_much and now["jacobi"] > (first or energies(state))["jacobi"]
+    return (reference, low_t, high_t, low_w, high_w), gains
 
 
 def turned_with_clamp(clamp: Any, state: State, stage: Stage) -> Array:

@@ -40,7 +40,7 @@ class State:
         memory: what the scheme keeps of the steps before.
         given: work (J) and angular impulse (N·m·s) that a free hub and its structure were given since t = 0, and the
             moment (N·m) of the forces from outside now; None where the hub is not free.
-        datum: what the rotations in q are counted from; None for the undeformed structure.
+        reference: what the rotations in q are counted from; None for the undeformed structure.
         balanced: whether the equations hold with q, v and a; otherwise a is that of another instant.
         inner: instants (s) within the step that led here at which the equations hold, too, and q, v, a there.
     """
@@ -51,7 +51,7 @@ class State:
     a: Array
     memory: Any = None
     given: Array | None = None
-    datum: Any = None
+    reference: Any = None
     balanced: bool = True
     inner: tuple[Instant, ...] = ()
 
@@ -64,7 +64,7 @@ class State:
             q: unknowns.
             v: their rates, where the frame does not turn with the structure.
         """
-        return cls(0.0, q, np.zeros_like(q) if v is None else v, np.zeros_like(q), datum=system.datum)
+        return cls(0.0, q, np.zeros_like(q) if v is None else v, np.zeros_like(q), reference=system.reference)
 
     def changed(self, **changes: Any) -> State:
         """Return a copy with other values."""
@@ -267,7 +267,7 @@ class Scheme(ABC):
         return {}
 
 
-class Watch(Protocol):
+class Observer(Protocol):
     """An observer of the steps of a march."""
 
     def __call__(self, old: State, new: State, leg: Any) -> None:

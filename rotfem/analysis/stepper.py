@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from rotfem.analysis.roots import came_true, check_root, fed, turned_with_clamp
-from rotfem.analysis.schemes import Array, Scheme, Shifts, Stage, State, Watch
+from rotfem.analysis.roots import came_true, check_root, energy_gain, turned_with_clamp
+from rotfem.analysis.schemes import Array, Observer, Scheme, Shifts, Stage, State
 from rotfem.analysis.turning import keep_rotations_small
 from rotfem.errors import ComputationError
-from rotfem.mechanics.courses import View
+from rotfem.mechanics.time_signals import View
 from rotfem.numerics.newton import REACH, Newton, OldFactor
 
 #: Failures in a row after which the time that passes before the next attempt grows no more.
 MOST = 5
 
 
-class Patience:
+class BackOff:
     """Attempts at something that pays where it works: after k failures in a row 2^k chances pass without one."""
 
     def __init__(self) -> None:
@@ -65,12 +65,12 @@ class StageSolver:
         newton: iteration control, shared by all steps so that it learns the quadratic constant.
 
     Attributes:
-        patience: with old factors.
+        back_off: with old factors.
     """
 
     def __init__(self, system: Any, newton: Newton):
         self.system, self.newton = system, newton
-        self._held: Shifts | None = None
+        self._factored: Shifts | None = None
         #: Matrices, and the stage that they are about.
         self._linearised: Any = None
         self._about: Stage | None = None
@@ -80,7 +80,7 @@ class StageSolver:
         self._hard = self._balanced = False
         #: Share of the last predicted move that came true.
         self._share = 1.0
-        self.patience = Patience()
+        self.back_off = BackOff()
 
     def predicted(self, stage: Stage, state: State) -> Array:
         """Return q of a stage that turns with the clamp where that moves: it is the better prediction."""
@@ -98,7 +98,7 @@ class StageSolver:
         """Return M, C and K about a stage, of None those of an earlier one if they still serve (see `Equations`)."""
         known = self._linearised
         if stage is None:
-            return known if known is not None and known.serves and known.datum is self.system.datum else None
+            return known if known is not None and known.serves and known.reference is self.system.reference else None
         self.imbalance(stage)
         self._linearised = self.system.linearised()
         self._about = replace(stage, q=stage.q.copy(), v=stage.v.copy(), a=stage.a.copy())
@@ -106,34 +106,34 @@ class StageSolver:
 
     @property
     def matrices(self) -> dict[str, Any] | None:
-        """What makes the matrices at hand again: time, q, v, a and datum that they are about, and if they serve."""
+        """What makes the matrices at hand again: time, q, v, a and reference that they are about, and if they serve."""
         if self._about is None:
             return None
         known, about = self._linearised, self._about
         at = {"t": about.t, "q": about.q, "v": about.v, "a": about.a}
-        return {**at, "datum": known.datum, "serves": known.serves}
+        return {**at, "reference": known.reference, "serves": known.serves}
 
     def make_matrices(self, known: dict[str, Any] | None) -> None:
         """Make matrices again from what is known of them (see `matrices`); nothing from None."""
         if known is not None:
-            self.system.count_rotations_from(known["datum"])
+            self.system.count_rotations_from(known["reference"])
             self.linearised(Stage(known["t"], known["q"], known["v"], known["a"], 0.0, 0.0)).serves = known["serves"]
 
     def solve(self, stage: Stage, state: State) -> None:
         """Solve a stage of a step from a state, with the factor of an earlier one if that serves."""
         factor = self._old_factor(stage)
-        if factor is not None and self.patience.over():
+        if factor is not None and self.back_off.over():
             predicted = stage.q.copy(), stage.v.copy(), stage.a.copy()
             try:
                 self._iterate(stage, state, factor)
-                if factor.made and self.newton.strayed:
+                if factor.made and self.newton.diverging:
                     check_root(self.system, stage, state)
             except ComputationError:  # the old factor does not serve here; nor will the next ones, perhaps
-                self._held = None
-                self.patience.failed()
+                self._factored = None
+                self.back_off.failed()
                 stage.q, stage.v, stage.a = predicted
             else:
-                self.patience.worked()
+                self.back_off.worked()
                 return
         if self.system.solved_at_once:
             self._iterate(stage, state)
@@ -151,7 +151,7 @@ class StageSolver:
             self._share, self._far = 0.0, True
             stage.v[:], stage.a[:] = v + stage.c_v * stage.q, a + stage.c_a * stage.q
             iterations = self._root(stage, state)
-        self._hard |= self.newton.strayed or iterations > MANY
+        self._hard |= self.newton.diverging or iterations > MANY
         self._balanced = stage.over is not None
         if self._share < WHOLE or iterations > MANY:
             self._share = came_true(self.system, stage.q - state.q, move)
@@ -161,7 +161,7 @@ class StageSolver:
 
         A nonlinear stage may begin with a new one; a long way, and a balance of energy, need one in every iteration.
         """
-        held = self._held == stage.shifts
+        held = self._factored == stage.shifts
         if not self.system.keeps_factor or self._new_factor_pays(stage.t):
             return None
         if not held and (self.system.linear or stage.over is not None or self._far or self._share < WHOLE):
@@ -171,7 +171,7 @@ class StageSolver:
     def _root(self, stage: Stage, state: State) -> int:
         """Solve a stage of a nonlinear system, see that it is the motion's and return the iterations."""
         iterations = self._iterate(stage, state)
-        if self.newton.strayed:
+        if self.newton.diverging:
             check_root(self.system, stage, state)
         return iterations
 
@@ -196,7 +196,7 @@ class StageSolver:
         def increment() -> float:
             nonlocal before, followed
             s.set_state(stage.q, stage.v, stage.a)
-            self._far |= followed >= SOON or self.newton.strayed
+            self._far |= followed >= SOON or self.newton.diverging
             is_old = factor is not None and factor.took()
             dq = s.chord() if is_old else s.correction(stage.shifts, before if self._far else None)
             followed += 1
@@ -214,7 +214,7 @@ class StageSolver:
         except ComputationError as error:
             raise ComputationError(error.what, time=stage.t, advice=error.advice) from None
         used = 0 if factor is None else factor.used
-        self._held = stage.shifts if s.keeps_factor and used <= (LONG if s.linear else NONLINEAR) else None
+        self._factored = stage.shifts if s.keeps_factor and used <= (LONG if s.linear else NONLINEAR) else None
         self._far = iterations > SOON if factor is None else factor.made > MANY
         if span is not None:
             stage.memory = s.finish(stage)
@@ -273,28 +273,28 @@ class Stepper(StageSolver):
 
     Attributes:
         substeps, rejected: steps that were halved (Newton failed, or energy rose), and adaptive ones taken back.
-        stood_in: steps that the scheme could not take, by the name of the one that did.
-        trust: in the scheme, where others may stand in for it.
+        substituted: steps that the scheme could not take, by the name of the one that did.
+        scheme_back_off: in the scheme, where others may stand in for it.
         pace: length of the next adaptive step (s), largest displacement so far (scaled), and length that the errors so
             far allow (s); None before the first.
-        watch: an observer of every step that counts; None without one.
+        observer: an observer of every step that counts; None without one.
     """
 
     def __init__(self, system: Any, scheme: Scheme, newton: Newton):
         super().__init__(system, newton)
         self.scheme = scheme
         self.substeps = self.rejected = 0
-        self.stood_in: dict[str, int] = {}
-        self.trust = Patience()
+        self.substituted: dict[str, int] = {}
+        self.scheme_back_off = BackOff()
         self.pace: tuple[float, float, float] | None = None
-        self.watch: Watch | None = None
+        self.observer: Observer | None = None
         #: Energy at the first step that was hard, and ranges of the energies that were seen since (see `fed`).
         self._exchange: tuple[float, ...] | None = None
 
     def start(self, t: float, q: Array, v: Array) -> State:
         """Return the state at t (s) with the acceleration that the equations of motion give."""
         s = self.system
-        state = State(t, q.copy(), v.copy(), np.zeros_like(q), datum=s.datum)
+        state = State(t, q.copy(), v.copy(), np.zeros_like(q), reference=s.reference)
         with seen(s, View(1)):
             s.prescribe(t, state.q, state.v, state.a)
             s.set_time(t)
@@ -312,7 +312,7 @@ class Stepper(StageSolver):
             after: how the next one does.
         """
         s, t = self.system, state.t
-        s.count_rotations_from(state.datum)
+        s.count_rotations_from(state.reference)
         with seen(s, before):
             old = s.driven(t)
         with seen(s, after):
@@ -336,7 +336,7 @@ class Stepper(StageSolver):
             given = given + np.array([0.0, self.system.row.impulse(state.t, end), 0.0])
         return state.changed(t=end, q=q, v=v, given=given)
 
-    def struck(self, state: State, h: float) -> State:
+    def after_blow(self, state: State, h: float) -> State:
         """Return a state that drifted through a blow, with the second half of its impulse from the end of the blow."""
         after = self.restart(state, View(window=(0.0, h)), View(window=(h, 0.0)))
         return after.changed(v=after.v + 0.5 * h * (after.a - state.a))
@@ -356,7 +356,7 @@ class Stepper(StageSolver):
         self._hard = False
         stages = self.scheme.solved(state, h, end, self)
         new = self.scheme.finish(state, h, stages)
-        new.datum = state.datum
+        new.reference = state.reference
         self.system.check_reach(new.q, new.t)
         new.given = self.system.given(new, state)
         return new
@@ -368,20 +368,20 @@ class Stepper(StageSolver):
             ComputationError: Newton failed at the smallest step too; says how small it was.
         """
         if keep_rotations_small(self.system, self.scheme, state, h):
-            self._held = None
-        others, failure, feeds = self.scheme.fallbacks(), None, False
-        if halvings == 0 or not others or self.trust.over():
+            self._factored = None
+        others, failure, gains = self.scheme.fallbacks(), None, False
+        if halvings == 0 or not others or self.scheme_back_off.over():
             try:
                 new = self.step(state, h, end)
             except ComputationError as error:
                 failure = error
-                self.trust.failed()
+                self.scheme_back_off.failed()
             else:
-                self.trust.worked()
-                feeds = halvings > STUBBORN and self._feeds(new, state)
-                if not feeds:
+                self.scheme_back_off.worked()
+                gains = halvings > STUBBORN and self._gains_energy(new, state)
+                if not gains:
                     return new
-        if halvings > 0 and not feeds and (stood := self._stood_in(others, state, h, end)) is not None:
+        if halvings > 0 and not gains and (stood := self._substituted(others, state, h, end)) is not None:
             return stood
         if failure is not None and (halvings == 0 or (self.system.solved_at_once and not others)):
             raise _cut_down(failure, h) if halvings == 0 else failure
@@ -389,7 +389,7 @@ class Stepper(StageSolver):
         middle = self.advance(state, h / 2, None, halvings - 1)
         return self.advance(middle, h / 2, state.t + h if end is None else end, halvings - 1).after(middle)
 
-    def _stood_in(self, others: Sequence[Scheme], state: State, h: float, end: float | None) -> State | None:
+    def _substituted(self, others: Sequence[Scheme], state: State, h: float, end: float | None) -> State | None:
         """Return the state at the end of a step that one of other schemes takes, in parts; None if none can."""
         for scheme in others:
             other = Stepper(self.system, scheme, self.newton)
@@ -400,22 +400,22 @@ class Stepper(StageSolver):
                     now = new.after(now) if part > 1 else new
             except ComputationError:
                 continue
-            self.stood_in[scheme.name] = self.stood_in.get(scheme.name, 0) + 1
+            self.substituted[scheme.name] = self.substituted.get(scheme.name, 0) + 1
             self.substeps += other.substeps
             return self.scheme.start(now)
         return None
 
-    def _feeds(self, new: State, state: State) -> bool:
+    def _gains_energy(self, new: State, state: State) -> bool:
         """Return whether a step that was hard to solve raises an energy that is too large already (see `fed`)."""
         if not self._hard or self._balanced or self.system.linear or not self.system.model.closed:
             return False
-        self._exchange, feeds = fed(self.system, new, state, self._exchange)
-        return feeds
+        self._exchange, gains = energy_gain(self.system, new, state, self._exchange)
+        return gains
 
-    def said(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """Return what a run says of its steps."""
         out = [f"{self.substeps} steps were halved where Newton failed or energy rose"] if self.substeps else []
-        for name, number in self.stood_in.items():
+        for name, number in self.substituted.items():
             taken = f"{number} steps that {self.scheme.name} could not solve were taken by {name}"
             out.append(f"{taken}: their errors are those of that scheme")
         return out

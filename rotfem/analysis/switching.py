@@ -87,7 +87,7 @@ class Switches:
 
     def _seen(self, state: State) -> Any:
         """Return time, angle, speed and the components of the tip, the arguments of the torque."""
-        self.system.count_rotations_from(state.datum)
+        self.system.count_rotations_from(state.reference)
         return np.array([state.t, state.q[-1], state.v[-1], *self.system.tip(state.q, state.t)])
 
     def _rates(self, state: State) -> list[float]:

@@ -294,9 +294,9 @@ class Farthest:
         time = self.seen[1] if from_rest else np.inf
         return self._there(system.held, partial(check.of_state, tips=tips, time=time))
 
-    def lost_digits(self) -> float | None:
+    def conditioning(self) -> float | None:
         """Return what round-off of the stiffness may have done there, relative; None where that is unknown."""
-        return self._there(self.system.held, partial(lost_digits, self.system.held))
+        return self._there(self.system.held, partial(conditioning, self.system.held))
 
     def _there(self, system: Any, of_state: Callable[[Array], T]) -> T | None:
         """Return a function of the state, with its time set; None where nothing was seen, or it fails."""
@@ -314,7 +314,7 @@ class Farthest:
             system.set_state(*state)
 
 
-def lost_digits(system: Any, q: Array) -> float:
+def conditioning(system: Any, q: Array) -> float:
     """Return a bound of the relative error that round-off of K makes in a state of a linear theory; 0 of others.
 
     K is summed once, and what rounding did to it stays: the work of its forces on a displacement q is in error by up to

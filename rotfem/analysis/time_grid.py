@@ -6,7 +6,8 @@ between which it is nearly straight. What is narrower than the distance of two s
 say where it is.
 
 A step with a breakpoint inside is taken in legs from one to the next. Where there are too many of them, those
-that matter least are passed, and the legs that pass them see the courses averaged (see `rotfem.mechanics.courses`), as
+that matter least are passed, and the legs that pass them see the signals averaged (see
+`rotfem.mechanics.time_signals`), as
 do legs that are as short as LEAST: a ramp of a microsecond is a blow.
 """
 
@@ -20,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.errors import InputError
-from rotfem.mechanics.courses import SAME, Course
+from rotfem.mechanics.time_signals import SAME, TimeSignal
 
 Array = npt.NDArray[Any]
 
@@ -33,7 +34,7 @@ CLOSE, LEAST = 1e-9, 1e-3
 #: Knots in a step from which only those are landed on that matter this many times as much as the others.
 MOST, OUTSTANDING = 4, 10.0
 
-#: Deviation of a course from a straight line over a step, as a part of its largest value, from which knots are landed
+#: Deviation of a signal from a straight line over a step, as a part of its largest value, from which knots are landed
 #: on where there are many, and from which marks are by a scheme of second order; by one of order p a power p/2 of that.
 KINKED, CURVED = 1e-3, 5e-2
 
@@ -67,7 +68,7 @@ class Leg:
         end: its last instant, s.
         length: s.
         lands: whether it ends on a knot, where it goes on with the accelerations that hold after it.
-        averaged: whether it sees the courses averaged.
+        averaged: whether it sees the signals averaged.
         drifts: whether it is too short to be solved for.
         whole: whether the step ends with it.
         plain: whether it is a step as long as the others.
@@ -92,43 +93,43 @@ class Leg:
 
 @dataclass
 class BreakpointData:
-    """A course at its breakpoints: values just before and just after each, evaluated once.
+    """A signal at its breakpoints: values just before and just after each, evaluated once.
 
     Attributes:
-        course: what is prescribed.
+        signal: what is prescribed.
         points: its knots, marks and looks in a march, s.
         before, after: values there, (n, components).
         size: largest of these, and of those at the ends of the first steps that were asked for.
     """
 
-    course: Course
+    signal: TimeSignal
     points: Array
     before: Array
     after: Array
     size: float = 0.0
 
     @classmethod
-    def of(cls, course: Course, inside: Callable[[Array], Array]) -> BreakpointData:
-        """Return the data of a course at those of its points that are inside a march; the same for the same points."""
-        points = inside(np.concatenate([course.knots, course.marks, course.looks]))
-        known: BreakpointData | None = course.data
+    def of(cls, signal: TimeSignal, inside: Callable[[Array], Array]) -> BreakpointData:
+        """Return the data of a signal at those of its points that are inside a march; the same for the same points."""
+        points = inside(np.concatenate([signal.knots, signal.marks, signal.probes]))
+        known: BreakpointData | None = signal.data
         if known is not None and np.array_equal(known.points, points):
             return replace(known, size=0.0)
         before: Array = np.empty((len(points), 0))
         after = before
         if len(points):
             fresh = np.ones(len(points), dtype=bool)
-            if course.samples is not None:
-                t, f = course.samples
+            if signal.samples is not None:
+                t, f = signal.samples
                 place = np.minimum(np.searchsorted(t, points), len(t) - 1)
-                fresh = (t[place] != points) | np.isin(points, course.knots)
+                fresh = (t[place] != points) | np.isin(points, signal.knots)
                 before, after = f[place].copy(), f[place].copy()
             if fresh.any():
-                sides = [course.values(points[fresh] * (1 + side * SAME)) for side in (-1, 1)]
+                sides = [signal.values(points[fresh] * (1 + side * SAME)) for side in (-1, 1)]
                 if fresh.all():
                     before, after = sides
                 before[fresh], after[fresh] = sides
-        course.data = found = cls(course, points, before, after)
+        signal.data = found = cls(signal, points, before, after)
         return found
 
     def inside(self, begin: float, end: float) -> slice | None:
@@ -137,7 +138,7 @@ class BreakpointData:
         return slice(i, j) if i < j else None
 
     def deviation(self, part: slice, times: Array, close: float) -> Array:
-        """Return how far the course is off the straight line over the step at each point, parts of its largest value.
+        """Return how far the signal is off the straight line over the step at each point, parts of its largest value.
 
         Args:
             part: of the points.
@@ -148,7 +149,7 @@ class BreakpointData:
         steps = np.clip(np.searchsorted(times + close, points, side="left"), 1, len(times) - 1)
         own, which = np.unique(steps, return_inverse=True)
         first, last = times[own - 1], times[own]
-        start, stop = self.course.values(first * (1 + SAME)), self.course.values(last * (1 - SAME))
+        start, stop = self.signal.values(first * (1 + SAME)), self.signal.values(last * (1 - SAME))
         share = np.clip((points - first[which]) / (last - first)[which], 0.0, 1.0)[:, None]
         chord = start[which] + share * (stop - start)[which]
         sides = [np.linalg.norm(f - chord, axis=1) for f in (before, after)]
@@ -162,19 +163,19 @@ class TimeGrid:
     """The legs of all steps.
 
     Args:
-        courses: what is prescribed.
+        signals: what is prescribed.
         times: ends of the steps, the first the start of the march, s.
         step: nominal length of a step, s.
         order: of the scheme that goes there.
         fixed: whether these are the steps that are gone, and not cells of some that adapt themselves to what is quick.
     """
 
-    def __init__(self, courses: Sequence[Course], times: Array, step: float, order: int = 2, fixed: bool = True):
+    def __init__(self, signals: Sequence[TimeSignal], times: Array, step: float, order: int = 2, fixed: bool = True):
         self.times, self.step, self.close, self.order, self.fixed = times, step, CLOSE * step, order, fixed
         self.curved = CURVED ** (order / 2)
-        for course in courses:
-            find_breakpoints(course, times)
-        self._data = [data for c in courses if len((data := BreakpointData.of(c, self._points)).points)]
+        for signal in signals:
+            find_breakpoints(signal, times)
+        self._data = [data for c in signals if len((data := BreakpointData.of(c, self._points)).points)]
         self._special: dict[int, list[Stop]] = {}
         if self._data:
             self._plan()
@@ -208,7 +209,7 @@ class TimeGrid:
         return np.array(landed), np.array(averaged).reshape(-1, 2)
 
     def bent(self, begin: float, end: float) -> float:
-        """Return how far a course is off a straight line over a stretch (s), as a part of its largest value."""
+        """Return how far a signal is off a straight line over a stretch (s), as a part of its largest value."""
         ends = np.array([begin, end])
         parts = [(data, part) for data in self._data if (part := data.inside(begin, end)) is not None]
         return max((float(data.deviation(part, ends, self.close).max()) for data, part in parts), default=0.0)
@@ -223,11 +224,11 @@ class TimeGrid:
     def _quick(self) -> Array:
         """Return rows (begin, end) of the stretches (s) between marks that are smooth, but not within a step."""
         rows = [np.empty((0, 2))]
-        for course in (d.course for d in self._data) if self.fixed and self.order <= AVERAGING else ():
-            if len(looks := course.looks):
-                begin, end = course.marks[:-1], course.marks[1:]
-                first, last = np.maximum(begin, looks - 0.5 * self.step), np.minimum(end, looks + 0.5 * self.step)
-                start, middle, stop = (course.values(t) for t in (first * (1 + SAME), looks, last * (1 - SAME)))
+        for signal in (d.signal for d in self._data) if self.fixed and self.order <= AVERAGING else ():
+            if len(probes := signal.probes):
+                begin, end = signal.marks[:-1], signal.marks[1:]
+                first, last = np.maximum(begin, probes - 0.5 * self.step), np.minimum(end, probes + 0.5 * self.step)
+                start, middle, stop = (signal.values(t) for t in (first * (1 + SAME), probes, last * (1 - SAME)))
                 off = np.linalg.norm(middle - 0.5 * (start + stop), axis=1)
                 size = float(np.linalg.norm([start, middle, stop], axis=2).max())
                 rows.append(np.column_stack([begin, end])[off > SMOOTH * size])
@@ -241,8 +242,8 @@ class TimeGrid:
     def _plan(self) -> None:
         """Choose landings, and which legs are averaged."""
         n = len(self.times) - 1
-        sharp = self._points(np.concatenate([d.course.knots for d in self._data]))
-        soft = self._points(np.concatenate([d.course.marks for d in self._data]))
+        sharp = self._points(np.concatenate([d.signal.knots for d in self._data]))
+        soft = self._points(np.concatenate([d.signal.marks for d in self._data]))
         points = np.unique(np.concatenate([d.points for d in self._data]))
         off, weight = np.zeros(n + 1), np.zeros(len(points))
         for data in self._data:
@@ -303,53 +304,53 @@ class TimeGrid:
                 allowed = KINKED if np.any(passes & kinks) else CURVED
                 averaged = np.any(passes) and (off[i] if len(stops) == 1 else self.bent(begin, stop)) > allowed
                 averaged |= np.any((quick[:, 0] < stop - self.close) & (quick[:, 1] > begin + self.close))
-                stretch = np.searchsorted(edges, 0.5 * (begin + stop)) % 2 == 1
-                legs.append((stop, stop in landed, bool(averaged or stretch)))
+                window = np.searchsorted(edges, 0.5 * (begin + stop)) % 2 == 1
+                legs.append((stop, stop in landed, bool(averaged or window)))
                 begin = stop
 
 
 # --- breakpoints of functions ---------------------------------------------------------------------------------------
 
 
-def find_breakpoints(course: Course, times: Array) -> None:
-    """Find the knots and marks of a course that are not known, between the ends of steps (s).
+def find_breakpoints(signal: TimeSignal, times: Array) -> None:
+    """Find the knots and marks of a signal that are not known, between the ends of steps (s).
 
     Raises:
         InputError: it, or its rate, jumps and must not (see `Course.continuous`).
     """
-    if course.known:
+    if signal.known:
         return
-    course.known = True
-    if course.continuous > 1:
-        check_bends(course, times)
+    signal.known = True
+    if signal.continuous > 1:
+        check_bends(signal, times)
         return
     number = int(np.clip(SAMPLES // (len(times) - 1), FEWEST, DENSEST))
     shares = np.arange(number) / number
     t = np.append((times[:-1, None] + np.diff(times)[:, None] * shares).ravel(), times[-1])
-    f = course.values(t)
+    f = signal.values(t)
     size = float(np.abs(f).max())
     if not size > 0.0:
         return
-    knots = _jumps(course, t, f, size)
-    if len(knots) and course.continuous:
+    knots = _jumps(signal, t, f, size)
+    if len(knots) and signal.continuous:
         raise InputError(
-            course.name,
+            signal.name,
             None,
             f"jumps at t = {knots[0]:.9g} s; a speed that changes at once takes a force without bound: give a ramp",
         )
-    course.knots = np.union1d(course.knots, knots)
-    course.marks = np.union1d(course.marks, _fast(t, f, number, size))
+    signal.knots = np.union1d(signal.knots, knots)
+    signal.marks = np.union1d(signal.marks, _fast(t, f, number, size))
     sides = np.concatenate([knots * (1 - SAME), knots * (1 + SAME)])
     if len(sides):
-        t, f = np.concatenate([t, sides]), np.concatenate([f, course.values(sides)])
+        t, f = np.concatenate([t, sides]), np.concatenate([f, signal.values(sides)])
     order = np.argsort(t, kind="stable")
-    course.samples = t[order], f[order]
+    signal.samples = t[order], f[order]
 
 
-def check_bends(course: Course, times: Array) -> None:
-    """Refuse a course with a kink or a jump, looked for between the ends of steps (s).
+def check_bends(signal: TimeSignal, times: Array) -> None:
+    """Refuse a signal with a kink or a jump, looked for between the ends of steps (s).
 
-    Where the slope changes much between two samples, it is followed to ever shorter intervals: that of a smooth course
+    Where the slope changes much between two samples, it is followed to ever shorter intervals: that of a smooth signal
     changes by a part of it there, at a kink by all of it, at a jump by more.
 
     Raises:
@@ -357,28 +358,28 @@ def check_bends(course: Course, times: Array) -> None:
     """
     number = int(np.clip(SAMPLES // (len(times) - 1), FEWEST, DENSEST))
     t = np.linspace(times[0], times[-1], number * (len(times) - 1) + 1)
-    values = course.values(t)[:, 0]
+    values = signal.values(t)[:, 0]
     slopes, noise = np.diff(values) / np.diff(t), ROUND_OFF * float(np.abs(values).max())
     changes, size = np.abs(np.diff(slopes)), float(np.abs(slopes).max())
     steep = np.flatnonzero(changes > STEEP * size)
     for i in steep[np.argsort(-changes[steep])][:BENDS]:
-        where, depth = _followed(course, (float(t[i]), float(t[i + 2])), float(changes[i]), noise)
+        where, depth = _followed(signal, (float(t[i]), float(t[i + 2])), float(changes[i]), noise)
         if depth >= SURE:
             raise InputError(
-                course.name,
+                signal.name,
                 None,
                 f"its rate jumps at t = {where:.9g} s, which takes a moment without bound: round it off",
             )
 
 
-def _followed(course: Course, interval: tuple[float, float], change: float, noise: float) -> tuple[float, int]:
+def _followed(signal: TimeSignal, interval: tuple[float, float], change: float, noise: float) -> tuple[float, int]:
     """Return where a change of slope in an interval (s) is, and how often that can be refined; 0 where it is none."""
     first, last = interval
     for depth in range(REFINEMENTS):
         inner = np.asarray(np.linspace(first, last, PARTS + 1))
         if noise > 0.1 * change * (inner[1] - inner[0]):
             return 0.5 * (first + last), depth
-        bends = np.abs(np.diff(np.diff(course.values(inner)[:, 0]) / np.diff(inner)))
+        bends = np.abs(np.diff(np.diff(signal.values(inner)[:, 0]) / np.diff(inner)))
         k = int(np.argmax(bends))
         if bends[k] < SLOPE_LEFT * change:
             return 0.5 * (first + last), 0
@@ -386,8 +387,8 @@ def _followed(course: Course, interval: tuple[float, float], change: float, nois
     return 0.5 * (first + last), REFINEMENTS
 
 
-def _jumps(course: Course, t: Array, f: Array, size: float) -> Array:
-    """Return the instants at which a course jumps, of the samples at t (n,) that gave f (n, components)."""
+def _jumps(signal: TimeSignal, t: Array, f: Array, size: float) -> Array:
+    """Return the instants at which a signal jumps, of the samples at t (n,) that gave f (n, components)."""
     change = np.linalg.norm(np.diff(f, axis=0), axis=1)
     steep = np.flatnonzero(change > STEEP * size)
     found = []
@@ -398,7 +399,7 @@ def _jumps(course: Course, t: Array, f: Array, size: float) -> Array:
             middle = 0.5 * (a + b)
             if not a < middle < b:
                 break
-            f_m = course.values(np.array([middle]))[0]
+            f_m = signal.values(np.array([middle]))[0]
             if np.linalg.norm(f_m - f_a) >= np.linalg.norm(f_b - f_m):
                 b, f_b = middle, f_m
             else:

@@ -19,15 +19,15 @@ def keep_rotations_small(system: Any, scheme: Scheme, state: State, h: float) ->
     turns = system.structure.turns
     if turns is None:
         return False
-    system.count_rotations_from(state.datum)
+    system.count_rotations_from(state.reference)
     if not turns.is_due(state.q, state.v, h):
         return False
     is_rate = isinstance(state.memory, np.ndarray) and state.memory.shape == state.a.shape
     q, v, a = state.q.copy(), state.v.copy(), state.a.copy()
     second = [a, state.memory.copy()] if is_rate else [a]
-    datum = turns.reset(q, v, second)
-    system.count_rotations_from(datum)
-    state.q, state.v, state.a, state.datum = q, v, a, datum
+    reference = turns.reset(q, v, second)
+    system.count_rotations_from(reference)
+    state.q, state.v, state.a, state.reference = q, v, a, reference
     state.memory = second[-1] if is_rate else scheme.start(state.changed(memory=None)).memory
     return True
 

@@ -17,7 +17,7 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
 from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.error_report import error_of_modes
-from rotfem.commands.loads import held
+from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
 from rotfem.commands.modes import analysis_of, hints_of, theory_error
 from rotfem.commands.monitor import check_rows
@@ -162,7 +162,11 @@ class Diagram:
         of_last = {} if mesh is None else dict(zip(sweep.nodes[-1].order, mesh, strict=False))
         known = None if mesh is None else [of_last.get(i) for i in range(len(last.pairs.values))]
         ends = mode_rows(analysis, last, known)
-        warnings = [*advice(analysis, fastest), *held(self.analysis.problem), *told(sweep, labels, onsets, ends)]
+        warnings = [
+            *advice(analysis, fastest),
+            *frozen_inputs(self.analysis.problem),
+            *remarks(sweep, labels, onsets, ends),
+        ]
         off = theory_error(analysis, last)
         warnings += [off.warning()] if off and off.warning() else []
         summary = {
@@ -185,7 +189,7 @@ class Diagram:
         return CampbellResult(summary, rows)
 
 
-def told(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends: list[dict[str, Any]]) -> list[str]:
+def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends: list[dict[str, Any]]) -> list[str]:
     """Return warnings of branches that were lost or are unsure, and of instabilities.
 
     Args:

@@ -29,8 +29,8 @@ from rotfem.errors import SceneError
 from rotfem.refinement.companion import Companion, Followed
 from rotfem.refinement.refine import Setting
 from rotfem.scene import Scene, Time
-from rotfem.structures.datum import Datum
 from rotfem.structures.numbering import Numbering
+from rotfem.structures.reference_rotation import ReferenceRotation
 from rotfem.version import versions
 
 #: Positions of nodes that differ by this part of the structure's size are those of another mesh.
@@ -43,7 +43,7 @@ GIVEN = (3,)
 OF_LOG, OF_MONITOR = ("steps", "warnings", "resumed"), ("since",)
 
 #: By class, attributes that a run makes anew or that have a place of their own in a checkpoint.
-_STEPPER = ("system", "newton", "patience", "scheme", "trust", "watch", "_linearised", "_about")
+_STEPPER = ("system", "newton", "back_off", "scheme", "scheme_back_off", "observer", "_linearised", "_about")
 APART = {
     "Stepper": _STEPPER,
     "FollowingStepper": (*_STEPPER, "followed", "carried", "differences", "_there"),
@@ -68,12 +68,12 @@ def identity(scene: Scene, terms: Mapping[str, Any], outputs: Mapping[str, Any])
     """Return all that a run depends on, but for its end: scene, content of a mesh file, names of what scripts added."""
     mesh = scene.structure.mesh_file
     content = None if mesh is None else hashlib.sha256(Path(mesh).read_bytes()).hexdigest()
-    tables = told(scene.digest())
+    tables = comparable(scene.digest())
     tables.get("time", {}).pop("end", None)
     return {"scene": tables, "mesh": content, "terms": sorted(terms), "outputs": sorted(outputs)}
 
 
-def told(scene: Any) -> Any:
+def comparable(scene: Any) -> Any:
     """Return the tables of a scene as a file has them, without those that nothing computed depends on."""
     tables = json.loads(json.dumps(scene, default=str))
     return {k: v for k, v in tables.items() if k not in ("name", "limits")} if isinstance(tables, dict) else tables
@@ -401,8 +401,8 @@ def check_state(system: Any, stepper: Stepper, state: State) -> None:
         raise ValueError("state")
     if (state.given is None) != (system.hub is None) or (state.given is not None and state.given.shape != GIVEN):
         raise ValueError("given")
-    if not suits(state.datum, Datum | None):
-        raise ValueError("datum")
+    if not suits(state.reference, ReferenceRotation | None):
+        raise ValueError("reference")
     memory, first = state.memory, stepper.scheme.start(state.changed(memory=None)).memory
     kinds = (type(first),) if first is not None else (stepper.scheme.remembers, tuple, type(None))
     arrays = [x for x in (*vars(memory).values(),) if isinstance(x, np.ndarray)] if is_dataclass(memory) else [memory]
@@ -427,9 +427,9 @@ def restored(system: Any, factored: Any, state: State) -> None:
     if factored is not None:
         check_motion(system.held, factored)
         alike((0.0, 0.0, 0.0), tuple(factored["shifts"]), "shifts")
-    system.held.count_rotations_from(state.datum)
+    system.held.count_rotations_from(state.reference)
     system.held.refactor(factored)
-    system.held.count_rotations_from(state.datum)
+    system.held.count_rotations_from(state.reference)
     system.set_time(state.t)
 
 
@@ -461,7 +461,12 @@ def suits(value: Any, hint: Any) -> bool:
 
 def learning(stepper: Stepper) -> dict[str, Any]:
     """Return a stepper and its parts that learn from its steps, by name."""
-    return {"own": stepper, "newton": stepper.newton, "patience": stepper.patience, "trust": stepper.trust}
+    return {
+        "own": stepper,
+        "newton": stepper.newton,
+        "back_off": stepper.back_off,
+        "scheme_back_off": stepper.scheme_back_off,
+    }
 
 
 def of_stepper(stepper: Stepper, packing: Packing) -> Tree:
@@ -482,7 +487,7 @@ def put_back_stepper(stepper: Stepper, packing: Packing, tree: Tree, state: Stat
     if matrices is not None:
         check_motion(stepper.system, matrices)
     stepper.make_matrices(matrices)
-    stepper.system.held.count_rotations_from(state.datum)
+    stepper.system.held.count_rotations_from(state.reference)
     stepper.system.set_time(state.t)
     for name, part in learning(stepper).items():
         vars(part).update(tree[name])

@@ -37,12 +37,12 @@ def run(
     resume: Annotated[bool, typer.Option("--resume", help="go on from the checkpoint in the result folder")] = False,
 ) -> None:
     """Compute the steady state or the time history of SCENE."""
-    from rotfem.commands.keeper import Interval, Keeper
     from rotfem.commands.run import simulate
+    from rotfem.commands.run_store import Interval, RunStore
 
     every = None if checkpoint is None else Interval.of(checkpoint)
-    keeper = Keeper(todo.session.comm, todo.results, every, resume)
-    if resume and (summary := keeper.finished(todo.scene)):
+    store = RunStore(todo.session.comm, todo.results, every, resume)
+    if resume and (summary := store.finished(todo.scene)):
         todo.session.print_json(summary)
         todo.session.say(
             [f"{todo.results.path} holds the finished run already; a later time.end is what --resume can go on to"]
@@ -50,7 +50,7 @@ def run(
         return
     bar = todo.progress()
     with bar as progress:
-        result = simulate(todo.scene, keeper, progress, todo.hint if todo.scene.accuracy is None else bar.says)
+        result = simulate(todo.scene, store, progress, todo.hint if todo.scene.accuracy is None else bar.says)
     todo.finish(result, run_report)
 
 

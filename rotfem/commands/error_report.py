@@ -98,18 +98,18 @@ class RunErrors:
             return None
         of = output_of(self.scene)
         scale = largest(np.column_stack([x for name, x in self.history.items() if name.startswith(COLUMNS[of])]))
-        shares: dict[str, float | None] = {"time": None, "space": None}
+        contributions: dict[str, float | None] = {"time": None, "space": None}
         found: dict[str, Any] = {"scale": scale}
         if self.reduced is not None:
             time = self.reduced.time_error + self.reduced.basis_error
-            shares = {"time": time, "space": self._space_of_reduced(scale)}
+            contributions = {"time": time, "space": self._space_of_reduced(scale)}
         elif self.shape is not None:
             space = error_of_shape(self.problem, self.system, self.shape, self._resting, OUTPUTS[of])
-            shares = {"time": 0.0, "space": space}
+            contributions = {"time": 0.0, "space": space}
         elif self.companions is not None:
-            shares = self.companions.errors(scale)
+            contributions = self.companions.errors(scale)
             found["time_at"] = self.companions.steps.difference[1]
-        return ErrorEstimate({**shares, "model": None if self.theory is None else self.theory.estimate}, found)
+        return ErrorEstimate({**contributions, "model": None if self.theory is None else self.theory.estimate}, found)
 
     @cached_property
     def theory(self) -> TheoryError | None:
@@ -205,13 +205,13 @@ class RunErrors:
         tolerance = None if scene.time is None else scene.time.tolerance
         if scene.accuracy is not None:  # what asked for it says what was reached
             return []
-        unknown = [word for name, word in UNKNOWN.items() if error.shares[name] is None]
+        unknown = [word for name, word in UNKNOWN.items() if error.contributions[name] is None]
         said = (
             [f"the error by the {' and the '.join(unknown)} is unknown: {self._why_unknown(error)}"] if unknown else []
         )
         if not error.exceeds(max(WANTED, scene.model.tolerance or 0.0, tolerance or 0.0)):
             return said
-        steps, mesh, model = (error.shares[name] or 0.0 for name in ("time", "space", "model"))
+        steps, mesh, model = (error.contributions[name] or 0.0 for name in ("time", "space", "model"))
         if steps + mesh <= WANTED and self.theory is not None and self.theory.warning():
             return said
         cures = []
@@ -221,8 +221,12 @@ class RunErrors:
             cures.append("a higher mesh.degree" if scene.structure.mesh_file else "more mesh.elements")
         if model >= WANTED / 2:
             cures.append("a richer theory")
-        shares = {"steps": steps, "mesh": mesh, "model": model}
-        named = [f"{percent(share)} by the {n}" for n, share in shares.items() if share > NAMED * sum(shares.values())]
+        contributions = {"steps": steps, "mesh": mesh, "model": model}
+        named = [
+            f"{percent(share)} by the {n}"
+            for n, share in contributions.items()
+            if share > NAMED * sum(contributions.values())
+        ]
         off = (
             f"the tip may be off by {percent(error.total)} of its largest displacement (estimated: {', '.join(named)})"
         )
@@ -230,9 +234,9 @@ class RunErrors:
 
     def _why_unknown(self, error: ErrorEstimate) -> str:
         """Return why a contribution is unknown."""
-        if self.companions is None and error.shares["space"] is None:
+        if self.companions is None and error.contributions["space"] is None:
             return "there is no other mesh to compare with"
-        if self.companions is None or error.shares["time"] is not None:
+        if self.companions is None or error.contributions["time"] is not None:
             return "the same in a richer theory fails"
         if self.companions.steps.sound:
             return "what is prescribed leaves no room for steps of twice the length"

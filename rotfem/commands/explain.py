@@ -11,7 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from rotfem.analysis.march import Steps
-from rotfem.commands.loads import held
+from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.modes import modes
 from rotfem.commands.problem import Problem, first_motion, scheme_of
 from rotfem.commands.run import run
@@ -126,7 +126,7 @@ def doubts(scene: Scene, of: Explanation) -> list[str]:
     """Return warnings about what the estimates are of."""
     out = [f"{name} of {of.problem.theory.name} cannot be computed: {what}" for name, what in of.failed.items()]
     if MODES in of.wanted:
-        out += [f"modes: {line}" for line in held(of.problem)]
+        out += [f"modes: {line}" for line in frozen_inputs(of.problem)]
     if scene.model.frame == "inertial":
         out.append("estimates are of the rotating frame, where the same physics is a sum of effects")
     return out

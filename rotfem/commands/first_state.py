@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.constant_conditions import act_at_start, are_constant, stability_ahead
+from rotfem.analysis.constant_conditions import act_at_start, are_constant, constant_stability
 from rotfem.analysis.equilibrium import static_tip_shape, steady_state
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.stability import Stability, stability_of
@@ -71,7 +71,7 @@ def first_state(scene: Scene, problem: Problem, system: Any, judged: bool = True
     start, motion = _shape(scene, problem, system, judged), first_motion(scene)
     if motion is not None:
         analysis = ModalAnalysis(problem, scene.initial.state, comm=system.comm, system=system)
-        start.q, start.v = motion.beside(start.q, analysis, Newton.of(scene.solver))
+        start.q, start.v = motion.about(start.q, analysis, Newton.of(scene.solver))
     return start
 
 
@@ -80,7 +80,7 @@ def _shape(scene: Scene, problem: Problem, system: Any, judged: bool) -> Start:
     initial, solver = scene.initial, scene.solver
     if initial.state == "steady":
         return _equilibrium(scene, problem, system, judged)
-    start = Start(stability=stability_ahead(system, Newton.of(solver)) if judged else None)
+    start = Start(stability=constant_stability(system, Newton.of(solver)) if judged else None)
     if start.stability is not None and (said := start.stability.warning()):
         start.warnings.append(f"what constant conditions hold in balance: {said}")
     if initial.tip_displacement is not None:

@@ -12,10 +12,10 @@ import numpy.typing as npt
 
 from rotfem.analysis.equilibrium import gravity_turns
 from rotfem.errors import InputError
-from rotfem.mechanics.courses import TINY
 from rotfem.mechanics.loads import WHOLE, AnyLoad, Load, Loads, PlaceLoad, PointLoads, Shapes, Term, named, replaced
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
+from rotfem.mechanics.time_signals import TINY
 from rotfem.scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -90,15 +90,15 @@ def _probes(structure: Any) -> tuple[Any, ...]:
     return tuple((float(s), 0.0) if structure.type == "plate" else float(s) for s in x)
 
 
-def held(problem: Problem) -> list[str]:
+def frozen_inputs(problem: Problem) -> list[str]:
     """Return warnings where what is computed at one time, as modes are, has pitch, gravity and loads as at t = 0."""
     given = {name: load.unpitched or load for name, load in named(problem.loads).items()}
     names = [f"loads.{name}" for name, load in given.items() if not (load.constant or load.is_zero)]
     said = [f"{', '.join(names)} {'change' if len(names) > 1 else 'changes'} with time: taken as at t = 0"]
-    return [*held_in_frame(problem), *(said if names else [])]
+    return [*frozen_in_frame(problem), *(said if names else [])]
 
 
-def held_in_frame(problem: Problem) -> list[str]:
+def frozen_in_frame(problem: Problem) -> list[str]:
     """Return the same of pitch and gravity."""
     found = {
         "structure.root.pitch changes with time": problem.motion.pitch is not None,

@@ -22,7 +22,7 @@ from rotfem.analysis.stability import Stability, stability_of_pencil
 from rotfem.analysis.theory_error import TheoryCheck, TheoryError
 from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.error_report import error_of_modes
-from rotfem.commands.loads import held
+from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.mode_tables import mode_tables
 from rotfem.commands.monitor import check_rows
 from rotfem.commands.problem import Problem
@@ -104,7 +104,7 @@ def _modes(
     check_rows(found.rows)
     spinning = found.spinning
     stability, off = stability_of_pencil(spinning.pencil, spinning.clamped), theory_error(analysis, spinning)
-    warnings = [*held(problem), *analysis.notes, *found.warnings]
+    warnings = [*frozen_inputs(problem), *analysis.notes, *found.warnings]
     warnings += [*_of_stability(stability, found.rows), *([off.warning()] if off and off.warning() else [])]
     result = {
         **modal_summary("modes", analysis, scene, started),

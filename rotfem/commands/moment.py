@@ -29,7 +29,7 @@ class Moment:
     @property
     def tip(self) -> dict[str, float]:
         """The unknowns at the tip, relative to the turning frame: u1, u2, … (m), alpha, … (rad)."""
-        self.system.count_rotations_from(self.state.datum)
+        self.system.count_rotations_from(self.state.reference)
         values = self.system.tip(self.state.q, self.t)
         return dict(zip(self.system.structure.components, map(float, values), strict=True))
 
@@ -76,7 +76,7 @@ class Moment:
 
     def _set(self) -> Any:
         """Write the state into the system."""
-        self.system.count_rotations_from(self.state.datum)
+        self.system.count_rotations_from(self.state.reference)
         self.system.set_time(self.t)
         write_state(self.system, self.state)
         return self.system
@@ -111,16 +111,16 @@ def first_shape(system: Any, start: Array | Moment | None) -> Array | None:
     """
     if start is None:
         return None
-    held, datum = system.held, None
+    held, reference = system.held, None
     q = np.asarray(start.state.q if isinstance(start, Moment) else start)
     if isinstance(start, Moment):
-        source, datum = start.system.held, start.state.datum
+        source, reference = start.system.held, start.state.reference
         q = q[: len(source.zeros())]
-        if datum is not None and held.structure.turns is None:
-            source.count_rotations_from(datum)
-            q, datum = source.structure.total(q), None
+        if reference is not None and held.structure.turns is None:
+            source.count_rotations_from(reference)
+            q, reference = source.structure.total(q), None
     if q.shape != held.zeros().shape:
         allowed = f"must have the {len(held.zeros())} unknowns of this structure and mesh on this process"
         raise InputError("start", f"{q.size} unknowns", allowed)
-    held.count_rotations_from(datum)
+    held.count_rotations_from(reference)
     return q

@@ -121,7 +121,7 @@ def _growth(constant: Array, moving: Array, between: bool) -> float:
     return grown / exchanged if exchanged > ROUND_OFF * np.max(np.abs(moving)) and grown > 0.0 else 0.0
 
 
-def said(system: Any, history: dict[str, Array], between: bool = False) -> str:
+def energy_warning(system: Any, history: dict[str, Array], between: bool = False) -> str:
     """Return what a run says of energy that came from nowhere; nothing where something gives it, or none came.
 
     Args:
@@ -169,7 +169,7 @@ def with_cause(
     error: ComputationError, system: Any, history: dict[str, Array], between: bool = False
 ) -> ComputationError:
     """Return a failure of a history, with the energy that it had gained before as its cause."""
-    cause = said(system, history, between)
+    cause = energy_warning(system, history, between)
     if not cause or type(error) is not ComputationError:
         return error
     why, _, advice = cause.partition("; ")

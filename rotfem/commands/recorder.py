@@ -254,7 +254,7 @@ class Recorder:
         """Return a result with the last shape and the fields kept."""
         structure = self.system.structure
         if self._last is not None:  # a state after it may have been refused
-            self.system.count_rotations_from(self._last.datum)
+            self.system.count_rotations_from(self._last.reference)
             self.system.set_time(self._last.t)
             self.system.set_state(self._last.q, self._last.v, self._last.a)
         shape = self.system.shape() if len(self.history) else {}

@@ -26,7 +26,7 @@ from rotfem.analysis.frequency_response import (
 )
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.stability import stability_of_pencil
-from rotfem.commands.loads import SWEPT, held_in_frame, swept_loads
+from rotfem.commands.loads import SWEPT, frozen_in_frame, swept_loads
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
 from rotfem.commands.modes import analysis_of, theory_error
 from rotfem.commands.problem import Problem
@@ -174,7 +174,7 @@ def result_of(
     modes = mode_rows(analysis, spinning)
     stability, theory = stability_of_pencil(spinning.pencil, spinning.clamped), theory_error(analysis, spinning)
     warnings = [
-        *held_in_frame(analysis.problem),
+        *frozen_in_frame(analysis.problem),
         *analysis.notes,
         *advice(analysis, spinning.speed),
         *instabilities(modes),
@@ -183,7 +183,7 @@ def result_of(
     warnings += [stability.warning()] if not stability.stable else []
     warnings += [theory.warning()] if theory and theory.warning() else []
     usual = float(np.median(off))
-    warnings += [*told(modes, undamped, usual, scene.modes.count), *not_pursued(scene)]
+    warnings += [*remarks(modes, undamped, usual, scene.modes.count), *not_pursued(scene)]
     summary = {
         **modal_summary("response", analysis, scene, started),
         "speed": spinning.speed,
@@ -242,7 +242,7 @@ def not_pursued(scene: Scene) -> list[str]:
     return [f"{name} is not pursued: a frequency response is of the scene's own model and mesh" for name in names]
 
 
-def told(modes: Sequence[Mapping[str, Any]], undamped: Sequence[int], off: float, count: int) -> list[str]:
+def remarks(modes: Sequence[Mapping[str, Any]], undamped: Sequence[int], off: float, count: int) -> list[str]:
     """Return warnings of modes without damping, and of a response by too few modes."""
     out = []
     if undamped:

@@ -10,9 +10,9 @@ from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady
 from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy, within_tolerance
-from rotfem.commands.keeper import Interval, Keeper
 from rotfem.commands.problem import Problem
 from rotfem.commands.result_folder import ResultFolder
+from rotfem.commands.run_store import Interval, RunStore
 from rotfem.commands.simulation import Simulation
 from rotfem.errors import ComputationError, Stopped, input_of
 from rotfem.listeners import Hint, Progress, silent
@@ -57,10 +57,10 @@ def run(
     scene = as_scene(scene)
     every = None if checkpoint is None else Interval.of(checkpoint)
     if folder is None:
-        return simulate(scene, Keeper(comm, None, every, resume), progress, hint, terms, outputs)
+        return simulate(scene, RunStore(comm, None, every, resume), progress, hint, terms, outputs)
     with ResultFolder(comm, Path(folder), "run", scene.inputs) as results:
         try:
-            done = simulate(scene, Keeper(comm, results, every, resume), progress, hint, terms, outputs)
+            done = simulate(scene, RunStore(comm, results, every, resume), progress, hint, terms, outputs)
         except (ComputationError, Stopped) as error:
             if error.result is not None:
                 results.write(error.result, plots=False)
@@ -73,32 +73,32 @@ def run(
 
 def simulate(
     scene: Scene,
-    keeper: Keeper,
+    store: RunStore,
     progress: Progress | None,
     hint: Hint | None,
     terms: Mapping[str, Work] | None = None,
     outputs: Mapping[str, Functional] | None = None,
 ) -> RunResult:
     """Return the result of a scene (see `run`), with what is kept of it on disk while it goes on."""
-    comm = keeper.comm
+    comm = store.comm
     scene.check_run()
-    keeper.open(scene, terms or {}, outputs or {})
+    store.open(scene, terms or {}, outputs or {})
     problem = Problem.of(scene, terms=terms, outputs=outputs)
     with input_of(scene.file):
         if scene.time is None:
             check_steady(problem)
         if scene.accuracy is not None:
-            return run_to_accuracy(scene, keeper, (progress, hint), terms, outputs)
+            return run_to_accuracy(scene, store, (progress, hint), terms, outputs)
         if scene.model.tolerance is not None:
-            return run_within_tolerance(scene, keeper, (progress, hint), terms, outputs)
-        simulation = Simulation(scene, problem, comm, keeper=keeper)
+            return run_within_tolerance(scene, store, (progress, hint), terms, outputs)
+        simulation = Simulation(scene, problem, comm, store=store)
         simulation.advise(hint)
         return simulation.run(progress)
 
 
 def run_to_accuracy(
     scene: Scene,
-    keeper: Keeper,
+    store: RunStore,
     listeners: tuple[Progress | None, Hint | None],
     terms: Mapping[str, Work] | None,
     outputs: Mapping[str, Functional] | None,
@@ -111,19 +111,19 @@ def run_to_accuracy(
     """
     refuse(scene, ("tip", ROOT_MOMENT), "run")
     progress, hint = listeners
-    clock = Clock(scene.accuracy_budget, keeper.comm, hint)
+    clock = Clock(scene.accuracy_budget, store.comm, hint)
 
     def compute(setting: Setting) -> RunResult:
         variant = scene.replace(changes_of(scene, setting))
         problem = Problem.of(variant, terms=terms, outputs=outputs)
-        return Simulation(variant, problem, keeper.comm, keeper=keeper, setting=setting, clock=clock).run(progress)
+        return Simulation(variant, problem, store.comm, store=store, setting=setting, clock=clock).run(progress)
 
-    return to_accuracy(scene, keeper.setting() or first_setting(scene), compute, clock)
+    return to_accuracy(scene, store.setting() or first_setting(scene), compute, clock)
 
 
 def run_within_tolerance(
     scene: Scene,
-    keeper: Keeper,
+    store: RunStore,
     listeners: tuple[Progress | None, Hint | None],
     terms: Mapping[str, Work] | None,
     outputs: Mapping[str, Functional] | None,
@@ -138,8 +138,8 @@ def run_within_tolerance(
     def compute(setting: Setting) -> RunResult:
         variant = scene.replace(setting.changes())
         problem = Problem.of(variant, terms=terms, outputs=outputs)
-        simulation = Simulation(variant, problem, keeper.comm, keeper=keeper, setting=setting)
+        simulation = Simulation(variant, problem, store.comm, store=store, setting=setting)
         simulation.advise(hint)
         return simulation.run(progress)
 
-    return within_tolerance(scene, compute, keeper.comm, keeper.setting())
+    return within_tolerance(scene, compute, store.comm, store.setting())

@@ -25,12 +25,12 @@ from rotfem.commands.checkpoint import Log, Parts
 from rotfem.commands.error_report import RunErrors, output_of
 from rotfem.commands.first_state import Start, first_state, hints_of_start
 from rotfem.commands.interrupts import together
-from rotfem.commands.keeper import Keeper
-from rotfem.commands.loads import held
+from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.monitor import Monitor
 from rotfem.commands.problem import scheme_of
 from rotfem.commands.recorder import Recorder
 from rotfem.commands.reduced_history import reduced_history
+from rotfem.commands.run_store import RunStore
 from rotfem.commands.summary import summary, timings
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, Stopped
@@ -56,7 +56,7 @@ class Simulation:
         scene: the scene as it was asked for.
         problem: its problem, with the model it is run with.
         comm: MPI communicator.
-        keeper: what is kept of it on disk while it goes on.
+        store: what is kept of it on disk while it goes on.
         setting: of the refinement that it is an answer of, if it is.
         clock: called with the number of steps and the part of the history that is done.
     """
@@ -66,12 +66,12 @@ class Simulation:
         scene: Scene,
         problem: Problem,
         comm: MPI.Comm = MPI.COMM_WORLD,
-        keeper: Keeper | None = None,
+        store: RunStore | None = None,
         setting: Setting | None = None,
         clock: Callable[[int, float], None] | None = None,
     ):
         self.scene, self.setting, self.clock = scene, setting, clock
-        self.keeper, self.log = keeper or Keeper(comm), Log()
+        self.store, self.log = store or RunStore(comm), Log()
         if scene.time is None and problem.frame == "inertial":
             problem = problem.replace(frame="rotating")
             self.log.warnings.append("a steady state is one only in the rotating frame, where it was computed")
@@ -110,7 +110,7 @@ class Simulation:
             if self.scene.time is None:
                 self._steady()
             else:
-                self.start = Start() if self.keeper.goes_on else self._start(self.system)
+                self.start = Start() if self.store.goes_on else self._start(self.system)
                 self.monitor.stability = self.start.stability
                 self.log.warnings += self.start.warnings
                 if not (self.scene.model.reduced and self._by_reduced_model(progress)):
@@ -130,7 +130,7 @@ class Simulation:
     def _steady(self) -> None:
         """Compute the equilibrium at the speed of t = 0."""
         system, log, speed = self.system, self.log, self.problem.motion.speed(0.0)
-        log.warnings += held(self.problem)
+        log.warnings += frozen_inputs(self.problem)
         past_limits = self.scene.solver.past_limits
         self.shape = steady_state(system, speed, self.iteration, past_limits=past_limits, notes=log.warnings)
         stability = self.monitor.stability = stability_of(system, self.shape, speed)
@@ -146,8 +146,8 @@ class Simulation:
 
     def _by_reduced_model(self, progress: Progress) -> bool:
         """Record the history of a reduced model; return whether one serves; a warning says where it does not."""
-        self.keeper.start(self._parts())
-        with self.keeper.interrupts():
+        self.store.start(self._parts())
+        with self.store.interrupts():
             self.reduced = reduced_history(
                 self.scene, self.system, self.start.q, self.record, self.monitor, self.log, self.setting is not None
             )
@@ -167,14 +167,14 @@ class Simulation:
             self.companions = HistoryErrors(
                 self.problem, self.system, scheme, newton, self._start_there, output, richer_problem(self.problem)
             )
-            self.stepper.watch = self.companions
-        march.reached = self.keeper.start(self._parts())
+            self.stepper.observer = self.companions
+        march.reached = self.store.start(self._parts())
         if time.output_step is not None:
             passed = max(len(self.record.history) - 1, 0)
-            self.rows = self.stepper.watch = RowTimes(
-                time.output_step, time.end, scheme.order, self.stepper.watch, passed
+            self.rows = self.stepper.observer = RowTimes(
+                time.output_step, time.end, scheme.order, self.stepper.observer, passed
             )
-        with self.keeper.interrupts():
+        with self.store.interrupts():
             first = 0 if march.reached is None else self.log.steps + 1
             for self.log.steps, state in enumerate(march, first):
                 self._stepped(state, time, progress)
@@ -189,7 +189,7 @@ class Simulation:
         """Return the shape and the velocities that a companion starts from."""
         nodes = [s.V.dofmap.index_map.size_global for s in (system, self.system)]
         same = nodes[0] == nodes[1] and system.model.problem.theory == self.problem.theory
-        start = self.start if self.keeper.goes_on or same else self._start(system)
+        start = self.start if self.store.goes_on or same else self._start(system)
         return start.q, start.v
 
     # --- what sees them ---------------------------------------------------------------------------------------------
@@ -209,7 +209,7 @@ class Simulation:
         for row in rows:
             self._recorded(row)
             progress(row.t / time.end)
-        self.keeper.stepped(state)
+        self.store.stepped(state)
         if self.clock is not None:
             self.clock(steps, state.t / time.end)
 
@@ -239,7 +239,7 @@ class Simulation:
                 f"no longer definite, since t = {watched.since:.4g} s"
             )
         errors = self._errors(history)
-        theory, lost = errors.theory, said_of(watched.farthest.lost_digits() or 0.0)
+        theory, lost = errors.theory, said_of(watched.farthest.conditioning() or 0.0)
         log.warnings += [line for line in ("" if theory is None else theory.warning(), lost) if line]
         error = None if failure is not None else errors.estimate()
         log.warnings += [] if error is None else errors.warnings(error)
@@ -276,11 +276,11 @@ class Simulation:
 
     def _said_of_steps(self, history: dict[str, Array], failure: ComputationError | None) -> list[str]:
         """Return what is to be known of the steps and their iterations."""
-        out = [] if self.stepper is None else self.stepper.said()
+        out = [] if self.stepper is None else self.stepper.warnings()
         if self.iteration.roundoff > 0:
             out.append(f"Newton stopped at round-off, increments {self.iteration.roundoff:.1e} (relative)")
         if failure is None and self.stepper is not None:
-            grown = monitor.said(self.system, history, self.rows is not None)
+            grown = monitor.energy_warning(self.system, history, self.rows is not None)
             out += [grown] if grown else []
         return out
 

@@ -10,8 +10,8 @@ from rotfem.equations.affine import AffineSystem
 from rotfem.equations.bordered import BorderedSystem
 from rotfem.equations.model import Model
 from rotfem.equations.nonlinear import NonlinearSystem
-from rotfem.mechanics.courses import View, watched
 from rotfem.mechanics.problem import Problem
+from rotfem.mechanics.time_signals import View, watched
 
 
 def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bool = True, parted: bool = False) -> Any:
@@ -28,7 +28,7 @@ def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bo
         InputError: a mesh or a section that cannot be computed with; a term that the theory cannot have.
     """
     view = View()
-    seen, courses = watched(problem, view) if moving else (problem, [])
+    seen, signals = watched(problem, view) if moving else (problem, [])
     model = Model(seen, comm)
     system: Any
     if problem.theory.linear:
@@ -37,7 +37,7 @@ def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bo
             system.check_terms()
     else:
         system = NonlinearSystem(model, moving, parted)
-    system.view, system.courses = view, tuple(courses)
+    system.view, system.signals = view, tuple(signals)
     return system if model.hub is None else BorderedSystem(system, once=parted and model.structure.planar)
 
 

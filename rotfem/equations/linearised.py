@@ -24,12 +24,12 @@ class Linearised:
         system: equations of motion of a structure.
 
     Attributes:
-        datum: what the rotations of the state are counted from.
+        reference: what the rotations of the state are counted from.
         serves: whether further steps may be solved with them.
     """
 
     def __init__(self, system: Any):
-        self.system, self.datum, self.serves = system, system.datum, True
+        self.system, self.reference, self.serves = system, system.reference, True
         self._matrices = tuple(reversed(system.held.mass_damping_stiffness()))
         self._shift: float | None = None
         self._part = Increment(system.held.V)

@@ -33,7 +33,7 @@ EQUAL = 1e-6
 NEW = 1e-6
 
 #: Frequency, relative to the median of so many first ones, below which a motion is one that nothing holds.
-HELD, FIRST = 1e-3, 6
+VIBRATING, FIRST = 1e-3, 6
 
 
 @dataclass(frozen=True)
@@ -67,13 +67,13 @@ def modes_at_rest(system: Any, count: int) -> ModesAtRest:
     count = min(count, massed(M))
     pairs = Pencil(M, M.duplicate(), K).solve(min(count + MORE, massed(M)))
     found = np.abs(pairs.values)
-    vibrates = found > HELD * np.median(found[:FIRST])
+    vibrates = found > VIBRATING * np.median(found[:FIRST])
     omegas, columns = [], []
     for group in _equal(found[vibrates]):
         X = _real_span(system.comm, M, pairs.right[:, vibrates][:, group])
         energies = family_products(system, X, times(M, X))
-        told_apart = sum(i * energy for i, energy in enumerate(energies.values()))
-        columns.append(X @ np.linalg.eigh(_symmetric(np.asarray(told_apart)))[1])
+        distinguished = sum(i * energy for i, energy in enumerate(energies.values()))
+        columns.append(X @ np.linalg.eigh(_symmetric(np.asarray(distinguished)))[1])
         omegas += [float(np.mean(found[vibrates][group]))] * X.shape[1]
     X = np.hstack(columns)[:, :count]
     return ModesAtRest(np.array(omegas[:count]), X, times(M, X))

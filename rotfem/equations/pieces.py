@@ -30,7 +30,7 @@ from rotfem.equations.model import Model
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import SAME, Assembler
-from rotfem.numerics.linear import DirectSolver, held, set_diagonal
+from rotfem.numerics.linear import DirectSolver, restrained, set_diagonal
 from rotfem.structures.root_reaction import RootReaction
 
 Index = npt.NDArray[np.int64]
@@ -483,7 +483,7 @@ class Pieces:
         for other in others:
             K.axpy(1.0, other, SAME)
         if self.structure.hinges:
-            held(K, self._hinged)
+            restrained(K, self._hinged)
         return K
 
     @cached_property

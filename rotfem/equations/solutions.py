@@ -62,11 +62,11 @@ class Solutions:
     def set_time(self, t: float) -> None:
         """Write what the forms depend on at time t (s)."""
 
-    def count_rotations_from(self, datum: Any) -> None:
-        """Count rotations from a datum, where there can be another one than the undeformed structure, None."""
+    def count_rotations_from(self, reference: Any) -> None:
+        """Count rotations from a reference, where there can be another one than the undeformed structure, None."""
 
     @property
-    def datum(self) -> Any:
+    def reference(self) -> Any:
         """What rotations are counted from; None for the undeformed structure."""
         return None
 
@@ -83,7 +83,7 @@ class Solutions:
         if changed and self.keeps_factor:
             q, v, a = (x.copy() for x in self._state)
             known = {"t": self.model.time, "q": q, "v": v, "a": a, "shifts": shifts, "before": before}
-            self.factored = {**known, "datum": self.datum}
+            self.factored = {**known, "reference": self.reference}
         assembled = perf_counter()
         dq = self._dx.solve(self.factor(A, changed), b)
         self.seconds["assemble"] += assembled - started
@@ -104,7 +104,7 @@ class Solutions:
     def refactor(self, known: dict[str, Any] | None) -> None:
         """Make the factor that is kept anew from what is known of it (see `factored`); nothing from None."""
         if known is not None:
-            self.count_rotations_from(known["datum"])
+            self.count_rotations_from(known["reference"])
             self.set_time(known["t"])
             self.set_state(known["q"], known["v"], known["a"])
             self.correction(known["shifts"], known["before"])
@@ -145,7 +145,7 @@ class Solutions:
 
         Args:
             forces: as of `forces`.
-            at_rest: whether M is taken of the undeformed structure, or of the datum; its factor is kept.
+            at_rest: whether M is taken of the undeformed structure, or of the reference; its factor is kept.
         """
         solver, massless = self.mass_solver(at_rest)
         b = self.residual()
@@ -157,10 +157,10 @@ class Solutions:
         """Return a solver with M at the state, or at rest (see `accelerated`), and unknowns without inertia."""
         if not at_rest:
             return self._new_mass_solver()
-        if self._mass is None or self._mass[0] is not self.datum:
+        if self._mass is None or self._mass[0] is not self.reference:
             q, v, a = (x.copy() for x in self._state)
             self.set_state(np.zeros_like(q))
-            self._mass = self.datum, self._new_mass_solver()
+            self._mass = self.reference, self._new_mass_solver()
             self.set_state(q, v, a)
         return self._mass[1]
 

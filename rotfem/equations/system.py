@@ -23,10 +23,10 @@ from rotfem.equations.modal_damping import EFFECT, ByMode, damping_by_mode
 from rotfem.equations.model import Model
 from rotfem.equations.solutions import Solutions
 from rotfem.errors import ComputationError
-from rotfem.mechanics.courses import Course, View
 from rotfem.mechanics.loads import is_moment
 from rotfem.mechanics.motion import IDENTITY, Motion
 from rotfem.mechanics.sums import added
+from rotfem.mechanics.time_signals import TimeSignal, View
 from rotfem.numerics import compat, forms
 from rotfem.numerics.linear import DirectSolver, Increment
 from rotfem.numerics.low_rank import PlusLowRank
@@ -208,7 +208,7 @@ class System(Readings, Solutions, ABC):
         scale: size of each local unknown (m or 1), by which increments are judged.
         clamp: motion of the clamp, where the frame does not rotate with it.
         root: rigid motions of what is clamped, which forces and moments at the root work on.
-        courses: what is prescribed and changes with time.
+        signals: what is prescribed and changes with time.
         view: how these are seen.
         seconds: time spent on assembly and solution of steps.
         assembled: time spent on assembly while compiling, s.
@@ -226,7 +226,7 @@ class System(Readings, Solutions, ABC):
     parted = False
     left_out: frozenset[str] = frozenset()
     hub: Any = None
-    courses: tuple[Course, ...] = ()
+    signals: tuple[TimeSignal, ...] = ()
     view: View
 
     def __init__(self, model: Model, moving: bool = True):
@@ -266,13 +266,13 @@ class System(Readings, Solutions, ABC):
         other.A = self.A.duplicate()
         return other
 
-    def count_rotations_from(self, datum: Any) -> None:
-        """Count rotations from a datum (see `rotfem.structures.datum`), None for the undeformed structure.
+    def count_rotations_from(self, reference: Any) -> None:
+        """Count rotations from a reference (`rotfem.structures.reference_rotation`), None for the undeformed structure.
 
-        The first time all forms are made anew, with the datum in them; set_time must follow then.
+        The first time all forms are made anew, with the reference in them; set_time must follow then.
         """
         turns = self.structure.turns
-        if datum is not None and self._by_mode is not None:
+        if reference is not None and self._by_mode is not None:
             raise ComputationError(
                 "the rotations have become too large for damping by mode, which is that of small motions",
                 time=self.time,
@@ -280,19 +280,19 @@ class System(Readings, Solutions, ABC):
             )
         if turns is None:
             return
-        if turns.use(datum):
+        if turns.use(reference):
             self.model.compose()
             self.model.compositions += 1
-        if datum is not None and self.compilations < self.model.compositions:
+        if reference is not None and self.compilations < self.model.compositions:
             forget(self)
             self._solver = None
             self.A = self._compile()
             self.compilations = self.model.compositions
 
     @property
-    def datum(self) -> Any:
+    def reference(self) -> Any:
         """What rotations are counted from; None for the undeformed structure."""
-        return None if self.structure.turns is None else self.structure.turns.datum
+        return None if self.structure.turns is None else self.structure.turns.reference
 
     def check_reach(self, q: Array, time: float | None = None) -> None:
         """Refuse rotations in q (local dof array) that have come too far from what they are counted from.

@@ -137,7 +137,7 @@ class Load:
     Attributes:
         kind: "dead" keeps its direction in the frame, "follower" turns with the section.
         terms: of the sum.
-        seen: time (s) ↦ what `at` returns in the place of the sum, as a march sees it (`rotfem.mechanics.courses`).
+        seen: time (s) ↦ what `at` returns for the sum, as a march sees it (`rotfem.mechanics.time_signals`).
         unpitched: the load in the frame of the hub, where this one is in that of a blade that pitches.
     """
 

@@ -3,7 +3,7 @@
 The plate lies in the plane (a_1, a_2); t = a_3 where it is undeformed. alpha_1 and alpha_2 turn the director one after
 the other, t = R_2(−alpha_1) R_1(alpha_2) a_3, so that to second order t = a_3 − alpha_γ a_γ − ½ |alpha|² a_3. The two
 angles meet a pole at alpha_2 = ±π/2; alpha_1 may go round. Where alpha_2 comes near it, both are counted from another
-shape (see `rotfem.structures.datum`).
+shape (see `rotfem.structures.reference_rotation`).
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ Scalar = Callable[[float], float]
 Array = npt.NDArray[np.float64]
 
 #: A quantity over time and its two rates.
-Course = tuple[Scalar, Scalar, Scalar]
+TimeSignal = tuple[Scalar, Scalar, Scalar]
 
 #: Distance of the hub's center from the axis of the pitch, relative to that of the root, below which it is none.
 ON_AXIS = 1e-12
@@ -78,8 +78,8 @@ class Pitch:
         return is_beside(self.root, self.axis)
 
     @property
-    def courses(self) -> dict[str, Scalar]:
-        """The angle and its rates by the names of their courses (see `rotfem.mechanics.courses`)."""
+    def signals(self) -> dict[str, Scalar]:
+        """The angle and its rates by the names of their signals (see `rotfem.mechanics.time_signals`)."""
         names = ("structure.root.pitch", "pitch.rate", "pitch.acceleration")
         return dict(zip(names, (self.angle, self.rate, self.acceleration), strict=True))
 
@@ -142,12 +142,12 @@ class Pitch:
         return np.asarray((triples @ self.rotation(t).T).reshape(values.shape))
 
 
-def constant_pitch(angle: float) -> Course:
+def constant_pitch(angle: float) -> TimeSignal:
     """Return (θ, θ̇, θ̈) of an angle (rad) that stays."""
     return (lambda t: angle), (lambda t: 0.0), (lambda t: 0.0)
 
 
-def tabulated_pitch(rows: npt.ArrayLike) -> Course:
+def tabulated_pitch(rows: npt.ArrayLike) -> TimeSignal:
     """Return (θ, θ̇, θ̈) through rows (t in s, θ in rad): at rest at the first and the last, and before and after them.
 
     Piecewise cubics without overshoot, whose rate is continuous (Fritsch & Carlson, SIAM J. Numer. Anal. 17, 1980,
@@ -171,7 +171,7 @@ def tabulated_pitch(rows: npt.ArrayLike) -> Course:
     )
 
 
-def differentiated(angle: Scalar, rate: Scalar | None = None, cell: float | None = None) -> Course:
+def differentiated(angle: Scalar, rate: Scalar | None = None, cell: float | None = None) -> TimeSignal:
     """Return (θ, θ̇, θ̈) of a function of time: differences whose step follows it, not before t = 0.
 
     Args:
@@ -183,7 +183,7 @@ def differentiated(angle: Scalar, rate: Scalar | None = None, cell: float | None
     return angle, first, Derivative(angle, 2, cell, (0.0,)) if rate is None else Derivative(rate, 1, cell, (0.0,))
 
 
-def harmonic_pitch(amplitude: float, phase: float, turn: Course) -> Course:
+def harmonic_pitch(amplitude: float, phase: float, turn: TimeSignal) -> TimeSignal:
     """Return (θ, θ̇, θ̈) of amplitude · cos(α + phase), of an angle α(t) and its two rates."""
     alpha, rate, acceleration = turn
 

@@ -45,7 +45,7 @@ def combine(target: Any, matrices: list[Any], weights: Array) -> Any:
     return out
 
 
-def held(K: Any, numbers: npt.NDArray[Any]) -> None:
+def restrained(K: Any, numbers: npt.NDArray[Any]) -> None:
     """Hold unknowns of these numbers in a stiffness matrix, by springs as stiff as it is there."""
     d = K.getDiagonal()
     d.array[numbers] *= 2.0

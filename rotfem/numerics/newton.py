@@ -94,7 +94,7 @@ class Newton:
         tolerance: largest accepted increment, relative to the scale of each unknown.
         max_iterations: iterations before failure.
         iterations: total over all solves.
-        strayed: whether increments were large or grew on the way of the last solve. They do where a structure is
+        diverging: whether increments were large or grew on the way of the last solve. They do where a structure is
             slender, on the way to the right root too; but that it is close to the start is no argument for it then.
         wandered: whether an increment after the first of the last solve was beyond where its tangent says anything.
         roundoff: largest increment accepted because it had stopped shrinking at round-off level.
@@ -104,7 +104,7 @@ class Newton:
     tolerance: float = 1e-9
     max_iterations: int = 25
     iterations: int = 0
-    strayed: bool = False
+    diverging: bool = False
     wandered: bool = False
     roundoff: float = 0.0
     foreseeing: bool = False
@@ -128,7 +128,7 @@ class Newton:
         Raises:
             ComputationError: not finite, growing, or too many iterations; says which.
         """
-        self.strayed = self.wandered = False
+        self.diverging = self.wandered = False
         previous, first, stalled = np.inf, np.inf, 0
         for k in range(1, self.max_iterations + 1):
             d = increment()
@@ -153,7 +153,7 @@ class Newton:
             if stalled >= 3 and d <= LOST * max(size(), self.tolerance):
                 self.roundoff = max(self.roundoff, d)
                 return k
-            self.strayed |= d > FAR or (k > 1 and d > max(previous, STRAYS))
+            self.diverging |= d > FAR or (k > 1 and d > max(previous, STRAYS))
             self.wandered |= k > 1 and d > REACH
             if k > 4 and d > 10 * first and d > 1:
                 raise ComputationError(f"Newton diverged: increments grew from {first:.1e} to {d:.1e} (scaled)")

@@ -86,13 +86,13 @@ class FollowingStepper(Stepper):
         """Solve a stage by Newton's method alone: what cannot be solved so is not known."""
         self._iterate(stage, state)
 
-    def _feeds(self, new: State, state: State) -> bool:
+    def _gains_energy(self, new: State, state: State) -> bool:
         return False
 
     def predicted(self, stage: Stage, state: State) -> Array:
         """Return q followed, plus the difference at the start of the step, growing as over the step before."""
         step = self.followed
-        if step is None or self.carried is None or state.datum is not step.end.datum:
+        if step is None or self.carried is None or state.reference is not step.end.reference:
             return super().predicted(stage, state)
         there = self._there if stage.t >= step.end.t else None
         t, difference = self.differences[-1]
@@ -107,7 +107,7 @@ class FollowingStepper(Stepper):
         self.followed = self._there = None
         if self.system.solved_at_once or self.carried is None:
             return
-        if any(s.datum is not state.datum for pair in step.steps for s in pair):
+        if any(s.reference is not state.reference for pair in step.steps for s in pair):
             self.differences = []
             return
         self.followed, self._there = step, self.carried(step.end.q)
@@ -116,7 +116,7 @@ class FollowingStepper(Stepper):
 
     def arrived(self, state: State) -> None:
         """Take note of the difference at the end of the step that was followed."""
-        if self.followed is None or self._there is None or state.datum is not self.followed.end.datum:
+        if self.followed is None or self._there is None or state.reference is not self.followed.end.reference:
             self.differences = []
         else:
             self.differences = [*self.differences[-1:], (state.t, state.q - self._there)]
@@ -161,7 +161,7 @@ class Companion:
         system.held.plain = True
         own = Newton(newton.tolerance, newton.max_iterations, foreseeing=True)
         self.stepper = FollowingStepper(system, scheme, own, carrier(followed, system))
-        self.further, self.stepper.watch = list(further), self._passed_on
+        self.further, self.stepper.observer = list(further), self._passed_on
         self.state: State | None = None
         self.difference, self.doubled, self.sound = (0.0, 0.0), 0.0, True
         self.components: tuple[float, ...] = (0.0,)

@@ -15,14 +15,14 @@ Output = Callable[[Any, State], Array]
 
 def tip(system: Any, state: State) -> Array:
     """Return the displacement of the tip in the frame that turns with the hub, m."""
-    system.count_rotations_from(state.datum)
+    system.count_rotations_from(state.reference)
     moves = [i for i, name in enumerate(system.structure.components) if name.startswith("u")]
     return np.asarray(system.tip(state.q, state.t)[moves])
 
 
 def root_moment(system: Any, state: State) -> Array:
     """Return the moment of the hub on the structure at its root, N·m."""
-    system.count_rotations_from(state.datum)
+    system.count_rotations_from(state.reference)
     system.set_time(state.t)
     system.set_state(state.q, state.v, state.a)
     return np.array([value for name, value in system.root_reaction().items() if name.startswith("m")])

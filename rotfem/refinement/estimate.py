@@ -17,22 +17,22 @@ class ErrorEstimate:
     """Shares of an error, relative to `scale` of a run and to each frequency of modes; None where nothing is known.
 
     Attributes:
-        shares: name (`time`, `space`, `model`, `round_off`) ↦ relative error.
+        contributions: name (`time`, `space`, `model`, `round_off`) ↦ relative error.
         found: further facts: instants, the scale, how a share was found.
     """
 
-    shares: dict[str, float | None]
+    contributions: dict[str, float | None]
     found: dict[str, Any] = field(default_factory=dict)
 
     @property
     def total(self) -> float | None:
         """Sum of the shares; None where one is unknown."""
-        known = [float(share) for share in self.shares.values() if share is not None]
-        return sum(known) if known and len(known) == len(self.shares) else None
+        known = [float(share) for share in self.contributions.values() if share is not None]
+        return sum(known) if known and len(known) == len(self.contributions) else None
 
     def summary(self) -> dict[str, Any]:
         """Return what a summary has of it."""
-        return {**self.shares, "total": self.total, **self.found}
+        return {**self.contributions, "total": self.total, **self.found}
 
     def line(self) -> str:
         """Return it as a line of text."""

@@ -130,7 +130,7 @@ class Case:
             return q, None
         about = "steady" if self.from_steady else "undeformed"
         modal, first = ModalAnalysis(problem, about, self.newton(), system.comm, system), self.first
-        return plainly(system, lambda: first.beside(q, modal, self.newton()))
+        return plainly(system, lambda: first.about(q, modal, self.newton()))
 
     def eigenvalues(self, system: Any, speed: float) -> Array:
         """Return λ of the wanted modes at a speed (rad/s): no rigid body, of an overdamped mode the slow one.
@@ -365,7 +365,7 @@ class Explanation:
         assert case.scheme is not None
         assert case.steps is not None
         march = March(system, case.scheme, case.steps, newton, *case.start(system))
-        march.stepper.watch = first
+        march.stepper.observer = first
         for state in march:
             self.size = max(self.size, float(system.size(state.q)))
             if system.linear and not self.size <= LARGEST_LINEAR_DEFLECTION:

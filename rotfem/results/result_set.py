@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 NAME = ".rotfem.lock"
 
 #: Folders that this process has locked ↦ descriptor, and how often.
-_held: dict[str, tuple[int, int]] = {}
+_locks: dict[str, tuple[int, int]] = {}
 
 
 class FolderLock:
@@ -69,7 +69,7 @@ class FolderLock:
         """
         if self._mine:
             return
-        descriptor, times = _held.get(self._key, (-1, 0))
+        descriptor, times = _locks.get(self._key, (-1, 0))
         if times == 0:
             try:
                 descriptor = self._locked()
@@ -77,7 +77,7 @@ class FolderLock:
                 if error.errno == errno.ELOOP:
                     raise OutputError(self.folder / NAME, "it is a symbolic link, which is not followed") from None
                 raise OutputError(self.folder, error.strerror or str(error)) from None
-        _held[self._key] = (descriptor, times + 1)
+        _locks[self._key] = (descriptor, times + 1)
         self._mine = True
 
     def release(self) -> None:
@@ -85,9 +85,9 @@ class FolderLock:
         if not self._mine:
             return
         self._mine = False
-        descriptor, times = _held.pop(self._key)
+        descriptor, times = _locks.pop(self._key)
         if times > 1:
-            _held[self._key] = (descriptor, times - 1)
+            _locks[self._key] = (descriptor, times - 1)
             return
         Path(self._key, NAME).unlink(missing_ok=True)
         os.close(descriptor)

@@ -14,7 +14,7 @@ from rotfem.scene.beam_files import with_tables
 from rotfem.scene.clamp_and_damping import Damping, check_one_hub
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_through
-from rotfem.scene.root import Held, Root, SpatialRoot, check_cone, check_pitch
+from rotfem.scene.root import Root, RootedStructure, SpatialRoot, check_cone, check_pitch
 from rotfem.scene.section import PlanarSection
 from rotfem.scene.section_spatial import SpatialSection
 from rotfem.scene.structure import MeanBeam, apart, means
@@ -105,7 +105,7 @@ def _as_sweep(value: Any) -> Profile:
 EXACT, AGREE = 1e-9, 1e-6
 
 
-class PlanarBeamStructure(Held):
+class PlanarBeamStructure(RootedStructure):
     """A beam that moves in the plane (1, 2) of the rotating frame, clamped at X = 0.
 
     Attributes:
@@ -184,7 +184,7 @@ class PlanarBeamStructure(Held):
         return self
 
 
-class SpatialBeamStructure(Held):
+class SpatialBeamStructure(RootedStructure):
     """A beam in space, its axis along direction 1 of the rotating frame (before precone), clamped at X = 0.
 
     Attributes:

@@ -178,7 +178,7 @@ class SpatialRoot(Root):
     pitch: PitchAngle = PitchAngle(value=0.0)
 
 
-class Held(StructureTable):
+class RootedStructure(StructureTable):
     """What a beam has of its `root`."""
 
     @property

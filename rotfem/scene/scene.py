@@ -284,7 +284,7 @@ class Scene(SceneModel):
         """Check that no table of a load along the structure may be of two kinds.
 
         Args:
-            when: what is computed at one time, where loads have no course over it; "" for a history.
+            when: what is computed at one time, where loads have no signal over it; "" for a history.
 
         Raises:
             SceneError: there is one.

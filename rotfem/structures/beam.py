@@ -115,7 +115,7 @@ class Beam(Structure):
 
         Every theory's 1 + Γ₁ is at least about cos α − |u'|, and rotation and slope are small at all quadrature points.
         """
-        if self.turns is not None and self.turns.datum is not None:
+        if self.turns is not None and self.turns.reference is not None:
             return False
         basis, cells = self.V.element.basix_element, np.arange(self.mesh.topology.index_map(1).size_local)
         at, by_x = basis.tabulate(1, quadrature_points(self.mesh, basis.degree))[..., 0]

@@ -25,12 +25,12 @@ from rotfem.mechanics.loads import AnyLoad
 from rotfem.mechanics.mindlin import PlateGradients, director, triad
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import forms
-from rotfem.structures.datum import DirectorTurns
 from rotfem.structures.memory import check_memory
 from rotfem.structures.meshes.plate_mesh import PlateGrid, plate_grid
 from rotfem.structures.mode_names import plate_mode_name, turning
 from rotfem.structures.moderate_turns import check_directors
 from rotfem.structures.points import Points
+from rotfem.structures.reference_rotation import DirectorTurns
 from rotfem.structures.structure import Array, Structure
 from rotfem.structures.tip_values import TipValues
 
@@ -295,7 +295,7 @@ class Plate(Structure):
         return self.triad(q)[2] if not self.problem.theory.linear else director(PlateGradients(q).alpha, exact=False)
 
     def triad(self, q: Any) -> list[Any]:
-        """Return (t_1, t_2, t), exact: those of alpha, turned by R where they are counted from a datum."""
+        """Return (t_1, t_2, t), exact: those of alpha, turned by R where they are counted from a reference."""
         axes, R = triad(PlateGradients(q).alpha), None if self.turns is None else self.turns.rotation
         return list(axes) if R is None else [ufl.dot(R, t) for t in axes]
 
@@ -432,7 +432,7 @@ class Plate(Structure):
         return turning(coordinates, values[:, 2])
 
     def check_range(self, q: Array, time: float | None = None) -> None:
-        """Refuse a state whose director has come to the pole of its angles, where these are not counted from a datum.
+        """Refuse a state whose director has come to the pole of its angles, where these have no reference.
 
         Raises:
             ComputationError: says how far it has come.

@@ -34,8 +34,8 @@ from rotfem.mechanics.bodies import AppliedLoad, Body, Kinematics, Strain
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.rotations import Turn
 from rotfem.structures.beam import Beam
-from rotfem.structures.datum import SectionTurns
 from rotfem.structures.moderate_turns import check_sections
+from rotfem.structures.reference_rotation import SectionTurns
 from rotfem.structures.spatial_section import SectionForms, euler_tensor
 from rotfem.structures.structure import Array
 
@@ -283,20 +283,20 @@ class SpatialBeam(Beam):
         c, s = ufl.cos(angle), ufl.sin(angle)
         return e_1, c * e_2 + s * e_3, c * e_3 - s * e_2
 
-    def _from_datum(self, v: Any) -> Any:
+    def _from_reference(self, v: Any) -> Any:
         """Return R v, what a vector v of the undeformed section is where θ is counted from."""
         R = None if self.turns is None else self.turns.rotation
         return v if R is None else ufl.as_vector([sum(R[i, j] * v[j] for j in range(3)) for i in range(3)])
 
     def _along_triad(self, v: Any) -> Any:
         """Return the components of v along R t_i⁰."""
-        triad = [self._from_datum(t) for t in self._triad]
+        triad = [self._from_reference(t) for t in self._triad]
         return ufl.as_vector([sum(t[i] * v[i] for i in range(3)) for t in triad])
 
     def _from_triad(self, components: Any) -> Any:
         """Return the vector with these components along R t_i⁰."""
         pairs = list(zip(components, self._triad, strict=True))
-        return self._from_datum(ufl.as_vector([sum(c * t[i] for c, t in pairs) for i in range(3)]))
+        return self._from_reference(ufl.as_vector([sum(c * t[i] for c, t in pairs) for i in range(3)]))
 
     def places(self, coordinates: dict[str, Array]) -> Array:
         """Return where points of the undeformed axis are in the frame, (n, 3) in m, by their coordinates."""
@@ -319,7 +319,7 @@ class SpatialBeam(Beam):
 
     def turned(self, q: Any, v: Any) -> Any:
         """Return Λ v = exp(θ) R v."""
-        return SectionTurn(rotation_part(q), self._turn.exact).rotate(self._from_datum(v))
+        return SectionTurn(rotation_part(q), self._turn.exact).rotate(self._from_reference(v))
 
     def root_turn(self, axis: int) -> Any:
         """Return θ·e at the root, e the axis of the blade there (1), the flap axis (2) or the lag axis (3)."""
@@ -342,7 +342,7 @@ class SpatialBeam(Beam):
     def _measured(self, measures: Callable[..., tuple[Any, Any]]) -> tuple[Any, Any]:
         """Return Γ and K of one theory's measures along t_i.
 
-        Counted from a datum they are those of a beam with the axis R e and the curvature of the datum beforehand.
+        Counted from a reference they are those of a beam with the axis R e and the curvature of the reference.
         """
         q, e = self.k.q, self._triad[0]
         dq = q.dx(0)
@@ -350,7 +350,7 @@ class SpatialBeam(Beam):
         if self.turns is None or self.turns.rotation is None:
             Gamma, K = measures(du, rotation_part(q), rotation_part(dq), e)
             return self._along_triad(Gamma), self._along_triad(K)
-        turned = self._from_datum(e)
+        turned = self._from_reference(e)
         Gamma, K = measures(e + du - turned, rotation_part(q), rotation_part(dq), turned)
         before = ufl.as_vector([sum(t[i] * self.turns.curvature[i] for i in range(3)) for t in self._triad])
         return self._along_triad(Gamma), self._along_triad(K) + before
@@ -418,7 +418,7 @@ class SpatialBeam(Beam):
         return [AppliedMoment(name, M, theta, measure, dead, section=self._turn)]
 
     def check_range(self, q: Array, time: float | None = None) -> None:
-        """Refuse a state in which some section has turned by more than a turn, where that is not counted from a datum.
+        """Refuse a state in which some section has turned by more than a turn, where that has no reference.
 
         In a plane a rotation vector has one component, and no limit.
 

@@ -17,7 +17,7 @@ from rotfem.mechanics.bodies import Body, Damping, Kinematics, RootSpring, Strai
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import forms
 from rotfem.structures.applied_loads import LoadsOfStructure
-from rotfem.structures.datum import Turns
+from rotfem.structures.reference_rotation import Turns
 from rotfem.structures.tip_values import TipValues
 
 Array = npt.NDArray[np.float64]
@@ -148,7 +148,7 @@ class Structure(LoadsOfStructure):
         """Return what holds the hinges; none here."""
         return []
 
-    def _held(self) -> list[int]:
+    def _clamped_components(self) -> list[int]:
         """Return which of the unknowns of a node the clamp holds."""
         free = {self.turns_of[axis] for axis in self.hinges}
         return [place for place, i in enumerate(self.active) if i not in free]
@@ -159,11 +159,11 @@ class Structure(LoadsOfStructure):
         Args:
             nodes: that are clamped; the owned ones if None.
         """
-        return self._numbers(nodes, self._held())
+        return self._numbers(nodes, self._clamped_components())
 
     def hinged_unknowns(self, nodes: npt.NDArray[np.int32] | None = None) -> npt.NDArray[np.int32]:
         """Return the local numbers of those that turn in hinges of the clamp, in order (see `clamped_unknowns`)."""
-        held = self._held()
+        held = self._clamped_components()
         return self._numbers(nodes, [i for i in range(self.size) if i not in held])
 
     def _numbers(self, nodes: npt.NDArray[np.int32] | None, components: list[int]) -> npt.NDArray[np.int32]:
@@ -182,7 +182,7 @@ class Structure(LoadsOfStructure):
             V: another space of the unknowns, as of a finer mesh; that of the structure if None.
             nodes: clamped nodes of that space; those of the structure if None.
         """
-        V, nodes, held = V or self.V, self.clamped if nodes is None else nodes, self._held()
+        V, nodes, held = V or self.V, self.clamped if nodes is None else nodes, self._clamped_components()
         if len(held) == self.size:
             return [fem.dirichletbc(fem.Function(V), nodes)]
         zero = default_scalar_type(0.0)

@@ -26,8 +26,8 @@ class TurningClamp:
 
     def __init__(self, structure: Any, motion: Motion):
         self.motion, self.structure = motion, structure
-        self._held = np.arange(2 if structure.hinges else 3)
-        self.dofs = (structure.clamped[:, None] * 3 + self._held).ravel()
+        self._clamped_components = np.arange(2 if structure.hinges else 3)
+        self.dofs = (structure.clamped[:, None] * 3 + self._clamped_components).ravel()
         self._x = structure.V.tabulate_dof_coordinates()[:, 0] + structure.hub_radius
 
     def angle(self, t: float) -> float:
@@ -42,7 +42,7 @@ class TurningClamp:
         q = np.array([R * (c - 1), R * s, psi])
         v = w * np.array([-R * s, R * c, 1.0])
         a = dw * np.array([-R * s, R * c, 1.0]) - w * w * np.array([R * c, R * s, 0.0])
-        held, repeat = self._held, len(self.dofs) // len(self._held)
+        held, repeat = self._clamped_components, len(self.dofs) // len(self._clamped_components)
         return np.tile(q[held], repeat), np.tile(v[held], repeat), np.tile(a[held], repeat)
 
     def rigid(self, relative: Array, t: float) -> tuple[Array, Array]:

@@ -21,7 +21,7 @@ import pytest
 
 import rotfem
 from rotfem import SceneError
-from rotfem.commands.keeper import Interval
+from rotfem.commands.run_store import Interval
 from rotfem.commands.simulation import Simulation
 from rotfem.results import checkpoint_file
 from rotfem.results.files import read_csv
@@ -336,7 +336,7 @@ def test_numbers_learnt_are_all_in_the_checkpoint(tmp_path: Path) -> None:
     stepper = result[0].stepper
     assert set(vars(stepper)) - set(plain(stepper)) == set(APART["Stepper"])
     parts = {name: part for name, part in learning(stepper).items() if part is not stepper}
-    assert {"system", "scheme", "watch", "_linearised", "_about", *parts} == set(APART["Stepper"])
+    assert {"system", "scheme", "observer", "_linearised", "_about", *parts} == set(APART["Stepper"])
     assert all(set(vars(part)) == set(plain(part)) for part in parts.values())
     stepper.newton.curvature = np.zeros(3)
     with pytest.raises(TypeError, match="cannot hold curvature of Newton"):

@@ -92,12 +92,12 @@ def test_a_kill_is_said_by_the_next_command_and_by_check(rotfem: Any) -> None:
     program = f"""
 import os
 from rotfem.commands.cli import main
-from rotfem.commands.keeper import Keeper
-saved = Keeper._save
+from rotfem.commands.run_store import RunStore
+saved = RunStore._save
 def killed(*given):
     saved(*given)
     os.kill(os.getpid(), {int(signal.SIGKILL)})
-Keeper._save = killed
+RunStore._save = killed
 main()
 """
     command = [sys.executable, "-c", program, "run", "beam.toml", "-o", "out", "--checkpoint", "50"]

@@ -1,4 +1,4 @@
-"""What a scene may say of a pitch over time, and the course that is made of it."""
+"""What a scene may say of a pitch over time, and the signal that is made of it."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from rotfem import SceneError
 from rotfem.analysis.time_grid import find_breakpoints
 from rotfem.commands.problem import Problem
 from rotfem.errors import InputError
-from rotfem.mechanics.courses import Course
 from rotfem.mechanics.loads import ConstantLoad, Load, Loads, Shapes, Term, pitched
 from rotfem.mechanics.pitch import Pitch, differentiated, tabulated_pitch, turn_about
+from rotfem.mechanics.time_signals import TimeSignal
 from rotfem.scene import Scene
 
 SECTION = {"EA": 1e8, "GA2": 1e8, "GA3": 1e8, "GJ": 1e5, "EI2": 1e4, "EI3": 5e4, "mass_per_length": 1.2}
@@ -25,7 +25,7 @@ def scene(pitch: Any, root: Any = None, **more: Any) -> Scene:
     return Scene.from_dict({"structure": structure, "motion": {"type": "constant", "speed": 4.0}, **more})
 
 
-def course(pitch: Any, **more: Any) -> Pitch:
+def signal(pitch: Any, **more: Any) -> Pitch:
     """Return the pitch over time of that scene."""
     found = Problem.of(scene(pitch, **more)).motion.pitch
     assert found is not None
@@ -50,7 +50,7 @@ def test_harmonics_and_functions_have_the_rates_of_their_sum() -> None:
     """Per revolution under a speed that changes: α = 2ψ, α̇ = 2Ω, α̈ = 2Ω̇; differences of fourth order."""
     motion = {"type": "spin_up", "speed": 5.0, "duration": 2.0}
     parts = [{"amplitude": 0.1, "per_rev": 2.0, "phase": 0.4}, {"amplitude": -0.05, "frequency": 7.0}]
-    found = course({"table": [[0, 0.1], [2, 0.3]], "harmonic": parts}, motion=motion)
+    found = signal({"table": [[0, 0.1], [2, 0.3]], "harmonic": parts}, motion=motion)
     assert found.start == pytest.approx(0.1 + 0.1 * np.cos(0.4) - 0.05, rel=1e-14)
     _, rate, acceleration = differentiated(found.angle)
     for t in (0.3, 1.1, 1.9):
@@ -60,12 +60,12 @@ def test_harmonics_and_functions_have_the_rates_of_their_sum() -> None:
 
 def test_a_function_may_have_its_rate_beside_it() -> None:
     """The rate that is given is taken, and the acceleration is that of the rate: here of another angle than given."""
-    found = course({"function": lambda t: 0.1 * t, "rate": lambda t: np.sin(300.0 * t)})
+    found = signal({"function": lambda t: 0.1 * t, "rate": lambda t: np.sin(300.0 * t)})
     assert found.angle(0.7) == pytest.approx(0.07, rel=1e-14)
     assert found.rate(0.7) == np.sin(210.0)
     assert found.acceleration(0.7) == pytest.approx(300.0 * np.cos(210.0), rel=1e-9)
     with pytest.raises(InputError, match="rate: the function of time, at 0.5, must return a number"):
-        course({"function": lambda t: 0.1, "rate": lambda t: "fast"}).rate(0.5)
+        signal({"function": lambda t: 0.1, "rate": lambda t: "fast"}).rate(0.5)
 
 
 def test_units() -> None:
@@ -111,11 +111,11 @@ def test_refused(pitch: Any, more: dict[str, Any], key: str) -> None:
 )
 def test_functions_that_are_none(function: Any, said: str) -> None:
     with pytest.raises(SceneError, match=said):
-        course(function)
+        signal(function)
 
 
-def angle(function: Any) -> Course:
-    return Course("structure.root.pitch", function, np.empty(0), np.empty(0), known=False, continuous=2)
+def angle(function: Any) -> TimeSignal:
+    return TimeSignal("structure.root.pitch", function, np.empty(0), np.empty(0), known=False, continuous=2)
 
 
 @pytest.mark.parametrize(

@@ -100,9 +100,9 @@ def test_divergence() -> None:
 def test_growth_on_the_way_is_remembered() -> None:
     """The root may be another one then; of the next solve it says nothing, nor does growth at the level of noise."""
     newton = Newton()
-    for values, strayed in (([1e-2, 1e-3, 5e-3, 1e-12], True), ([1e-2, 1e-5, 2e-5, 1e-12], False)):
+    for values, diverging in (([1e-2, 1e-3, 5e-3, 1e-12], True), ([1e-2, 1e-5, 2e-5, 1e-12], False)):
         assert newton.solve(iter(values).__next__, lambda: 1.0) == 4
-        assert newton.strayed == strayed
+        assert newton.diverging == diverging
 
 
 def test_stops_at_round_off_and_says_so() -> None:

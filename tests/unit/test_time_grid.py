@@ -9,24 +9,24 @@ import pytest
 
 from rotfem import SceneError, run
 from rotfem.analysis.time_grid import TimeGrid, find_breakpoints
-from rotfem.mechanics.courses import Course
+from rotfem.mechanics.time_signals import TimeSignal
 from tests.beams import STRUCTURE
 
 TIMES = np.linspace(0.0, 2.0, 201)
 
 
-def looked(f: Any, name: str = "loads.tip_force") -> Course:
-    course = Course(name, f, np.empty(0), np.empty(0), known=False)
-    find_breakpoints(course, TIMES)
-    return course
+def looked(f: Any, name: str = "loads.tip_force") -> TimeSignal:
+    signal = TimeSignal(name, f, np.empty(0), np.empty(0), known=False)
+    find_breakpoints(signal, TIMES)
+    return signal
 
 
 @pytest.mark.parametrize("at", [0.5033, 1.0 / 3.0, 1.25])
 def test_a_jump_is_found_to_round_off(at: float) -> None:
     """Halving sixty times leaves two neighbouring numbers, one on each side."""
-    course = looked(lambda t: 3.0 if t >= at else -1.0)
-    assert len(course.knots) == 1
-    assert course.knots[0] == pytest.approx(at, rel=4e-16)
+    signal = looked(lambda t: 3.0 if t >= at else -1.0)
+    assert len(signal.knots) == 1
+    assert signal.knots[0] == pytest.approx(at, rel=4e-16)
 
 
 def test_what_is_smooth_has_no_knots_and_what_is_slow_no_marks() -> None:
@@ -43,21 +43,21 @@ def test_what_is_smooth_in_up_to_three_steps_is_averaged_wherever_they_end(
     step: float, order: int, averages: bool
 ) -> None:
     """A parabola of 20 ms: every leg in it is averaged or none, so that hats add up to all of it, 2/3 · 20 ms."""
-    course = Course(
+    signal = TimeSignal(
         "motion.rate",
         lambda t: max(0.0, 1.0 - ((t - 0.51) / 0.01) ** 2),
         np.empty(0),
         np.array([0.0, 0.5, 0.52, 1.0]),
-        looks=np.array([0.25, 0.51, 0.76]),
+        probes=np.array([0.25, 0.51, 0.76]),
     )
-    legs = [leg for _, leg in TimeGrid([course], np.append(np.arange(0.0, 1.0, step), 1.0), step, order)]
+    legs = [leg for _, leg in TimeGrid([signal], np.append(np.arange(0.0, 1.0, step), 1.0), step, order)]
     inside = [leg for leg in legs if leg.end > 0.5 + 1e-9 and leg.end - leg.length < 0.52 - 1e-9]
     assert {leg.averaged for leg in inside} == {averages}
     if averages:
         ends = [inside[0].end - inside[0].length, *(leg.end for leg in inside)]
         lengths = [0.0, *np.diff(ends), 0.0]
         impulse = sum(
-            0.5 * (before + after) * course.mean(t, before, after)
+            0.5 * (before + after) * signal.mean(t, before, after)
             for t, before, after in zip(ends, lengths, lengths[1:], strict=False)
         )
         assert impulse == pytest.approx(2 / 3 * 0.02, rel=1e-9)

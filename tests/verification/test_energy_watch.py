@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rotfem import ComputationError, run
-from rotfem.commands.monitor import growth, growth_on_hub, said, with_cause
+from rotfem.commands.monitor import energy_warning, growth, growth_on_hub, with_cause
 from tests.beams import STRUCTURE
 
 T = np.linspace(0.0, 100.0, 1001)
@@ -59,8 +59,8 @@ def test_growth_is_said_and_named_as_a_cause() -> None:
     """Where nothing gives energy only; errors of other kinds stay what they are."""
     history = {**SHAPE, "jacobi": -1e3 + 0.01 * T}
     closed, driven = (SimpleNamespace(hub=None, model=SimpleNamespace(closed=closed)) for closed in (True, False))
-    assert "the energy has grown by 0.45" in said(closed, history)
-    assert said(driven, history) == ""
+    assert "the energy has grown by 0.45" in energy_warning(closed, history)
+    assert energy_warning(driven, history) == ""
     error = ComputationError("too far", time=1.0, advice="less")
     assert with_cause(error, driven, history) is error
     caused = with_cause(error, closed, history)

@@ -1,4 +1,4 @@
-"""Rotations of any size: beams and plates rolled up by turns, motions beyond a turn, what a new datum leaves."""
+"""Rotations of any size: beams and plates rolled up by turns, motions beyond a turn, what a new reference leaves."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ def test_a_resumed_run_counts_rotations_from_the_same_shapes(tmp_path: Path) -> 
         np.testing.assert_array_equal(resumed.history[name], values, err_msg=name)
 
 
-# --- what a change of the datum leaves as it is ----------------------------------------------------------------------
+# --- what a change of the reference leaves as it is -----------------------------------------------------------------
 
 
 def bent(kind: str, elements: int) -> tuple[Any, State]:
@@ -199,7 +199,7 @@ def test_energy_and_orientation_do_not_feel_a_new_datum(kind: str) -> None:
 
 
 def test_rates_go_over_to_a_new_datum() -> None:
-    """Rates and second rates from the datum are those of the same motion, by differences: Λ(t) R⁻¹ = exp(θ(t))."""
+    """Rates and second rates from the reference are those of the same motion, by differences: Λ(t) R⁻¹ = exp(θ(t))."""
     system, state = bent("spatial_beam", 2)
     theta, v, a = (x.reshape(-1, 6)[:, 3:].copy() for x in (state.q, state.v, state.a))
     keep_rotations_small(system, rotfem.GeneralisedAlpha(), state, 0.0)
@@ -265,7 +265,7 @@ def test_a_motion_starts_where_another_system_is() -> None:
     }
     problem = rotfem.Problem.of(scene)
     steady = problem.steady()
-    assert steady.state.datum is not None
+    assert steady.state.reference is not None
     *_, last = problem.march(end=0.01, step=0.005, start=steady)
     np.testing.assert_allclose(list(last.tip.values()), list(steady.tip.values()), rtol=0, atol=1e-7)
     assert last.tip["theta3"] == pytest.approx(2.2 * np.pi, abs=1e-9)

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from rotfem import Problem, RunResult, run
-from rotfem.analysis.theory_error import lost_digits
+from rotfem.analysis.theory_error import conditioning
 
 #: Tip deflection that is asked for, over the length.
 SMALL = 1e-3
@@ -51,12 +51,12 @@ def test_bound_of_the_deflection(slenderness: float, elements: int) -> None:
     steady = Problem.of(scene).steady()
     exact = SMALL * 10.0 * (1 + 3 * 2.6 * slenderness**2)
     error = abs(steady.tip["u2"] / exact - 1)
-    bound = lost_digits(steady.system, steady.state.q)
+    bound = conditioning(steady.system, steady.state.q)
     assert error <= bound
     assert error < 1e-9 or bound < 1e4 * error
     scene["model"] = {"theory": "reissner"}
     exact = Problem.of(scene).steady()
-    assert lost_digits(exact.system, exact.state.q) == 0.0
+    assert conditioning(exact.system, exact.state.q) == 0.0
 
 
 def test_what_is_said() -> None:

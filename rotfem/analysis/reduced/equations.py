@@ -15,7 +15,7 @@ from rotfem.analysis.reduced.manifold import Manifold
 from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.analysis.reduced.solution import Solution, States
 from rotfem.analysis.time_grid import find_breakpoints
-from rotfem.mechanics.courses import SAME as RESOLVED
+from rotfem.mechanics.time_signals import SAME as RESOLVED
 
 Array = npt.NDArray[np.float64]
 
@@ -48,11 +48,11 @@ class Excitation:
 
     def __init__(self, system: Any, times: Array):
         self.system, self.motion, self.frame = system, system.motion, system.model.frame
-        self._signals = {signal.name: signal for signal in system.courses}
-        for signal in system.courses:
+        self._signals = {signal.name: signal for signal in system.signals}
+        for signal in system.signals:
             find_breakpoints(signal, times)
         first, last = float(times[0]), float(times[-1])
-        points = np.concatenate([np.empty(0), *(np.concatenate([c.knots, c.marks]) for c in system.courses)])
+        points = np.concatenate([np.empty(0), *(np.concatenate([c.knots, c.marks]) for c in system.signals)])
         inside = np.unique(points[(points > first) & (points < last)])
         knots = np.concatenate([[first], inside, [last]])
         self.knots: Array = knots[np.append(np.diff(knots) > ASIDE * (last - first), True)]
@@ -116,7 +116,7 @@ class Excitation:
             values["gravity"] = self._gravity(angle)
         if pitch is None:
             return values
-        beta, d_beta, dd_beta = (self._signal(name, at, t)[:, 0] for name, at in pitch.courses.items())
+        beta, d_beta, dd_beta = (self._signal(name, at, t)[:, 0] for name, at in pitch.signals.items())
         beta = beta - pitch.start
         if "gravity" in names:
             values["gravity"] = pitch.seen(beta[:, None], values["gravity"])

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from rotfem.analysis.reduced.equations import Excitation, Forces, HeldEquations
 from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.analysis.reduced.solution import Solution, States
-from rotfem.mechanics.courses import POINTS, WEIGHTS
+from rotfem.mechanics.time_signals import POINTS, WEIGHTS
 from rotfem.numerics.projection import summed
 
 Array = npt.NDArray[np.float64]

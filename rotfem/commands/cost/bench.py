@@ -104,12 +104,12 @@ class Bench:
         go = self._start(variant)
         ready = perf_counter(), process_time()
 
-        def watch(share: float) -> None:
+        def observer(share: float) -> None:
             if self.comm.size == 1 and process_time() - ready[1] > limit:
                 raise OverTime
 
         try:
-            samples, counts = go(watch)
+            samples, counts = go(observer)
         finally:
             end = perf_counter(), process_time()
             out.setup.append(ready[0] - clock[0])

@@ -197,7 +197,7 @@ class Refinement:
         return log2(before / last) if before > last > 0.0 else None
 
 
-def beside(known: Reference, there: Samples, here: Samples, each: bool) -> Reference:
+def paired(known: Reference, there: Samples, here: Samples, each: bool) -> Reference:
     """Return the reference of a theory from that of another, and the outputs of both for one setting.
 
     The errors of the setting are nearly the same in both: the error of their difference is its product with the error.

@@ -16,7 +16,7 @@ from rotfem.commands.cost.bench import check_degrees
 from rotfem.commands.cost.budget import DEFAULT_FULL, DEFAULT_QUICK, Budget, seconds_of
 from rotfem.commands.cost.laboratory import Laboratory
 from rotfem.commands.cost.record import Measurement
-from rotfem.commands.cost.reference import Refinement, beside, distance
+from rotfem.commands.cost.reference import Refinement, distance, paired
 from rotfem.commands.cost.result import (
     CostResult,
     References,
@@ -221,7 +221,7 @@ class Study:
             known = self.references[truth]
             there, here = (self._measured(replace(known.setting, theory=t)) for t in (theory, truth))
             if there is not None and there.samples is not None and here is not None and here.samples is not None:
-                self.references[theory] = beside(known, there.samples, here.samples, self.each)
+                self.references[theory] = paired(known, there.samples, here.samples, self.each)
             else:
                 self.failures[theory] = "the budget is too small for it" if there is None else there.reason
 

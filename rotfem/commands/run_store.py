@@ -11,7 +11,7 @@ from typing import Any
 from mpi4py import MPI
 
 from rotfem.analysis.schemes import State
-from rotfem.commands.checkpoint import Memory, Parts, Tree, check_end, check_identity, check_parts, identity, told
+from rotfem.commands.checkpoint import Memory, Parts, Tree, check_end, check_identity, check_parts, comparable, identity
 from rotfem.commands.interrupts import Interrupts
 from rotfem.commands.result_folder import ResultFolder
 from rotfem.errors import OutputError, SceneError, Stopped
@@ -52,7 +52,7 @@ class Interval:
         return cls(seconds=float(found[1])) if found[2] else cls(steps=int(found[1]))
 
 
-class Keeper:
+class RunStore:
     """Keeps a run's rows and checkpoints on disk, and ends it between steps when it is asked to.
 
     Args:
@@ -122,7 +122,7 @@ class Keeper:
             return None
         summary = self.folder.first_does(lambda files: read_summary(files.folder))
         is_done = summary.get("command") == "run" and summary.get("status") == "done"
-        return summary if is_done and told(summary.get("scene")) == told(scene.digest()) else None
+        return summary if is_done and comparable(summary.get("scene")) == comparable(scene.digest()) else None
 
     def setting(self) -> Setting | None:
         """Return the setting of the run that goes on, which an accuracy or a tolerance has led to; None without."""
@@ -170,12 +170,12 @@ class Keeper:
         """
         if self._live is not None:
             self._live.update()
-        told = ASKED * self._interrupts.asked + DUE * self._is_due()
+        comparable = ASKED * self._interrupts.asked + DUE * self._is_due()
         if self.comm.size > 1:
-            told = self.comm.allreduce(told, op=MPI.BOR)
-        if told or self._is_last(state):
+            comparable = self.comm.allreduce(comparable, op=MPI.BOR)
+        if comparable or self._is_last(state):
             self._save(state)
-        if told & ASKED and self._interrupts.active:
+        if comparable & ASKED and self._interrupts.active:
             raise Stopped
 
     def _is_due(self) -> bool:

@@ -1,8 +1,8 @@
 """What is prescribed over time, and how a march sees it: from one side of an instant, or as a mean around it.
 
-Speed, base acceleration, torque and loads are *courses*, smooth between their knots. A march lands on knots, and there
-a course has two values: that of the step that ends, t⁻, and that of the step that starts, t⁺. Where knots are closer
-than steps can be, a course is seen through the hat function of an instant and its steps l before and r after it,
+Speed, base acceleration, torque and loads are *signals*, smooth between their knots. A march lands on knots, and there
+a signal has two values: that of the step that ends, t⁻, and that of the step that starts, t⁺. Where knots are closer
+than steps can be, a signal is seen through the hat function of an instant and its steps l before and r after it,
 
     f̄(t) = ∫ f(s) φ(s) ds / ∫ φ(s) ds,    φ = 1 + (s − t)/l before t, 1 − (s − t)/r after it.
 
@@ -38,11 +38,11 @@ POINTS, WEIGHTS = 0.5 + 0.5 * np.sqrt(0.6) * np.array([-1.0, 0.0, 1.0]), np.arra
 
 @dataclass
 class View:
-    """How the courses of a problem are seen at present.
+    """How the signals of a problem are seen at present.
 
     Attributes:
         side: −1 just before the time asked for, 1 just after it, 0 at it.
-        window: lengths (s) of the steps before and after it that courses are averaged over; None for their values.
+        window: lengths (s) of the steps before and after it that signals are averaged over; None for their values.
     """
 
     side: int = 0
@@ -50,7 +50,7 @@ class View:
 
 
 @dataclass
-class Course:
+class TimeSignal:
     """One quantity over time.
 
     Attributes:
@@ -59,7 +59,7 @@ class Course:
         knots: times (s) between which it is smooth, increasing.
         marks: further times (s) between which it is nearly straight, where it is known to be fast.
         many: the same of an array of times, shape (n, components); made of `at` if None.
-        looks: times (s) at which it is sampled to see whether a step resolves it, but not landed on.
+        probes: times (s) at which it is sampled to see whether a step resolves it, but not landed on.
         samples: times (n,) and values (n, components) of a function that has been sampled, nearly straight between;
             jumps are two times; None of anything else.
         data: what has been made of its values at knots and marks (`rotfem.analysis.time_grid`); None before.
@@ -74,7 +74,7 @@ class Course:
     marks: Array
     many: Callable[[Array], Array] | None = None
     known: bool = True
-    looks: Array = field(default_factory=lambda: np.empty(0))
+    probes: Array = field(default_factory=lambda: np.empty(0))
     samples: tuple[Array, Array] | None = None
     data: Any = None
     continuous: int = 0
@@ -110,7 +110,7 @@ class Course:
         return np.stack([np.interp(s, t, column) for column in f.T], axis=1)
 
     def seen(self, view: View) -> Callable[[float], Any]:
-        """Return the course as a function of time that shows what a view shows."""
+        """Return the signal as a function of time that shows what a view shows."""
 
         def at(t: float) -> Any:
             if view.window is not None:
@@ -131,42 +131,42 @@ class SeenTorque(Torque):
         return super().at(t, True) if after else self.seen(t)
 
 
-def watched(problem: Problem, view: View) -> tuple[Problem, list[Course]]:
-    """Return the problem whose courses are seen as a view shows them, and those that change with time."""
-    courses: list[Course] = []
+def watched(problem: Problem, view: View) -> tuple[Problem, list[TimeSignal]]:
+    """Return the problem whose signals are seen as a view shows them, and those that change with time."""
+    signals: list[TimeSignal] = []
 
-    def see(course: Course) -> Callable[[float], Any]:
-        courses.append(course)
-        return course.seen(view)
+    def see(signal: TimeSignal) -> Callable[[float], Any]:
+        signals.append(signal)
+        return signal.seen(view)
 
     motion = _watched_motion(problem.motion, see)
     changing = {name: load for name, load in named(problem.loads).items() if not load.constant}
-    seen = {name: _seen_load(f"loads.{name}", load, see, view) for name, load in changing.items()}
-    return problem.replace(motion=motion, loads=replaced(problem.loads, seen)), courses
+    seen = {name: _watched_load(f"loads.{name}", load, see, view) for name, load in changing.items()}
+    return problem.replace(motion=motion, loads=replaced(problem.loads, seen)), signals
 
 
-def _seen_load(name: str, load: AnyLoad, see: Callable[[Course], Callable[[float], Any]], view: View) -> AnyLoad:
+def _watched_load(name: str, load: AnyLoad, see: Callable[[TimeSignal], Callable[[float], Any]], view: View) -> AnyLoad:
     """Return a load as a view shows it; a function of place at every place, with the knots found at its probes."""
-    course = Course(name, load.at, _times(load.knots), np.empty(0), load.many, known=load.linear)
-    sampled = see(course)
+    signal = TimeSignal(name, load.at, _times(load.knots), np.empty(0), load.many, known=load.linear)
+    sampled = see(signal)
     if not isinstance(load, PlaceLoad):
         return replace(load, seen=sampled)
     function = load.function
 
     def at(place: Any, t: float) -> Array:
-        one = Course(name, lambda s: function(place, s), course.knots, course.marks)
+        one = TimeSignal(name, lambda s: function(place, s), signal.knots, signal.marks)
         return np.asarray(one.seen(view)(t))
 
     return replace(load, function=at)
 
 
-def _watched_motion(motion: Motion, see: Callable[[Course], Callable[[float], Any]]) -> Motion:
+def _watched_motion(motion: Motion, see: Callable[[TimeSignal], Callable[[float], Any]]) -> Motion:
     changes: dict[str, Any] = {}
     none = np.empty(0)
     if motion.is_accelerated and not motion.constant:
         base, at = motion.base_knots, motion.base_acceleration
         changes["base_acceleration"] = see(
-            Course("motion.base_acceleration", at, _times(base), none, _between(at, base), known=base is not None)
+            TimeSignal("motion.base_acceleration", at, _times(base), none, _between(at, base), known=base is not None)
         )
     if motion.hub is not None:
         if len(motion.hub.torque.knots):
@@ -175,29 +175,29 @@ def _watched_motion(motion: Motion, see: Callable[[Course], Callable[[float], An
         known = motion.smooth or motion.breakpoints is not None
         for name, f in (("speed", motion.speed), ("rate", motion.rate)):
             many = _columns(f) if motion.arrays else None
-            course = Course(f"motion.{name}", f, _times(motion.sharp), _times(motion.knots), many, known)
-            course.looks = 0.5 * (course.marks[1:] + course.marks[:-1])
-            course.continuous = int(name == "speed")
-            changes[name] = see(course)
+            signal = TimeSignal(f"motion.{name}", f, _times(motion.sharp), _times(motion.knots), many, known)
+            signal.probes = 0.5 * (signal.marks[1:] + signal.marks[:-1])
+            signal.continuous = int(name == "speed")
+            changes[name] = see(signal)
     if motion.pitch is not None:
         changes["pitch"] = _watched_pitch(motion.pitch, see)
     return replace(motion, **changes)
 
 
-def _watched_pitch(pitch: Pitch, see: Callable[[Course], Callable[[float], Any]]) -> Pitch:
+def _watched_pitch(pitch: Pitch, see: Callable[[TimeSignal], Callable[[float], Any]]) -> Pitch:
     """Return a pitch as it is seen; of a function the acceleration is sampled, which shows fast changes most."""
     none, changes = np.empty(0), dict[str, Any]()
-    for name, (key, at) in zip(("angle", "rate", "acceleration"), pitch.courses.items(), strict=True):
-        course = Course(key, at, _times(pitch.knots), none, known=pitch.known or name == "rate")
-        course.continuous = 2 if name == "angle" else 0
-        changes[name] = see(course)
+    for name, (key, at) in zip(("angle", "rate", "acceleration"), pitch.signals.items(), strict=True):
+        signal = TimeSignal(key, at, _times(pitch.knots), none, known=pitch.known or name == "rate")
+        signal.continuous = 2 if name == "angle" else 0
+        changes[name] = see(signal)
     return replace(pitch, **changes)
 
 
-def _watched_hub(hub: FreeHub, see: Callable[[Course], Callable[[float], Any]]) -> FreeHub:
+def _watched_hub(hub: FreeHub, see: Callable[[TimeSignal], Callable[[float], Any]]) -> FreeHub:
     torque = hub.torque
-    course = Course("motion.torque", torque.at, torque.knots, np.empty(0), lambda t: torque.many(t)[:, None])
-    return replace(hub, torque=SeenTorque(torque.pulses, torque.table, see(course)))
+    signal = TimeSignal("motion.torque", torque.at, torque.knots, np.empty(0), lambda t: torque.many(t)[:, None])
+    return replace(hub, torque=SeenTorque(torque.pulses, torque.table, see(signal)))
 
 
 def _times(knots: Iterable[float] | None) -> Array:
@@ -209,7 +209,7 @@ def _columns(f: Callable[[Any], Any]) -> Callable[[Array], Array]:
 
 
 def _between(at: Callable[[float], Array], knots: tuple[float, ...] | None) -> Callable[[Array], Array] | None:
-    """Return a course of an array of times that is linear between knots; None where it is not, or jumps there."""
+    """Return a signal of an array of times that is linear between knots; None where it is not, or jumps there."""
     if not knots or np.any(np.diff(knots) <= 0.0):
         return None
     columns = np.array([at(t) for t in knots], dtype=float).T

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.equations.resultants import Resultants, Saddle
+from rotfem.equations.mixed_form import Resultants, Saddle
 from rotfem.errors import ComputationError
 from rotfem.numerics.balance import power_of_two
 from rotfem.numerics.eigenproblem import ROUNDED, Eigenpairs, Pencil, RoundOff, relative

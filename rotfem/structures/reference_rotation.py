@@ -2,10 +2,10 @@
 
 A rotation vector stands for a rotation one to one up to a full turn, and the two angles of a plate's director have a
 pole. Neither is a limit of the structure. Before rotations come there they are counted afresh from the shape reached,
-the *datum*: with its orientation R(X) the section is turned by exp(θ) R, the director is R t(alpha), and θ or alpha
+the *reference*: with its orientation R(X) the section is turned by exp(θ) R, the director is R t(alpha), and θ or alpha
 start again at zero. Displacements do not change. R lies as polynomials in every cell, of a degree so much above that of
 the unknowns that the strains are the same before and after; at their nodes R is exact, so errors do not add up. It is
-known, exactly, at the nodes of the unknowns too. A beam also keeps the curvature of the datum, axial(Rᵀ R').
+known, exactly, at the nodes of the unknowns too. A beam also keeps the curvature of the reference, axial(Rᵀ R').
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ Array = npt.NDArray[np.float64]
 
 
 class BeyondReach(ComputationError):
-    """Rotations have come farther from their datum than they may: what led there was too long a step."""
+    """Rotations have come farther from their reference than they may: what led there was too long a step."""
 
 
 @dataclass(frozen=True, eq=False)
-class Datum:
+class ReferenceRotation:
     """The orientations that rotations are counted from; arrays of this process, which are not changed.
 
     Attributes:
@@ -62,15 +62,15 @@ class Discretised(Protocol):
 
 
 class Turns(ABC):
-    """The rotations of a structure, and the datum they are counted from.
+    """The rotations of a structure, and the reference they are counted from.
 
     Args:
         structure: it is discretised already.
 
     Attributes:
-        datum: None as long as rotations are counted from the undeformed structure.
-        rotation, curvature: the functions that hold R and its curvature in the forms; None until there is a datum.
-        before: a function of the unknowns' space that holds the total rotations of the datum; None until there is one.
+        reference: None as long as rotations are counted from the undeformed structure.
+        rotation, curvature: the functions that hold R and its curvature in the forms; None until there is a reference.
+        before: a function of the unknowns' space, the total rotations of the reference; None until there is one.
     """
 
     #: The unknowns that are rotations.
@@ -84,14 +84,14 @@ class Turns(ABC):
 
     def __init__(self, structure: Discretised):
         self._structure = structure
-        self.datum: Datum | None = None
+        self.reference: ReferenceRotation | None = None
         self.rotation: Any = None
         self.curvature: Any = None
         self.before: Any = None
 
     @classmethod
     def of(cls, structure: Discretised) -> Self | None:
-        """Return the rotations of a structure; None in a theory whose strains do not allow a datum."""
+        """Return the rotations of a structure; None in a theory whose strains do not allow a reference."""
         return cls(structure) if structure.problem.theory.exact else None
 
     # --- what sections and directors differ in ---------------------------------------------------------------------
@@ -113,11 +113,11 @@ class Turns(ABC):
         """Return rates and second rates of rotations that are counted from the present shape."""
 
     @abstractmethod
-    def _curvature(self, datum: Datum, rotations: Array, nodal: Array) -> Array:
-        """Return the curvature of the next datum at the points of the polynomials.
+    def _curvature(self, reference: ReferenceRotation, rotations: Array, nodal: Array) -> Array:
+        """Return the curvature of the next reference at the points of the polynomials.
 
         Args:
-            datum: the present one.
+            reference: the present one.
             rotations: at the points, (cells, points, 3 or 2).
             nodal: at the nodes of the unknowns, cell by cell, (cells, nodes of a cell, 3 or 2).
         """
@@ -141,7 +141,7 @@ class Turns(ABC):
         return now * self.limit > self.enough or (v is not None and 2 * now > 1.0 and self.reached(q, v, h) > 1.0)
 
     def check(self, q: Array, time: float | None = None) -> None:
-        """Refuse rotations that have come farther from their datum than they may.
+        """Refuse rotations that have come farther from their reference than they may.
 
         Raises:
             BeyondReach: they have.
@@ -149,24 +149,24 @@ class Turns(ABC):
         if (part := self.reached(q)) > 1.0:
             raise BeyondReach(f"rotations changed by {part * self.limit:.3g} rad at once", time)
 
-    # --- change of the datum ---------------------------------------------------------------------------------------
+    # --- change of the reference -----------------------------------------------------------------------------------
 
-    def use(self, datum: Datum | None) -> bool:
-        """Count rotations from a datum, None for the undeformed structure; return whether forms must be made anew."""
-        if datum is self.datum:
+    def use(self, reference: ReferenceRotation | None) -> bool:
+        """Count rotations from a reference, None for the undeformed structure; return whether forms change."""
+        if reference is self.reference:
             return False
         first = self.rotation is None
         if first:
             self._make_functions()
-        self.datum = datum
-        shape = datum or self._undeformed
+        self.reference = reference
+        shape = reference or self._undeformed
         _write(self.rotation, shape.rotation)
         _write(self.curvature, shape.curvature)
         self._of(self.before.x.array)[:] = shape.total
         return first
 
-    def reset(self, q: Array, v: Array, second: list[Array]) -> Datum:
-        """Return the shape of q as a datum, and make rotations, their rates and second rates those from there.
+    def reset(self, q: Array, v: Array, second: list[Array]) -> ReferenceRotation:
+        """Return the shape of q as a reference, and make rotations, their rates and second rates those from there.
 
         Args:
             q: local dof array of the unknowns, overwritten.
@@ -177,20 +177,20 @@ class Turns(ABC):
         for a in second:
             self._of(v)[:], self._of(a)[:] = self._rates(rotations, rates, self._of(a))
         self._of(q)[:] = 0.0
-        old, cells = self.datum or self._undeformed, self._structure.V.dofmap.list
+        old, cells = self.reference or self._undeformed, self._structure.V.dofmap.list
         nodes, nodal = self._orientation(rotations, old.nodes), rotations[cells]
         at_points = np.einsum("pn,cni->cpi", self._tables[0], nodal)
         total = self._from_rest(nodes, old.total + rotations)
         curvature = self._curvature(old, at_points, nodal)
-        return Datum(nodes, total, self._orientation(at_points, old.rotation), curvature)
+        return ReferenceRotation(nodes, total, self._orientation(at_points, old.rotation), curvature)
 
     def total(self, q: Array) -> Array:
         """Return q (local dof array) with its rotations counted from the undeformed structure."""
-        if self.datum is None:
+        if self.reference is None:
             return q
         out, rotations = q.copy(), self._of(q)
-        orientation = self._orientation(rotations, self.datum.nodes)
-        self._of(out)[:] = self._from_rest(orientation, self.datum.total + rotations)
+        orientation = self._orientation(rotations, self.reference.nodes)
+        self._of(out)[:] = self._from_rest(orientation, self.reference.total + rotations)
         return out
 
     # --- fields -----------------------------------------------------------------------------------------------------
@@ -214,18 +214,18 @@ class Turns(ABC):
         return np.asarray(self._structure.V.element.basix_element.tabulate(1, points)[..., 0])
 
     @cached_property
-    def _undeformed(self) -> Datum:
+    def _undeformed(self) -> ReferenceRotation:
         nodes = self._structure.V.dofmap.index_map
         n = nodes.size_local + nodes.num_ghosts
         cells, points = self._space.dofmap.list.shape
         total = np.zeros((n, self.components.stop - self.components.start))
         everywhere = np.broadcast_to(np.eye(3), (cells, points, 3, 3))
-        return Datum(np.broadcast_to(np.eye(3), (n, 3, 3)), total, everywhere, np.zeros((cells, points, 3)))
+        return ReferenceRotation(np.broadcast_to(np.eye(3), (n, 3, 3)), total, everywhere, np.zeros((cells, points, 3)))
 
     def _make_functions(self) -> None:
         mesh, degree = self._structure.mesh, self._space.element.basix_element.degree
         vectors = fem.functionspace(mesh, element("DG", mesh.basix_cell(), degree, shape=(3,)))
-        self.rotation = fem.Function(self._space, name="datum")
+        self.rotation = fem.Function(self._space, name="reference")
         self.curvature = fem.Function(vectors, name="datum_curvature")
         self.before = fem.Function(self._structure.V, name="before")
 
@@ -256,13 +256,13 @@ class SectionTurns(Turns):
     def _rates(self, rotations: Array, v: Array, a: Array) -> tuple[Array, Array]:
         return turned.spins(rotations, v, a)
 
-    def _curvature(self, datum: Datum, rotations: Array, nodal: Array) -> Array:
+    def _curvature(self, reference: ReferenceRotation, rotations: Array, nodal: Array) -> Array:
         """Return Rᵀ T(θ) θ' + axial(Rᵀ R')."""
         geometry = self._structure.mesh.geometry
         ends = geometry.x[geometry.dofmap, 0]
         slopes = np.einsum("pn,cni->cpi", self._tables[1], nodal) / np.diff(ends)[:, :, None]
         change = turned.material_curvature(rotations, slopes)
-        return np.asarray(np.einsum("cpji,cpj->cpi", datum.rotation, change) + datum.curvature)
+        return np.asarray(np.einsum("cpji,cpj->cpi", reference.rotation, change) + reference.curvature)
 
 
 class DirectorTurns(Turns):
@@ -292,6 +292,6 @@ class DirectorTurns(Turns):
     def _rates(self, rotations: Array, v: Array, a: Array) -> tuple[Array, Array]:
         return turned.tilts(rotations, v, a)
 
-    def _curvature(self, datum: Datum, rotations: Array, nodal: Array) -> Array:
+    def _curvature(self, reference: ReferenceRotation, rotations: Array, nodal: Array) -> Array:
         """Return zeros: what bends a plate are the derivatives of its director, which the polynomials of R have."""
-        return datum.curvature
+        return reference.curvature
