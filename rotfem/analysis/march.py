@@ -102,10 +102,9 @@ def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State
         ComputationError: the step failed, however short.
     """
     old, before = None, state
+    finish = View(-1 if leg.lands else 0, (leg.length, 0.0) if leg.averaged else None)
     if leg.drifts:
-        state = stepper.drift(state, leg.length, leg.end)
-        if leg.averaged:
-            state = stepper.after_blow(state, leg.length)
+        state = stepper.drift(state, leg.length, leg.end, finish)
     else:
         joined = after is not None and leg.joins(after)
         window = (leg.length, after.length if after is not None and joined else 0.0) if leg.averaged else None
@@ -118,7 +117,6 @@ def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State
     if old is not None and not after.drifts and after.length != leg.length:
         state = stepper.scheme.resized(state, old, after.length)
     if leg.lands or ((leg.averaged or after.averaged) and not leg.joins(after)):
-        finish = View(-1 if leg.lands else 0, (leg.length, 0.0) if leg.averaged else None)
         ahead = View(1 if leg.lands else 0, (0.0, after.length) if after.averaged else None)
         state = stepper.restart(state, finish, ahead)
     if old is not None and not (after.drifts or leg.averaged or after.averaged) and bends(stepper.scheme, leg, after):
@@ -309,7 +307,7 @@ class AdaptiveSteps:
             start = stepper.restart(state, View(), View(window=(0.0, h))) if averaged else state
             finish = View(-1 if lands else 0, (h, 0.0) if averaged else None)
             drifts = h <= LEAST * (1 + 1e-6) * min(self.cells.step, wanted)
-            new, ratio = self._drifted(start, h, stop, finish) if drifts else self._tried(start, h, stop, finish)
+            new, ratio = (stepper.drift(start, h, stop, finish), 0.0) if drifts else self._tried(start, h, stop, finish)
             power, most = 1 / (stepper.scheme.estimate[1] - 1), stepper.scheme.growth
             if averaged and ratio > 1.0 and ratio != FAILED and h <= self.cells.step * (1 + 1e-9):
                 ratio = 1.0  # the time grid has nothing finer; shorter steps would follow each breakpoint after all
@@ -379,11 +377,6 @@ class AdaptiveSteps:
             return new, 1.0
         return new, MARGIN * self.measure(local, h) / max(self.tolerance * self.largest, self.least)
 
-    def _drifted(self, start: State, h: float, stop: float, finish: View) -> tuple[State, float]:
-        """Return the state after a step between two knots that is too short to be solved for, and no error."""
-        new = self.stepper.drift(start, h, stop)
-        return (new if finish.window is None else self.stepper.after_blow(new, h)), 0.0
-
     def _next(self, t: float, wanted: float, least: float) -> tuple[float, float]:
         """Return end and length of a step from t that is about as long as wanted and steps over nothing.
 
@@ -392,8 +385,11 @@ class AdaptiveSteps:
         i = int(np.searchsorted(self.landings, t * (1 + SAME), side="right"))
         stop = float(self.landings[i]) if i < len(self.landings) else self.end
         left, h = stop - t, min(wanted, self.longest)
-        if h < least and self._averaged(t, t + min(h, left)):
-            h = least
+        if self._averaged(t, t + min(h, left)):
+            if self._is_blow(t):
+                h = min(left, LEAST * self.cells.step)
+                return (stop, left) if h >= left * (1 - 1e-9) else (t + h, h)
+            h = max(h, least)
         while h > self.cells.step and self.cells.bent(t, t + min(h, left)) > BENT:
             h /= 2
         if h >= left * (1 - 1e-9):
@@ -405,6 +401,13 @@ class AdaptiveSteps:
         """Return whether a step meets what is denser than it can follow."""
         i = np.searchsorted(self.dense[:, 1], begin * (1 + SAME), side="right")
         return bool(i < len(self.dense) and self.dense[i, 0] < end * (1 - SAME))
+
+    def _is_blow(self, t: float) -> bool:
+        """Return whether what is averaged here is shorter than a cell: steps that drift have its whole impulse."""
+        apart = np.flatnonzero(self.dense[1:, 0] > self.dense[:-1, 1] * (1 + SAME))
+        begins, ends = self.dense[np.append(0, apart + 1), 0], self.dense[np.append(apart, -1), 1]
+        i = int(np.searchsorted(ends, t * (1 + SAME), side="right"))
+        return bool(begins[i] <= t * (1 + SAME) and ends[i] - begins[i] < self.cells.step)
 
     def _shorter(self, t: float, h: float) -> float:
         """Return the length (s) of a step to be tried again.

@@ -318,7 +318,13 @@ class Stepper(StageSolver):
         with seen(s, after):
             if np.allclose(s.driven(t), old, rtol=STEADY, atol=0.0):
                 return self.scheme.kinked(state)
-            new = state.changed(q=state.q.copy(), v=state.v.copy(), a=state.a.copy(), balanced=True)
+        return self._accelerated(state, after)
+
+    def _accelerated(self, state: State, view: View) -> State:
+        """Return a state with the accelerations that its equations of motion give, seen by a view."""
+        s, t = self.system, state.t
+        new = state.changed(q=state.q.copy(), v=state.v.copy(), a=state.a.copy(), balanced=True)
+        with seen(s, view):
             s.prescribe(t, new.q, new.v, new.a)
             s.set_time(t)
             s.set_state(new.q, new.v, new.a)
@@ -328,18 +334,24 @@ class Stepper(StageSolver):
             new.given[:2] = state.given[:2]
         return self.scheme.jumped(new, new.a - state.a)
 
-    def drift(self, state: State, h: float, end: float) -> State:
-        """Return the state at the end of a step too short to be solved for: round-off of q would spoil a."""
+    def drift(self, state: State, h: float, end: float, finish: View) -> State:
+        """Return the state at the end of a step too short to be solved for: round-off of q would spoil a.
+
+        The accelerations at both ends count by halves in v (the trapezoidal rule), so that no blow is lost.
+
+        Args:
+            state: where the step starts.
+            h: length of the step, s.
+            end: its last instant, s.
+            finish: how it sees there what is prescribed.
+        """
+        self.system.count_rotations_from(state.reference)
         q, v = state.q + h * state.v + 0.5 * h * h * state.a, state.v + h * state.a
         given = state.given
         if given is not None:
             given = given + np.array([0.0, self.system.row.impulse(state.t, end), 0.0])
-        return state.changed(t=end, q=q, v=v, given=given)
-
-    def after_blow(self, state: State, h: float) -> State:
-        """Return a state that drifted through a blow, with the second half of its impulse from the end of the blow."""
-        after = self.restart(state, View(window=(0.0, h)), View(window=(h, 0.0)))
-        return after.changed(v=after.v + 0.5 * h * (after.a - state.a))
+        new = self._accelerated(state.changed(t=end, q=q, v=v, given=given), finish)
+        return new.changed(v=new.v + 0.5 * h * (new.a - state.a))
 
     def step(self, state: State, h: float, end: float | None = None) -> State:
         """Return the state at state.t + h.
