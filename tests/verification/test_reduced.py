@@ -215,14 +215,14 @@ def distance(result: Any, exact: Any) -> float:
 
 
 def test_foreshortening_brings_the_spin_up_near_reissner(spin_up: MakeScene) -> None:
-    """From 3.3e-2 to 1.1e-3 of the largest displacement; the error given is the difference that it makes, not less."""
+    """From 3.3e-2 to 1.1e-3 of the largest displacement, as estimated."""
     time = {"end": 20.0, "step": 0.01, "output_every": 10}
     changes: dict[str, Any] = {"model.theory": "consistent_linear", "model.reduced": True, "model.foreshortening": True}
     exact, scene = run(spin_up(time=time | {"scheme": "radau5"})), spin_up(changes, time=time)
     given, linear = run(scene), run(scene.replace({"model.foreshortening": None}))
     assert distance(linear, exact) == pytest.approx(3.3e-2, rel=0.02)
     assert distance(given, exact) < 1.5e-3
-    assert given.summary["theory_error"]["estimate"] == pytest.approx(distance(linear, given), rel=0.02)
+    assert given.summary["theory_error"]["estimate"] == pytest.approx(distance(given, exact), rel=0.1)
     assert given.shape["u1"][-1] == pytest.approx(given.history["tip_u1"][-1], rel=1e-12)  # summed in another order
     with pytest.raises(SceneError, match="model.foreshortening = true: needs reduced = true"):
         scene.replace({"model.reduced": None})
@@ -230,9 +230,13 @@ def test_foreshortening_brings_the_spin_up_near_reissner(spin_up: MakeScene) -> 
 
 @pytest.mark.parametrize("structure", ["planar_beam", "spatial_beam"])
 def test_foreshortening_is_of_second_order(structure: str) -> None:
-    """At a quarter of the load the relative error falls by 4 linearly, and by 16 with the foreshortening."""
+    """At a quarter of the load the relative error falls by 4 linearly, and by 16 with the foreshortening.
+
+    The estimate by defect correction is that error at both loads.
+    """
     tube = {"shape": "tube", "outer_radius": 0.012, "inner_radius": 0.010, "E": 7e9, "nu": 0.33, "rho": 1600.0}
     off: dict[bool, list[float]] = {False: [], True: []}
+    estimated: list[float] = []
     for load in (16.0, 4.0):
         rows = [[0, 0, 0, 0], [0.1, 0, load, 0], [0.2, 0, -load / 2, load], [0.4, 0, 0, -load]]
         scene: dict[str, Any] = {
@@ -240,15 +244,18 @@ def test_foreshortening_is_of_second_order(structure: str) -> None:
             "mesh": {"elements": 4},
             "motion": {"type": "constant", "speed": 0.0},
             "loads": {"tip_force": {"table": [row if structure == "spatial_beam" else row[:3] for row in rows]}},
-            "time": {"end": 0.4, "step": 2e-3, "scheme": "radau5"},
+            "time": {"end": 0.4, "step": 5e-4, "output_every": 4, "scheme": "radau5"},
             "output": {"error": False},
         }
         exact = run(scene)
         for bent, errors in off.items():
             model = {"theory": "consistent_linear", "reduced": 1e-6, "foreshortening": bent}
-            errors.append(distance(run(scene | {"model": model}), exact))
+            given = run(scene | {"model": model, "output": {"error": bent}})
+            errors.append(distance(given, exact))
+        estimated.append(given.summary["theory_error"]["estimate"])
+    assert estimated == pytest.approx(off[True], rel=0.15)  # a vibration that samples do not resolve is left out
     assert off[False][0] / off[False][1] == pytest.approx(4.0, rel=0.15)
-    assert off[True][0] / off[True][1] == pytest.approx(16.0, rel=0.3)
+    assert off[True][0] / off[True][1] == pytest.approx(16.0, rel=0.1)
 
 
 def test_what_stretch_does_is_in_the_second_order() -> None:

@@ -19,7 +19,7 @@ from rotfem.mechanics.time_signals import SAME as RESOLVED
 
 Array = npt.NDArray[np.float64]
 
-#: Forces (n, m) at times (n,), s.
+#: Forces (n, unknowns) at times (n,), s.
 Forces = Callable[[Array], Array]
 
 #: Relative change of a matrix that is round-off.
@@ -30,6 +30,9 @@ ASIDE = 4 * RESOLVED
 
 #: Samples between two breakpoints, and between all of them at least, by which active pieces are found.
 SAMPLES, FEWEST = 5, 40
+
+#: Angle by which a vibration goes on in a step, at most, that the four nodes of a step resolve: half a period, rad.
+HALF = np.pi
 
 #: Part of an interval from one sample to the next, counted on from its start: no multiple of it is a period.
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1)
@@ -143,7 +146,7 @@ class HeldEquations:
     Args:
         model: the basis.
         excitation: what acts.
-        further: of times (n,), s, forces (n, m) added to f; none if None.
+        further: of times (n,), s, forces (n, unknowns) that are added; none if None.
     """
 
     def __init__(self, model: ReducedModel, excitation: Excitation, further: Forces | None = None):
@@ -161,9 +164,14 @@ class HeldEquations:
         """Return angle (rad), speed and its rate of the frame at times (n,), s, (n, 3)."""
         return self.excitation.turn(t)
 
-    def coordinates(self, solution: Solution, t: Array, slow: bool = False) -> States:
-        """Return the states (n, m) of the structure in a solution at times (n,), s (see `Solution.at`)."""
-        return solution.at(t, slow)
+    def structure(self, y: Array) -> Array:
+        """Return the coordinates of the structure (…, m) among unknowns."""
+        return y[..., : self.model.size]
+
+    def coordinates(self, solution: Solution, t: Array) -> States:
+        """Return the states (n, m) of the structure in a solution at times (n,), s."""
+        q, v, a = (self.structure(x) for x in solution.at(t))
+        return q, v, a
 
     def reference(self, t: float, y: Array, v: Array) -> tuple[Array, Array, Array]:
         """Return M, C, K (m, m) at a time, s."""
@@ -181,10 +189,14 @@ class HeldEquations:
         return residual
 
     def second_order(self, manifold: Manifold, solution: Solution) -> Forces:
-        """Return the forces (n, m) that a solution of the linear equations has on a manifold, a function of times."""
+        """Return the forces (n, unknowns) of a linear solution on a manifold, a function of times; none on a hub."""
+        fastest = HALF / float(np.diff(solution.ends).max())
 
         def forces(t: Array) -> Array:
             c = self.excitation.factors(t, self.turn(t, solution))
-            return manifold.forces(c, *self.coordinates(solution, t, slow=True))
+            states = solution.at(t, fastest)
+            out = np.zeros_like(states[0])
+            self.structure(out)[:] = manifold.forces(c, *(self.structure(x) for x in states))
+            return out
 
         return forces

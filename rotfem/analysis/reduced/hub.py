@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.reduced.equations import Excitation, Forces, HeldEquations
 from rotfem.analysis.reduced.model import ReducedModel
-from rotfem.analysis.reduced.solution import Solution, States
+from rotfem.analysis.reduced.solution import Solution
 from rotfem.mechanics.time_signals import POINTS, WEIGHTS
 from rotfem.numerics.projection import summed
 
@@ -164,7 +164,7 @@ class FreeHubEquations(HeldEquations):
         model: the basis.
         excitation: what acts.
         bordered: equations of structure and hub.
-        further: of times (n,), s, forces (n, m) on the structure added to f; none if None.
+        further: of times (n,), s, forces (n, m + 1) that are added; none if None.
     """
 
     def __init__(self, model: ReducedModel, excitation: Excitation, bordered: Any, further: Forces | None = None):
@@ -182,11 +182,6 @@ class FreeHubEquations(HeldEquations):
         if solution is not None:
             return np.stack([x[:, -1] for x in solution.at(t)], axis=1)
         return rigid_turn(self.bordered, t)
-
-    def coordinates(self, solution: Solution, t: Array, slow: bool = False) -> States:
-        """Return the states (n, m) of the structure in a solution at times (n,), s (see `Solution.at`)."""
-        q, v, a = (x[:, :-1] for x in solution.at(t, slow))
-        return q, v, a
 
     def reference(self, t: float, y: Array, v: Array) -> tuple[Array, Array, Array]:
         """Return M, C, K (m + 1, m + 1) at a time (s), angle and speed, coupled as at rest; a spring holds the angle.
@@ -218,9 +213,10 @@ class FreeHubEquations(HeldEquations):
             constants = self.excitation.constants(t, turn, loads)
             c = np.asarray(self.model.system.factors(constants, len(t)))
             M, C, K, f = self.model.operators(c)
-            out = f + further + sum(np.einsum("nij,nj->ni", A, x) for A, x in ((M, a), (C, v), (K, q)))
+            out = f + sum(np.einsum("nij,nj->ni", A, x) for A, x in ((M, a), (C, v), (K, q)))
             own = self.hub.inertia * turn[:, 2] + self.hub.damping * turn[:, 1] - torque
-            return np.column_stack([out, own + self.moment.value(self.moment.weights(constants, *turn.T[1:]), q, v, a)])
+            moment = self.moment.value(self.moment.weights(constants, *turn.T[1:]), q, v, a)
+            return np.column_stack([out, own + moment]) + further
 
         return residual
 

@@ -24,13 +24,12 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
-from dolfinx.fem import petsc as fem_petsc
 
 from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.equations.geometric import second_order_work
 from rotfem.equations.pieces import PRESTRESS, Piece
 from rotfem.mechanics.effects import INTERNAL, Effect
-from rotfem.numerics import compat, forms
+from rotfem.numerics import forms
 from rotfem.numerics.projection import summed, times
 
 Array = npt.NDArray[np.float64]
@@ -75,11 +74,7 @@ class Manifold:
         right = out[model.owned]
         for column, (i, j) in zip(right.T, self.pairs, strict=True):
             one.x.array[:], other.x.array[:] = V[:, i] * (0.5 if i == j else 1.0), V[:, j]
-            b = compat.create_vector(system.V)
-            fem_petsc.assemble_vector(b, form)
-            b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
-            b.array[system.clamped] = 0.0
-            column[:] = b.array[model.owned]
+            column[:] = model.assembled(form)
         return -model.solve(system.material_solver, right)
 
     def _project(self) -> None:
@@ -127,9 +122,9 @@ class Manifold:
             for number, P, B in zip(numbers, second, first, strict=True):
                 on_basis += c[:, number, None] * (y @ P.T)
                 on_pairs += c[:, number, None] * (x @ B.T)
-        return on_basis + self._along(q, on_pairs)
+        return on_basis + self.along(q, on_pairs)
 
-    def _along(self, q: Array, on_pairs: Array) -> Array:
+    def along(self, q: Array, on_pairs: Array) -> Array:
         """Return the transpose of ∂(products)/∂η times forces on the pairs, (n, m)."""
         x, out = q @ self.shapes, np.zeros((len(q), self.shapes.shape[1]))
         for force, (i, j) in zip(on_pairs.T, self.pairs, strict=True):

@@ -20,6 +20,7 @@ import ufl
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 
+from rotfem.equations.nonlinear import assembled
 from rotfem.equations.pieces import PRESTRESS
 from rotfem.numerics import compat, forms
 from rotfem.numerics.eigenproblem import is_symmetric
@@ -152,6 +153,10 @@ class ReducedModel:
     def solve(self, solver: DirectSolver, right: Array) -> Array:
         """Return the solutions (local dof arrays (n, k)) with right-hand sides of owned rows, (n, k)."""
         return self._with_ghosts(solver.solve_all(right))
+
+    def assembled(self, form: Any) -> Array:
+        """Return a compiled linear form, owned rows, zero at clamped unknowns."""
+        return np.asarray(assembled(form, self.system.V, self.system.clamped).array[self.owned])
 
     # --- outputs -----------------------------------------------------------------------------------------------------
 

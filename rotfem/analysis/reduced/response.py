@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 from time import perf_counter, process_time
 from typing import Any
 
@@ -58,7 +59,7 @@ class Response:
         rounds: solutions until the basis was large enough.
         seconds: of processor and clock, what all of it took, compilation excluded.
         manifold: on which it is foreshortened; None where the theory's own displacements are wanted.
-        bent: coordinates (n, m) of the motion on it.
+        bent: solution of the equations on it.
         foreshortening: largest difference that it makes at the tip, relative.
     """
 
@@ -72,14 +73,19 @@ class Response:
     rounds: int
     seconds: dict[str, float]
     manifold: Manifold | None = None
-    bent: Array | None = None
+    bent: Solution | None = None
     foreshortening: float | None = None
+
+    @cached_property
+    def _bent(self) -> Array:
+        """Coordinates of the motion on the manifold in all rows, (n, m)."""
+        return np.asarray(self.equations.coordinates(self.bent, self.times)[0])
 
     @property
     def tips(self) -> Array:
         """The unknowns at the tip in all rows, (n, components)."""
-        if self.manifold is not None and self.bent is not None:
-            return self.manifold.tip(self.bent)
+        if self.manifold is not None:
+            return self.manifold.tip(self._bent)
         return self.states[0] @ self.model.tips().T
 
     @property
@@ -93,8 +99,8 @@ class Response:
 
     def shape(self, i: int) -> Array:
         """Return the displacement in a row, a local dof array."""
-        if self.manifold is not None and self.bent is not None:
-            return self.manifold.shape(self.bent[i])
+        if self.manifold is not None:
+            return self.manifold.shape(self._bent[i])
         return np.asarray(self.model.V @ self.states[0][i])
 
     def summary(self) -> dict[str, Any]:
@@ -219,8 +225,8 @@ class Growth:
             manifold = Manifold(self.model, states[0])
             beside = copy(equations)
             beside.further = equations.second_order(manifold, solution)
-            bent = self.solved(beside, longest)[1][0]
-            found = manifold.tip(bent)
+            bent, (q, _, _) = self.solved(beside, longest)
+            found = manifold.tip(q)
             difference = self.model.largest(found - tips) / max(self.model.largest(found), 1e-300)
             out = replace(out, manifold=manifold, bent=bent, foreshortening=difference)
         began, now = self.began, (process_time(), perf_counter())

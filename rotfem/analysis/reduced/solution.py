@@ -171,15 +171,15 @@ class Window:
             self._g -= np.linalg.solve(modes.M, residual(y, v, a).T).T.reshape(self._g.shape)
         self.end: Array = (modes.out @ self._z[-1]).real
 
-    def at(self, t: Array, slow: bool = False) -> States:
-        """Return coordinates, rates and accelerations (n, m) at times within the window (n,), s; `slow`: see above."""
+    def at(self, t: Array, fastest: float = np.inf) -> States:
+        """Return coordinates, rates and accelerations (n, m) at times within the window (n,), s (see `Solution.at`)."""
         i = np.clip(np.searchsorted(self.ends, t, side="right") - 1, 0, len(self.ends) - 2)
         s, c, values = t - self.ends[i], self._coefficients(i), self._modes.values
         growth, by_power = self._modes.weights(s)
         z = growth * self._z[i] + _sum(by_power, c)
         powers = s[:, None] ** np.arange(len(NODES))
-        if slow:
-            fast = np.abs(values) * (self.ends[i + 1] - self.ends[i])[:, None] > np.pi
+        fast = np.abs(values) > fastest
+        if np.any(fast):
             rates = np.arange(1, len(NODES)) * powers[:, :-1]
             static = -np.einsum("nd,ndp->np", powers, c) / values
             z = np.where(fast, static - np.einsum("nd,ndp->np", rates, c[:, 1:]) / values**2, z)
@@ -237,19 +237,19 @@ class Solution:
         """Number of steps."""
         return len(self.ends) - 1
 
-    def at(self, t: Array, slow: bool = False) -> States:
+    def at(self, t: Array, fastest: float = np.inf) -> States:
         """Return coordinates, rates and accelerations (n, m) at increasing times (n,), s; of a jump those after it.
 
         Args:
             t: times.
-            slow: with vibrations of which a step has more than half a period in their quasi-static place
-                z = −g/λ − ġ/λ²: the polynomials in the steps do not resolve products of them.
+            fastest: vibrations of a higher frequency (rad/s) are put in their quasi-static place
+                z = −g/λ − ġ/λ²: samples of their products would not resolve them.
         """
         none: Array = np.zeros((len(t), 0))
         if not self._windows:
             return none, none, none
         number = np.searchsorted([window.ends[0] for window in self._windows[1:]], t, side="right")
-        found = [window.at(t[number == k], slow) for k, window in enumerate(self._windows)]
+        found = [window.at(t[number == k], fastest) for k, window in enumerate(self._windows)]
         y, v, a = (np.concatenate(parts) for parts in zip(*found, strict=True))
         return y, v, a
 
