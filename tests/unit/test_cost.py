@@ -17,7 +17,7 @@ from rotfem.commands.cost.budget import Budget
 from rotfem.commands.cost.laboratory import Prediction
 from rotfem.commands.cost.plot import ERRORS
 from rotfem.commands.cost.record import Measurement, Record, fingerprint
-from rotfem.commands.cost.reference import Array, Move, Refinement, Samples, beside, distance
+from rotfem.commands.cost.reference import Array, Move, Refinement, Samples, distance, paired
 from rotfem.commands.cost.result import Row, pareto, recommend
 from rotfem.commands.cost.settings import (
     HIGHEST_DEGREE,
@@ -111,7 +111,7 @@ def test_a_theory_beside_another_is_off_by_the_product_of_two_errors() -> None:
     change = 0.01 * np.cos(TIMES)[:, None]
     here = computed(COARSE)
     there = Samples(here.values + change, TIMES)
-    found = beside(known, there, here, each=False)
+    found = paired(known, there, here, each=False)
     np.testing.assert_allclose(found.samples.values, known.samples.values + change, atol=1e-12)
     assert found.parts["theory"] == pytest.approx(
         distance(there, here, each=False) * distance(here, known.samples, each=False)
