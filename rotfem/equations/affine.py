@@ -8,8 +8,7 @@ The pieces say what they are of (see `rotfem.equations.pieces`), so that a part 
 from __future__ import annotations
 
 from abc import ABC
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping
 from functools import cached_property
 from typing import Any, Self
 
@@ -90,19 +89,6 @@ class AffineStiffness(System, ABC):
         """The function that N⁰ of the form G is of: the displacement under the loads, by the material alone."""
         return self._decomposed.prestressed
 
-    @contextmanager
-    def of_material(self) -> Iterator[None]:
-        """Let the form K be that of the strains alone."""
-        switches = self.model.switches
-        values = {name: float(switch.value) for name, switch in switches.items()}
-        for name, switch in switches.items():
-            switch.value = float(name == INTERNAL.name)
-        try:
-            yield
-        finally:
-            for name, switch in switches.items():
-                switch.value = values[name]
-
     def displaced(self) -> Array:
         """Return the displacement (local dof array) of the structure at rest under the loads at the time set."""
         if self._increment is None:
@@ -118,12 +104,6 @@ class AffineStiffness(System, ABC):
     def material_solver(self) -> DirectSolver:
         """Solver of the `material`."""
         return self._decomposed.material_solver
-
-    @property
-    def only_strains(self) -> bool:
-        """Whether the stiffness at rest is that of the strains alone, and regular."""
-        at_rest = [p for p in self.pieces if p.kind == "K" and not p.key and PRESTRESS not in p.of]
-        return not self.structure.hinges and all(INTERNAL.name in p.of for p in at_rest)
 
     def geometric(self, u: Any, w: Any, base: Any, theory: Theory | None = None) -> Any:
         """Return ∫ N⁰ D²Γ₁[u, w], a UFL form (see `Pieces.geometric`)."""

@@ -425,7 +425,7 @@ class Explanation:
     ) -> None:
         """Write the changes of an output that needs no history, on half the cells.
 
-        Where these are in error by what nobody would call negligible, they are computed on all cells as well.
+        Where these have errors that are not negligible, they are computed on all cells as well.
 
         Args:
             name: of the output.

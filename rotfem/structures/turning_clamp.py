@@ -78,10 +78,6 @@ class TurningClamp:
         """Return the distance of points at X (m) from the axis of rotation, undeformed."""
         return self.structure.hub_radius + X
 
-    def turned_back(self, vectors: Array, t: float) -> Array:
-        """Return inertial components (n, 2) of vectors in the turning frame."""
-        return np.column_stack(self._turn(vectors[:, 0], vectors[:, 1], -self.angle(t)))
-
     @staticmethod
     def _turn(x: Any, y: Any, angle: float) -> tuple[Any, Any]:
         c, s = np.cos(angle), np.sin(angle)
