@@ -21,8 +21,8 @@ from explain_scenes import FRESH, scene
 
 import rotfem
 from rotfem.commands.explain import compared
-from rotfem.refinement.distance import distance
-from rotfem.refinement.explain import LARGE, NOTICEABLE, modes_change
+from rotfem.refinement.distance import distance, distance_each
+from rotfem.refinement.explain import LARGE, NOTICEABLE
 from rotfem.scene import Scene
 
 #: Below it a change is not compared: round-off of two Newton solutions.
@@ -65,7 +65,7 @@ def truth_of(of: Scene, result: Any) -> dict[str, Any]:
 
 def apart(of: dict[str, Any], to: dict[str, Any]) -> dict[str, float]:
     """Return output ↦ relative change from one truth to another; infinite where one fails."""
-    measures = {"modes": modes_change}
+    measures = {"modes": distance_each}
     return {
         name: np.inf if here is None or to[name] is None else measures.get(name, distance)(here, to[name])
         for name, here in of.items()

@@ -122,7 +122,7 @@ def changes_of(scene: Scene, setting: Setting) -> dict[str, Any]:
     out: dict[str, Any] = setting.changes()
     time = scene.time
     if setting.moving and time is not None:
-        out |= {f"time.{name}": None for name in time.parameters}
+        out |= {f"time.{name}": None for name in time.parameters if setting.scheme != time.scheme}
         out |= {"time.output_every": None, "time.output_step": time.output_step or time.end / ROWS}
         if time.output_step is None and time.step is not None:
             out["time.output_step"] = time.step * time.output_every

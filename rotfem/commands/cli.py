@@ -217,6 +217,8 @@ def cost(
             progress=progress,
         )
     todo.finish(result, lambda summary, folder: result.report(folder))
+    if result.recommended is None:
+        raise result.missed()
     if write is not None and todo.session.first:
         result.write_tuned(write)
         todo.session.say([f"tuned scene in {write}"])

@@ -22,8 +22,8 @@ from rotfem.mechanics.effects import Effect, Work
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.dimensionless import MEANING, groups
-from rotfem.refinement.distance import distance
-from rotfem.refinement.explain import HISTORY, MODES, RESOLVED, STEADY, Case, Change, Explanation, modes_change
+from rotfem.refinement.distance import distance, distance_each
+from rotfem.refinement.explain import HISTORY, MODES, RESOLVED, STEADY, Case, Change, Explanation
 from rotfem.results import ExplainResult
 from rotfem.scene import Scene, as_scene
 
@@ -42,7 +42,7 @@ UNKNOWN = ("these steps do not show it", "the error is unknown")
 FULL, INCREMENT = " of the full model", 1e-10
 
 #: How far two answers are apart, by the name of the output.
-MEASURES = {HISTORY: distance, STEADY: distance, MODES: modes_change}
+MEASURES = {HISTORY: distance, STEADY: distance, MODES: distance_each}
 
 
 def explain(

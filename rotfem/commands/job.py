@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from rotfem.commands.console import Session, missing
-from rotfem.commands.options import as_path, folder_name
+from rotfem.commands.options import as_path, folder_name, seconds_of
 from rotfem.commands.result_folder import ResultFolder, Writer
 from rotfem.commands.signals import held_back
 from rotfem.errors import ComputationError, InputError, Stopped
@@ -117,8 +117,6 @@ def job(
     with Session(as_json, quiet, debug) as session:
         wanted = [] if accuracy is None else [f"accuracy={accuracy!r}"]
         if budget is not None:
-            from rotfem.commands.cost.budget import seconds_of
-
             wanted.append(f"accuracy_budget={seconds_of(budget, 'command line', '--budget')!r}")
         if no_error:
             wanted.append("output.error=false")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,30 @@ from typing import Any
 import typer
 
 from rotfem.errors import SceneError
+
+#: Units of a time ↦ s.
+UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
+
+
+def seconds_of(text: str | float, file: str = "", key: str = "cost --budget") -> float:
+    """Return seconds from a number, or text such as "60s", "2min", "1h".
+
+    Args:
+        text: what was given.
+        file: name for error messages.
+        key: what it was given for.
+
+    Raises:
+        SceneError: it is neither, or not greater than 0.
+    """
+    found = re.fullmatch(r"\s*([0-9.]+(?:e[+-]?[0-9]+)?)\s*(s|min|h|)\s*", str(text))
+    try:
+        value = float(found[1]) * UNITS[found[2]] if found else 0.0
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < 1e9:
+        raise SceneError(file, key, text, "must be a time greater than 0, such as 60s, 2min or 1h")
+    return value
 
 
 def as_path(text: str) -> Path:

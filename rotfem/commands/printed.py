@@ -1,4 +1,4 @@
-"""What the commands print of their results, as lines of text; `cost` has cost_report.py."""
+"""What the commands print of their results, as lines of text; that of `cost` is in its package."""
 
 from __future__ import annotations
 

@@ -44,6 +44,15 @@ def distance(one: Array, other: Array) -> float:
     return 0.0 if off == 0.0 else np.inf
 
 
+def distance_each(one: Array, other: Array) -> float:
+    """Return the largest distance of two lists of eigenvalues, complex or (n, components), each relative to itself.
+
+    Of lists of different length the first ones are compared.
+    """
+    pairs = zip(one, other, strict=False)
+    return max((distance(np.reshape(a, (1, -1)), np.reshape(b, (1, -1))) for a, b in pairs), default=0.0)
+
+
 def largest(values: Array) -> float:
     """Return the largest Euclidean norm of an output over a history (n, components)."""
     return float(np.linalg.norm(values, axis=-1).max(initial=0.0))

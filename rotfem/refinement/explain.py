@@ -34,7 +34,7 @@ from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.companion import Companion
 from rotfem.refinement.discretisation import ASYMPTOTIC, HistoryErrors, error_by_cells
-from rotfem.refinement.distance import distance, tip
+from rotfem.refinement.distance import distance, distance_each, tip
 from rotfem.structures.symmetry import inactive_unknowns
 
 Array = npt.NDArray[Any]
@@ -264,7 +264,7 @@ class Explanation:
         steps, from_file = self.case.steps, getattr(self.problem.structure, "mesh", None) is not None
         self.mesh.name = "mesh.degree" if from_file else "mesh.elements"
         coarse, ratio = self._history() if self.moving else self._coarser()
-        for name, of, measure in ((STEADY, self._tip, distance), (MODES, self._modes, modes_change)):
+        for name, of, measure in ((STEADY, self._tip, distance), (MODES, self._modes, distance_each)):
             if name in self.wanted:
                 self._compare(name, of, measure, coarse, ratio)
         if steps is None:
@@ -483,9 +483,3 @@ class Explanation:
         self.mesh.estimate[name] = None
         if name == HISTORY:
             self.steps.estimate[name] = None
-
-
-def modes_change(of: Array, to: Array) -> float:
-    """Return max |Δλ| / |λ| of eigenvalues sorted by size."""
-    n = min(len(of), len(to))
-    return max((distance(np.array([[a]]), np.array([[b]])) for a, b in zip(of[:n], to[:n], strict=True)), default=0.0)

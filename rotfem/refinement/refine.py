@@ -13,6 +13,7 @@ one takes.
 
 from __future__ import annotations
 
+import json
 import math
 import os
 from collections.abc import Callable, Mapping
@@ -43,6 +44,9 @@ COARSE = 1e-2
 #: steps take.
 LONG, SHOWN = 5.0, 1 / 3
 
+#: Highest degree of elements that a scene may ask for.
+HIGHEST = 6
+
 Elements = int | tuple[int, int] | None
 
 
@@ -54,8 +58,9 @@ class Setting:
         models: keys of [model] of the models there are, from the cheapest to the richest, that in use first.
         elements: number of elements, (nx, ny) of a plate; None where a mesh file says it.
         degree: their polynomial degree.
-        scheme: of the adaptive steps of a history; None without one.
-        tolerance: of these; None without.
+        scheme: of the steps of a history; None without one.
+        tolerance: of adaptive steps; None without.
+        step: of fixed steps, s; None without.
     """
 
     models: tuple[Mapping[str, Any], ...]
@@ -63,6 +68,7 @@ class Setting:
     degree: int
     scheme: str | None = None
     tolerance: float | None = None
+    step: float | None = None
 
     @property
     def moving(self) -> bool:
@@ -74,6 +80,11 @@ class Setting:
         """Whether the model in use is a reduced one."""
         return bool(self.models[0].get("reduced"))
 
+    @property
+    def theory(self) -> str:
+        """Name of the theory in use."""
+        return str(self.models[0]["theory"])
+
     def changes(self) -> dict[str, Any]:
         """Return the scene's keys ↦ values of this setting; None removes what the scene says."""
         out: dict[str, Any] = {f"model.{key}": value for key, value in self.models[0].items()}
@@ -81,7 +92,8 @@ class Setting:
         if self.elements is not None:
             out["mesh.elements"] = list(self.elements) if isinstance(self.elements, tuple) else self.elements
         if self.moving:
-            out |= {"time.scheme": self.scheme, "time.tolerance": self.tolerance, "time.step": None}
+            out |= {"time.scheme": self.scheme, "time.tolerance": self.tolerance, "time.step": self.step}
+            out |= {"time.max_step": None, "time.min_step": None} if self.tolerance is None else {}
         return out
 
     def summary(self) -> dict[str, Any]:
@@ -90,12 +102,20 @@ class Setting:
         known = {key: value for key, value in asdict(self).items() if key not in unused and value is not None}
         return {**{key: value for key, value in self.models[0].items() if value is not None}, **known}
 
+    def key(self) -> str:
+        """Return what identifies the setting: all of it as JSON."""
+        return json.dumps(asdict(self), sort_keys=True)
+
     def words(self) -> str:
         """Return it in words."""
-        model = f"{self.models[0]['theory']}{', reduced' if self.reduced else ''}"
-        cells = "" if self.elements is None else f", {self.elements} elements".replace("(", "").replace(")", "")
-        steps = "" if self.tolerance is None or self.reduced else f", steps to {self.tolerance:.1g} by {self.scheme}"
-        return model + steps + cells
+        steps, cells = "", f", degree {self.degree}"
+        if self.moving and not self.reduced:
+            length = f"to {self.tolerance:.2g}" if self.step is None else f"of {self.step:.3g} s"
+            steps = f", steps {length} by {self.scheme}"
+        if self.elements is not None:
+            number = "×".join(map(str, self.elements if isinstance(self.elements, tuple) else [self.elements]))
+            cells = f", {number} elements of degree {self.degree}"
+        return f"{self.theory}{', reduced' if self.reduced else ''}{steps}{cells}"
 
     def richer(self) -> Self | None:
         """Return this setting with the next richer model; None if this is the richest."""
@@ -125,15 +145,42 @@ class Setting:
         if (space := contribution(error, "space")) > each or error.get("space", 0.0) is None:
             order = 2 * self.degree if "round_off" in error else self.degree + 1  # of frequencies, of displacements
             growth = (space / (AIM * each)) ** (1 / order) if space > 0.0 else 2.0
-            if self.elements is None:
+            if self.elements is not None:
+                new = replace(new, elements=grown(self.elements, max(growth, GROWTH)))
+            elif self.degree < HIGHEST:
+                new = replace(new, degree=self.degree + 1)
+            else:
                 return None
-            new = replace(new, elements=grown(self.elements, max(growth, GROWTH)))
         return self.richer() if new == self else new
 
+    def coarser(self) -> dict[str, Self]:
+        """Return `time` and `space` ↦ a setting whose answer is so far from this one's as the error of this is at most.
+
+        Steps and cells are longer by r = √2 or more: with an order p ≥ 2 the difference is (r^p − 1) ≥ 1 times the
+        error. Steps of a fourth-order scheme are r times as long at r⁴ times the tolerance. Cells of a mesh file have
+        one degree less instead.
+        """
+        ratio, out = math.sqrt(2.0), dict[str, Self]()
+        if self.tolerance is not None:
+            out["time"] = replace(self, tolerance=ratio**4 * self.tolerance)
+        if self.elements is None:
+            return out | {"space": replace(self, degree=self.degree - 1)} if self.degree > 1 else out
+        fewer = grown(self.elements, 1.0 / ratio, math.floor)
+        return out if fewer == self.elements else out | {"space": replace(self, elements=fewer)}
+
+    def unknowns(self) -> float:
+        """Return what the number of unknowns is proportional to: that of nodes."""
+        cells = self.elements if isinstance(self.elements, tuple) else (self.elements or 1,)
+        return float(math.prod(n * self.degree + 1 for n in cells))
+
     def work(self) -> float:
-        """Return what the time of an answer grows with: steps of a fourth-order scheme times unknowns."""
-        cells = math.prod(self.elements) if isinstance(self.elements, tuple) else self.elements or 1
-        return float(cells * (self.tolerance or 1.0) ** -0.25)
+        """Return what the time of a step grows with, times the number of adaptive ones by a fourth-order scheme.
+
+        With n unknowns a step takes O(n) of a beam, whose matrices are a band, and O(n^{3/2}) of a plane mesh (nested
+        dissection; A. George, SIAM J. Numer. Anal. 10, 1973).
+        """
+        power = 1.5 if isinstance(self.elements, tuple) else 1.0
+        return float(self.unknowns() ** power * (self.tolerance or 1.0) ** -0.25)
 
 
 def contribution(error: Mapping[str, Any], name: str) -> float:
@@ -155,11 +202,14 @@ def is_within(error: Mapping[str, Any], accuracy: float) -> bool:
     return bool(SAFETY * (error["total"] - bound) + bound <= accuracy)
 
 
-def grown(elements: int | tuple[int, int], factor: float) -> int | tuple[int, int]:
-    """Return numbers of elements that have grown by a factor."""
+def grown(
+    elements: int | tuple[int, int], factor: float, rounded: Callable[[float], int] = math.ceil
+) -> int | tuple[int, int]:
+    """Return numbers of elements that have grown by a factor, 1 in each direction at least."""
     if isinstance(elements, tuple):
-        return (math.ceil(elements[0] * factor), math.ceil(elements[1] * factor))
-    return math.ceil(elements * factor)
+        x, y = (max(1, rounded(n * factor)) for n in elements)
+        return x, y
+    return max(1, rounded(elements * factor))
 
 
 # --- time ------------------------------------------------------------------------------------------------------------
@@ -169,10 +219,6 @@ def cpu_time() -> float:
     """Return the CPU time (s) of this process and of what it called, such as compilers."""
     called = os.times()
     return process_time() + called.children_user + called.children_system
-
-
-#: What to do where a budget is too small.
-TOO_LITTLE = "a looser accuracy, or a larger accuracy_budget"
 
 
 class TooDear(ComputationError):
@@ -186,10 +232,13 @@ class Clock:
         budget: all may take together, s; None where there is no limit.
         comm: of the processes that compute them; rank 0 decides for all.
         announce: takes a line on every answer that is long; None takes none.
+        key: what says the budget.
     """
 
-    def __init__(self, budget: float | None, comm: MPI.Comm, announce: Hint | None = None):
-        self.budget, self.comm, self._announce = budget, comm, announce or (lambda line: None)
+    def __init__(
+        self, budget: float | None, comm: MPI.Comm, announce: Hint | None = None, key: str = "accuracy_budget"
+    ):
+        self.budget, self.comm, self.key, self._announce = budget, comm, key, announce or (lambda line: None)
         self.wanted: float | None = None
         self._started, self._began, self._next = cpu_time(), 0.0, 1
 
@@ -231,7 +280,9 @@ class Clock:
         self.wanted = predicted
         would = "" if predicted is None else f"the next answer would take about {predicted:.2g} s, "
         left = max(0.0, (self.budget or 0.0) - self._began)
-        return TooDear(f"{would}{left:.2g} s of accuracy_budget are left", advice=TOO_LITTLE)
+        return TooDear(
+            f"{would}{left:.2g} s of {self.key} are left", advice=f"a looser accuracy, or a larger {self.key}"
+        )
 
     def summary(self) -> dict[str, float | None]:
         """Return what a summary has of a budget: `seconds`, `used` and `wanted`, of the answer that was too dear."""

@@ -284,7 +284,7 @@ def test_a_format_is_not_guessed(tmp_path: Path) -> None:
 
 
 def test_paths_of_blades_move_with_a_tuned_scene(tmp_path: Path) -> None:
-    from rotfem.commands.cost.tuned import _moved
+    from rotfem.commands.cost.result import _moved
 
     structure = {"line": "line.csv", "section": {"from": "blade", "EA": "EA.csv", "shape": "circle", "GJ": 1.0}}
     found = _moved({"structure": structure}, tmp_path, tmp_path / "deeper")["structure"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,7 +14,7 @@ from mpi4py import MPI
 from rotfem.commands.accuracy import Missed, to_accuracy
 from rotfem.errors import ComputationError, Stopped
 from rotfem.refinement.distance import distance
-from rotfem.refinement.refine import MOST, SAFETY, Clock, Refinement, Setting, TooDear, refine
+from rotfem.refinement.refine import HIGHEST, MOST, SAFETY, Clock, Refinement, Setting, TooDear, refine
 from rotfem.scene import Scene
 from tests.beams import STRUCTURE
 
@@ -101,8 +102,9 @@ def test_the_largest_contribution_is_refined_by_its_order() -> None:
     poor = Setting((LINEAR, FULL), 6, 3, "esdirk4", 1e-2)
     assert poor.finer({"model": 0.5, "total": 0.5}, 1e-3) == SETTING
     assert SETTING.finer({"model": 0.5, "total": 0.5}, 1e-3) is None
-    file = Setting((FULL,), None, 2, "esdirk4", 1e-2)
-    assert file.finer({"time": 0.0, "space": 0.1, "total": 0.1}, 1e-3) is None
+    file, coarse = Setting((FULL,), None, 2, "esdirk4", 1e-2), {"time": 0.0, "space": 0.1, "total": 0.1}
+    assert file.finer(coarse, 1e-3) == replace(file, degree=3)
+    assert replace(file, degree=HIGHEST).finer(coarse, 1e-3) is None
 
 
 def test_the_first_that_meets_it_is_returned() -> None:

@@ -106,7 +106,6 @@ def cost_row(step: float, time: float, error: float | None, pareto: bool) -> dic
         "degree": 2,
         "scheme": "newmark",
         "tolerance": None,
-        "every": 1,
     }
     found = {"status": "failed" if error is None else "done", "error": error, "total_error": error, "reason": ""}
     return {**setting, "step": step, **found, "time": time, "cost": time, "pareto": pareto}
@@ -122,7 +121,7 @@ def cost() -> CostResult:
     ]
     said = summary(command="cost", output="tip", accuracy=1e-4, uncertainty=1e-6, recommended=rows[0])
     del said["theory"]  # a study is of several
-    said |= {"references": {}, "model_errors": {"reissner": 0.0}, "recommendations": [], "scaling": []}
+    said |= {"references": {}, "model_errors": {"reissner": 0.0}, "recommendations": []}
     structure = {"type": "planar_beam", "length": 1.0}
     structure["section"] = {"EA": 1.0, "GA": 1.0, "EI": 1.0, "mass_per_length": 1.0}
     scene = Scene.from_dict({"structure": structure, "motion": {"type": "constant", "speed": 1.0}})
@@ -208,7 +207,10 @@ def test_points_of_a_study() -> None:
     assert [point.setting.step for point in result.front] == [0.02, 0.01]
     assert result.recommended == result.points[0]
     assert result.recommended.setting.elements == (4, 2)
-    assert str(result.recommended) == "reissner, 4×2 P2, newmark with step 0.01 s: error 1.0e-05, 4 s of CPU time"
+    assert (
+        str(result.recommended)
+        == "reissner, steps of 0.01 s by newmark, 4×2 elements of degree 2: error 1.0e-05, 4 s of CPU time"
+    )
     result.summary["recommended"] = None
     assert result.recommended is None
 

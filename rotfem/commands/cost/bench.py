@@ -1,37 +1,92 @@
-"""One setting of a work–precision study, computed and timed."""
+"""Settings of a study of cost, computed and timed; each is kept on disk as soon as it is there."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import ctypes
+import gc
+import hashlib
+import json
+import os
+import resource
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
 from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady
+from rotfem.commands.accuracy import changes_of
 from rotfem.commands.campbell import Diagram
-from rotfem.commands.cost.budget import PeakMemory, cpu_time
-from rotfem.commands.cost.record import Measurement
-from rotfem.commands.cost.reference import Samples
-from rotfem.commands.cost.settings import Setting, sweep_speeds
+from rotfem.commands.cost.settings import sweep_speeds
 from rotfem.commands.modes import analysis_of
 from rotfem.commands.problem import Problem
+from rotfem.commands.signals import held_back
 from rotfem.commands.simulation import Simulation
-from rotfem.equations.model import Model
-from rotfem.errors import ComputationError, InputError, SceneError, input_of
-from rotfem.listeners import Progress
+from rotfem.errors import ComputationError, InputError, OutputError, input_of
+from rotfem.refinement.distance import COLUMNS
+from rotfem.refinement.refine import Clock, Setting, TooDear, cpu_time
 from rotfem.scene import Scene
+from rotfem.version import __version__
 
-#: Steps of the run that warms up: the first ones load compiled forms and touch every library once.
-WARM_STEPS = 3
+Array = npt.NDArray[np.float64]
 
-#: What computes an output once everything is set up: samples, and numbers of unknowns, steps, Newton iterations.
-Go = Callable[[Progress], tuple[Samples, tuple[int, int, int]]]
+#: Steps of the run that compiles the forms: the first step of a scheme may have forms of its own.
+FIRST_STEPS = 3
+
+#: What computes an output once everything is set up: its values, and numbers of unknowns, steps, Newton iterations.
+Go = Callable[[], tuple[Array, tuple[int, int, int]]]
 
 
-class OverTime(Exception):
-    """The time of the study is over, in the middle of a computation."""
+@dataclass
+class Measurement:
+    """One setting, computed.
+
+    Attributes:
+        status: "done", "failed", or "stopped" where the time of the study was over.
+        reason: why it failed.
+        values: the output (rows, components): over time, or a row an eigenvalue, or of a steady state; m, rad/s.
+        wall, cpu: of every repetition, s, without set-up.
+        setup, setup_cpu: of every repetition, s: mesh, forms (compiled before, on disk), constant operators.
+        memory: bytes at the height, above what the program needs by itself; of all processes.
+        dofs, steps, iterations: sizes and counts.
+    """
+
+    status: str = "done"
+    reason: str = ""
+    values: Array | None = None
+    wall: list[float] = field(default_factory=list)
+    cpu: list[float] = field(default_factory=list)
+    setup: list[float] = field(default_factory=list)
+    setup_cpu: list[float] = field(default_factory=list)
+    memory: float = 0.0
+    dofs: int = 0
+    steps: int = 0
+    iterations: int = 0
+
+    def median(self, name: str) -> float:
+        """Return the median of `wall`, `cpu`, `setup` or `setup_cpu`, s; nan where nothing was measured."""
+        values = getattr(self, name)
+        return float(np.median(values)) if values else float("nan")
+
+    @property
+    def cost(self) -> float:
+        """CPU time (s) of set-up and computation, by which settings are ranked; that of other programs is not in it."""
+        return self.median("setup_cpu") + self.median("cpu")
+
+    def to_json(self) -> dict[str, Any]:
+        """Return a JSON-able dictionary, without loss."""
+        return {**vars(self), "values": None if self.values is None else self.values.tolist()}
+
+    @classmethod
+    def from_json(cls, data: dict[str, Any]) -> Measurement:
+        """Return what `to_json` wrote."""
+        values = data["values"]
+        return cls(**{**data, "values": None if values is None else np.array(values, dtype=np.float64)})
 
 
 class Bench:
@@ -43,143 +98,231 @@ class Bench:
         comm: MPI communicator.
 
     Attributes:
-        compiling: CPU time (s) of all runs that warmed up.
-        memory: at the height.
+        compiling: CPU time (s) in which forms were compiled.
+        memory: that the program needs by itself, bytes.
     """
 
-    def __init__(self, scene: Scene, output: str, comm: MPI.Comm = MPI.COMM_WORLD):
+    def __init__(self, scene: Scene, output: str, comm: MPI.Comm):
         self.scene, self.output, self.comm = scene, output, comm
         self._warm: set[tuple[str, int, str | None]] = set()
         self.compiling = 0.0
-        self.memory = PeakMemory()
+        self.memory = restart_memory()
 
-    def measure(
-        self, setting: Setting, repeat: int, before: Measurement | None = None, limit: float = float("inf")
-    ) -> Measurement:
+    def measure(self, setting: Setting, repeat: int, before: Measurement | None, clock: Clock) -> Measurement:
         """Return the output of a setting with its timings, or the reason why there is none.
 
-        Forms are compiled once for each theory and degree, in a run of a few steps that is not timed.
+        Forms are compiled once for each theory, degree and scheme, in a run of a few steps that is not timed.
 
         Args:
             setting: what is measured.
             repeat: how often in all.
             before: what was measured of it already.
-            limit: CPU time (s) after which a computation on one process is stopped.
+            clock: ends a history that would take more than there is.
         """
         out = before or Measurement()
         try:
-            variant = self.scene.replace(setting.changes(self.scene))
-            self._warm_up(variant)
+            variant = self.scene.replace(changes_of(self.scene, setting))
+            self._compile(variant, setting)
             for _ in range(repeat - len(out.wall)):
-                self._once(variant, out, limit)
-        except OverTime:
-            out.status, out.reason, out.samples = "stopped", f"not done after {limit:.3g} s", None
-        except (ComputationError, SceneError) as error:
-            out.status, out.reason, out.samples = "failed", str(error), None
-        if out.samples is not None and not np.all(np.isfinite(out.samples.values)):
-            out.status, out.reason, out.samples = "failed", "the output is not finite", None
+                self._once(variant, out, clock)
+        except TooDear as error:
+            out.status, out.reason, out.values = "stopped", error.what, None
+        except (ComputationError, InputError) as error:
+            out.status, out.reason, out.values = "failed", str(error), None
+        if out.values is not None and not np.all(np.isfinite(out.values)):
+            out.status, out.reason, out.values = "failed", "the output is not finite", None
         return out
 
-    def _warm_up(self, variant: Scene) -> None:
-        """Compile the forms of a theory and degree."""
-        marching = self.output == "tip" and variant.time is not None
-        key = (variant.model.theory, variant.mesh.degree, variant.time.scheme if marching and variant.time else None)
+    def _compile(self, variant: Scene, setting: Setting) -> None:
+        """Compile the forms of a theory, degree and scheme."""
+        key = (setting.theory, setting.degree, setting.scheme)
         if key in self._warm:
             return
-        started = cpu_time()
-        short = variant
-        if marching and variant.time is not None and variant.time.step is not None:
-            end = min(WARM_STEPS * variant.time.step, variant.time.end)
-            short = variant.replace({"time.end": end, "time.output_every": 1})
-        if self.output == "campbell":
-            self._modal(short)(lambda share: None)  # the forms of a sweep, at one speed
-        else:
-            self._start(short)(lambda share: None)
+        started, short, time = cpu_time(), variant, variant.time
+        if setting.moving and time is not None:
+            few = FIRST_STEPS * time.step if time.step is not None else time.output_step or time.end
+            short = variant.replace({"time.end": min(few, time.end)})
+        self._prepared(short, None, "frequencies" if self.output == "campbell" else self.output)()
         self._warm.add(key)
         self.compiling += cpu_time() - started
 
-    def _once(self, variant: Scene, out: Measurement, limit: float) -> None:
-        self.memory.restart()
-        clock = perf_counter(), process_time()
-        go = self._start(variant)
+    def _once(self, variant: Scene, out: Measurement, clock: Clock) -> None:
+        restart_memory()
+        start = perf_counter(), process_time()
+        go = self._prepared(variant, clock, self.output)
         ready = perf_counter(), process_time()
-
-        def observer(share: float) -> None:
-            if self.comm.size == 1 and process_time() - ready[1] > limit:
-                raise OverTime
-
         try:
-            samples, counts = go(observer)
+            values, counts = go()
         finally:
             end = perf_counter(), process_time()
-            out.setup.append(ready[0] - clock[0])
-            out.setup_cpu.append(ready[1] - clock[1])
+            out.setup.append(ready[0] - start[0])
+            out.setup_cpu.append(ready[1] - start[1])
             out.wall.append(end[0] - ready[0])
             out.cpu.append(end[1] - ready[1])
-            out.memory = max(out.memory, self.comm.allreduce(self.memory.height()))
-        out.samples = samples
-        out.dofs, out.steps, out.iterations = counts
+            out.memory = max(out.memory, self.comm.allreduce(max(most_memory() - self.memory, 0.0)))
+        out.values, (out.dofs, out.steps, out.iterations) = values, counts
 
-    def _start(self, variant: Scene) -> Go:
-        """Return what computes the output once everything is set up."""
-        ways = {"tip": self._motion, "frequencies": self._modal, "campbell": self._sweep}
-        return ways[self.output](variant)
+    def _prepared(self, variant: Scene, clock: Clock | None, output: str) -> Go:
+        """Return what computes an output once everything is set up."""
+        with input_of(variant.file):
+            if output == "tip":
+                return self._motion(variant, clock)
+            return self._sweep(variant) if output == "campbell" else self._modal(variant)
 
-    def _motion(self, variant: Scene) -> Go:
+    def _motion(self, variant: Scene, clock: Clock | None) -> Go:
         variant.check_run()
         problem = Problem.of(variant)
-        with input_of(variant.file):
-            if variant.time is None:
-                check_steady(problem)
-            simulation = Simulation(variant, problem, self.comm)
+        if variant.time is None:
+            check_steady(problem)
+        simulation = Simulation(variant, problem, self.comm, clock=clock)
 
-        def go(progress: Progress) -> tuple[Samples, tuple[int, int, int]]:
-            result = simulation.run(progress)
-            columns = [name for name in ("tip_u1", "tip_u2", "tip_u3") if name in result.history]
-            values = np.column_stack([result.history[name] for name in columns])
-            times = result.history["t"] if variant.time is not None else np.empty(0)
+        def go() -> tuple[Array, tuple[int, int, int]]:
+            result = simulation.run()
+            columns = [x for name, x in result.history.items() if name.startswith(COLUMNS["tip"])]
             s = result.summary
-            return Samples(values, times), (s["dofs"], s["steps"], s["newton_iterations"])
+            return np.column_stack(columns), (s["dofs"], s["steps"], s["newton_iterations"])
 
         return go
 
     def _modal(self, variant: Scene) -> Go:
         problem = Problem.of(variant)
-        with input_of(variant.file):
-            analysis = analysis_of(variant, problem, self.comm)
+        analysis = analysis_of(variant, problem, self.comm)
         V, speed = analysis.system.V, problem.motion.final_speed(variant.time.end if variant.time is not None else 0.0)
 
-        def go(progress: Progress) -> tuple[Samples, tuple[int, int, int]]:
-            spinning = analysis.at(speed, variant.modes.count)
-            values: Any = spinning.pairs.values[: variant.modes.count]
+        def go() -> tuple[Array, tuple[int, int, int]]:
+            values = analysis.at(speed, variant.modes.count).pairs.values[: variant.modes.count]
             dofs = V.dofmap.index_map.size_global * V.dofmap.index_map_bs
-            samples = Samples(np.column_stack([values.imag, values.real]), np.empty(0))
-            return samples, (dofs, 0, analysis.newton.iterations)
+            return np.column_stack([values.imag, values.real]), (dofs, 0, analysis.newton.iterations)
 
         return go
 
     def _sweep(self, variant: Scene) -> Go:
         problem, speeds, started = Problem.of(variant), sweep_speeds(variant), perf_counter()
-        with input_of(variant.file):
-            diagram = Diagram(variant, problem, speeds, self.comm, None)
+        diagram = Diagram(variant, problem, speeds, self.comm, None)
 
-        def go(progress: Progress) -> tuple[Samples, tuple[int, int, int]]:
-            result = diagram.result(None, progress, started)
+        def go() -> tuple[Array, tuple[int, int, int]]:
+            result = diagram.result(None, lambda share: None, started)
             rows = sorted((r["speed"], r["frequency"]) for r in result.rows if not r["refined"])
-            samples = Samples(np.array([[frequency] for _, frequency in rows]), np.empty(0))
-            return samples, (result.summary["dofs"], result.summary["speeds_solved"], 0)
+            values = np.array([[frequency] for _, frequency in rows])
+            return values, (result.summary["dofs"], result.summary["speeds_solved"], 0)
 
         return go
 
 
-def check_degrees(scene: Scene, degrees: Sequence[int], comm: MPI.Comm = MPI.COMM_WORLD) -> None:
-    """Check that elements of these degrees may be used; of a mesh file only the file says of what shape they are.
+# --- what is kept ----------------------------------------------------------------------------------------------------
+
+
+def fingerprint(scene: Scene, output: str, ranks: int) -> str:
+    """Return a hash of all that a measurement depends on besides its setting: scene, output, version, processes.
+
+    A mesh file counts by its content, a Python function in the scene by its name only. What a measurement consists of
+    counts too.
+    """
+    mesh = getattr(scene.structure, "mesh", None)
+    content = hashlib.sha256(Path(mesh).read_bytes()).hexdigest() if mesh is not None else None
+    of_what = sorted(vars(Measurement()))
+    text = json.dumps([scene.to_dict(), content, output, __version__, ranks, of_what], sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+class Record:
+    """Measurements by the key of their setting; each is a line of a file as soon as it is there.
+
+    A line is written whole, by one call; one cut short by a power failure is not read.
+
+    Args:
+        path: the file, or None to keep nothing.
+        identity: fingerprint of the study; lines of another one are passed over.
+        fresh: forget what the file holds.
+
+    Attributes:
+        found: key ↦ measurement.
 
     Raises:
-        SceneError: they may not.
+        OutputError: the file cannot be written.
     """
-    for degree in degrees if getattr(scene.structure, "mesh", None) is not None else ():
+
+    def __init__(self, path: Path | None, identity: str, fresh: bool = False):
+        self.path, self.identity = path, identity
+        self.found: dict[str, Measurement] = {}
+        if path is None:
+            return
         try:
-            Model(Problem.of(scene.replace({"mesh.degree": degree})).replace(effects=()), comm)
-        except InputError as error:
-            raise SceneError(scene.file, "cost --degrees", degree, error.allowed) from None
+            path.parent.mkdir(parents=True, exist_ok=True)
+            text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+            if text and not text.startswith('{"study": '):
+                raise FileExistsError(0, "it is there already, and no record of measurements")
+            if fresh:
+                path.unlink(missing_ok=True)
+                text = ""
+            if text and not text.endswith("\n"):  # a start that died in the middle of a line
+                self._append("\n")
+        except OSError as error:
+            raise OutputError(path, error.strerror or str(error)) from None
+        for line in text.splitlines():
+            try:
+                entry = json.loads(line)
+                if entry["study"] == identity:
+                    self.found[entry["setting"]] = Measurement.from_json(entry["measurement"])
+            except (ValueError, KeyError, TypeError):
+                continue
+
+    def put(self, key: str, measurement: Measurement) -> None:
+        """Keep a measurement.
+
+        Raises:
+            OutputError: the file cannot be written.
+        """
+        self.found[key] = measurement
+        if self.path is None:
+            return
+        entry = {"study": self.identity, "setting": key, "measurement": measurement.to_json()}
+        try:
+            self._append(json.dumps(entry) + "\n")
+        except OSError as error:
+            raise OutputError(self.path, error.strerror or str(error)) from None
+
+    def _append(self, text: str) -> None:
+        assert self.path is not None
+        descriptor = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW, 0o666)
+        try:
+            os.write(descriptor, text.encode())
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+# --- memory ----------------------------------------------------------------------------------------------------------
+
+
+def restart_memory() -> float:
+    """Set back the mark of the most memory of this process, where the system can; return what it has now, bytes.
+
+    What is no longer used is given back before: the last system is large and full of cycles.
+    """
+    with held_back():  # what a signal raises is lost in the finalisers that a collection runs
+        gc.collect()
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # of glibc, which keeps what was freed
+    if trim is not None:
+        trim(0)
+    with suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5", encoding="ascii")  # proc(5): sets VmHWM back
+    return bytes_of("VmRSS") or 0.0
+
+
+def most_memory() -> float:
+    """Return the most memory of this process since the mark was set back, bytes."""
+    return bytes_of("VmHWM") or 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+def free_memory() -> float:
+    """Return the memory (bytes) that can be had without swapping; infinite where the system does not say."""
+    return bytes_of("MemAvailable", "/proc/meminfo") or float("inf")
+
+
+def bytes_of(name: str, file: str = "/proc/self/status") -> float | None:
+    """Return a number of bytes that Linux says; None elsewhere."""
+    with suppress(OSError, StopIteration, ValueError, IndexError):
+        lines = Path(file).read_text(encoding="ascii").splitlines()
+        return 1024.0 * float(next(line for line in lines if line.startswith(f"{name}:")).split()[1])
+    return None

@@ -1,4 +1,4 @@
-"""The figures of a work–precision study: error over time, and time and memory over size; imports only results."""
+"""The figure of a study of cost: error over time."""
 
 from __future__ import annotations
 
@@ -8,13 +8,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
 
-from rotfem.commands.cost.result import CostResult, judged, mesh_name
+from rotfem.commands.cost.result import CostResult, judged, mesh_name, step_name
 
 #: A marker a scheme, or, where there are none, a degree.
 MARKERS = "osD^Pv*X<>"
-
-#: Size of a letter next to a point, and how far it stands above the line through it, in parts of the axes.
-NAME_SIZE, ABOVE = (0.0085, 0.026), 0.013
 
 #: What an output's error is relative to.
 ERRORS = {
@@ -58,7 +55,11 @@ def cost_figure(result: CostResult) -> Figure:
     chosen = summary["recommended"]
     if chosen is not None and judged(chosen):
         axis.plot(chosen["cost"], judged(chosen) or 0.0, "o", ms=14, mfc="none", mec="black", mew=1.2)
-    _names(axis, done, chosen)
+    for row in done:
+        if row["pareto"]:
+            axis.annotate(
+                short_name(row), (row["cost"], judged(row) or 0.0), (5, 5), textcoords="offset points", size="x-small"
+            )
     axis.set_xlabel("CPU time of one run with its set-up, median (s)")
     axis.set_ylabel(ERRORS[summary["output"]])
     axis.set_title(f"{summary['name']}: what accuracy costs")
@@ -73,40 +74,10 @@ def _kind(row: dict[str, Any]) -> str:
     return str(row["scheme"] or f"degree {row['degree']}")
 
 
-def _names(axis: Any, done: list[dict[str, Any]], chosen: dict[str, Any] | None) -> None:
-    """Write mesh and step next to the points, the front first, on a side where there is room, or not at all."""
-    width, height = NAME_SIZE
-    taken = [tuple(_place(axis, row)) for row in done]
-    boxes = [(x - 0.008, y - 0.012, x + 0.008, y + 0.012) for x, y in taken]
-    for row in sorted(done, key=lambda r: (r is not chosen, not r["pareto"], judged(r) or 0.0)):
-        (x, y), name = _place(axis, row), short_name(row)
-        for side in (1, -1):
-            left = x + 0.012 if side > 0 else x - 0.012 - width * len(name)
-            box = (left, y - height / 2, left + width * len(name), y + height / 2)
-            if left > 0.0 and box[2] < 1.0 and not any(_overlap(box, other) for other in boxes):
-                align = {"ha": "left", "va": "center", "fontsize": "x-small", "transform": axis.transAxes}
-                axis.text(left, y + ABOVE, name, **align)
-                boxes.append(box)
-                break
-
-
-def _place(axis: Any, row: dict[str, Any]) -> tuple[float, float]:
-    """Return where a point is, in parts of the axes."""
-    x, y = axis.transAxes.inverted().transform(axis.transData.transform((row["cost"], judged(row))))
-    return float(x), float(y)
-
-
-def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
-    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
-
-
 def short_name(row: dict[str, Any]) -> str:
-    """Return mesh, degree, scheme, and step or tolerance."""
-    name = mesh_name(row)
-    if row["scheme"] is None:
-        return name
-    step = f"{row['step']:.3g} s" if row["step"] is not None else f"tol {row['tolerance']:.0e}"
-    return f"{name}, {row['scheme']} {step}"
+    """Return mesh, degree, scheme, and step (s) or tolerance."""
+    steps = "" if row["scheme"] is None else f", {row['scheme']} {step_name(row)}"
+    return f"{mesh_name(row)} P{row['degree']}{steps}"
 
 
 def _uncertainty(axis: Any, summary: dict[str, Any], errors: list[float]) -> None:
@@ -136,32 +107,3 @@ def _legend(result: CostResult, colours: dict[str, str], markers: dict[str, str]
         handles.append(Line2D([], [], color="black", marker="o", mfc="none", ms=11, ls="none", label=text))
     handles.append(Line2D([], [], color="0.85", lw=6, label=f"uncertainty {summary['uncertainty'] or 0:.0e}"))
     return handles
-
-
-def scaling_figure(result: CostResult) -> Figure:
-    """Return time and memory over the number of unknowns: measured, and what is predicted for larger systems."""
-    figure = Figure(figsize=(9, 4), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    marching = any(row["scheme"] is not None for row in result.rows)
-    _growth(left, result, "time", 1.0)
-    _growth(right, result, "memory", 1e6)
-    left.set_ylabel("CPU time of a step (s)" if marching else "CPU time with set-up (s)")
-    right.set_ylabel("memory at the height (MB)")
-    right.legend(fontsize="small")
-    return figure
-
-
-def _growth(axis: Any, result: CostResult, name: str, unit: float) -> None:
-    """Draw a column of the table of sizes over the unknowns."""
-    rows = result.summary["scaling"]
-    for i, theory in enumerate(dict.fromkeys(row["theory"] for row in rows)):
-        mine = [row for row in rows if row["theory"] == theory]
-        known = [row for row in mine if not row["predicted"]]
-        ahead = [known[-1], *(row for row in mine if row["predicted"])]
-        for part, style in ((ahead, "o--"), (known, "o-")):
-            x, y = [row["dofs"] for row in part], [row[name] / unit for row in part]
-            axis.plot(x, y, style, color=f"C{i}", mfc="none" if part is ahead else None, ms=4)
-        axis.plot([], [], "o-", color=f"C{i}", ms=4, label=theory)
-    axis.plot([], [], "o--", color="0.3", mfc="none", ms=4, label="predicted")
-    axis.set(xscale="log", yscale="log", xlabel="unknowns")
-    axis.grid(True, which="both", lw=0.3, alpha=0.5)

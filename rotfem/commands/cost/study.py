@@ -1,10 +1,19 @@
-"""`rotfem cost`: what accuracy costs in time, over theory, mesh, degree, step and scheme."""
+"""`rotfem cost`: what accuracy costs in time, over theory, mesh, degree, step and scheme.
+
+The reference is the last answer of a refinement in the richest theory (`rotfem.refinement.refine`). An answer u(h, n)
+in steps h and n cells has the error
+
+    |u(h, n) − u(rh, n)| + |u(h, n) − u(h, n/r)|,    r = √2,
+
+at most, and is refined until that is a part of the accuracy. The error of a setting is the distance of its answer from
+the reference. Settings are computed from the cheapest on, those first that may be within the accuracy: errors of
+theory, mesh and steps add up, and each is no larger than the least error of a setting with this theory, mesh or steps.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from math import ceil, inf, log2
+from collections.abc import Mapping, Sequence
+from math import inf, isfinite, log, nan
 from pathlib import Path
 from typing import Any
 
@@ -12,58 +21,66 @@ import numpy as np
 from mpi4py import MPI
 
 from rotfem import registry
-from rotfem.commands.cost.bench import check_degrees
-from rotfem.commands.cost.budget import DEFAULT_FULL, DEFAULT_QUICK, Budget, seconds_of
-from rotfem.commands.cost.laboratory import Laboratory
-from rotfem.commands.cost.record import Measurement
-from rotfem.commands.cost.reference import Refinement, distance, paired
+from rotfem.commands.cost.bench import Array, Bench, Measurement, Record, fingerprint, free_memory
 from rotfem.commands.cost.result import (
+    DECADES,
     CostResult,
-    References,
+    Reference,
     Row,
-    describe,
+    closest,
+    missing,
+    pareto,
+    promise,
     recommend,
-    rows_of,
     setting_of,
-    study_summary,
-    truth_of,
 )
 from rotfem.commands.cost.settings import (
+    MESHES,
     OUTPUTS,
-    Setting,
-    cells,
+    Chosen,
+    allowed_by,
     check_choice,
-    count,
     default_output,
+    default_theories,
     grid,
     own_setting,
-    remeshed,
-    restepped,
-    sample_interval,
-    samples_every,
-    scheme_of,
+    parts_of,
     sweep_speeds,
-    unique,
+    with_theory,
 )
-from rotfem.errors import ComputationError, SceneError
+from rotfem.commands.options import seconds_of
+from rotfem.commands.problem import Problem
+from rotfem.equations.model import Model
+from rotfem.errors import ComputationError, InputError, SceneError
 from rotfem.listeners import Progress
 from rotfem.mechanics.theories import ladder, richest
+from rotfem.refinement.distance import distance, distance_each
+from rotfem.refinement.refine import (
+    AIM,
+    COARSE,
+    HIGHEST,
+    Clock,
+    Refinement,
+    Setting,
+    TooDear,
+    grown,
+    is_known,
+    refine,
+)
 from rotfem.scene import Scene, as_scene
+from rotfem.version import versions
+
+#: Default CPU time of a study, s.
+DEFAULT = {False: 1200.0, True: 120.0}
 
 #: Name of the file that keeps what has been measured.
 RECORD = "cost.jsonl"
 
-#: What a setting does not have outside a history.
-STILL: dict[str, Any] = {"scheme": None, "step": None, "tolerance": None, "every": 1}
+#: Scheme of the adaptive steps that references are made with.
+ADAPTIVE = "esdirk4"
 
-#: Part of the accuracy that the error of references may be: the rest is left to the settings that are judged by them.
-CERTAIN = 1 / 4
-
-#: Uncertainty (relative) below which no reference is refined: the increments at which Newton stops are not far below.
-LEAST_GOAL = 1e-8
-
-#: Steps too long for a scheme that are halved before it is given up.
-MOST_FAILURES = 3
+#: Keys of a scene by which it chooses its setting, which a study does itself.
+CHOICES = ("accuracy", "accuracy_of", "accuracy_budget", "model.tolerance", "model.reduced", "model.foreshortening")
 
 
 def cost(
@@ -109,22 +126,31 @@ def cost(
         ComputationError: not one setting could be computed.
         OutputError: the folder cannot be written.
     """
-    scene, output = checked(as_scene(scene), accuracy, repeat, output)
-    seconds = (DEFAULT_QUICK if quick else DEFAULT_FULL) if budget is None else seconds_of(budget, scene.file)
+    scene = without_choices(as_scene(scene))
+    output = checked(scene, accuracy, repeat, output)
     chosen = {"theories": theories, "elements": elements, "degrees": degrees, "steps": steps, "schemes": schemes}
-    check_choice(scene, chosen)  # before anything is computed or kept
-    study = Study(scene, output, repeat, Budget(seconds, comm), None if folder is None else Path(folder), resume)
-    return study.run(quick, accuracy, chosen, progress or (lambda share: None))
+    seconds = DEFAULT[quick] if budget is None else seconds_of(budget, scene.file)
+    check_choice(scene, chosen)
+    check_degrees(scene, degrees or (), comm)
+    path = None if folder is None else Path(folder) / RECORD
+    study = Study(scene, output, chosen, repeat, (seconds, path, resume), comm)
+    return study.run(quick, accuracy, progress or (lambda share: None))
 
 
-def checked(scene: Scene, accuracy: float, repeat: int, output: str | None) -> tuple[Scene, str]:
-    """Return the scene as it is studied, over all theories without its own choice, and the output that is compared.
+def without_choices(scene: Scene) -> Scene:
+    """Return a scene in its own setting."""
+    changes: dict[str, Any] = dict.fromkeys(CHOICES)
+    if scene.time is not None:  # an accuracy may have given its steps
+        changes |= {"time.tolerance": scene.time.tolerance, "time.step": scene.time.step}
+    return scene.replace(changes)
+
+
+def checked(scene: Scene, accuracy: float, repeat: int, output: str | None) -> str:
+    """Return the output that is compared.
 
     Raises:
         SceneError: what is asked for is not valid, or has no meaning for the scene.
     """
-    if scene.model.tolerance is not None:
-        scene = scene.replace({"model.tolerance": None})
     if not (np.isfinite(accuracy) and accuracy > 0):
         raise SceneError(scene.file, "cost --accuracy", accuracy, "must be a number greater than 0")
     if repeat < 1:
@@ -136,298 +162,377 @@ def checked(scene: Scene, accuracy: float, repeat: int, output: str | None) -> t
         scene.check_run()
     if output == "campbell":
         sweep_speeds(scene)
-    return scene, output
+    return output
+
+
+def check_degrees(scene: Scene, degrees: Sequence[int], comm: MPI.Comm) -> None:
+    """Check that elements of these degrees may be used; of a mesh file only the file says of what shape they are.
+
+    Raises:
+        SceneError: they may not.
+    """
+    for degree in degrees if scene.structure.mesh_file is not None else ():
+        try:
+            Model(Problem.of(scene.replace({"mesh.degree": degree})).replace(effects=()), comm)
+        except InputError as error:
+            raise SceneError(scene.file, "cost --degrees", degree, error.allowed) from None
 
 
 class Study:
-    """One work–precision study: references, the search for the cheapest setting, then the rest of the grid.
+    """One study: the reference, then the grid, then the best settings again.
 
     Args:
         scene: validated scene.
         output: one of OUTPUTS.
+        chosen: lists that replace those of the grid.
         repeat: repetitions of every setting that may be recommended.
-        budget: time and memory.
-        folder: where the record is kept, or None.
-        resume: whether to go on with the record that is there.
+        limits: CPU time of all, s; where the record is kept, or None; whether to go on with the one that is there.
+        comm: MPI communicator.
+
+    Attributes:
+        measured: key of a setting ↦ the setting and what was measured of it.
+        references: theory ↦ its reference.
+        failures: theory ↦ why it has none.
+        refused: settings that were not computed for want of time or memory.
+        of_grid: keys of the settings that the grid has.
+        new: keys of those that were not taken from the record.
     """
 
-    def __init__(self, scene: Scene, output: str, repeat: int, budget: Budget, folder: Path | None, resume: bool):
-        self.scene, self.output, self.repeat, self.budget = scene, output, repeat, budget
-        self.each = output != "tip"
-        self.laboratory = Laboratory(scene, output, budget, None if folder is None else folder / RECORD, resume)
-        self.own = own_setting(scene) if output == "tip" else replace(own_setting(scene), **STILL)
-        self.references: References = {}
+    def __init__(
+        self,
+        scene: Scene,
+        output: str,
+        chosen: Chosen,
+        repeat: int,
+        limits: tuple[float, Path | None, bool],
+        comm: MPI.Comm,
+    ):
+        seconds, path, resume = limits
+        self.scene, self.output, self.chosen, self.repeat, self.comm = scene, output, chosen, repeat, comm
+        self.clock = Clock(seconds, comm, key="the budget")
+        identity = fingerprint(scene, output, comm.size)
+        self.record = Record(path if comm.rank == 0 else None, identity, fresh=not resume)
+        self.record.found = comm.bcast(self.record.found)
+        self.bench = Bench(scene.replace({"output.error": False}), output, comm)
+        self.own = own_setting(scene, output)
+        self.measured: dict[str, tuple[Setting, Measurement]] = {}
+        self.references: dict[str, Reference] = {}
         self.failures: dict[str, str] = {}
-        self.chosen: Mapping[str, Sequence[Any] | None] = {}
-        self.interval = self.goal = 0.0
-        self.outlook: dict[str, Any] | None = None
+        self.refused: dict[str, dict[str, Any]] = {}
+        self.of_grid, self.new = set[str](), set[str]()
 
-    def run(
-        self, quick: bool, accuracy: float, chosen: Mapping[str, Sequence[Any] | None], progress: Progress
-    ) -> CostResult:
+    def run(self, quick: bool, accuracy: float, progress: Progress) -> CostResult:
         """Return the result (see `cost`)."""
-        self.chosen, self.goal = chosen, accuracy
-        base = self.base_step()
-        settings = grid(self.scene, self.output, quick, base, chosen)
-        check_degrees(self.scene, chosen.get("degrees") or (), self.laboratory.comm)
-        self.interval = 0.0 if base is None else sample_interval(self.scene, base)
-        self._refer(settings, max(CERTAIN * accuracy, LEAST_GOAL))
+        self._refer(quick, accuracy, self.chosen["theories"] or default_theories(self.scene, quick))
         progress(0.4)
-        if self.own in settings:
-            self.laboratory.get(self.own, "grid")
-        self._search(settings, accuracy)
-        progress(0.6)
+        self._explore(grid(self.scene, self.output, quick, self.chosen, self._own_step()), accuracy, progress)
         self._repeat(accuracy)
-        for i, setting in enumerate(sorted(settings, key=lambda s: self.laboratory.prediction.of(s)["cpu"] or 0.0)):
-            self.laboratory.get(setting, "grid")
-            progress(0.7 + 0.3 * i / len(settings))
-        self._check_computed()
         progress(1.0)
         rows = self.rows()
-        return CostResult(study_summary(self, rows, accuracy, quick), rows, self.scene, self.references)
-
-    def _check_computed(self) -> None:
-        rows = [row for row in self.rows() if row["candidate"]]
-        if not any(row["status"] == "done" for row in rows):
-            row = rows[-1] if rows else None
-            why = "the budget is too small" if row is None else f"{describe(row)}: {row['reason']}"
-            raise ComputationError(f"no setting could be computed ({why})")
-        truth = truth_of(self.references)
-        if not self.each and truth is not None and not np.any(self.references[truth].samples.values):
-            raise SceneError(self.scene.file, "cost --of", "tip", 'the tip does not move; try output "frequencies"')
+        self._check_computed(rows)
+        return CostResult(self._summary(rows, accuracy, quick), rows, self.scene, self.references)
 
     def rows(self) -> list[Row]:
-        """Return one row a setting that was measured."""
-        return rows_of(self.laboratory.measured, self.references, self.each, self.chosen.get("theories"))
+        """Return one row a setting that was measured.
+
+        `error` is the distance from the reference of the same theory, `total_error` that from the richest theory's.
+        That of a reference itself is its uncertainty. What a failed setting does not have is None.
+        """
+        truth, rows = self.truth, list[Row]()
+
+        def error(reference: Reference | None, m: Measurement) -> float | None:
+            if reference is None or m.values is None:
+                return None
+            return self.apart(reference.values, m.values) or reference.uncertainty
+
+        for key, (setting, m) in self.measured.items():
+            own = self.references.get(setting.theory)
+            row = {
+                "theory": setting.theory,
+                "elements": list(setting.elements) if isinstance(setting.elements, tuple) else setting.elements,
+                **{name: getattr(setting, name) for name in ("degree", "scheme", "step", "tolerance")},
+                "purpose": "grid" if key in self.of_grid else "reference",
+                "candidate": allowed_by(setting, self.chosen),
+                "status": m.status,
+                "error": error(own, m),
+                "model_error": None if own is None or truth is None else self.apart(truth.values, own.values),
+                "total_error": error(truth, m),
+                "uncertainty": own.uncertainty if own else None,
+                "cost": m.cost,
+                "time": m.median("wall"),
+                "cpu_time": m.median("cpu"),
+                "time_min": min(m.wall, default=nan),
+                "time_max": max(m.wall, default=nan),
+                "setup": m.median("setup"),
+                "setup_cpu": m.median("setup_cpu"),
+                "memory": m.memory or None,
+                "dofs": m.dofs or None,
+                "steps": m.steps,
+                "iterations": m.iterations,
+                "repeats": len(m.wall),
+                "pareto": False,
+                "reason": m.reason,
+            }
+            rows.append(row)
+        for row in pareto(rows):
+            row["pareto"] = True
+        return rows
+
+    def apart(self, one: Array, other: Array) -> float:
+        """Return the distance of two outputs, relative to the first; infinite where they cannot be compared."""
+        if one.shape != other.shape:
+            return inf
+        return distance(one, other) if self.output == "tip" else distance_each(one, other)
 
     @property
-    def uncertainty(self) -> float:
-        """How far what errors are measured against may be off; infinite where there is nothing."""
-        truth = truth_of(self.references)
-        return inf if truth is None else self.references[truth].uncertainty
+    def truth(self) -> Reference | None:
+        """Reference of the richest theory that has one, by which all settings are judged."""
+        return next((self.references[name] for name in reversed(ladder()) if name in self.references), None)
+
+    def _check_computed(self, rows: list[Row]) -> None:
+        candidates = [row for row in rows if row["candidate"]]
+        if not any(row["status"] == "done" for row in candidates):
+            why = "the budget is too small"
+            if candidates:
+                why = f"{setting_of(candidates[-1]).words()}: {candidates[-1]['reason']}"
+            raise ComputationError(f"no setting could be computed ({why})")
+        if self.output == "tip" and self.truth is not None and not np.any(self.truth.values):
+            raise SceneError(self.scene.file, "cost --of", "tip", 'the tip does not move; try output "frequencies"')
 
     # --- what errors are measured against ----------------------------------------------------------------------------
 
-    def _refer(self, settings: Sequence[Setting], goal: float) -> None:
-        """Make the reference of the richest theory, and those of the others from their difference at one setting."""
-        mesh = min((s for s in settings), key=lambda s: (cells(s.elements), -s.degree))
-        base = replace(self.own, elements=mesh.elements, degree=max(s.degree for s in settings))
-        theories = unique([richest().name, *(s.theory for s in settings)])
-        for theory in sorted(theories, key=ladder().index, reverse=True):
-            truth = truth_of(self.references)
-            if truth is None:
-                self._refine(replace(base, theory=theory), settings, goal)
+    def _refer(self, quick: bool, accuracy: float, theories: Sequence[str]) -> None:
+        """Make the reference of the richest theory, in half of the time, and compute the others in its setting."""
+        whole = self.clock.budget
+        assert whole is not None
+        self.clock.budget = AIM * whole
+        for theory in sorted({richest().name, *theories}, key=ladder().index, reverse=True):
+            if self.truth is None:
+                self._refine(theory, quick, accuracy)
                 continue
-            known = self.references[truth]
-            there, here = (self._measured(replace(known.setting, theory=t)) for t in (theory, truth))
-            if there is not None and there.samples is not None and here is not None and here.samples is not None:
-                self.references[theory] = paired(known, there.samples, here.samples, self.each)
+            self.clock.budget, truth = whole, self.truth
+            found = self.get(with_theory(truth.setting, theory), "reference")
+            if found is None or found.values is None:
+                self.failures[theory] = "the budget is too small for it" if found is None else found.reason
             else:
-                self.failures[theory] = "the budget is too small for it" if there is None else there.reason
+                product = self.apart(truth.values, found.values) * truth.uncertainty
+                self.references[theory] = Reference(
+                    found.values, {**truth.parts, "theory": product}, with_theory(truth.setting, theory)
+                )
+        self.clock.budget = whole
 
-    def _measured(self, setting: Setting) -> Measurement | None:
-        return self.laboratory.get(setting, "reference")
-
-    def _refine(self, base: Setting, settings: Sequence[Setting], goal: float) -> None:
-        """Make the reference of a theory by refinement, steps on the coarsest mesh first."""
-
-        def finer_mesh(setting: Setting) -> Setting | None:
-            return remeshed(setting, 2.0)
-
-        moves: dict[str, Callable[[Setting], Setting | None]] = {"mesh": finer_mesh}
-        start: Setting | None = base
-        if base.scheme is not None:
-            moves["time"] = self._finer_step
-            start = self._race(base, settings, goal)
-        samples = None if start is None else self._measured(start)
-        if start is None or samples is None or samples.samples is None:
-            at_fault = samples or self.laboratory.measured.get(base, ("", None))[1]
-            self.failures[base.theory] = "the budget is too small for it" if at_fault is None else at_fault.reason
-            return
-
-        def get(setting: Setting) -> Any:
-            found = self._measured(setting)
-            return None if found is None else found.samples
-
-        refinement = Refinement(get, start, moves, self.each)
-        before = restepped(start, 2.0, self.interval)
-        if before in self.laboratory.measured:  # of the race, so that the order of the scheme can be observed
-            refinement.differences["time"] = [(before, self._apart(before, start))]
-        found = refinement.reference(goal)
-        if found is None:
-            self.failures[base.theory] = "the budget is too small for it"
+    def _refine(self, theory: str, quick: bool, accuracy: float) -> None:
+        """Make the reference of a theory by refinement."""
+        own, found, goal = self.own, Refinement[Array](), AIM * accuracy
+        elements, degree = own.elements, own.degree
+        if elements is None:
+            degree = min(degree + 1, HIGHEST)
         else:
-            self.references[base.theory] = found
+            elements = grown(grown(elements, min(MESHES[quick])), 2.0)
+        first = Setting(({"theory": theory},), elements, degree)
+        if own.moving:
+            first = Setting(first.models, elements, degree, ADAPTIVE, max(accuracy, COARSE))
+        try:
+            refine(first, self._paired, goal, self.clock, found)
+        except (ComputationError, InputError) as error:
+            self.failures[theory] = str(error)
+        if isinstance(found.failure, TooDear):
+            self.refused["reference"] = {"setting": {}, "why": found.failure.what, "time": None, "memory": None}
+        if found.best is not None and is_known(found.best.error):
+            parts = {name: float(x) for name, x in found.best.error.items() if name in ("time", "space")}
+            self.references[theory] = Reference(found.best.result, parts, found.best.setting)
+        elif found.best is not None:
+            self.failures[theory] = "its error is unknown"
 
-    def _finer_step(self, setting: Setting) -> Setting | None:
-        return restepped(setting, 0.5, self.interval)
+    def _paired(self, setting: Setting) -> tuple[Array, dict[str, float | None]]:
+        """Return the output of a setting, and its differences from those of coarser ones."""
+        error: dict[str, float | None] = {"time": 0.0} if setting.moving else {}
+        error |= {"space": None} | ({} if self.output == "tip" else {"round_off": 0.0})
+        coarser = {name: self._computed(other) for name, other in setting.coarser().items()}
+        here = self._computed(setting)
+        for name, there in coarser.items():
+            if there.values is not None and (
+                name == "time" or there.dofs < here.dofs
+            ):  # knots may have fixed the cells
+                error[name] = self.apart(here.values, there.values)
+            else:
+                error[name] = None
+        known = [part for part in error.values() if part is not None]
+        return here.values, {**error, "total": sum(known) if len(known) == len(error) else None}
 
-    def _race(self, base: Setting, settings: Sequence[Setting], goal: float) -> Setting | None:
-        """Return the step and scheme whose next halving changes the output by a goal at most, soonest reached.
+    def _computed(self, setting: Setting) -> Any:
+        """Return the measurement of a setting.
 
-        All schemes start with the longest step of the grid. The one goes on that promises to get there first: a halving
-        takes twice the iterations, and the difference falls with the order of the scheme. Times, which scatter, decide
-        nothing here.
+        Raises:
+            ComputationError: it failed, or was refused.
         """
-        steps = unique([s.step for s in settings if s.step is not None]) or [self.base_step() or 0.0]
-        shared = [h for h in steps if abs(log2(self.interval / h) - round(log2(self.interval / h))) < 1e-6] or steps
-        first = replace(base, step=max(shared), tolerance=None, every=samples_every(self.interval, max(shared)))
-        able: dict[Setting, float] = {}
-        for scheme in self.chosen.get("schemes") or registry.schemes.names:
-            setting: Setting | None = replace(first, scheme=scheme)
-            for _ in range(MOST_FAILURES):
-                promise = None if setting is None else self._promise(setting, goal)
-                if setting is not None and promise is not None:
-                    able[setting] = promise
-                    break
-                setting = None if setting is None else self._finer_step(setting)
-        while able:
-            setting = min(able, key=lambda s: able[s])
-            finer = self._finer_step(setting)
-            assert finer is not None
-            if self._apart(setting, finer) <= goal / 2:  # the other half is the mesh's
-                return setting
-            promise = self._promise(finer, goal)
-            if promise is None and len(able) == 1:
-                return setting  # as far as it goes
-            del able[setting]
-            if promise is not None:
-                able[finer] = promise
-        return None
+        found = self.get(setting, "reference")
+        if found is None or found.status == "stopped":
+            raise TooDear("the budget is too small for it" if found is None else found.reason)
+        if found.values is None:
+            raise ComputationError(found.reason)
+        return found
 
-    def _promise(self, setting: Setting, goal: float) -> float | None:
-        """Return about how many Newton iterations a scheme takes to a goal; None where it cannot be computed."""
-        finer = self._finer_step(setting)
-        assert finer is not None
-        apart = self._apart(setting, finer)
-        if apart == inf:
-            return None
-        further = ceil(log2(apart / goal) / scheme_of(setting).order) if apart > goal else 0
-        return self.laboratory.measured[finer][1].iterations * 2.0**further
+    # --- the grid ----------------------------------------------------------------------------------------------------
 
-    def _apart(self, one: Setting, other: Setting) -> float:
-        """Return the distance of the outputs of two settings; infinite where one is not to be had."""
-        here, there = self._measured(one), self._measured(other)
-        if here is None or here.samples is None or there is None or there.samples is None:
-            return inf
-        return distance(here.samples, there.samples, self.each)
+    def _own_step(self) -> float | None:
+        """Return the scene's fixed step (s), or the mean of its adaptive ones; None where there is none."""
+        time = self.scene.time if self.own.moving else None
+        if time is None or time.step is not None:
+            return None if time is None else time.step
+        found = self.get(self.own, "grid")
+        return None if found is None or found.values is None else time.end / found.steps
 
-    # --- what is tried -----------------------------------------------------------------------------------------------
+    def _explore(self, settings: Sequence[Setting], accuracy: float, progress: Progress) -> None:
+        """Compute the settings of a grid.
 
-    def _search(self, settings: Sequence[Setting], accuracy: float) -> None:
-        """Compute what should be the cheapest setting within an accuracy until none cheaper is in sight."""
-        while True:
-            found = self._candidate(settings, accuracy)
-            best = recommend(self.rows(), accuracy, self.uncertainty)
-            if found is None or (best is not None and found[1] >= best["cost"]):
-                return
-            if self.laboratory.get(found[0], "proposal") is None:
-                if best is None:
-                    used = self.budget.seconds - self.budget.left()
-                    self.outlook = {"setting": found[0].key(), "cost": found[1], "budget": used + 2 * found[1]}
-                return
-
-    def _candidate(self, settings: Sequence[Setting], accuracy: float) -> tuple[Setting, float] | None:
-        """Return the setting not yet computed, and its predicted cost, that is the cheapest expected to be good enough.
-
-        Errors of theory, steps and mesh add up at most. That of steps is no more than the least error of any setting
-        with these steps, and so is that of a mesh; next to these they change with the order of the method.
+        Those come first that change the own one in one part, then those that may be within the accuracy, each the
+        cheapest first.
         """
-        rows = [row for row in self.rows() if row["status"] == "done" and row["error"] is not None]
-        models = {t: row["model_error"] for row in rows if (t := row["theory"]) in (self.chosen.get("theories") or [t])}
-        ways = self._errors(rows, ("scheme", "step", "tolerance", "every"), self._other_ways, settings)
-        meshes = self._errors(rows, ("elements", "degree"), self._other_meshes, settings)
-        best: tuple[Setting, float] | None = None
-        for theory, model in models.items():
-            for way, time in ways.items():
-                for mesh, space in meshes.items():
-                    setting = Setting(theory, mesh[0], mesh[1], *way)
-                    if setting in self.laboratory.measured or not model + time + space + self.uncertainty <= accuracy:
-                        continue
-                    price = self.laboratory.prediction.of(setting)["cpu"]
-                    if price is not None and (best is None or price < best[1]):
-                        best = setting, price
-        return best
+        left = [(setting, self.predicted(setting)["time"] or 0.0) for setting in settings]
+        for number in range(len(settings)):
+            least: dict[tuple[Any, ...], float] = {}
+            for row in self.rows():
+                error = row["total_error"]
+                for part in parts_of(setting_of(row)) if error is not None else ():
+                    least[part] = min(error, least.get(part, inf))
 
-    def _errors(
-        self,
-        rows: Sequence[Row],
-        names: Sequence[str],
-        others: Callable[[Setting, float], list[tuple[Setting, float]]],
-        settings: Sequence[Setting],
-    ) -> dict[tuple[Any, ...], float]:
-        """Return values of some keys of settings ↦ error that they cause at most: as measured, and of the next ones.
+            def rank(entry: tuple[Setting, float], least: Mapping[Any, float] = least) -> tuple[bool, bool, float]:
+                parts = parts_of(entry[0])
+                changes = sum(one != other for one, other in zip(parts, parts_of(self.own), strict=True))
+                return changes > 1, sum(least.get(part, 0.0) for part in parts) > accuracy, entry[1]
 
-        Args:
-            rows: of settings that were computed.
-            names: of the keys.
-            others: (setting, error) ↦ its neighbours in these keys and their errors.
-            settings: of the grid, to which they are bound where the user has chosen them.
-        """
-        found: dict[tuple[Any, ...], tuple[Setting, float]] = {}
-
-        def note(setting: Setting, error: float) -> None:
-            key = tuple(getattr(setting, name) for name in names)
-            if key not in found or error < found[key][1]:
-                found[key] = setting, error
-
-        for row in rows:
-            note(setting_of(row), row["error"])
-        for setting, error in list(found.values()):
-            for other, other_error in others(setting, error):
-                if tuple(getattr(other, name) for name in names) not in found:
-                    note(other, other_error)
-        fixed = {"step": "steps", "elements": "elements"}
-        for name, option in fixed.items():
-            if name in names and self.chosen.get(option):
-                allowed = {getattr(s, name) for s in settings}
-                found = {key: value for key, value in found.items() if key[names.index(name)] in allowed}
-        return {key: error for key, (_, error) in found.items()}
-
-    def _other_ways(self, setting: Setting, error: float) -> list[tuple[Setting, float]]:
-        """Return a setting with half and twice its step, and the error of each by the order of the scheme.
-
-        A tolerance is a relative error: none above the accuracy is of use.
-        """
-        scheme = scheme_of(setting)
-        power = 0 if scheme is None else scheme.order if setting.step is not None else 1
-        found = [(restepped(setting, factor, self.interval), error * factor**power) for factor in (0.5, 2.0)]
-        end = self.scene.time.end if self.scene.time is not None else 0.0
-        return [
-            (s, e) for s, e in found if s is not None and (s.step or 0.0) <= end and (s.tolerance or 0.0) <= self.goal
-        ]
-
-    def _other_meshes(self, setting: Setting, error: float) -> list[tuple[Setting, float]]:
-        """Return a setting on the next coarser and finer mesh, with errors of order k + 1, of eigenvalues 2k.
-
-        Strang & Fix, "An Analysis of the Finite Element Method", 1973, sections 3.2 and 6.3.
-        """
-        power = 2 * setting.degree if self.each else setting.degree + 1
-        found = [(remeshed(setting, factor), factor) for factor in (0.5, 2.0)]
-        return [(s, error * factor**-power) for s, factor in found if s is not None and count(s) > setting.degree]
+            following = min(left, key=rank)
+            left.remove(following)
+            self.get(following[0], "grid")
+            progress(0.4 + 0.5 * number / len(settings))
 
     def _repeat(self, accuracy: float) -> None:
         """Time the recommended setting and the front as often as was asked for."""
         rows = self.rows()
         best = recommend(rows, accuracy, self.uncertainty)
         for row in [*([best] if best is not None else []), *(row for row in rows if row["pareto"])]:
-            self.laboratory.get(setting_of(row), row["purpose"], self.repeat)
+            self.get(setting_of(row), row["purpose"], self.repeat)
 
-    # --- the scene ---------------------------------------------------------------------------------------------------
+    @property
+    def uncertainty(self) -> float:
+        """How far what errors are measured against may be off; infinite where there is nothing."""
+        return inf if self.truth is None else self.truth.uncertainty
 
-    def base_step(self) -> float | None:
-        """Return the fixed step (s) around which steps are tried: the scene's own, or the mean of its adaptive ones.
+    # --- measuring ---------------------------------------------------------------------------------------------------
 
-        Raises:
-            ComputationError: the scene as it is cannot be computed, so that the mean step is not known.
+    def get(self, setting: Setting, purpose: str, repeat: int = 1) -> Measurement | None:
+        """Return the measurement of a setting, from the record where it has it; None where the budget refuses it.
+
+        Args:
+            setting: what is measured.
+            purpose: what for: grid or reference.
+            repeat: how often it is to be computed, in all.
         """
-        time = self.scene.time
-        if self.output != "tip" or time is None:
-            return None
-        if time.step is not None:
-            return time.step
-        pilot = self.laboratory.get(self.own, "grid")
-        if pilot is None or pilot.status != "done":
-            why = "" if pilot is None else f": {pilot.reason}"
-            raise ComputationError(f"the scene as it is failed, so that no grid can be made around it{why}")
-        return time.end / pilot.steps
+        key = setting.key()
+        self.of_grid |= {key} if purpose == "grid" else set()
+        found = self.record.found.get(key)
+        if found is None or (found.status == "done" and len(found.wall) < repeat):
+            if not self._allows(setting):
+                return None
+            found = self.comm.bcast(self.bench.measure(setting, repeat, found, self.clock))
+            self.new.add(key)
+            if found.status != "stopped":
+                self.record.put(key, found)
+        self.measured[key] = setting, found
+        return found
+
+    def _allows(self, setting: Setting) -> bool:
+        """Return whether a setting may be computed, and note what is refused.
+
+        Besides a reference it may take half of the time left, so that there is as much for what follows from it; and
+        the free memory.
+        """
+        known, free = self.predicted(setting), self.comm.bcast(free_memory())
+        time, memory, why = known["time"], known["memory"], ""
+        if memory is not None and memory > free:
+            why = f"would need about {memory / 1e9:.2g} GB, {free / 1e9:.2g} GB are free"
+        else:
+            try:
+                self.clock.begin(setting.words(), len(self.measured) + 1, (time or 0.0) / (AIM if self.truth else 1.0))
+            except TooDear as error:
+                why = error.what
+        if why:
+            self.refused.setdefault(setting.key(), {"setting": setting.summary(), "why": why, **known})
+        return not why
+
+    def predicted(self, setting: Setting) -> dict[str, float | None]:
+        """Return `time` (s, CPU, with set-up) and `memory` (bytes) that a setting takes, by the most similar one.
+
+        Memory grows as n log n at most (nested dissection; George 1973).
+        """
+        done = [(s, m) for s, m in self.measured.values() if m.status == "done"]
+        if not done:
+            return {"time": None, "memory": None}
+
+        def far(entry: tuple[Setting, Measurement]) -> tuple[bool, bool, float]:
+            s, ratio = entry[0], self._work(setting, *entry) / self._work(entry[0], *entry)
+            steps_differ = s.scheme != setting.scheme or (s.step is None) != (setting.step is None)
+            return steps_differ, s.theory != setting.theory, abs(log(ratio))
+
+        near, m = min(done, key=far)
+        more = setting.unknowns() / near.unknowns()
+        filled = more * max(1.0, 1.0 + log(more) / log(max(m.dofs, 3)))
+        return {"time": m.cost * self._work(setting, near, m) / self._work(near, near, m), "memory": m.memory * filled}
+
+    def _work(self, setting: Setting, near: Setting, found: Measurement) -> float:
+        """Return what the time of a setting is proportional to, with the number of adaptive steps of a measured one."""
+        if setting.scheme is None or near.scheme is None or self.scene.time is None:
+            return setting.work()
+        stages = registry.schemes[setting.scheme].stages
+        steps = found.steps * (near.tolerance or 1.0) ** 0.25
+        if setting.step is not None:
+            steps = self.scene.time.end / setting.step
+        return float(setting.work() * stages * steps)
+
+    # --- what comes of it --------------------------------------------------------------------------------------------
+
+    def _summary(self, rows: list[Row], accuracy: float, quick: bool) -> dict[str, Any]:
+        """Return the summary of the study."""
+        references, uncertainty, truth = self.references, self.uncertainty, self.truth
+        best = {a: recommend(rows, a, uncertainty) for a in sorted({*DECADES, accuracy}, reverse=True)}
+        chosen, refused, clock = best[accuracy], list(self.refused.values()), self.clock.summary()
+        used, compiling, warnings = self.clock.used(), self.bench.compiling, []
+        if richest().name not in references:
+            reason = self.failures.get(richest().name, "")
+            warnings.append(f"no reference of {richest().name} ({reason}): errors do not include that of the model")
+        if isfinite(uncertainty) and uncertainty > AIM * accuracy:
+            warnings.append(f"the reference is known to {uncertainty:.1e}: errors near that are not resolved")
+        return {
+            "command": "cost",
+            "status": "done",
+            "name": self.scene.name,
+            "output": self.output,
+            "quick": quick,
+            "accuracy": accuracy,
+            "truth": None if truth is None else truth.setting.theory,
+            "uncertainty": None if truth is None else uncertainty,
+            "references": {
+                name: {"uncertainty": r.uncertainty, "parts": r.parts, "setting": r.setting.summary()}
+                for name, r in references.items()
+            },
+            "reference_failures": self.failures,
+            "model_errors": {t: self.apart(truth.values, r.values) for t, r in references.items() if truth is not None},
+            "recommended": chosen,
+            "promise": None if chosen is None else promise(chosen, uncertainty),
+            "closest": closest(rows, uncertainty) if chosen is None else None,
+            "missing": missing(rows, uncertainty, refused) if chosen is None else "",
+            "recommendations": [
+                {"accuracy": a, "setting": r and setting_of(r).words(), "row": r} for a, r in best.items()
+            ],
+            "settings": len(rows),
+            "failed": sum(row["status"] == "failed" for row in rows),
+            "measured": len(self.new),
+            "resumed": len(rows) - len(self.new),
+            "budget": {"seconds": clock["seconds"], "used": used, "refused": refused},
+            "timings": {"compile": compiling, "other": used - compiling, "total": used},
+            "warnings": warnings,
+            "versions": versions(),
+            "ranks": self.comm.size,
+            "scene": self.scene.digest(),
+        }
