@@ -40,8 +40,7 @@ if TYPE_CHECKING:
     from rotfem.scene import BeamMesh, PlateMesh
     from rotfem.scene.beams import PlanarBeamStructure as PlanarBeam
     from rotfem.scene.beams import SpatialBeamStructure as SpatialBeam
-    from rotfem.scene.blades.deck import Deck
-    from rotfem.scene.blades.formats import Asked, BladeFormat
+    from rotfem.scene.blades.deck import Asked, BladeFormat, Deck
     from rotfem.scene.plates import PlateStructure as Plate
     from rotfem.scene.section_shapes import Geometry, Shape
     from rotfem.scene.structure import StructureKind
@@ -69,8 +68,7 @@ _HOMES = {
     "commands.cost.result": ("CostResult",),
     "results": ("CampbellResult", "CheckResult", "ExplainResult", "ModesResult", "ResponseResult", "RunResult"),
     "scene": ("BeamMesh", "PlateMesh"),
-    "scene.blades.deck": ("Deck",),
-    "scene.blades.formats": ("Asked", "BladeFormat"),
+    "scene.blades.deck": ("Asked", "BladeFormat", "Deck"),
     "scene.structure": ("StructureKind",),
     "scene.section_shapes": ("Geometry", "Shape"),
 }

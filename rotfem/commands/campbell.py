@@ -31,8 +31,7 @@ from rotfem.refinement.frequencies import FrequencyErrors
 from rotfem.refinement.refine import Clock, Setting
 from rotfem.results import CampbellResult
 from rotfem.scene import Scene, as_scene
-from rotfem.scene.limits import Limits
-from rotfem.scene.values import LARGEST
+from rotfem.scene.values import LARGEST, Limits
 from rotfem.units import split_unit
 
 Array = npt.NDArray[Any]

@@ -19,7 +19,7 @@ from rotfem.mechanics.effects import Effect
 from rotfem.mechanics.theories import Theory
 from rotfem.results.check import CheckResult
 from rotfem.scene import Scene, as_scene
-from rotfem.scene.blade_profile import columns_of, doubts
+from rotfem.scene.values import Array, evaluate
 
 
 def check(scene: Scene | str | Path | Mapping[str, Any], *, comm: MPI.Comm = MPI.COMM_WORLD) -> CheckResult:
@@ -67,3 +67,133 @@ def check(scene: Scene | str | Path | Mapping[str, Any], *, comm: MPI.Comm = MPI
         }
         coordinates, _ = model.structure.nodes(model.structure.k.functions[0].x.array)
         return CheckResult(found, columns, coordinates, model.structure.surface())
+
+
+# --- along the span ---------------------------------------------------------------------------------------------------
+
+#: What is doubtful: pretwist (rad), ratio of a property from row to row, of radii of gyration of stiffness and
+#: mass, and distance of a centre in radii of gyration.
+LARGE_TWIST, LARGE_STEP, UNLIKE, OUTSIDE = 2.0, 30.0, 10.0, 4.0
+
+#: Places between two rows of the tables.
+BETWEEN = 4
+
+
+def central_properties(stiffness: Array, mass: Array) -> dict[str, Array]:
+    """Return the section properties about the section's own centres of matrices (n, 6, 6) about the reference line.
+
+    They are `EA` (N), `EI2`, `EI3` (N·m²) about the tension centre; `GA2`, `GA3` (N), `GJ` (N·m²) about the shear one;
+    `mass_per_length` (kg/m), `rotary_inertia2`, `rotary_inertia3` (kg·m) about the mass centre; `tension_center_y`,
+    `tension_center_z` (m) and those of the others. Couplings that no centre takes away are left out.
+    """
+    K, M = stiffness, mass
+    EA, m = K[:, 0, 0], M[:, 0, 0]
+    across = K[:, 1:3, 1:3]
+    arm = np.linalg.solve(across, K[:, 1:3, 3, None])[..., 0]  # (−z, y) of the shear centre
+    y, z = M[:, 2, 3] / m, M[:, 0, 4] / m
+    return {
+        "mass_per_length": m,
+        "EA": EA,
+        "GA2": K[:, 1, 1],
+        "GA3": K[:, 2, 2],
+        "GJ": K[:, 3, 3] - np.einsum("ni,ni->n", arm, K[:, 1:3, 3]),
+        "EI2": K[:, 4, 4] - K[:, 0, 4] ** 2 / EA,
+        "EI3": K[:, 5, 5] - K[:, 0, 5] ** 2 / EA,
+        "rotary_inertia2": M[:, 4, 4] - m * z**2,
+        "rotary_inertia3": M[:, 5, 5] - m * y**2,
+        "mass_center_y": y,
+        "mass_center_z": z,
+        "tension_center_y": -K[:, 0, 5] / EA,
+        "tension_center_z": K[:, 0, 4] / EA,
+        "shear_center_y": arm[:, 1],
+        "shear_center_z": -arm[:, 0],
+    }
+
+
+def places(knots: tuple[float, ...], length: float) -> Array:
+    """Return the rows of the tables, and places between them (m)."""
+    ends = np.array([0.0, *knots, length])
+    steps = np.linspace(0.0, 1.0, BETWEEN, endpoint=False)
+    return np.append((ends[:-1, None] + np.diff(ends)[:, None] * steps).ravel(), length)
+
+
+def axes_along(beam: Any, x: Array) -> tuple[Array, Array]:
+    """Return (r, T) in the frame: position of the axis (m), (n, 3), and the section axes as columns, (n, 3, 3)."""
+    c, s = np.cos(beam.precone), np.sin(beam.precone)
+    coned = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
+    line = beam.reference_line
+    if line is not None:
+        position, (chi, zeta) = line.at(x)[0], line.angles(x)
+    else:
+        chi = zeta = np.zeros(len(x))
+        position = x[:, None] * np.eye(3)[0]
+    zero, one = np.zeros(len(x)), np.ones(len(x))
+    twist = evaluate(beam.pretwist, x)
+    swept = _stacked([[np.cos(chi), -np.sin(chi), zero], [np.sin(chi), np.cos(chi), zero], [zero, zero, one]])
+    bent = _stacked([[np.cos(zeta), zero, -np.sin(zeta)], [zero, one, zero], [np.sin(zeta), zero, np.cos(zeta)]])
+    turned = _stacked([[one, zero, zero], [zero, np.cos(twist), -np.sin(twist)], [zero, np.sin(twist), np.cos(twist)]])
+    r = np.array(beam.root_position) + position @ coned.T
+    return r, coned @ swept @ bent @ turned
+
+
+def columns_of(structure: Any) -> dict[str, Array]:
+    """Return columns over `x` (m) of a beam, none of another structure.
+
+    Of a spatial beam `axis_1` … `axis_3` say where its axis runs in the frame (m), `t1_1` … `t3_3` are components of
+    the section axes there, `pretwist` is their angle (rad), and the rest is `central_properties`; of a planar beam they
+    are its section.
+    """
+    section = getattr(structure, "section", None)
+    if section is None:
+        return {}
+    x = places(structure.knots, structure.length)
+    if structure.is_planar:
+        return {"x": x, **section.at(x)}
+    r, T = axes_along(structure, x)
+    matrices = section.at(x)
+    return {
+        "x": x,
+        **{f"axis_{i + 1}": r[:, i] for i in range(3)},
+        **{f"t{j + 1}_{i + 1}": T[:, i, j] for j in range(3) for i in range(3)},
+        "pretwist": evaluate(structure.pretwist, x),
+        **central_properties(matrices["stiffness"], matrices["mass"]),
+    }
+
+
+def doubts(columns: Mapping[str, Array]) -> list[str]:
+    """Return what looks like a slip: degrees for radians, another unit, a point that is missing."""
+    out = []
+    x = columns.get("x", np.zeros(0))
+    if "pretwist" in columns and (most := np.max(np.abs(columns["pretwist"]))) > LARGE_TWIST:
+        out.append(f"the pretwist reaches {most:.4g} rad at x = {x[np.argmax(np.abs(columns['pretwist']))]:.4g} m")
+    for name in columns.keys() & {"EA", "GJ", "EI", "EI2", "EI3", "GA", "GA2", "GA3", "mass_per_length"}:
+        rows, values = x[::BETWEEN], columns[name][::BETWEEN]
+        ratio = np.abs(np.log(values[1:] / values[:-1])) if np.all(values > 0.0) else np.zeros(0)
+        if ratio.size and (most := float(np.exp(ratio.max()))) > LARGE_STEP:
+            i = int(np.argmax(ratio))
+            out.append(f"{name} changes {most:.3g} times from x = {rows[i]:.4g} to {rows[i + 1]:.4g} m")
+    for axis, other in (("2", "z"), ("3", "y")):
+        if f"EI{axis}" not in columns:
+            continue
+        stiff = np.sqrt(columns[f"EI{axis}"] / columns["EA"])
+        heavy = np.sqrt(np.abs(columns[f"rotary_inertia{axis}"]) / columns["mass_per_length"])
+        far = np.where(heavy > 0.0, np.maximum(heavy / stiff, stiff / np.where(heavy > 0.0, heavy, 1.0)), 1.0)
+        if np.max(far) > UNLIKE:
+            i = int(np.argmax(far))
+            out.append(
+                f"at x = {x[i]:.4g} m the radius of gyration about axis {axis} is {stiff[i]:.3g} m of the stiffness, "
+                f"{heavy[i]:.3g} m of the mass"
+            )
+        for center in ("mass_center", "tension_center", "shear_center"):
+            away = np.abs(columns[f"{center}_{other}"]) / stiff
+            if np.max(away) > OUTSIDE:
+                i = int(np.argmax(away))
+                out.append(
+                    f"at x = {x[i]:.4g} m {center} lies {away[i]:.3g} radii of gyration from the axis in {other}"
+                )
+    return sorted(out)
+
+
+def _stacked(rows: list[list[Array]]) -> Array:
+    """Return matrices (n, 3, 3) of rows of entries (n,)."""
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

@@ -21,6 +21,7 @@ from rotfem.analysis.modal import participation as masses_of
 from rotfem.analysis.stability import Stability, stability_of_pencil
 from rotfem.analysis.theory_error import TheoryCheck, TheoryError
 from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy, within_tolerance
+from rotfem.commands.advice import advise
 from rotfem.commands.error_report import error_of_modes
 from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.mode_tables import mode_tables
@@ -37,7 +38,6 @@ from rotfem.refinement.frequencies import FrequencyErrors
 from rotfem.refinement.refine import Clock, Setting
 from rotfem.results import ModesResult
 from rotfem.scene import Scene, as_scene
-from rotfem.scene.advice import advise
 from rotfem.structures.paraview import writer
 
 Array = npt.NDArray[Any]

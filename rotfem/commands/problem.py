@@ -28,7 +28,7 @@ from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
 from rotfem.results import ModesResult
 from rotfem.scene import Scene, Time, as_scene
-from rotfem.scene.stepping import estimates_error, usual
+from rotfem.scene.settings import estimates_error, usual
 
 
 class Problem(ProblemData):

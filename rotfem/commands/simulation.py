@@ -21,6 +21,7 @@ from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.switching import SMOOTHER, watched_switches
 from rotfem.analysis.theory_error import said_of
 from rotfem.commands import monitor
+from rotfem.commands.advice import advise
 from rotfem.commands.checkpoint import Log, Parts
 from rotfem.commands.error_report import RunErrors, output_of
 from rotfem.commands.first_state import Start, first_state, hints_of_start
@@ -43,7 +44,6 @@ from rotfem.refinement.refine import Setting
 from rotfem.results.columns import figures
 from rotfem.results.run import RunResult
 from rotfem.scene import Scene, Time
-from rotfem.scene.advice import advise
 from rotfem.structures.symmetry import inactive_unknowns
 
 Array = npt.NDArray[np.float64]

@@ -8,9 +8,8 @@ from rotfem.scene.output import OutputTable
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.scene import Scene, as_scene, load_scene
 from rotfem.scene.section_shapes import Geometry, Shape
-from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh, Solver
+from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh, Solver, Time
 from rotfem.scene.signals import Signal
-from rotfem.scene.stepping import Time
 
 __all__ = [
     "EFFECTS",

@@ -1,23 +1,21 @@
-"""The [structure] table: planar beam or spatial beam here, plate in its own module."""
+"""The [structure] table of a beam, planar or spatial; that of a plate is in its own module."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
-from rotfem.scene.beam_files import with_tables
-from rotfem.scene.clamp_and_damping import Damping, check_one_hub
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_through
-from rotfem.scene.root import Root, RootedStructure, SpatialRoot, check_cone, check_pitch
-from rotfem.scene.section import PlanarSection
-from rotfem.scene.section_spatial import SpatialSection
-from rotfem.scene.structure import MeanBeam, apart, means
+from rotfem.scene.root import Root, RootedStructure, SpatialRoot
+from rotfem.scene.section import PlanarSection, SpatialSection
+from rotfem.scene.span_tables import with_tables
+from rotfem.scene.structure import Damping, MeanBeam, apart, check_one_hub, means
+from rotfem.scene.table import SceneModel, problem, problems_at
 from rotfem.scene.values import (
     AnyProfile,
     Array,
@@ -25,28 +23,34 @@ from rotfem.scene.values import (
     Matrix,
     NonNegative,
     Number,
+    PaddedVector,
     Positive,
     Profile,
-    SceneModel,
     Vector,
-    Vector3,
-    as_padded_vector3,
     as_rows,
     as_symmetric_matrix,
     check_magnitudes,
     check_profile_length,
-    problem,
 )
 
-#: Part of the length by which a place may be beside the beam.
-NEAR = 1e-9
+#: Part of the length by which a place may be beside the beam, and by which the end of a table may miss its end: where
+#: the length is given, and where it is the arc length of a line, whose points have the digits of a file.
+NEAR, ARC = 1e-9, 1e-6
 
 
-def as_inertia(value: Any) -> float | Matrix:
+def _as_inertia(value: Any) -> float | Matrix:
     """Return a moment of inertia or a tensor, 3×3; raise on anything else."""
     if isinstance(value, list | tuple):
         return as_symmetric_matrix(value, 3, definite=False)
     return Bounds(ge=0.0).number(value)
+
+
+def _as_matrix(inertia: float | Matrix) -> Array:
+    """Return an inertia tensor (kg·m²), shape (3, 3), of one that may be isotropic."""
+    return inertia * np.eye(3) if isinstance(inertia, float) else np.array(inertia)
+
+
+Inertia = Annotated[float | Matrix, PlainValidator(_as_inertia)]
 
 
 class PointMass(SceneModel):
@@ -62,13 +66,13 @@ class PointMass(SceneModel):
 
     x: Number = Field(description="a place along the beam (m)")
     mass: NonNegative = 0.0
-    offset: Annotated[Vector3, PlainValidator(as_padded_vector3)] = (0.0, 0.0, 0.0)
-    inertia: Annotated[float | Matrix, PlainValidator(as_inertia)] = 0.0
+    offset: PaddedVector = (0.0, 0.0, 0.0)
+    inertia: Inertia = 0.0
 
     @property
     def inertia_matrix(self) -> Array:
         """Inertia tensor (kg·m²), shape (3, 3)."""
-        return self.inertia * np.eye(3) if isinstance(self.inertia, float) else np.array(self.inertia)
+        return _as_matrix(self.inertia)
 
     @model_validator(mode="after")
     def _check_any(self) -> Self:
@@ -77,16 +81,117 @@ class PointMass(SceneModel):
         return self
 
 
-def check_masses(masses: Iterable[PointMass], length: float, planar: bool) -> None:
-    """Refuse masses beside the beam (m), and those that are none of a planar one."""
-    for i, body in enumerate(masses):
-        key = f"masses.{i}"
-        if not -NEAR <= body.x / length <= 1 + NEAR:
-            raise problem(f"{key}.x", body.x, f"must be from 0 to the length {length:g}")
-        if planar and body.offset[2] != 0.0:
-            raise problem(f"{key}.offset", list(body.offset), "the third component must be 0 for a planar_beam")
-        if planar and not isinstance(body.inertia, float):
-            raise problem(f"{key}.inertia", None, "must be a number, about axis 3, for a planar_beam")
+class BeamStructure(RootedStructure):
+    """What planar and spatial beams share; a planar one is clamped at (hub_radius, 0, 0) of the frame.
+
+    Attributes:
+        type: which of them.
+        length: L (m).
+        hub_radius: distance of the clamp from the axis of rotation, or from the origin, along direction 1 (m).
+        tip_mass: mass at the free end (kg).
+        masses: further masses along the beam.
+        damping: damping coefficients.
+    """
+
+    type: str
+    length: Positive = Field(description="a number greater than 0 (m)")
+    hub_radius: NonNegative = 0.0
+    tip_mass: NonNegative = 0.0
+    masses: tuple[PointMass, ...] = ()
+    damping: Damping = Damping()
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Places (m) of all rows of tables between the ends, and of masses, increasing."""
+        return apart({*self._section.breakpoints, *self.nodes}, self.length)
+
+    @property
+    def nodes(self) -> tuple[float, ...]:
+        """Places (m) of masses."""
+        return apart([body.x for body in self.masses], self.length)
+
+    @property
+    def has_tip_mass(self) -> bool:
+        """Whether there is anything at the tip, or at another point, that has inertia."""
+        return self.tip_mass > 0.0 or bool(np.any(_as_matrix(vars(self)["tip_inertia"]))) or bool(self.masses)
+
+    @property
+    def has_rotary_inertia(self) -> bool:
+        """Whether the sections have rotary inertia."""
+        return self._section.has_rotary_inertia
+
+    @property
+    def _section(self) -> PlanarSection | SpatialSection:
+        section: PlanarSection | SpatialSection = vars(self)["section"]
+        return section
+
+    def _mean(self, section: dict[str, float], bending: dict[str, tuple[float, float]]) -> MeanBeam:
+        mass = section["mass_per_length"] + (self.tip_mass + sum(body.mass for body in self.masses)) / self.length
+        return MeanBeam(self.length, self.root_position[0], section["EA"], mass, bending)
+
+    def _check_tables(self, slack: float = NEAR) -> None:
+        """Refuse tapers of the section that end elsewhere, properties of a size that cannot be, masses elsewhere."""
+        section = self._section
+        for name, taper in section.tapers.items():
+            check_profile_length(f"section.{name}", taper, self.length, slack)
+        if section.way.name != "matrix":
+            properties = section.central if isinstance(section, SpatialSection) else section.at
+            check_magnitudes(lambda: properties(section.knots), "section")
+        for i, body in enumerate(self.masses):
+            key = f"masses.{i}"
+            if not -NEAR <= body.x / self.length <= 1 + NEAR:
+                raise problem(f"{key}.x", body.x, f"must be from 0 to the length {self.length:g}")
+            if self.is_planar and body.offset[2] != 0.0:
+                raise problem(f"{key}.offset", list(body.offset), "the third component must be 0 for a planar_beam")
+            if self.is_planar and not isinstance(body.inertia, float):
+                raise problem(f"{key}.inertia", None, "must be a number, about axis 3, for a planar_beam")
+
+
+class PlanarBeamStructure(BeamStructure):
+    """A beam that moves in the plane (1, 2) of the rotating frame, clamped at X = 0.
+
+    Attributes:
+        type: "planar_beam".
+        tip_inertia: moment of inertia of the tip mass about axis 3 (kg·m²).
+        section: cross-section.
+        root: hinge, spring and damper at the clamp.
+    """
+
+    type: Literal["planar_beam"] = "planar_beam"
+    tip_inertia: NonNegative = 0.0
+    root: Root = Root()
+    section: PlanarSection = Field(description="a table of section properties")
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether it moves in the plane (1, 2) of the frame only: it does."""
+        return True
+
+    @property
+    def root_position(self) -> tuple[float, float, float]:
+        """Position of the root in the frame (m)."""
+        return self.hub_radius + self.root.hinge_offset, 0.0, 0.0
+
+    @property
+    def release_limit(self) -> float:
+        """Length (m), which a displacement of the tip to be released from must stay below."""
+        return self.length
+
+    def mean_beam(self) -> MeanBeam:
+        """Return the uniform beam with the mean of its section."""
+        s = means(self.section.at, self.length)
+        return self._mean(s, {"lag": (s["EI"], 0.0)})
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_files(cls, data: Any, info: ValidationInfo) -> Any:
+        """Read the files of the section."""
+        return with_tables(data, info, None)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        self._check_tables()
+        return self
 
 
 def _as_sweep(value: Any) -> Profile:
@@ -101,101 +206,14 @@ def _as_sweep(value: Any) -> Profile:
     return tuple((row[0], row[1]) for row in rows)
 
 
-#: Part of the length by which the end of a table may miss it, where that is given, and where it is an arc length.
-EXACT, AGREE = 1e-9, 1e-6
-
-
-class PlanarBeamStructure(RootedStructure):
-    """A beam that moves in the plane (1, 2) of the rotating frame, clamped at X = 0.
-
-    Attributes:
-        type: "planar_beam".
-        length: L (m).
-        hub_radius: distance of the clamp from the axis of rotation (m).
-        tip_mass: mass at the free end (kg).
-        tip_inertia: its moment of inertia about axis 3 (kg·m²).
-        masses: further masses along the beam.
-        section: cross-section.
-        root: hinge, spring and damper at the clamp.
-        damping: damping coefficients.
-    """
-
-    type: Literal["planar_beam"] = "planar_beam"
-    length: Positive = Field(description="a number greater than 0 (m)")
-    hub_radius: NonNegative = 0.0
-    tip_mass: NonNegative = 0.0
-    tip_inertia: NonNegative = 0.0
-    masses: tuple[PointMass, ...] = ()
-    root: Root = Root()
-    section: PlanarSection = Field(description="a table of section properties")
-    damping: Damping = Damping()
-
-    @property
-    def is_planar(self) -> bool:
-        """Whether it moves in the plane (1, 2) of the frame only: it does."""
-        return True
-
-    @property
-    def root_position(self) -> tuple[float, float, float]:
-        """Position of the root in the frame (m)."""
-        return self.hub_radius + self.root.hinge_offset, 0.0, 0.0
-
-    @property
-    def knots(self) -> tuple[float, ...]:
-        """Places (m) of the rows of tapers between the ends, and of masses."""
-        return apart({*self.section.breakpoints, *self.nodes}, self.length)
-
-    @property
-    def nodes(self) -> tuple[float, ...]:
-        """Places (m) of masses."""
-        return apart([body.x for body in self.masses], self.length)
-
-    @property
-    def release_limit(self) -> float:
-        """Length (m), which a displacement of the tip to be released from must stay below."""
-        return self.length
-
-    @property
-    def has_tip_mass(self) -> bool:
-        """Whether there is anything at the tip, or at another point, that has inertia."""
-        return self.tip_mass > 0.0 or self.tip_inertia > 0.0 or bool(self.masses)
-
-    @property
-    def has_rotary_inertia(self) -> bool:
-        """Whether the sections have rotary inertia."""
-        return self.section.has_rotary_inertia
-
-    def mean_beam(self) -> MeanBeam:
-        """Return the uniform beam with the mean of its section."""
-        s = means(self.section.at, self.length)
-        mass = s["mass_per_length"] + (self.tip_mass + sum(body.mass for body in self.masses)) / self.length
-        return MeanBeam(self.length, self.root_position[0], s["EA"], mass, {"lag": (s["EI"], 0.0)})
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_files(cls, data: Any, info: ValidationInfo) -> Any:
-        """Read the files of the section."""
-        return with_tables(data, info, None)
-
-    @model_validator(mode="after")
-    def _check_tapers(self) -> Self:
-        _check_section(self.section, self.length)
-        check_masses(self.masses, self.length, planar=True)
-        return self
-
-
-class SpatialBeamStructure(RootedStructure):
+class SpatialBeamStructure(BeamStructure):
     """A beam in space, its axis along direction 1 of the rotating frame (before precone), clamped at X = 0.
 
     Attributes:
         type: "spatial_beam".
-        length: L (m).
-        hub_radius: distance of the clamp from the origin of the frame along direction 1 (m).
         hub_offset: position of the clamp in the frame (m), instead of the hub radius; None if not given.
-        tip_mass: mass at the free end (kg).
         tip_inertia: its inertia tensor (kg·m²) as 3×3 rows, or a number for an isotropic one.
         tip_offset: position of its center relative to the end of the axis, in section axes (m).
-        masses: further masses along the beam.
         section: cross-section.
         pretwist: angle of the section axes about the beam axis (rad), a number or a taper. May also stand in the
             section table.
@@ -207,24 +225,18 @@ class SpatialBeamStructure(RootedStructure):
         precone: angle of the beam axis out of the plane (1, 2), towards direction 3 (rad). May also stand in the
             section table.
         root: hinges, springs, dampers and pitch angle at the clamp.
-        damping: damping coefficients.
     """
 
     type: Literal["spatial_beam"] = "spatial_beam"
-    length: Positive = Field(description="a number greater than 0 (m)")
-    hub_radius: NonNegative = 0.0
     hub_offset: Vector | None = None
-    tip_mass: NonNegative = 0.0
-    tip_inertia: Annotated[float | Matrix, PlainValidator(as_inertia)] = 0.0
+    tip_inertia: Inertia = 0.0
     tip_offset: Vector = (0.0, 0.0, 0.0)
-    masses: tuple[PointMass, ...] = ()
     section: SpatialSection = Field(description="a table of section properties")
     pretwist: AnyProfile = 0.0
     sweep: Annotated[Profile, PlainValidator(_as_sweep)] = 0.0
     line: Annotated[Matrix, PlainValidator(as_line)] | None = None
     precone: Number = 0.0
     root: SpatialRoot = SpatialRoot()
-    damping: Damping = Damping()
 
     @property
     def reference_line(self) -> ReferenceLine | SweptLine | None:
@@ -238,21 +250,20 @@ class SpatialBeamStructure(RootedStructure):
     @property
     def knots(self) -> tuple[float, ...]:
         """Places (m) of all rows of tables over the span, and of masses, increasing."""
-        places = {*self.section.breakpoints, *self.nodes}
-        places |= {x for x, _ in self.pretwist[1:-1]} if isinstance(self.pretwist, tuple) else set()
+        twist = {x for x, _ in self.pretwist[1:-1]} if isinstance(self.pretwist, tuple) else set()
         line = self.reference_line
-        return apart(places | set(line.knots if line is not None else ()), self.length)
+        return apart(twist | {*super().knots, *(line.knots if line is not None else ())}, self.length)
 
     @property
     def nodes(self) -> tuple[float, ...]:
         """Places (m) of masses, of kinks of the line, and of the ends of arcs."""
         line = self.reference_line
-        return apart((*(body.x for body in self.masses), *(line.kinks if line is not None else ())), self.length)
+        return apart((*super().nodes, *(line.kinks if line is not None else ())), self.length)
 
     @property
     def tip_inertia_matrix(self) -> Array:
         """Inertia tensor of the tip mass (kg·m²), shape (3, 3)."""
-        return self.tip_inertia * np.eye(3) if isinstance(self.tip_inertia, float) else np.array(self.tip_inertia)
+        return _as_matrix(self.tip_inertia)
 
     @property
     def root_position(self) -> tuple[float, float, float]:
@@ -266,16 +277,6 @@ class SpatialBeamStructure(RootedStructure):
         return float(np.cos(self.precone)), 0.0, float(np.sin(self.precone))
 
     @property
-    def has_tip_mass(self) -> bool:
-        """Whether there is anything at the tip, or at another point, that has inertia."""
-        return self.tip_mass > 0.0 or bool(np.any(self.tip_inertia_matrix != 0.0)) or bool(self.masses)
-
-    @property
-    def has_rotary_inertia(self) -> bool:
-        """Whether the sections have rotary inertia."""
-        return self.section.has_rotary_inertia
-
-    @property
     def has_fibers(self) -> bool:
         """Whether the sections have fibers beside the axis they twist about, as all have but where it is denied."""
         return self.section.polar_radius != 0.0
@@ -285,9 +286,7 @@ class SpatialBeamStructure(RootedStructure):
         if self.section.given.keys() & {"stiffness", "mass"}:
             return None
         s = means(self.section.central, self.length)
-        mass = s["mass_per_length"] + (self.tip_mass + sum(body.mass for body in self.masses)) / self.length
-        bending = {"flap": (s["EI2"], 1.0), "lag": (s["EI3"], 0.0)}
-        return MeanBeam(self.length, self.root_position[0], s["EA"], mass, bending)
+        return self._mean(s, {"flap": (s["EI2"], 1.0), "lag": (s["EI3"], 0.0)})
 
     @model_validator(mode="before")
     @classmethod
@@ -303,24 +302,20 @@ class SpatialBeamStructure(RootedStructure):
                 continue
             if key in data:
                 raise problem(f"section.{key}", section[key], f"given twice; structure.{key} is also set")
-            try:
+            with problems_at(f"section.{key}", section[key]):
                 lifted[key] = read(section[key])
-            except PydanticCustomError as error:
-                raise problem(f"section.{key}", section[key], error.message()) from None
         return data | lifted | {"section": {key: value for key, value in section.items() if key not in lifted}}
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        slack = EXACT if self.line is None else AGREE
-        _check_section(self.section, self.length, slack)
+        slack = NEAR if self.line is None else ARC
         check_profile_length("pretwist", self.pretwist, self.length, slack)
         check_profile_length("sweep", self.sweep, self.length)
         if self.line is not None and self.sweep != 0.0:
             raise problem("sweep", None, "cannot be combined with line, which holds it")
         check_one_hub(self.hub_radius, self.hub_offset)
-        check_masses(self.masses, self.length, planar=False)
-        check_cone(self.root, self.precone)
-        check_pitch(self.root)
+        self._check_tables(slack)
+        self.root.check(self.precone)
         return self
 
 
@@ -328,28 +323,14 @@ Structure = Annotated[PlanarBeamStructure | SpatialBeamStructure | PlateStructur
 
 
 def _with_length(data: Any) -> Any:
-    """Return the table with the arc length of its line as its length.
-
-    Raises:
-        PydanticCustomError: another length is given.
-    """
+    """Return the table with the arc length of its line as its length; raise if another one is given."""
     if not isinstance(data, dict) or data.get("line") is None:
         return data
     try:
         arc = line_through(as_line(data["line"])).length
     except PydanticCustomError as error:
-        context = error.context or {}
-        raise problem("line", context.get("value"), error.message()) from None
+        raise problem("line", (error.context or {}).get("value"), error.message()) from None
     given = data.get("length", arc)
-    if isinstance(given, int | float) and not isinstance(given, bool) and abs(given - arc) > AGREE * arc:
+    if isinstance(given, int | float) and not isinstance(given, bool) and abs(given - arc) > ARC * arc:
         raise problem("length", given, f"is not the arc length of the line, {arc:.9g}; it may be left out")
     return data | {"length": arc}
-
-
-def _check_section(section: PlanarSection | SpatialSection, length: float, slack: float = EXACT) -> None:
-    for name, taper in section.tapers.items():
-        check_profile_length(f"section.{name}", taper, length, slack)
-    knots = sorted({0.0, *(x for taper in section.tapers.values() for x, _ in taper)})
-    if section.way.name != "matrix":
-        properties = section.central if isinstance(section, SpatialSection) else section.at
-        check_magnitudes(lambda: properties(knots), "section")

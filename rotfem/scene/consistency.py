@@ -6,18 +6,27 @@ from typing import Any
 
 from rotfem import registry
 from rotfem.errors import show
-from rotfem.scene.beams import PlanarBeamStructure, SpatialBeamStructure
-from rotfem.scene.limits import Limits
-from rotfem.scene.loads import Loads
+from rotfem.scene.loads import Loads, check_loads
 from rotfem.scene.motion import Motion, TorqueMotion
-from rotfem.scene.output import OutputTable
-from rotfem.scene.plates import PlateStructure
-from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh
+from rotfem.scene.settings import BeamMesh, Initial, Model, PlateMesh
 from rotfem.scene.span_tables import FORCE
-from rotfem.scene.stepping import Time
-from rotfem.scene.values import problem
+from rotfem.scene.table import problem
+from rotfem.scene.values import Matrix
 
-AnyStructure = PlanarBeamStructure | SpatialBeamStructure | PlateStructure
+
+def check_together(scene: Any) -> None:
+    """Refuse tables of a scene that cannot be combined, the most basic of them first."""
+    structure, motion, model = scene.structure, scene.motion, scene.model
+    if structure.is_planar:
+        check_planar(motion, scene.loads)
+    check_loads(structure, motion, scene.loads)
+    check_mesh(structure, scene.mesh)
+    check_theory(structure, model)
+    check_frame(structure, motion, model)
+    check_initial(structure, motion, model, scene.initial)
+    check_limits(scene)
+    check_accuracy(scene)
+    scene.output.check(structure.type, structure.length)
 
 
 def check_planar(motion: Motion, loads: Loads) -> None:
@@ -34,7 +43,7 @@ def check_planar(motion: Motion, loads: Loads) -> None:
         raise problem("loads.gravity", list(loads.gravity), "the third component must be 0 for a planar_beam")
 
 
-def check_mesh(structure: AnyStructure, mesh: BeamMesh | PlateMesh) -> None:
+def check_mesh(structure: Any, mesh: BeamMesh | PlateMesh) -> None:
     """Refuse a mesh that is given both as a file and by numbers of elements, and elements that lock."""
     if structure.mesh_file is None:
         if (why := mesh.locking) is not None:
@@ -45,7 +54,7 @@ def check_mesh(structure: AnyStructure, mesh: BeamMesh | PlateMesh) -> None:
             raise problem(f"mesh.{key}", getattr(mesh, key), "has no meaning with structure.mesh")
 
 
-def check_theory(structure: AnyStructure, model: Model) -> None:
+def check_theory(structure: Any, model: Model) -> None:
     """Refuse a theory that has no strains for the structure."""
     kind, theory = structure.type, registry.theories[model.theory]
     if not theory.holds_for(kind):
@@ -58,7 +67,7 @@ def check_theory(structure: AnyStructure, model: Model) -> None:
         raise problem("model.reduced", model.reduced, f'needs a linear model.theory, not "{theory.name}": {able}')
 
 
-def check_prestress(structure: AnyStructure, model: Model) -> None:
+def check_prestress(structure: Any, model: Model) -> None:
     """Refuse to say what the prestress is of where there is none, or one kind of it only."""
     kind = structure.type
     if model.prestress is None:
@@ -75,7 +84,7 @@ def check_prestress(structure: AnyStructure, model: Model) -> None:
         raise problem("model.prestress", model.prestress, f"needs model.theory = {' or '.join(able)}")
 
 
-def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:
+def check_frame(structure: Any, motion: Motion, model: Model) -> None:
     """Refuse the inertial-frame form where there is none, and a controller where the motion is solved for at once."""
     if model.reduced and isinstance(motion, TorqueMotion) and motion.function is not None:
         raise problem("model.reduced", model.reduced, "needs a torque over time, not motion.function")
@@ -112,7 +121,7 @@ def check_frame(structure: AnyStructure, motion: Motion, model: Model) -> None:
             )
 
 
-def check_initial(structure: AnyStructure, motion: Motion, initial: Initial) -> None:
+def check_initial(structure: Any, motion: Motion, model: Model, initial: Initial) -> None:
     """Refuse an initial state that the scene cannot have."""
     displacement, limit = initial.tip_displacement, structure.release_limit
     if displacement is not None:
@@ -121,28 +130,10 @@ def check_initial(structure: AnyStructure, motion: Motion, initial: Initial) -> 
         if abs(displacement) >= limit:
             reason = f"must be less than the length {limit:g} in size"
             raise problem("initial.tip_displacement", displacement, reason)
-    _check_moving(structure, motion, initial)
-
-
-def _check_moving(structure: AnyStructure, motion: Motion, initial: Initial) -> None:
-    """Refuse a mode or velocities to start with that the scene cannot have."""
     if initial.mode is not None and motion.is_free:
         raise problem("initial.mode", initial.mode, 'needs a speed that is prescribed, not motion.type = "torque"')
-    if initial.velocity is None:
-        return
-    rows, length = initial.velocity, structure.length
-    if structure.type == "plate" or length is None:
-        raise problem("initial.velocity", None, "is available for beams only; a plate may start in a mode")
-    if rows[0][0] != 0.0 or abs(rows[-1][0] - length) > 1e-9 * length:
-        raise problem("initial.velocity", None, f"the table must run from x = 0 to the length {length:g}")
-    if any(rows[0][1:]):
-        raise problem("initial.velocity", None, "must be zero at x = 0, where the root is held")
-    if structure.is_planar and any(row[3] for row in rows):
-        raise problem("initial.velocity", None, "the third component must be 0 for a planar_beam")
-
-
-def check_first_state(model: Model, initial: Initial) -> None:
-    """Refuse a mode or velocities to start with where the history is one that starts at rest."""
+    if initial.velocity is not None:
+        _check_velocity(structure, initial.velocity)
     if not initial.moves:
         return
     key, value = ("initial.mode", initial.mode) if initial.mode is not None else ("initial.velocity", None)
@@ -152,33 +143,38 @@ def check_first_state(model: Model, initial: Initial) -> None:
         raise problem(key, value, 'is relative to the turning frame: it needs model.frame = "rotating"')
 
 
-def check_accuracy(model: Model, output: OutputTable, accuracy: float | None) -> None:
-    """Refuse what an accuracy excludes: a tolerance of the model, which it has in it, and no estimates.
-
-    Raises:
-        PydanticCustomError: there are both, or errors are not estimated.
-    """
-    if accuracy is not None and model.tolerance is not None:
-        reason = "cannot be combined with accuracy, which allows the model a share of its own"
-        raise problem("model.tolerance", model.tolerance, reason)
-    if accuracy is not None and not output.error:
-        raise problem("output.error", False, "cannot be combined with accuracy, which is met by what is estimated")
-
-
-def check_budget(accuracy: float | None, budget: float | None) -> None:
-    """Refuse a budget of no accuracy.
-
-    Raises:
-        PydanticCustomError: there is none.
-    """
-    if budget is not None and accuracy is None:
-        raise problem("accuracy_budget", budget, "is what an accuracy may take, and needs accuracy")
+def _check_velocity(structure: Any, rows: Matrix) -> None:
+    length = structure.length
+    why = None
+    if structure.type == "plate":
+        why = "is available for beams only; a plate may start in a mode"
+    elif rows[0][0] != 0.0 or abs(rows[-1][0] - length) > 1e-9 * length:
+        why = f"the table must run from x = 0 to the length {length:g}"
+    elif any(rows[0][1:]):
+        why = "must be zero at x = 0, where the root is held"
+    elif structure.is_planar and any(row[3] for row in rows):
+        why = "the third component must be 0 for a planar_beam"
+    if why is not None:
+        raise problem("initial.velocity", None, why)
 
 
-def check_limits(limits: Limits, time: Time | None, modes: Modes) -> None:
+def check_limits(scene: Any) -> None:
     """Refuse more steps and modes than the scene's limits allow."""
-    if time is not None and time.step is not None:
-        limits.check("steps", time.end / time.step, "time.step", time.step)
-    if time is not None and time.output_step is not None:
-        limits.check("steps", time.end / time.output_step, "time.output_step", time.output_step)
-    limits.check("modes", modes.count, "modes.count", modes.count)
+    for key in ("step", "output_step") if scene.time is not None else ():
+        if (step := getattr(scene.time, key)) is not None:
+            scene.limits.check("steps", scene.time.end / step, f"time.{key}", step)
+    scene.limits.check("modes", scene.modes.count, "modes.count", scene.modes.count)
+
+
+def check_accuracy(scene: Any) -> None:
+    """Refuse what an accuracy excludes, and a budget without one."""
+    if scene.accuracy is None:
+        if scene.accuracy_budget is not None:
+            reason = "is what an accuracy may take, and needs accuracy"
+            raise problem("accuracy_budget", scene.accuracy_budget, reason)
+        return
+    if scene.model.tolerance is not None:
+        reason = "cannot be combined with accuracy, which allows the model a share of its own"
+        raise problem("model.tolerance", scene.model.tolerance, reason)
+    if not scene.output.error:
+        raise problem("output.error", False, "cannot be combined with accuracy, which is met by what is estimated")

@@ -16,7 +16,7 @@ from pydantic import PlainValidator
 from rotfem import registry
 from rotfem.errors import SceneError
 from rotfem.scene.files import Unreadable, read_bytes
-from rotfem.scene.values import SceneModel, problem
+from rotfem.scene.table import SceneModel, problem
 
 #: Bytes of a file, at most.
 LARGEST = 10_000_000

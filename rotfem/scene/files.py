@@ -19,8 +19,8 @@ import numpy as np
 from pydantic import ValidationInfo
 
 from rotfem.errors import SceneError, printable, show
-from rotfem.scene.limits import limits_in
-from rotfem.scene.values import Array, Matrix, are_numbers, as_increasing_rows, problem, rows_of
+from rotfem.scene.table import problem
+from rotfem.scene.values import Array, Matrix, are_numbers, as_increasing_rows, limits_in, rows_of
 
 #: What a pipe may keep one waiting (s) before it has anything to say.
 PATIENCE = 10.0

@@ -11,7 +11,8 @@ from pydantic_core import PydanticCustomError
 from rotfem.scene.motion import Motion
 from rotfem.scene.signals import Given, TimeFunction, arguments
 from rotfem.scene.span_tables import FORCE, MOMENT, PRESSURE, Kind, Over
-from rotfem.scene.values import Matrix, Number, PaddedVector, Positive, SceneModel, as_number, as_vector, problem
+from rotfem.scene.table import SceneModel, problem
+from rotfem.scene.values import Matrix, Number, PaddedVector, Positive, as_number, as_vector
 
 #: Part of the length by which a place may be off the structure.
 NEAR = 1e-9

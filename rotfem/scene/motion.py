@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import ConfigDict, Discriminator, Field, PlainValidator, Tag, ValidationInfo, model_validator
@@ -12,20 +11,9 @@ from pydantic import ConfigDict, Discriminator, Field, PlainValidator, Tag, Vali
 from rotfem.errors import show
 from rotfem.registry import Registry, motion_laws, register
 from rotfem.scene.files import as_time_table
-from rotfem.scene.signals import Signal, arguments, as_function
-from rotfem.scene.stepping import parameters_of
-from rotfem.scene.values import (
-    Matrix,
-    NonNegative,
-    Number,
-    Positive,
-    SceneModel,
-    Vector3,
-    as_name,
-    as_rows,
-    as_vector3,
-    problem,
-)
+from rotfem.scene.signals import Signal, TimeFunction, arguments
+from rotfem.scene.table import SceneModel, check_parameters, parameters_of, problem, with_parameters
+from rotfem.scene.values import Matrix, NonNegative, Number, Positive, Vector3, as_rows, as_vector3
 
 
 def _as_axis(value: Any) -> Vector3:
@@ -67,29 +55,25 @@ class Motion(SceneModel):
     """
 
     registry: ClassVar[Registry[Any]] = motion_laws
+    #: Whether the speed is constant and prescribed, so that there is a steady state.
+    is_steady: ClassVar[bool] = False
+    #: Whether the hub is free, its angle an unknown.
+    is_free: ClassVar[bool] = False
+    #: Whether the speeds it takes are known beforehand.
+    is_known: ClassVar[bool] = False
 
     axis: Annotated[Vector3, PlainValidator(_as_axis)] = (0.0, 0.0, 1.0)
     base_acceleration: Signal | None = None
 
     @property
-    def is_steady(self) -> bool:
-        """Whether the speed is constant and prescribed, so that there is a steady state."""
-        return False
-
-    @property
     def is_spinning(self) -> bool:
         """Whether the speed is not identically zero (as far as can be known beforehand)."""
-        return True
+        return not self.is_known or self.top_speed(None) != 0.0
 
     @property
     def changes_speed(self) -> bool:
         """Whether the spin rate changes (as far as can be known beforehand)."""
-        return True
-
-    @property
-    def is_free(self) -> bool:
-        """Whether the hub is free, its angle an unknown."""
-        return False
+        return self.is_spinning and not self.is_steady
 
     @property
     def is_accelerated(self) -> bool:
@@ -120,23 +104,10 @@ class ConstantMotion(Motion):
     """Steady rotation at the given speed (rad/s)."""
 
     name: ClassVar[str] = "constant"
+    is_steady: ClassVar[bool] = True
+    is_known: ClassVar[bool] = True
     type: Literal["constant"]
     speed: Number = Field(description="a number (rad/s)")
-
-    @property
-    def is_steady(self) -> bool:
-        """Whether there is a steady state: there is, at this speed."""
-        return True
-
-    @property
-    def is_spinning(self) -> bool:
-        """Whether the speed is not 0."""
-        return self.speed != 0.0
-
-    @property
-    def changes_speed(self) -> bool:
-        """Whether the spin rate changes: it does not."""
-        return False
 
     def top_speed(self, end: float | None) -> float:
         """Return |Ω| (rad/s)."""
@@ -152,19 +123,10 @@ class SpinUpMotion(Motion):
     """
 
     name: ClassVar[str] = "spin_up"
+    is_known: ClassVar[bool] = True
     type: Literal["spin_up"]
     speed: Number = Field(description="a number (rad/s)")
     duration: Positive = Field(description="a number greater than 0 (s)")
-
-    @property
-    def is_spinning(self) -> bool:
-        """Whether the final speed is not 0."""
-        return self.speed != 0.0
-
-    @property
-    def changes_speed(self) -> bool:
-        """Whether the hub starts at all."""
-        return self.speed != 0.0
 
     def top_speed(self, end: float | None) -> float:
         """Return the |Ω| (rad/s) that is reached until `end` (s)."""
@@ -181,16 +143,12 @@ class TableMotion(Motion):
     """
 
     name: ClassVar[str] = "table"
+    is_known: ClassVar[bool] = True
     type: Literal["table"]
     table: Annotated[Matrix, PlainValidator(_as_speed_table)] = Field(
         description="a table [[t, speed], …] or the path of a CSV file"
     )
     interpolation: Literal["pchip", "cubic", "linear"] = "pchip"
-
-    @property
-    def is_spinning(self) -> bool:
-        """Whether a speed of the table is not 0."""
-        return any(speed != 0.0 for _, speed in self.table)
 
     @property
     def changes_speed(self) -> bool:
@@ -217,6 +175,7 @@ class TorqueMotion(Motion):
     """
 
     name: ClassVar[str] = "torque"
+    is_free: ClassVar[bool] = True
     type: Literal["torque"]
     hub_inertia: Positive = Field(description="a number greater than 0 (kg·m²)")
     pulses: Annotated[Matrix, PlainValidator(_as_pulses)] | None = None
@@ -225,11 +184,6 @@ class TorqueMotion(Motion):
     coupled: Annotated[bool, Field(strict=True)] = True
     hub_damping: NonNegative = 0.0
     speed: Number = 0.0
-
-    @property
-    def is_free(self) -> bool:
-        """Whether the hub is free: it is."""
-        return True
 
     @property
     def is_coupled(self) -> bool:
@@ -256,11 +210,9 @@ class CallableMotion(Motion):
 
     name: ClassVar[str] = "callable"
     type: Literal["callable"]
-    speed: Annotated[Callable[[float], float], PlainValidator(as_function)] = Field(
-        description="a Python function of the time t (s)"
-    )
-    rate: Annotated[Callable[[float], float], PlainValidator(as_function)] | None = None
-    angle: Annotated[Callable[[float], float], PlainValidator(as_function)] | None = None
+    speed: TimeFunction = Field(description="a Python function of the time t (s)")
+    rate: TimeFunction | None = None
+    angle: TimeFunction | None = None
 
 
 class LawMotion(Motion):
@@ -294,24 +246,11 @@ class LawMotion(Motion):
             return data
         if data.get("type") is None:
             raise problem("type", None, f"required key is missing; allowed: {', '.join(map(show, motion_laws.names))}")
-        name, defaults = as_name(data["type"], motion_laws, "type"), dict[str, Any]()
-        own = parameters_of(motion_laws[name])
-        for key, field in own.items():
-            if key in cls.model_fields:
-                raise problem("type", name, f"cannot have a parameter {key}, which is a key of [motion] already")
-            if field.default is not MISSING:
-                defaults[key] = field.default
-            elif key not in data:
-                raise problem(key, None, f'required key is missing; type = "{name}" needs it')
-        for key in data:
-            if key not in own and key not in cls.model_fields and key in list(cls.keys()):
-                raise problem(key, data[key], f'has no meaning with type = "{name}"')
-        return defaults | dict(data)
+        return with_parameters(cls, data, "type", motion_laws)
 
     @model_validator(mode="after")
     def _check_law(self) -> Self:
-        for key, allowed in motion_laws[self.type].check(dict(self.__pydantic_extra__)).items():
-            raise problem(key, self.__pydantic_extra__[key], allowed)
+        check_parameters(motion_laws[self.type], "type", self.__pydantic_extra__)
         return self
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from pydantic import PlainValidator
 
 from rotfem import registry
-from rotfem.scene.values import Count, Named, SceneModel, as_names, problem
+from rotfem.scene.table import SceneModel, as_names, problem
+from rotfem.scene.values import Count
 from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
 
 AngularUnit = Literal["rad/s", "rpm", "Hz", "deg/s"]
@@ -18,27 +19,9 @@ AngularUnit = Literal["rad/s", "rpm", "Hz", "deg/s"]
 MOST = 10_000
 
 
-class _Known(Named):
-    """Names that `quantities` may hold: registered outputs, and what beams have at a section."""
-
-    kind = "output"
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """All of them."""
-        tables = (FORCES, STRAINS, RESULTANTS)
-        sections = dict.fromkeys(name for table in tables for names in table.values() for name in names)
-        return (*registry.outputs.names, *sections)
-
-
-class _Formats(Named):
-    """Names that `fields` may hold."""
-
-    kind, names = "format", ("vtx", "xdmf")
-
-
 def _as_quantities(value: Any) -> tuple[str, ...]:
-    return as_names(value, _Known())
+    sections = dict.fromkeys(name for table in (FORCES, STRAINS, RESULTANTS) for of in table.values() for name in of)
+    return as_names(value, (*registry.outputs.names, *sections), "an output")
 
 
 def _as_stations(value: Any) -> int | tuple[float, ...]:
@@ -53,7 +36,7 @@ def _as_stations(value: Any) -> int | tuple[float, ...]:
 
 
 def _as_formats(value: Any) -> tuple[str, ...]:
-    return as_names(value, _Formats())
+    return as_names(value, ("vtx", "xdmf"), "a format")
 
 
 class OutputTable(SceneModel):

@@ -10,10 +10,9 @@ import numpy.typing as npt
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
-from rotfem.scene.alternatives import Way, choose_way
-from rotfem.scene.clamp_and_damping import Damping, check_one_hub
 from rotfem.scene.files import existing_file
-from rotfem.scene.structure import StructureTable
+from rotfem.scene.structure import Damping, StructureTable, check_one_hub
+from rotfem.scene.table import Way, choose_way, problem
 from rotfem.scene.values import (
     Array,
     Bounds,
@@ -31,7 +30,6 @@ from rotfem.scene.values import (
     check_magnitudes,
     check_profile_length,
     evaluate,
-    problem,
 )
 
 

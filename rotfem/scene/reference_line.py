@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.scene.values import Array, Matrix, as_rows, problem
+from rotfem.scene.table import problem
+from rotfem.scene.values import Array, Matrix, as_rows
 
 #: Gauss points for the arc length between two points: the speed along a cubic is smooth there.
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)

@@ -11,9 +11,10 @@ from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 from rotfem.errors import InputError
 from rotfem.scene.files import as_time_table
 from rotfem.scene.loads import Harmonic
-from rotfem.scene.signals import arguments
+from rotfem.scene.signals import Given, arguments
 from rotfem.scene.structure import StructureTable
-from rotfem.scene.values import Matrix, NonNegative, Number, SceneModel, problem
+from rotfem.scene.table import SceneModel, problem
+from rotfem.scene.values import Matrix, NonNegative, Number
 
 KEY = "structure.root.pitch"
 
@@ -35,7 +36,7 @@ class HarmonicAngle(Harmonic):
     amplitude: Number = Field(description="a number (rad)")
 
 
-class PitchAngle(SceneModel):
+class PitchAngle(Given):
     """The pitch over time: one of value, table and function, and harmonics in addition or alone.
 
     In a scene it may be written without its table: a number is a value, [[t, angle], …] or the path of a CSV file a
@@ -48,6 +49,8 @@ class PitchAngle(SceneModel):
         rate: Python function t (s) ↦ rate of the function's angle (rad/s), or None: differences, whose step follows it.
         harmonic: added to these.
     """
+
+    WAYS: ClassVar[tuple[str, ...]] = ("value", "table", "function")
 
     value: Number | None = None
     table: Annotated[Matrix, PlainValidator(_as_rows)] | None = None
@@ -80,23 +83,15 @@ class PitchAngle(SceneModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _from_bare(cls, data: Any) -> Any:
-        if isinstance(data, PitchAngle):
-            return data
-        if isinstance(data, Mapping):
-            harmonic = data.get("harmonic", ())
-            one = isinstance(harmonic, Mapping | Harmonic)
-            return {**data, "harmonic": [harmonic]} if one else data
-        if callable(data):
-            return {"function": data}
-        return {"table" if isinstance(data, list | tuple | str) else "value": data}
+    def _list_harmonics(cls, data: Any) -> Any:
+        one = isinstance(data, Mapping) and isinstance(data.get("harmonic"), Mapping | Harmonic)
+        return {**data, "harmonic": [data["harmonic"]]} if one else data
 
     @model_validator(mode="after")
     def _check_one(self) -> Self:
-        given = [name for name in ("value", "table", "function") if getattr(self, name) is not None]
-        if len(given) > 1 or not (given or self.harmonic):
+        if len(self.given) > 1 or not (self.given or self.harmonic):
             why = "give exactly one of value, table and function; harmonic may stand beside"
-            raise problem("", ", ".join(given) or None, why)
+            raise problem("", ", ".join(self.given) or None, why)
         if self.rate is not None and self.function is None:
             raise problem("rate", None, "is that of a function; tables and harmonics have their own")
         return self
@@ -177,6 +172,15 @@ class SpatialRoot(Root):
     pitch_damping: NonNegative = 0.0
     pitch: PitchAngle = PitchAngle(value=0.0)
 
+    def check(self, precone: float) -> None:
+        """Refuse one spring of the two whose axes the precone (rad), or a pitch over time, turns, the other rigid."""
+        pairs = [(1, 3, "a precone")] if precone != 0.0 else []
+        for first, second, what in [*pairs, (2, 3, "a pitch over time")] if self.pitch.changes else pairs:
+            if (first in self.hinges) != (second in self.hinges):
+                missing = next(name for name, axis in self.AXES.items() if axis in {first, second} - self.hinges.keys())
+                why = f"must be given too with {what}, which turns the axes of both; a large number holds it"
+                raise problem(f"root.{missing}_stiffness", None, why)
+
 
 class RootedStructure(StructureTable):
     """What a beam has of its `root`."""
@@ -192,29 +196,3 @@ class RootedStructure(StructureTable):
         """Whether its pitch changes with time."""
         root: Root = vars(self)["root"]
         return isinstance(root, SpatialRoot) and root.pitch.changes
-
-
-def check_pitch(root: SpatialRoot) -> None:
-    """Refuse one spring of the two whose axes a pitch over time turns, the other rigid.
-
-    Raises:
-        PydanticCustomError: says which is missing.
-    """
-    if not root.pitch.changes or (2 in root.hinges) == (3 in root.hinges):
-        return
-    missing = "lag" if 2 in root.hinges else "flap"
-    why = "must be given too with a pitch over time, which turns the axes of both; a large number holds it"
-    raise problem(f"root.{missing}_stiffness", None, why)
-
-
-def check_cone(root: SpatialRoot, precone: float) -> None:
-    """Refuse one spring of the two whose axes the precone turns, the other rigid.
-
-    Raises:
-        PydanticCustomError: says which is missing.
-    """
-    if precone == 0.0 or (1 in root.hinges) == (3 in root.hinges):
-        return
-    missing = "lag" if 1 in root.hinges else "pitch"
-    why = "must be given too with a precone, which turns the axes of both; a large number holds it"
-    raise problem(f"root.{missing}_stiffness", None, why)

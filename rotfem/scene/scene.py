@@ -26,60 +26,37 @@ from pydantic import (
 from rotfem import registry
 from rotfem.errors import SceneError
 from rotfem.scene.beams import Structure
-from rotfem.scene.consistency import (
-    check_accuracy,
-    check_budget,
-    check_first_state,
-    check_frame,
-    check_initial,
-    check_limits,
-    check_mesh,
-    check_planar,
-    check_theory,
-)
+from rotfem.scene.consistency import check_together
 from rotfem.scene.extensions import Extensions, load_wanted
 from rotfem.scene.files import apply_overrides, check_depth, noted_files, read_toml, set_key, to_builtin
-from rotfem.scene.limits import Limits, limits_of
-from rotfem.scene.loads import Loads, check_loads, doubtful_table
+from rotfem.scene.loads import Loads, doubtful_table
 from rotfem.scene.motion import AnyMotion, Swept
 from rotfem.scene.output import OutputTable
-from rotfem.scene.problems import scene_error
-from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh, Solver
-from rotfem.scene.stepping import Time
+from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, PlateMesh, Solver, Time
 from rotfem.scene.structure import designed, is_design
+from rotfem.scene.table import SceneModel, scene_error
 from rotfem.scene.units import in_si
-from rotfem.scene.values import Bounds, SceneModel
+from rotfem.scene.values import Bounds, Limits, limits_of
 
 #: Rows up to which a summary repeats a table.
 LONGEST = 1000
 
 
-def abridged(tables: Mapping[str, Any], given: Any) -> dict[str, Any]:
-    """Return the tables of a scene with long tables replaced by what identifies them.
+def abridged(value: Any, given: Any) -> Any:
+    """Return the tables of a validated scene with long tables of numbers replaced by what identifies them.
 
     In their place stand the number of `rows` and `columns`, the `sha256` of the numbers (doubles, least byte first, row
-    after row), and the `file` that they came from, if there is one.
-
-    Args:
-        tables: of the validated scene.
-        given: the same tables as the user gave them, where the path of a file may stand for a table.
+    after row), and the `file` where the user gave one: `given` are the same tables as they were given.
     """
-    return {key: _entry(value, _below(given, key)) for key, value in tables.items()}
-
-
-def _below(given: Any, key: str) -> Any:
-    # A load may be given as the path of its table, without the table around it.
-    return given.get(key) if isinstance(given, Mapping) else given
-
-
-def _entry(value: Any, given: Any) -> Any:
     if isinstance(value, Mapping):
-        return abridged(value, given)
+        # A load may be given as the path of its table, without the table around it.
+        below = given if isinstance(given, Mapping) else dict.fromkeys(value, given)
+        return {key: abridged(entry, below.get(key)) for key, entry in value.items()}
     if not isinstance(value, list) or len(value) <= LONGEST or not isinstance(value[0], list):
         return value
     table = np.array([np.concatenate([np.ravel(entry) for entry in row]) for row in value], dtype="<f8")
     note = {"rows": len(table), "columns": table.shape[1], "sha256": hashlib.sha256(table.tobytes()).hexdigest()}
-    return {"file": str(given), **note} if isinstance(given, str) else note
+    return {"file": given, **note} if isinstance(given, str) else note
 
 
 #: A relative error that may be asked for, and CPU seconds that it may take.
@@ -222,12 +199,9 @@ class Scene(SceneModel):
     def to_dict(self) -> dict[str, Any]:
         """Return tables of what was set and of all defaults, fit for JSON and TOML; functions become their names."""
         tables: dict[str, Any] = plain(self)
-        if self.output == OutputTable():
-            del tables["output"]
-        if self.limits == Limits():
-            del tables["limits"]
-        if self.extensions == Extensions():
-            del tables["extensions"]
+        for name in ("output", "limits", "extensions"):
+            if getattr(self, name) == type(self).model_fields[name].default:
+                del tables[name]
         if self.structure.mesh_file is not None:
             without = {"elements", "cell"} | ({"degree"} - self.mesh.model_fields_set)
             tables["mesh"] = {key: value for key, value in tables["mesh"].items() if key not in without}
@@ -235,7 +209,8 @@ class Scene(SceneModel):
 
     def digest(self) -> dict[str, Any]:
         """Return `to_dict` with long tables referred to instead of repeated (see `abridged`)."""
-        return abridged(self.to_dict(), self._tables)
+        digest: dict[str, Any] = abridged(self.to_dict(), self._tables)
+        return digest
 
     @property
     def frame(self) -> str:
@@ -304,18 +279,7 @@ class Scene(SceneModel):
     @model_validator(mode="after")
     def _check_combinations(self) -> Self:
         vars(self)["mesh"] = self.mesh.suited(self.structure)
-        if self.structure.is_planar:
-            check_planar(self.motion, self.loads)
-        check_loads(self.structure, self.motion, self.loads)
-        check_mesh(self.structure, self.mesh)
-        check_theory(self.structure, self.model)
-        check_frame(self.structure, self.motion, self.model)
-        check_initial(self.structure, self.motion, self.initial)
-        check_limits(self.limits, self.time, self.modes)
-        check_accuracy(self.model, self.output, self.accuracy)
-        check_budget(self.accuracy, self.accuracy_budget)
-        check_first_state(self.model, self.initial)
-        self.output.check(self.structure.type, self.structure.length)
+        check_together(self)
         return self
 
 

@@ -1,39 +1,40 @@
-"""Cross-section of a planar beam, and what all beam sections share.
+"""Cross-sections of beams, given in exactly one of several ways: stiffnesses, matrices, or a material with geometry.
 
-A section is given in exactly one of several ways (stiffnesses, or material with geometry); every property may be a
-number or a taper. Dimensions are interpolated first and properties computed from them, so a wedge has the cubic EI
-of a wedge.
+Every property may be a number or a taper. Dimensions are interpolated first and properties computed from them, so a
+wedge has the cubic EI of a wedge.
+
+Axes of a section: 1 along the beam, 2 and 3 across it. Strains are ordered (Γ₁, Γ₂, Γ₃, K₁, K₂, K₃), conjugate to the
+axial force, the shear forces V₂, V₃, the torque and the moments M₂, M₃. A point (y, z) of the section has the
+axial strain Γ₁ + z K₂ − y K₃; bending about axis 2 is therefore flap in direction 3.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import ConfigDict, PlainValidator, model_validator
 
 from rotfem import registry
-from rotfem.scene.alternatives import Way, choose_way, shape_ways
 from rotfem.scene.section_shapes import MATERIAL_AND_SHAPE, Geometry, Shape
-from rotfem.scene.span_tables import is_table
+from rotfem.scene.span_tables import MatrixTable, Point, PointTable, as_matrix_or_table, as_point_or_table
+from rotfem.scene.table import SceneModel, Way, as_name, choose_way, problem
 from rotfem.scene.values import (
+    AnyProfile,
     Array,
     Bounds,
+    Matrix,
     NonNegativeProfile,
     PositiveProfile,
     Profile,
-    SceneModel,
-    as_name,
     evaluate,
-    problem,
+    is_table,
 )
 
 PoissonProfile = Annotated[Profile, PlainValidator(Bounds(gt=-1.0, le=0.5).profile)]
 ShearProfile = Annotated[Profile, PlainValidator(Bounds(gt=0.0, le=1.0).profile)]
-
-DEFAULT_SHEAR_CORRECTION = 5.0 / 6.0
 
 
 class Section(SceneModel):
@@ -67,11 +68,6 @@ class Section(SceneModel):
         dimensions = (key for shape in registry.shapes for keys in shape.choices for key in keys)
         return list(dict.fromkeys([*super().keys(), *dimensions]))
 
-    @classmethod
-    def ways(cls) -> tuple[Way, ...]:
-        """Return all ways of giving the section."""
-        return *cls.WAYS, *shape_ways(cls.WITH_SHAPE)
-
     @property
     def given(self) -> dict[str, object]:
         """The keys that are set, with their values."""
@@ -80,8 +76,13 @@ class Section(SceneModel):
 
     @property
     def way(self) -> Way:
-        """The set of keys by which the section is given."""
-        return choose_way(self.given, self.ways())
+        """The set of keys by which the section is given: one of its own, or a material and a registered shape."""
+        shapes = (
+            Way("shape", (*MATERIAL_AND_SHAPE, *dimensions), self.WITH_SHAPE, shape.name)
+            for shape in registry.shapes
+            for dimensions in shape.choices
+        )
+        return choose_way(self.given, (*self.WAYS, *shapes))
 
     @property
     def breakpoints(self) -> tuple[float, ...]:
@@ -98,18 +99,37 @@ class Section(SceneModel):
         """The properties given as tables over the span, by name: rows (x, value), values may be points or matrices."""
         return {name: value for name, value in self.given.items() if isinstance(value, tuple) and is_table(value)}
 
+    @property
+    def knots(self) -> list[float]:
+        """Places of all rows of tapers (m), and the root."""
+        return sorted({0.0, *(x for taper in self.tapers.values() for x, _ in taper)})
+
     def _at(self, name: str, x: Array) -> Array:
-        """Return the profile of that name at x; the caller knows from `way` that it is set."""
-        profile: Profile = getattr(self, name)
-        return evaluate(profile, x)
+        """Return the profile of that name at x, or zeros where it may be missing and is."""
+        return evaluate(getattr(self, name) or 0.0, x)
 
     def _dimensions(self, x: Array) -> dict[str, Array]:
         """Return the dimensions of the shape at x; the caller knows from `way` that there is one."""
         return {name: self._at(name, x) for name in self.way.required if name not in MATERIAL_AND_SHAPE}
 
     def _geometry(self, x: Array) -> Geometry:
-        shape: Shape = registry.shapes[str(self.shape)]
-        return shape.geometry(self._at("nu", x), **self._dimensions(x))
+        """Return the geometry of the shape, or as it is given beside a material."""
+        if self.shape is not None:
+            shape: Shape = registry.shapes[self.shape]
+            return shape.geometry(self._at("nu", x), **self._dimensions(x))
+        names = ["second_moment2", "second_moment3", "torsion_constant"]
+        if "second_moment" in type(self).model_fields:
+            names = ["second_moment"] * 3
+        I2, I3, J = (self._at(name, x) for name in names)
+        return Geometry(self._at("area", x), I2, I3, J, np.full(x.shape, 5.0 / 6.0))
+
+    def _of_material(self, x: Array) -> tuple[Array, ...]:
+        """Return EA, kGA (N), GJ, EI₂, EI₃ (N·m²), ρA (kg/m), ρI₂ and ρI₃ (kg·m) of a material with a geometry."""
+        g, E, rho = self._geometry(x), self._at("E", x), self._at("rho", x)
+        k = g.shear_correction if self.shear_correction is None else self._at("shear_correction", x)
+        G = E / (2.0 * (1.0 + self._at("nu", x)))
+        I2, I3 = g.second_moment2, g.second_moment3
+        return E * g.area, k * G * g.area, G * g.torsion_constant, E * I2, E * I3, rho * g.area, rho * I2, rho * I3
 
     @model_validator(mode="before")
     @classmethod
@@ -123,8 +143,8 @@ class Section(SceneModel):
     def _check_way(self) -> Self:
         if self.way.name == "shape":
             # All dimensions are linear between knots, so it is enough to look at the knots.
-            knots = np.array(sorted({x for taper in self.tapers.values() for x, _ in taper} | {0.0}))
-            for key, allowed in registry.shapes[str(self.shape)].check(**self._dimensions(knots)).items():
+            dimensions = self._dimensions(np.array(self.knots))
+            for key, allowed in registry.shapes[str(self.shape)].check(**dimensions).items():
                 raise problem(key, self.given[key], allowed)
         return self
 
@@ -157,38 +177,207 @@ class PlanarSection(Section):
     @property
     def has_rotary_inertia(self) -> bool:
         """Whether the rotary inertia is positive anywhere."""
-        if self.way.name != "stiffness":
-            return True
-        profile = self.rotary_inertia or 0.0
-        return any(value > 0.0 for _, value in profile) if isinstance(profile, tuple) else profile > 0.0
+        return bool(np.any(self.at(self.knots)["rotary_inertia"] > 0.0))
 
     def at(self, x: npt.ArrayLike) -> dict[str, Array]:
-        """Return the section properties at positions along the beam, by name, each of the shape of x.
+        """Return the section properties at positions x (m) along the beam, by name, each of the shape of x.
 
         They are EA (N), GA (N), EI (N·m²), mass_per_length (kg/m) and rotary_inertia (kg·m).
-
-        Args:
-            x: positions from the clamp (m), any shape.
         """
         x = np.asarray(x, dtype=np.float64)
-        way = self.way
-        if way.name == "stiffness":
-            rotary_inertia = np.zeros(x.shape) if self.rotary_inertia is None else self._at("rotary_inertia", x)
-            return {key: self._at(key, x) for key in way.required} | {"rotary_inertia": rotary_inertia}
-        if way.name == "shape":
-            geometry = self._geometry(x)
-            area, second_moment, k = geometry.area, geometry.second_moment2, geometry.shear_correction
-        else:
-            area, second_moment = self._at("area", x), self._at("second_moment", x)
-            k = np.full(x.shape, DEFAULT_SHEAR_CORRECTION)
-        if self.shear_correction is not None:
-            k = self._at("shear_correction", x)
-        E, rho = self._at("E", x), self._at("rho", x)
-        G = E / (2.0 * (1.0 + self._at("nu", x)))
+        names = ("EA", "GA", "EI", "mass_per_length", "rotary_inertia")
+        if self.way.name == "stiffness":
+            return {name: self._at(name, x) for name in names}
+        EA, GA, _, EI, _, mass, rotary_inertia, _ = self._of_material(x)
+        return dict(zip(names, (EA, GA, EI, mass, rotary_inertia), strict=True))
+
+
+# --- spatial beams ----------------------------------------------------------------------------------------------------
+
+#: Part of the largest entry of a mass matrix by which it may differ from one that rigid mass has.
+MASS_SLACK = 1e-9
+
+
+def _as_stiffness(value: Any) -> Matrix | MatrixTable:
+    return as_matrix_or_table(value, definite=True)
+
+
+def _as_mass(value: Any) -> Matrix | MatrixTable:
+    """Return a mass matrix or a table of them; raise on any that no rigid mass has."""
+    read = as_matrix_or_table(value, definite=False)
+    for x, M in [(row[0], row[1]) for row in read] if is_table(read) else [(None, read)]:
+        rows = np.array(M)
+        m, coupling, size = rows[0, 0], rows[:3, 3:], MASS_SLACK * np.max(np.abs(rows))
+        rigid = np.allclose(rows[:3, :3], m * np.eye(3), rtol=0, atol=MASS_SLACK * abs(m))
+        if m <= 0.0 or not rigid or not np.allclose(coupling, -coupling.T, rtol=0, atol=size):
+            where = "" if x is None else f"at x = {x:g} it "
+            reason = (
+                f"{where}must be that of rigid mass: m 1 with m > 0 for velocities, m times a skew matrix beside it"
+            )
+            raise problem("", rows.tolist(), reason)
+    return read
+
+
+Center: TypeAlias = Annotated[Point | PointTable, PlainValidator(as_point_or_table)]
+
+#: What says where in a section its properties belong to, and the radius of its fibers.
+_PLACES = ("mass_center", "shear_center", "tension_center", "principal_angle", "polar_radius")
+_STIFFNESSES = ("EA", "GA2", "GA3", "GJ", "EI2", "EI3")
+_INERTIAS = ("mass_per_length", "rotary_inertia2", "rotary_inertia3")
+
+
+class SpatialSection(Section):
+    """Cross-section of a spatial beam.
+
+    For a rectangle the width is along axis 2 and the height along axis 3.
+
+    Attributes:
+        EA: axial stiffness (N).
+        GA2: effective shear stiffness in direction 2 (N).
+        GA3: effective shear stiffness in direction 3 (N).
+        GJ: torsional stiffness (N·m²), about the shear center.
+        EI2: bending stiffness about axis 2 through the tension center (N·m²).
+        EI3: bending stiffness about axis 3 through the tension center (N·m²).
+        mass_per_length: mass per length (kg/m).
+        rotary_inertia2: ∫ρz² dA about axis 2 through the mass center (kg·m).
+        rotary_inertia3: ∫ρy² dA about axis 3 through the mass center (kg·m). The polar one is the sum.
+        second_moment2: ∫z² dA (m⁴).
+        second_moment3: ∫y² dA (m⁴).
+        torsion_constant: Saint-Venant's J (m⁴).
+        mass_center: position (y, z) in the section (m), or a table of them.
+        shear_center: position (y, z) in the section (m), or a table of them.
+        tension_center: position (y, z) in the section (m), or a table of them.
+        polar_radius: radius of gyration of the axial stiffness about the shear center, (∫Er² dA/∫E dA)^½ (m); if not
+            given, that of EA, EI2, EI3 and the centers. Only the effect `trapeze` has to do with it.
+        principal_angle: angle (rad) about axis 1 from the section axes to those that GA2, GA3, EI2, EI3 and the rotary
+            inertias belong to; the centers do not turn with it.
+        stiffness: full 6×6 stiffness matrix, or a table of them.
+        mass: full 6×6 mass matrix of (velocity, angular velocity) in section axes, or a table of them.
+    """
+
+    WAYS: ClassVar[tuple[Way, ...]] = (
+        Way("stiffness", (*_STIFFNESSES, "mass_per_length"), (*_INERTIAS[1:], *_PLACES)),
+        Way("matrix", ("stiffness", "mass"), ("polar_radius",)),
+        Way(
+            "material",
+            ("E", "nu", "rho", "area", "second_moment2", "second_moment3", "torsion_constant"),
+            ("shear_correction", *_PLACES),
+        ),
+    )
+    WITH_SHAPE: ClassVar[tuple[str, ...]] = ("shear_correction", *_PLACES)
+
+    EA: PositiveProfile | None = None
+    GA2: PositiveProfile | None = None
+    GA3: PositiveProfile | None = None
+    GJ: PositiveProfile | None = None
+    EI2: PositiveProfile | None = None
+    EI3: PositiveProfile | None = None
+    mass_per_length: PositiveProfile | None = None
+    rotary_inertia2: NonNegativeProfile | None = None
+    rotary_inertia3: NonNegativeProfile | None = None
+    second_moment2: PositiveProfile | None = None
+    second_moment3: PositiveProfile | None = None
+    torsion_constant: PositiveProfile | None = None
+    mass_center: Center | None = None
+    shear_center: Center | None = None
+    tension_center: Center | None = None
+    polar_radius: NonNegativeProfile | None = None
+    principal_angle: AnyProfile | None = None
+    stiffness: Annotated[Matrix | MatrixTable, PlainValidator(_as_stiffness)] | None = None
+    mass: Annotated[Matrix | MatrixTable, PlainValidator(_as_mass)] | None = None
+
+    @property
+    def has_rotary_inertia(self) -> bool:
+        """Whether the mass matrix has any rotary part."""
+        return bool(np.any(self.at(self.knots)["mass"][..., 3:, 3:] != 0.0))
+
+    def at(self, x: npt.ArrayLike) -> dict[str, Array]:
+        """Return the matrices `stiffness` and `mass` at positions x (m), shape (…), along the beam: (…, 6, 6).
+
+        They are in SI units and section axes.
+        """
+        x = np.asarray(x, dtype=np.float64)
+        if self.stiffness is not None and self.mass is not None:
+            return {"stiffness": evaluate(self.stiffness, x), "mass": evaluate(self.mass, x)}
+        central = self.central(x)
+        stiffnesses = np.stack([central[key] for key in _STIFFNESSES], axis=-1)
+        m, J2, J3 = (central[key] for key in _INERTIAS)
+        mass_center = self.center("mass_center", x)
+        turned = np.swapaxes(_turn(self.angle_at(x)), -1, -2)
+        B = turned @ _offset(axial=self.center("tension_center", x), transverse=self.center("shear_center", x))
+        B_mass = turned @ _offset(axial=mass_center, transverse=mass_center)
+        masses = np.stack([m, m, m, J2 + J3, J2, J3], axis=-1)
         return {
-            "EA": E * area,
-            "GA": k * G * area,
-            "EI": E * second_moment,
-            "mass_per_length": rho * area,
-            "rotary_inertia": rho * second_moment,
+            "stiffness": np.swapaxes(B, -1, -2) @ (stiffnesses[..., None] * B),
+            "mass": np.swapaxes(B_mass, -1, -2) @ (masses[..., None] * B_mass),
         }
+
+    def central(self, x: npt.ArrayLike) -> dict[str, Array]:
+        """Return the section properties about their own centers at positions x (m), each of the shape of x.
+
+        Both matrices are diagonal there: EA, GA2, GA3 (N), GJ, EI2, EI3 (N·m²), mass_per_length (kg/m),
+        rotary_inertia2 and rotary_inertia3 (kg·m). Not for a section of full matrices.
+        """
+        x, names = np.asarray(x, dtype=np.float64), (*_STIFFNESSES, *_INERTIAS)
+        if self.way.name == "stiffness":
+            return {name: self._at(name, x) for name in names}
+        EA, GA, *rest = self._of_material(x)
+        return dict(zip(names, (EA, GA, GA, *rest), strict=True))
+
+    def center(self, name: str, x: npt.ArrayLike) -> Array:
+        """Return a centre, `mass_center`, `shear_center` or `tension_center`, at positions x (m): (…, 2) in m."""
+        of_shape = self._of_shape(name, np.asarray(x, dtype=np.float64))
+        return evaluate(getattr(self, name) or (0.0, 0.0), x) if of_shape is None else of_shape
+
+    def varies(self, name: str) -> bool:
+        """Return whether a centre changes along the beam: it is a table, or that of a shape that tapers."""
+        return name in self.tapers or (not self.uniform and self._of_shape(name, np.zeros(1)) is not None)
+
+    def _of_shape(self, name: str, x: Array) -> Array | None:
+        """Return the centre (…, 2) that the shape has; None where the section has another, or the shape has none."""
+        if getattr(self, name) is not None or self.shape is None:
+            return None
+        geometry = self._geometry(x)
+        found = geometry.shear_center if name == "shear_center" else geometry.centroid
+        return None if found is None else np.stack([np.broadcast_to(c, x.shape) for c in found], axis=-1)
+
+    def angle_at(self, x: npt.ArrayLike) -> Array:
+        """Return the principal angle (rad) at positions along the beam (m)."""
+        return self._at("principal_angle", np.asarray(x, dtype=np.float64))
+
+    def polar_radius_at(self, x: npt.ArrayLike) -> Array:
+        """Return the polar radius (m) at positions along the beam (m); only where it is given."""
+        return self._at("polar_radius", np.asarray(x, dtype=np.float64))
+
+    @property
+    def has_material(self) -> bool:
+        """Whether it is given by a material, of which E/G is known."""
+        return self.nu is not None
+
+    def modular_ratio(self, x: npt.ArrayLike) -> Array:
+        """Return E/G of the material at positions along the beam (m); only where it is given."""
+        return 2.0 * (1.0 + self._at("nu", np.asarray(x, dtype=np.float64)))
+
+
+def _turn(angle: Array) -> Array:
+    """Return R (…, 6, 6): components along the section axes from those along axes turned by an angle (rad) about 1."""
+    c, s = np.cos(angle), np.sin(angle)
+    R = np.broadcast_to(np.eye(6), (*angle.shape, 6, 6)).copy()
+    for i in (1, 4):
+        R[..., i, i], R[..., i, i + 1], R[..., i + 1, i], R[..., i + 1, i + 1] = c, -s, s, c
+    return R
+
+
+def _offset(axial: Array, transverse: Array) -> Array:
+    """Return B (…, 6, 6): motion (v, ω) of the reference axis ↦ axial motion at one centre, transverse at another.
+
+    It is v + ω×(0, y, z) row by row; the same map holds for strains, with (Γ, K) for (v, ω).
+
+    Args:
+        axial: (y, z) of the one, (…, 2) in m.
+        transverse: (y, z) of the other.
+    """
+    B = np.broadcast_to(np.eye(6), (*axial.shape[:-1], 6, 6)).copy()
+    B[..., 0, 4], B[..., 0, 5] = axial[..., 1], -axial[..., 0]
+    B[..., 1, 3], B[..., 2, 3] = -transverse[..., 1], transverse[..., 0]
+    return B

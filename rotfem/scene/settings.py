@@ -1,28 +1,26 @@
-"""The tables that say how to compute: model, initial state, mesh, modes, solver; time and output in their own ones."""
+"""The tables that say how to compute: model, initial state, mesh, time, modes, solver."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import PlainValidator, ValidationInfo, model_validator
+from pydantic import ConfigDict, Field, PlainValidator, ValidationInfo, model_validator
 
 from rotfem import registry
+from rotfem.errors import show
 from rotfem.scene.files import as_table
 from rotfem.scene.plates import locking
-from rotfem.scene.values import (
-    Bounds,
-    Count,
-    Matrix,
-    Number,
-    Positive,
+from rotfem.scene.table import (
     SceneModel,
-    as_increasing_rows,
     as_name,
     as_names,
+    check_parameters,
+    parameters_of,
     problem,
+    with_parameters,
 )
+from rotfem.scene.values import Bounds, Count, Matrix, Number, Positive, as_increasing_rows
 
 
 def _as_theory(value: Any) -> str:
@@ -30,7 +28,7 @@ def _as_theory(value: Any) -> str:
 
 
 def _as_effects(value: Any) -> str | tuple[str, ...]:
-    return "auto" if value == "auto" else as_names(value, registry.effects, '"auto" or ')
+    return "auto" if value == "auto" else as_names(value, registry.effects.names, "an effect", '"auto" or ')
 
 
 def _as_plate_elements(value: Any) -> tuple[int, int]:
@@ -166,10 +164,6 @@ class BeamMesh(SceneModel):
         """Return the mesh: the defaults of beams suit all lengths."""
         return self
 
-    def at_most(self, nodes: int) -> Self:
-        """Return the mesh, with no more elements than so many nodes along the beam need."""
-        return self.model_copy(update={"elements": min(self.elements, math.ceil(nodes / self.degree))})
-
 
 class PlateMesh(SceneModel):
     """The [mesh] table of a plate.
@@ -193,16 +187,12 @@ class PlateMesh(SceneModel):
         return self.locking_on(self.cell)
 
     def suited(self, structure: Any) -> Self:
-        """Return the mesh with the counts that suit a rectangle, where none are given.
-
-        Args:
-            structure: a plate; its `length` and `width` (m) are None of one with a mesh file.
-        """
+        """Return the mesh with the counts that suit a rectangle, where none are given."""
         if "elements" in self.model_fields_set or structure.mesh_file is not None:
             return self
         out = self.model_copy()
         # Not by `update`, which would count them as given: for another structure they are chosen anew.
-        vars(out)["elements"] = counts_for(structure.length / structure.width)
+        vars(out)["elements"] = _counts_for(structure.length / structure.width)
         return out
 
     @model_validator(mode="before")
@@ -216,28 +206,115 @@ class PlateMesh(SceneModel):
         """Return the polynomial degree on cells of a shape: as given, else 2 on quadrilaterals and 3 on triangles."""
         return 3 if cell == "triangle" and "degree" not in self.model_fields_set else self.degree
 
-    def at_most(self, nodes: int) -> Self:
-        """Return the mesh of a rectangle, with no more elements than so many nodes in each direction need."""
-        enough = math.ceil(nodes / self.degree)
-        return self.model_copy(update={"elements": tuple(min(n, enough) for n in self.elements)})
-
     def locking_on(self, cell: str) -> str | None:
         """Return why the elements lock on cells of a shape; None if they do not (see `locking`)."""
         return locking(cell, self.degree_on(cell), self.integration)
 
 
-def counts_for(aspect: float) -> tuple[int, int]:
+def _counts_for(aspect: float) -> tuple[int, int]:
     """Return (nx, ny), 64 cells of a rectangle: (8, 8) up to 2:1, (16, 4) up to 32:1, (32, 2) beyond, or swapped.
 
     A strip bends with ever shorter waves along it before anything happens across it, where its cells stay narrower.
-
-    Args:
-        aspect: length over width.
     """
     ratio = max(aspect, 1 / aspect)
     doublings = 0 if ratio <= 2.0 else 1 if ratio <= 32.0 else 2
     many, few = 8 * 2**doublings, 8 // 2**doublings
     return (many, few) if aspect >= 1.0 else (few, many)
+
+
+def estimates_error(scheme: type) -> bool:
+    """Return whether a class of `Scheme` says `local_error` itself, rather than have what all schemes inherit."""
+    base: Any = next(parent for parent in scheme.__mro__ if "registry" in vars(parent))
+    own: Any = scheme
+    return own.local_error is not base.local_error
+
+
+def usual(given: Mapping[str, Any]) -> str:
+    """Return the name of the scheme of a [time] table that names none, by what it gives.
+
+    Fixed steps are generalised-α's; to a tolerance one of higher order needs far fewer steps.
+    """
+    fixed = "generalised_alpha"
+    of_fixed = any(key in given for key in parameters_of(registry.schemes[fixed]))
+    return "esdirk4" if given.get("tolerance") is not None and not of_fixed else fixed
+
+
+class Time(SceneModel):
+    """The [time] table. Either step or tolerance is given; the parameters of the scheme are keys as well.
+
+    Attributes:
+        end: final time (s).
+        step: time step (s), or None for adaptive steps.
+        tolerance: error of all adaptive steps together, relative to the largest displacement, or None.
+        max_step: longest adaptive step (s), or None.
+        min_step: shortest adaptive step (s), or None.
+        scheme: name of a registered scheme; if not given, the usual one of fixed or adaptive steps.
+        output_every: number of steps from one output to the next.
+        output_step: time (s) from one output to the next, wherever steps end; None where steps are counted.
+    """
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Number]
+
+    end: Positive = Field(description="a number greater than 0 (s)")
+    step: Positive | None = None
+    tolerance: Positive | None = None
+    max_step: Positive | None = None
+    min_step: Positive | None = None
+    scheme: str = "generalised_alpha"
+    output_every: Count = 1
+    output_step: Positive | None = None
+
+    @classmethod
+    def keys(cls) -> list[str]:
+        """Return the keys of the table and the parameters of all schemes."""
+        return list(dict.fromkeys([*super().keys(), *(key for s in registry.schemes for key in parameters_of(s))]))
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Parameters of the scheme by name, those that are not given with their defaults."""
+        return dict(self.__pydantic_extra__)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_scheme(cls, data: Any, info: ValidationInfo) -> Any:
+        """Add the parameters of the chosen scheme that are not given; a slip in its name comes before all others.
+
+        Where an accuracy is wanted and no steps are given, they follow from it.
+        """
+        if not isinstance(data, Mapping):
+            return data
+        given = {key: value for key, value in data.items() if value is not None}
+        wanted = (info.context or {}).get("accuracy")
+        if isinstance(wanted, float) and wanted > 0.0 and not {"step", "tolerance"} & given.keys():
+            given["tolerance"] = wanted
+        return with_parameters(cls, {"scheme": usual(given)} | given, "scheme", registry.schemes)
+
+    @model_validator(mode="after")
+    def _check_scheme(self) -> Self:
+        scheme = registry.schemes[self.scheme]
+        check_parameters(scheme, "scheme", self.parameters)
+        if self.tolerance is not None and not estimates_error(scheme):
+            able = ", ".join(show(other.name) for other in registry.schemes if estimates_error(other))
+            reason = f'scheme = "{self.scheme}" does not estimate its error, so its steps are fixed: give step instead'
+            raise problem("tolerance", self.tolerance, f"{reason} (adaptive steps: {able})")
+        return self
+
+    @model_validator(mode="after")
+    def _check_steps(self) -> Self:
+        if (self.step is None) == (self.tolerance is None):
+            reason = "give exactly one of step (fixed steps, s) and tolerance (adaptive steps)"
+            raise problem("step", self.step, reason)
+        if self.step is not None and self.step > self.end:
+            raise problem("step", self.step, f"must be at most time.end = {self.end:g}")
+        if self.output_step is not None and self.output_every != 1:
+            raise problem("output_step", self.output_step, "cannot be combined with output_every, which counts steps")
+        for key in ("max_step", "min_step"):
+            if self.tolerance is None and getattr(self, key) is not None:
+                raise problem(key, getattr(self, key), "has a meaning only with tolerance (adaptive steps)")
+        if self.max_step is not None and self.min_step is not None and self.min_step > self.max_step:
+            raise problem("min_step", self.min_step, f"must be at most max_step = {self.max_step:g}")
+        return self
 
 
 class Modes(SceneModel):

@@ -11,7 +11,8 @@ import numpy as np
 from pydantic import PlainValidator, ValidationInfo, model_validator
 
 from rotfem.scene.files import as_time_table
-from rotfem.scene.values import Array, Matrix, SceneModel, as_padded_vector3, problem
+from rotfem.scene.table import SceneModel, problem
+from rotfem.scene.values import Array, Matrix, as_padded_vector3
 
 
 def arguments(function: Callable[..., Any]) -> int:

@@ -1,4 +1,4 @@
-"""Numbers, vectors, tapers and tables as a scene may hold them: what is accepted and how it is stored.
+"""Numbers, vectors, tapers and matrices as a scene may hold them, and how much of them it may ask for.
 
 Booleans and strings are not numbers here, and nothing infinite or undefined gets past this module. Sequences
 become tuples, so that a validated scene cannot be changed by accident.
@@ -10,33 +10,37 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Protocol, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, PlainValidator, model_validator
+from pydantic import PlainValidator, ValidationError, ValidationInfo
 from pydantic_core import PydanticCustomError
 
-from rotfem.errors import show
-from rotfem.registry import Registry
-from rotfem.scene.problems import InputErrors, did_you_mean
+from rotfem.scene.table import SceneModel, problem, problems_at
 
-#: Sizes that a stiffness or a mass may have, if it is not 0; beyond them the products of the elements are none.
-SMALLEST, LARGEST = 1e-140, 1e140
+Array: TypeAlias = npt.NDArray[np.float64]
+Vector3: TypeAlias = tuple[float, float, float]
+Matrix: TypeAlias = tuple[tuple[float, ...], ...]
+Taper: TypeAlias = tuple[tuple[float, float], ...]
+Profile: TypeAlias = float | Taper
+
+#: Sizes that a number of a scene may have, if it is not 0: its third power is a double, as those of thicknesses are.
+SMALLEST, LARGEST = 1e-100, 1e100
+
+#: The same of a stiffness or a mass made of them: its square is a double, as elements multiply two of them.
+SMALLEST_PROPERTY, LARGEST_PROPERTY = 1e-140, 1e140
 
 #: Properties of a section without which it moves all the same.
 MAY_BE_ZERO = ("rotary_inertia", "rotary_inertia2", "rotary_inertia3")
 
 
 def check_magnitudes(values: Callable[[], Mapping[str, Array]], key: str) -> None:
-    """Refuse what a section makes of good numbers: infinite, undefined, or nothing at all.
+    """Refuse at a key what a section makes of good numbers: infinite, undefined, or nothing at all.
 
     Args:
         values: returns the properties of the section by name, each of any shape.
         key: where the section is given.
-
-    Raises:
-        PydanticCustomError: names the property.
     """
     with np.errstate(all="ignore"):
         try:
@@ -45,103 +49,15 @@ def check_magnitudes(values: Callable[[], Mapping[str, Array]], key: str) -> Non
             raise problem(key, None, "its numbers cannot be multiplied: too large or too small") from None
     for name, value in found.items():
         size = np.abs(value)
-        good = (size == 0.0) | ((size >= SMALLEST) & (size <= LARGEST))
+        good = (size == 0.0) | ((size >= SMALLEST_PROPERTY) & (size <= LARGEST_PROPERTY))
         if np.all(good & (size > 0.0) if name not in MAY_BE_ZERO else good):
             continue
         worst = float(np.ravel(value)[np.argmin(good & (size > 0.0))])
-        reason = f"its {name} comes out as {worst:g}; must be from {SMALLEST:g} to {LARGEST:g} in size"
-        raise problem(key, None, reason)
+        allowed = f"must be from {SMALLEST_PROPERTY:g} to {LARGEST_PROPERTY:g} in size"
+        raise problem(key, None, f"its {name} comes out as {worst:g}; {allowed}")
 
 
-class Named(Protocol):
-    """What a list may name, where that is more than one registry."""
-
-    kind: str
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """All names, in their order."""
-
-
-def as_name(value: Any, registry: Registry[Any], key: str = "") -> str:
-    """Return the value; raise a problem at `key` if it is not the name of an entry."""
-    names = registry.names
-    if isinstance(value, str) and value in names:
-        return value
-    raise problem(key, value, f"{did_you_mean(value, names)}allowed: {', '.join(map(show, names))}")
-
-
-def as_names(value: Any, registry: Registry[Any] | Named, others: str = "") -> tuple[str, ...]:
-    """Return the value as a tuple.
-
-    Args:
-        value: a list of names.
-        registry: what they name: effects or outputs.
-        others: what is allowed instead of a list, for the error message.
-
-    Raises:
-        PydanticCustomError: it is not a list, or has something in it that is not registered, or is there twice.
-    """
-    names = registry.names
-    allowed = f"allowed: {others}a list of {', '.join(names)}" if names else "none are registered"
-    if not isinstance(value, list | tuple):
-        raise problem("", value, allowed)
-    for name in value:
-        if name not in names:
-            hint = did_you_mean(name, names)
-            raise problem("", value, f"{show(name)} is not an {registry.kind}; {hint}{allowed}")
-        if list(value).count(name) > 1:
-            raise problem("", value, f"{show(name)} is listed twice")
-    return tuple(value)
-
-
-Array: TypeAlias = npt.NDArray[np.float64]
-Vector3: TypeAlias = tuple[float, float, float]
-Matrix: TypeAlias = tuple[tuple[float, ...], ...]
-Taper: TypeAlias = tuple[tuple[float, float], ...]
-Profile: TypeAlias = float | Taper
-
-#: Sizes that a number may have, if it is not 0: beyond them squares and products are none any more.
-SMALLEST, LARGEST = 1e-100, 1e100
-
-
-def problem(key: str, value: Any, allowed: str) -> PydanticCustomError:
-    """Return a validation error that names a key.
-
-    Args:
-        key: dotted path relative to the table being validated; empty for the validated value itself.
-        value: the offending value, None if the key is absent.
-        allowed: what is wrong and what is allowed.
-    """
-    return PydanticCustomError("scene", "{reason}", {"reason": allowed, "key": key, "value": value})
-
-
-class SceneModel(BaseModel, metaclass=InputErrors):
-    """A table of the scene: immutable, and unknown or missing keys are errors that say what is allowed."""
-
-    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
-
-    @classmethod
-    def keys(cls) -> list[str]:
-        """Return all keys that the table may have."""
-        return list(cls.model_fields)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _check_keys(cls, data: Any) -> Any:
-        if isinstance(data, cls):
-            return data
-        if not isinstance(data, Mapping):
-            raise problem("", data, "must be a table of key = value pairs")
-        names = cls.keys()
-        for key in data:
-            if key not in names:
-                hint = did_you_mean(key, names)
-                raise problem(str(key), None, f"unknown key; {hint}allowed: {', '.join(names)}")
-        for name, field in cls.model_fields.items():
-            if field.is_required() and name not in data:
-                raise problem(name, None, f"required key is missing; must be {field.description or 'given'}")
-        return data
+# --- numbers ----------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -174,11 +90,8 @@ class Bounds:
         return number
 
     def integer(self, value: Any) -> int:
-        """Return the value; raise if it is not an integer in the interval."""
-        if not isinstance(value, int) or isinstance(value, bool):
-            raise problem("", value, f"must be an integer {self}")
-        # Before the bound check: an integer too long to print, or to become a float, is not a count of anything.
-        if abs(value) > 2**31 or not self.contains(value):
+        """Return the value; raise if it is not an integer in the interval, or one too long for a count."""
+        if type(value) is not int or abs(value) > 2**31 or not self.contains(value):
             raise problem("", value, f"must be an integer {self}")
         return value
 
@@ -212,94 +125,19 @@ def as_number(value: Any) -> float:
     return number
 
 
-def as_rows(
-    value: Any, columns: Sequence[int], shape: str, row_name: Callable[[int], str] = "row {}".format
-) -> tuple[tuple[float, ...], ...]:
-    """Return a rectangular table of numbers as a tuple of rows.
-
-    Args:
-        value: a sequence of rows.
-        columns: allowed numbers of columns; all rows must have the same.
-        shape: the expected form in words, for the error message.
-        row_name: number of a row, from 1 ↦ what the error message calls it.
-
-    Raises:
-        PydanticCustomError: it is not such a table.
-    """
-    if not isinstance(value, list | tuple) or not value or not all(isinstance(row, list | tuple) for row in value):
-        raise problem("", value, f"must be {shape}")
-    if len(value[0]) not in columns:
-        raise problem("", value, f"must be {shape}; {row_name(1)} has {len(value[0])} entries")
-    if (quick := _quick_rows(value)) is not None:
-        return quick
-    for i, row in enumerate(value, start=1):
-        if len(row) != len(value[0]):
-            reason = f"{row_name(i)} has {len(row)} entries, {row_name(1)} has {len(value[0])}"
-            raise problem("", value, f"must be {shape}; {reason}")
-        for entry in row:
-            try:
-                as_number(entry)
-            except PydanticCustomError as error:
-                raise problem("", value, f"must be {shape}; an entry of {row_name(i)} {error.message()}") from None
-    return tuple(tuple(float(entry) for entry in row) for row in value)
-
-
-def as_increasing_rows(
-    value: Any, columns: Sequence[int], shape: str, row_name: Callable[[int], str] = "row {}".format
-) -> tuple[tuple[float, ...], ...]:
-    """Return `as_rows`, at least two of them with a strictly increasing first column; raise on anything else."""
-    rows = as_rows(value, columns, shape, row_name)
-    if len(rows) < 2:
-        raise problem("", value, f"must be {shape} with at least two rows")
-    first = np.fromiter((row[0] for row in rows), dtype=np.float64, count=len(rows))
-    bad = np.flatnonzero(first[1:] <= first[:-1])
-    if len(bad):
-        i = int(bad[0])
-        reason = f"{row_name(i + 2)}: {first[i + 1]:g} ≤ {first[i]:g}"
-        raise problem("", value, f"the first column must increase strictly; {reason}")
-    return rows
-
-
 def are_numbers(table: Array) -> bool:
     """Return whether all numbers are 0 or of a size that is allowed."""
     size = np.abs(table)
     return bool(np.all((size == 0.0) | ((size >= SMALLEST) & (size <= LARGEST))))
 
 
-def rows_of(table: Array) -> Matrix:
-    """Return the rows of an array (n, columns)."""
-    rows: Any = table.tolist()
-    return tuple(map(tuple, rows))
-
-
-def _quick_rows(value: Sequence[Sequence[Any]]) -> Matrix | None:
-    """Return a table of good numbers as a tuple of rows; None where every entry has to be checked."""
-    if set(map(len, value)) != {len(value[0])} or not set(map(type, itertools.chain(*value))) <= {int, float}:
-        return None
-    try:
-        table = np.array(value, dtype=np.float64)
-    except OverflowError:
-        return None
-    return rows_of(table) if are_numbers(table) else None
-
-
-def as_taper(value: Any) -> Taper:
-    """Return a taper ((x, value), …) with x (m) strictly increasing; raise on anything else."""
-    rows = as_increasing_rows(value, (2,), "a taper [[x, value], …]")
-    return tuple((x, number) for x, number in rows)
-
-
 def as_vector(value: Any, sizes: Sequence[int]) -> tuple[float, ...]:
     """Return a vector as a tuple of floats; raise if it has not one of the allowed sizes."""
-    wanted = " or ".join(str(size) for size in sizes)
+    shape = f"must be a list of {' or '.join(map(str, sizes))} numbers"
     if not isinstance(value, list | tuple) or len(value) not in sizes:
-        raise problem("", value, f"must be a list of {wanted} numbers")
-    for entry in value:
-        try:
-            as_number(entry)
-        except PydanticCustomError as error:
-            raise problem("", value, f"must be a list of {wanted} numbers; an entry {error.message()}") from None
-    return tuple(float(entry) for entry in value)
+        raise problem("", value, shape)
+    with problems_at("", value, f"{shape}; an entry "):
+        return tuple(map(as_number, value))
 
 
 def as_vector3(value: Any) -> Vector3:
@@ -314,44 +152,122 @@ def as_padded_vector3(value: Any) -> Vector3:
     return a, b, c
 
 
-def as_symmetric_matrix(value: Any, size: int, *, definite: bool) -> Matrix:
-    """Return a symmetric matrix as a tuple of rows.
+# --- rows, tapers and matrices ----------------------------------------------------------------------------------------
+
+
+def as_rows(value: Any, columns: Sequence[int], shape: str, row_name: Callable[[int], str] = "row {}".format) -> Matrix:
+    """Return a rectangular table of numbers as a tuple of rows; raise on anything else.
 
     Args:
         value: a sequence of rows.
-        size: number of rows and columns.
-        definite: whether it must be positive definite; positive semidefinite otherwise.
+        columns: allowed numbers of columns; all rows must have the same.
+        shape: the expected form in words, for the error message.
+        row_name: number of a row, from 1 ↦ what the error message calls it.
+    """
+    if not isinstance(value, list | tuple) or not value or not all(isinstance(row, list | tuple) for row in value):
+        raise problem("", value, f"must be {shape}")
+    if len(value[0]) not in columns:
+        raise problem("", value, f"must be {shape}; {row_name(1)} has {len(value[0])} entries")
+    if (quick := _quick_rows(value)) is not None:
+        return quick
+    for i, row in enumerate(value, start=1):
+        if len(row) != len(value[0]):
+            reason = f"{row_name(i)} has {len(row)} entries, {row_name(1)} has {len(value[0])}"
+            raise problem("", value, f"must be {shape}; {reason}")
+        with problems_at("", value, f"must be {shape}; an entry of {row_name(i)} "):
+            for entry in row:
+                as_number(entry)
+    return tuple(tuple(float(entry) for entry in row) for row in value)
 
-    Raises:
-        PydanticCustomError: the size, the symmetry (to 1e-9 of the largest entry) or the definiteness is wrong.
+
+def _quick_rows(value: Sequence[Sequence[Any]]) -> Matrix | None:
+    """Return a table of good numbers as a tuple of rows; None where every entry has to be checked."""
+    if set(map(len, value)) != {len(value[0])} or not set(map(type, itertools.chain(*value))) <= {int, float}:
+        return None
+    try:
+        table = np.array(value, dtype=np.float64)
+    except OverflowError:
+        return None
+    return rows_of(table) if are_numbers(table) else None
+
+
+def rows_of(table: Array) -> Matrix:
+    """Return the rows of an array (n, columns)."""
+    rows: Any = table.tolist()
+    return tuple(map(tuple, rows))
+
+
+def as_increasing_rows(
+    value: Any, columns: Sequence[int], shape: str, row_name: Callable[[int], str] = "row {}".format
+) -> Matrix:
+    """Return `as_rows`, at least two of them with a strictly increasing first column; raise on anything else."""
+    rows = as_rows(value, columns, shape, row_name)
+    if len(rows) < 2:
+        raise problem("", value, f"must be {shape} with at least two rows")
+    first = np.fromiter((row[0] for row in rows), dtype=np.float64, count=len(rows))
+    bad = np.flatnonzero(first[1:] <= first[:-1])
+    if len(bad):
+        i = int(bad[0])
+        reason = f"{row_name(i + 2)}: {first[i + 1]:g} ≤ {first[i]:g}"
+        raise problem("", value, f"the first column must increase strictly; {reason}")
+    return rows
+
+
+def as_taper(value: Any) -> Taper:
+    """Return a taper ((x, value), …) with x (m) strictly increasing; raise on anything else."""
+    return tuple((x, number) for x, number in as_increasing_rows(value, (2,), "a taper [[x, value], …]"))
+
+
+def is_positive(matrix: Array, definite: bool = True, slack: float = 1e-9) -> bool:
+    """Return whether a symmetric matrix is positive definite, or semidefinite to a slack, as mass without inertias is.
+
+    It is judged with ones on its diagonal, as its entries have different units and sizes: otherwise a soft direction
+    would pass for round-off, or the reverse.
+    """
+    diagonal = np.diag(matrix)
+    if not np.all(np.isfinite(matrix)) or np.any(diagonal <= 0.0 if definite else diagonal < 0.0):
+        return False
+    scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, np.max(diagonal) or 1.0))
+    least = float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T) * np.outer(scale, scale))[0])
+    return least > 1e-12 if definite else least >= -slack
+
+
+def as_symmetric_matrix(value: Any, size: int, *, definite: bool) -> Matrix:
+    """Return a symmetric matrix as a tuple of rows.
+
+    Raise on another size, a lack of symmetry of 1e-9 of the largest entry, or one that is not positive (semi)definite.
     """
     shape = f"a symmetric {size}×{size} matrix"
     rows = as_rows(value, (size,), shape)
     if len(rows) != size:
         raise problem("", value, f"must be {shape}; it has {len(rows)} rows")
     matrix = np.array(rows)
-    scale = float(np.max(np.abs(matrix))) or 1.0
-    if not np.allclose(matrix, matrix.T, rtol=0.0, atol=1e-9 * scale):
+    if not np.allclose(matrix, matrix.T, rtol=0.0, atol=1e-9 * np.max(np.abs(matrix))):
         raise problem("", value, f"must be {shape}; it is not symmetric")
-    # Entries of one matrix differ in units and by many orders of magnitude, so definiteness is judged after
-    # scaling to a unit diagonal; otherwise a soft direction would pass for a rounding error, or the reverse.
-    diagonal = np.diag(matrix)
-    if np.any(diagonal < 0.0) or (definite and np.any(diagonal == 0.0)):
-        raise problem("", value, f"must be {shape}, positive {'definite' if definite else 'semidefinite'}")
-    weights = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, scale))
-    lowest = float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T) * np.outer(weights, weights))[0])
-    if lowest < -1e-9 or (definite and lowest <= 1e-12):
+    if not is_positive(matrix, definite):
         raise problem("", value, f"must be {shape}, positive {'definite' if definite else 'semidefinite'}")
     return rows
 
 
-def evaluate(profile: Profile, x: npt.ArrayLike) -> Array:
-    """Return the profile at positions x (m), shape of x; linear between the knots of a taper."""
+def is_table(value: object) -> bool:
+    """Return whether a validated value is a table over the span, not one number, point or matrix for all of it."""
+    return isinstance(value, tuple) and isinstance(value[0], tuple) and len(value[0]) == 2
+
+
+def evaluate(value: Any, x: npt.ArrayLike) -> Array:
+    """Return a number, point or matrix, or a table of them over the span, at positions x (m), any shape (…).
+
+    Tables are linear between their rows, entry by entry. The shape is (…, *shape of the value).
+    """
     positions = np.asarray(x, dtype=np.float64)
-    if isinstance(profile, float | int):
-        return np.full(positions.shape, float(profile))
-    knots, values = np.array(profile).T
-    return np.asarray(np.interp(positions, knots, values), dtype=np.float64)
+    if not is_table(value):
+        entry = np.asarray(value, dtype=np.float64)
+        return np.broadcast_to(entry, (*positions.shape, *entry.shape)).copy()
+    knots = np.array([row[0] for row in value])
+    entries = np.array([row[1] for row in value], dtype=np.float64)
+    columns = entries.reshape(len(knots), -1).T
+    values = np.stack([np.interp(positions, knots, column) for column in columns], axis=-1)
+    return np.asarray(values.reshape((*positions.shape, *entries.shape[1:])))
 
 
 def check_profile_length(key: str, profile: Profile, length: float, slack: float = 1e-9) -> None:
@@ -372,3 +288,49 @@ NonNegativeProfile = Annotated[Profile, PlainValidator(Bounds(ge=0.0).profile)]
 AnyProfile = Annotated[Profile, PlainValidator(Bounds().profile)]
 Vector = Annotated[Vector3, PlainValidator(as_vector3)]
 PaddedVector = Annotated[Vector3, PlainValidator(as_padded_vector3)]
+
+
+# --- how much may be asked for ----------------------------------------------------------------------------------------
+
+
+class Limits(SceneModel):
+    """The [limits] table. What lies above is taken for a slip and refused before it is computed.
+
+    Attributes:
+        steps: steps of a time history.
+        rows: rows of a table.
+        modes: modes at one speed.
+        speeds: speeds of a Campbell diagram.
+    """
+
+    steps: Count = 10_000_000
+    rows: Count = 2_000_000
+    modes: Count = 1_000
+    speeds: Count = 100_000
+
+    def refusal(self, name: str, wanted: float) -> str | None:
+        """Return why so many of what a limit is of are refused, with how to allow them; None where they are not."""
+        most = getattr(self, name)
+        if wanted <= most:
+            return None
+        return f"makes {wanted:.4g} {name}, more than limits.{name} = {most}; a larger one in [limits] allows them"
+
+    def check(self, name: str, wanted: float, key: str = "", value: object = None) -> None:
+        """Refuse more than a limit, at the key that asks for them and its value."""
+        if (why := self.refusal(name, wanted)) is not None:
+            raise problem(key, value, why)
+
+
+def limits_of(tables: object) -> Limits:
+    """Return the limits of a scene's tables; where those are wrong, which is reported elsewhere, the usual ones."""
+    given = tables.get("limits") if isinstance(tables, dict) else None
+    try:
+        return Limits.model_validate({} if given is None else given)
+    except (ValidationError, PydanticCustomError):
+        return Limits()
+
+
+def limits_in(info: ValidationInfo) -> Limits:
+    """Return the limits of the scene being validated; the usual ones outside of a scene."""
+    found = (info.context or {}).get("limits")
+    return found if isinstance(found, Limits) else Limits()

@@ -14,11 +14,10 @@ import pytest
 
 import rotfem
 from rotfem import scene
-from rotfem.scene.clamp_and_damping import Damping
-from rotfem.scene.limits import Limits
-from rotfem.scene.section import PlanarSection
-from rotfem.scene.section_spatial import SpatialSection
-from rotfem.scene.values import SceneModel
+from rotfem.scene.section import PlanarSection, SpatialSection
+from rotfem.scene.structure import Damping
+from rotfem.scene.table import SceneModel
+from rotfem.scene.values import Limits
 from tests.launch import MPIRUN, environment
 
 DEMOS = Path(__file__).parents[2] / "demos"

@@ -258,8 +258,6 @@ def test_the_fields_of_a_scheme_are_keys_of_its_table(add: Add) -> None:
     assert time is not None
     assert time.parameters == {"decay": 0.5, "gamma": 0.75}
     assert registry.schemes[time.scheme](**time.parameters) == Damped(0.5, 0.75)
-    assert time.gamma == 0.75
-    assert time.beta is None
 
 
 @pytest.mark.parametrize(
@@ -307,7 +305,7 @@ def test_a_parameter_cannot_have_the_name_of_a_key(add: Add) -> None:
 
     add(Clashing)
     message = refusal(time={"end": 1, "step": 0.1, "scheme": "clashing"})
-    assert "cannot have a parameter tolerance, which is a key of [time] already" in message
+    assert "cannot have a parameter tolerance, which is a key of the table already" in message
 
 
 @pytest.mark.parametrize("scheme", ["rk4", 4, ["newmark"], {"name": "newmark"}])

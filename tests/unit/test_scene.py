@@ -130,10 +130,10 @@ def test_integers_become_floats() -> None:
 def test_time_parameters_belong_to_the_scheme() -> None:
     alpha = scene(time={"end": 1, "step": 0.1}).time
     assert alpha is not None
-    assert (alpha.scheme, alpha.spectral_radius, alpha.beta, alpha.gamma) == ("generalised_alpha", 0.9, None, None)
+    assert (alpha.scheme, alpha.parameters) == ("generalised_alpha", {"spectral_radius": 0.9})
     newmark = scene(time={"end": 1, "tolerance": 1e-4, "scheme": "newmark"}).time
     assert newmark is not None
-    assert (newmark.spectral_radius, newmark.beta, newmark.gamma, newmark.step) == (None, 0.25, 0.5, None)
+    assert (newmark.parameters, newmark.step) == ({"beta": 0.25, "gamma": 0.5}, None)
 
 
 def test_plate_elements_may_be_one_number() -> None:

@@ -11,8 +11,7 @@ from pydantic import ValidationError
 
 from rotfem.errors import SceneError
 from rotfem.scene import PlanarBeamStructure, Scene, SpatialBeamStructure
-from rotfem.scene.section import PlanarSection
-from rotfem.scene.section_spatial import SpatialSection
+from rotfem.scene.section import PlanarSection, SpatialSection
 
 MATERIAL = {"E": 210e9, "nu": 0.3, "rho": 7800.0}
 G = 210e9 / 2.6

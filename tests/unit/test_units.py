@@ -10,7 +10,7 @@ import pytest
 from rotfem import Scene, SceneError
 from rotfem.commands.campbell import parse_speeds
 from rotfem.results.units import ShownUnits
-from rotfem.scene import beams, loads, motion, plates, section, section_spatial, settings, stepping
+from rotfem.scene import beams, loads, motion, plates, section, settings
 from rotfem.scene.units import DEPENDING, UNITS, in_si
 from rotfem.units import quantity
 
@@ -108,11 +108,11 @@ def test_region_and_type_decide():
 PURE = {"nu", "nu12", "shear_correction", "stiffness", "mass", "axis", "speed", "rate", "angle", "tolerance"}
 TABLES = {
     "structure": (beams.PlanarBeamStructure, beams.SpatialBeamStructure, plates.PlateStructure),
-    "structure.section": (section.PlanarSection, section_spatial.SpatialSection),
+    "structure.section": (section.PlanarSection, section.SpatialSection),
     "motion": (motion.ConstantMotion, motion.SpinUpMotion, motion.TableMotion, motion.TorqueMotion),
     "initial": (settings.Initial,),
     "loads": (loads.Loads,),
-    "time": (stepping.Time,),
+    "time": (settings.Time,),
 }
 
 

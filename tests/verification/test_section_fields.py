@@ -16,9 +16,9 @@ from mpi4py import MPI
 from numpy.polynomial import legendre
 
 import rotfem
+from rotfem.commands.advice import advise
 from rotfem.commands.problem import Problem
 from rotfem.scene import Scene
-from rotfem.scene.advice import advise
 from rotfem.structures import build
 from rotfem.structures.section_fields import not_negative, positive_matrices
 from tests.beams import STRUCTURE

@@ -12,8 +12,8 @@ from rotfem.errors import SceneError
 from rotfem.mechanics.theories import ladder, theories
 from rotfem.refinement.refine import Setting, grown
 from rotfem.scene import Scene
-from rotfem.scene.problems import did_you_mean
-from rotfem.scene.stepping import estimates_error
+from rotfem.scene.settings import estimates_error
+from rotfem.scene.table import did_you_mean
 
 #: What errors may be of: the tip's motion, eigenvalues at the scene's speed, frequencies over a range of speeds.
 OUTPUTS = ("tip", "frequencies", "campbell")

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.scene.reference_line import ReferenceLine, as_line, line_through
 from rotfem.scene.values import Array
 
 #: Components along our axes 1, 2, 3 from those along x (flapwise, downwind), y (to the trailing edge), z (to the tip)
@@ -29,19 +30,6 @@ def turned_matrix(matrix: npt.ArrayLike, axes: Array) -> Array:
 def is_symmetric(matrix: Array) -> bool:
     """Return whether a matrix is symmetric to what another program may have left."""
     return bool(np.max(np.abs(matrix - matrix.T)) <= SYMMETRIC * np.max(np.abs(matrix)))
-
-
-def is_positive(matrix: Array, definite: bool = True) -> bool:
-    """Return whether a symmetric matrix is positive definite, or at least semidefinite, as a mass without inertias is.
-
-    It is judged with ones on its diagonal, as its entries have different units.
-    """
-    diagonal = np.diag(matrix)
-    if not np.all(np.isfinite(matrix)) or np.any(diagonal <= 0.0 if definite else diagonal < 0.0):
-        return False
-    scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-    least = np.linalg.eigvalsh(matrix / np.outer(scale, scale))[0]
-    return bool(least > 0.0 if definite else least >= -SYMMETRIC)
 
 
 def symmetric(matrix: Array) -> Array:
@@ -98,3 +86,10 @@ def coned_root(radius: float, precone: float) -> dict[str, Any]:
         return {"hub_radius": radius}
     offset = [radius * float(np.cos(precone)), 0.0, radius * float(np.sin(precone))]
     return {"hub_offset": offset, "precone": precone}
+
+
+def line_of(points: npt.ArrayLike) -> tuple[list[Any], ReferenceLine, Array]:
+    """Return the rows of a line through points (m) from its first one, the line itself and its arc lengths there."""
+    rows = (np.asarray(points) - np.asarray(points)[0]).tolist()
+    through = line_through(as_line(rows))
+    return rows, through, np.array([0.0, *through.knots, through.length])

@@ -7,14 +7,14 @@ sc_offst`, and inertias and bending stiffness are about that line, not about cen
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
 
 from rotfem.registry import register
 from rotfem.scene.blades.axes import coned_root, scaled_rows
-from rotfem.scene.blades.deck import Deck
-from rotfem.scene.blades.formats import Asked, BladeFormat
+from rotfem.scene.blades.deck import Asked, BladeFormat, Deck
 from rotfem.scene.values import Array
 
 COLUMNS = [
@@ -66,7 +66,10 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
         length = asked.length(deck, "sec_loc is a part of radius − hub_rad of BModes' main file")
         return _keys(deck, asked, length, {})
     if "BMODES" in deck.lines[0].upper():  # files of pyBModes name neither program nor version
-        deck.check_version("BModes", VERSIONS, "main")
+        version = re.search(r"BModes\s+V(\d+\.\d+)", deck.lines[0], re.IGNORECASE)
+        if version is None or version[1] not in VERSIONS:
+            named = version[1] if version else "missing"
+            deck.fail(f"the version of BModes' main file is {named}; known: {', '.join(VERSIONS)}", 1)
     for name, value in ONLY.items():
         if (found := deck.number(name)) != value:
             deck.fail(f"{name} = {found:g} is not known; only {value:g}", deck.named(name)[0], 1)
@@ -74,16 +77,12 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
         if deck.number(name) != 0.0:
             reason = f"{name} is not read; set it to 0 and give tip_offset and tip_inertia in the scene"
             deck.fail(reason, deck.named(name)[0], 1)
-    radius, hub = deck.number("radius"), deck.number("hub_rad")
-    if not 0.0 <= hub < radius:
-        deck.fail(
-            f"hub_rad = {hub:g} must be at least 0 and less than radius = {radius:g}", deck.named("hub_rad")[0], 1
-        )
+    hub, length = deck.hub_and_length("hub_rad", "radius")
     factors = {column: deck.number(factor) for factor, column in FACTORS.items()}
     properties = deck.file("sec_props_file")
-    keys = _keys(properties, asked, radius - hub, factors)
+    keys = _keys(properties, asked, length, factors)
     place = coned_root(hub, float(np.radians(deck.number("precone"))))
-    return {"length": radius - hub, **place, "tip_mass": deck.number("tip_mass"), **keys}
+    return {"length": length, **place, "tip_mass": deck.number("tip_mass"), **keys}
 
 
 def _keys(deck: Deck, asked: Asked, length: float, factors: dict[str, float]) -> dict[str, Any]:
@@ -132,12 +131,9 @@ def _table(deck: Deck) -> tuple[Array, dict[str, Array], int]:
     if names[0] not in FIRST or names[1:] != COLUMNS:
         deck.fail(f"columns must be {FIRST[0]} {' '.join(COLUMNS)}", head)
     first = head + 2  # below the units
-    values = np.array(deck.rows(first, count, len(names))).T
-    x, table = values[0], dict(zip(COLUMNS, values[1:], strict=True))
+    table = deck.table(first, count, names, POSITIVE)
+    x = table.pop(names[0])
     deck.increasing(x, first, 1.0, names[0])
-    for column, name in enumerate(COLUMNS, start=2):
-        for i in np.flatnonzero(table[name] <= 0.0) if name in POSITIVE else ():
-            deck.fail(f"{name} must be greater than 0, not {table[name][i]:g}", first + int(i), column)
     for i in np.flatnonzero(table["tw_iner"] != table["str_tw"]):
         deck.fail(
             "tw_iner must be str_tw: principal axes of mass and stiffness that differ are not read", first + int(i), 3

@@ -1,16 +1,22 @@
-"""The text of a blade file, read line by line, with errors that name file, line and column."""
+"""Blade files of other programs: their text with errors that name line and column, and what a format of them is."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, ClassVar, NoReturn
+
+import numpy as np
 
 from rotfem.errors import show, shown
+from rotfem.registry import Registry
+from rotfem.registry import blade_formats as registered
 from rotfem.scene.files import SHOWN_CELL, Unreadable, read_bytes
-from rotfem.scene.values import problem
+from rotfem.scene.table import as_name, problem
+from rotfem.scene.values import Array
 
 #: Bytes of a blade file, at most.
 LARGEST = 50_000_000
@@ -38,15 +44,10 @@ def find_file(folder: Path, name: str) -> Path | None:
 class Deck:
     """A blade file, in UTF-8 or else in Latin-1, as old ones are.
 
-    Args:
-        path: the file.
-
     Attributes:
+        path: the file.
         text: its content, lines ended by line feeds.
         lines: without their ends; messages count them from 1.
-
-    Raises:
-        PydanticCustomError: it cannot be read as text.
     """
 
     def __init__(self, path: Path):
@@ -65,35 +66,9 @@ class Deck:
         self.lines = self.text.split("\n")
 
     def fail(self, reason: str, line: int | None = None, column: int | None = None) -> NoReturn:
-        """Refuse the file.
-
-        Args:
-            reason: what is wrong and what is allowed.
-            line: from 1.
-            column: of the value, from 1.
-
-        Raises:
-            PydanticCustomError: always.
-        """
+        """Refuse the file: what is wrong and what is allowed, with line and column of the value, from 1."""
         where = "" if line is None else f"line {line}: " if column is None else f"line {line}, column {column}: "
         raise problem("", shown(self.path), f"{where}{reason}")
-
-    def check_version(self, program: str, known: Sequence[str], kind: str = "blade") -> None:
-        """Refuse a file whose first line does not name a version that is known.
-
-        Args:
-            program: whose file it is, which stands before the version.
-            known: versions, such as "1.00".
-            kind: which of its files it is.
-
-        Raises:
-            PydanticCustomError: it names another one, or none.
-        """
-        found = re.search(rf"{program}\s+V(\d+\.\d+)", self.lines[0], re.IGNORECASE)
-        if found is None or found[1] not in known:
-            version = found[1] if found else "missing"
-            possessive = f"{program}'" if program.endswith("s") else f"{program}'s"
-            self.fail(f"the version of {possessive} {kind} file is {version}; known: {', '.join(known)}", 1)
 
     def find(self, words: str, start: int = 1) -> int:
         """Return the number of the first line, not before start, in which all words stand, whatever their case."""
@@ -166,7 +141,25 @@ class Deck:
         """Return the numbers of successive lines."""
         return [self.row(first + i, columns) for i in range(count)]
 
-    def increasing(self, values: Sequence[float], first: int, last: float | None = None, what: str = "x") -> None:
+    def table(self, first: int, count: int, names: Sequence[str], positive: Collection[str]) -> dict[str, Array]:
+        """Return the columns (count,) of successive lines by name; refuse values that must be positive and are not."""
+        table = dict(zip(names, np.array(self.rows(first, count, len(names))).T, strict=True))
+        for column, name in enumerate(names, start=1):
+            for i in np.flatnonzero(table[name] <= 0.0) if name in positive else ():
+                self.fail(f"{name} must be greater than 0, not {table[name][i]:g}", first + int(i), column)
+        return table
+
+    def hub_and_length(self, hub: str, tip: str) -> tuple[float, float]:
+        """Return the radius of the hub and the length beyond it (m) of lines `value  name …`."""
+        inner, outer = self.number(hub), self.number(tip)
+        if not 0.0 <= inner < outer:
+            reason = f"{hub} = {inner:g} must be at least 0 and less than {tip} = {outer:g}"
+            self.fail(reason, self.named(hub)[0], 1)
+        return inner, outer - inner
+
+    def increasing(
+        self, values: Sequence[float] | Array, first: int, last: float | None = None, what: str = "x"
+    ) -> None:
         """Refuse a first column, on lines from `first` on, that does not rise from 0 strictly (up to `last`)."""
         if values[0] != 0.0:
             self.fail(f"{what} must start at 0, not at {values[0]:g}", first, 1)
@@ -175,3 +168,90 @@ class Deck:
                 self.fail(f"{what} must increase: {values[i]:g} ≤ {values[i - 1]:g}", first + i, 1)
         if last is not None and not math.isclose(values[-1], last, rel_tol=1e-6):
             self.fail(f"{what} must end at {last:g}, not at {values[-1]:g}", first + len(values) - 1, 1)
+
+
+# --- formats ---------------------------------------------------------------------------------------------------------
+
+#: Keys of [structure] that a scene may give beside a file that has them: they say how the blade is used.
+SETTINGS = ("damping", "root")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a scene gives of a blade in addition to its file.
+
+    Attributes:
+        structure: the table [structure] as it is given, without its section.
+        section: the table of the section as it is given.
+        hints: what the files have and the scene does not get; readers add to it.
+    """
+
+    structure: Mapping[str, Any]
+    section: Mapping[str, Any]
+    hints: list[str] = field(default_factory=list)
+
+    def length(self, deck: Deck, why: str) -> float:
+        """Return structure.length (m), which the file does not have; refuse a scene without."""
+        length = self.structure.get("length")
+        if not isinstance(length, int | float) or isinstance(length, bool) or not length > 0.0:
+            raise problem("length", length, f"must be given, greater than 0 (m), beside {deck.path.name}: {why}")
+        return float(length)
+
+    def needs(self, deck: Deck, keys: tuple[str, ...], why: str) -> None:
+        """Refuse a file that leaves properties open which the scene does not give."""
+        missing = [key for key in keys if key not in self.section]
+        if missing:
+            raise problem("section", None, f"must have {', '.join(missing)} beside {deck.path.name}: {why}")
+
+    def leaves_out(self, deck: Deck, what: str, key: str = "") -> None:
+        """Say what a file has that is not taken, and the key of the scene that takes its place."""
+        self.hints.append(f"{deck.path.name}: left out: {what}" + (f"; {key} is the key for it" if key else ""))
+
+
+@dataclass(frozen=True)
+class BladeFormat:
+    """A format of blade files.
+
+    Attributes:
+        name: what `section.format` calls it.
+        what: which files these are, in words.
+        recognises: whether a file says that it is one of these.
+        read: (file, what the scene says beside it) ↦ keys of [structure], section among them.
+    """
+
+    registry: ClassVar[Registry[BladeFormat]] = registered
+
+    name: str
+    what: str
+    recognises: Callable[[Deck], bool]
+    read: Callable[[Deck, Asked], dict[str, Any]]
+
+
+def format_of(deck: Deck, name: Any) -> BladeFormat:
+    """Return the format that is asked for, or the one format that a file says it has."""
+    if name is not None:
+        chosen: BladeFormat = registered[as_name(name, registered, "section.format")]
+        return chosen
+    found: list[BladeFormat] = [each for each in registered if each.recognises(deck)]
+    if len(found) != 1:
+        known = "; ".join(f"{show(each.name)}: {each.what}" for each in registered)
+        deck.fail(f"does not say which format it has; give section.format, or a file of one of these: {known}")
+    return found[0]
+
+
+def keys_of(path: Path, asked: Asked) -> dict[str, Any]:
+    """Return the keys of [structure] that a blade file stands for, merged with those of the scene.
+
+    Damping and pitch are the scene's, where it has them; what else both have is refused.
+    """
+    deck = Deck(path)
+    kind = format_of(deck, asked.section.get("format"))
+    with np.errstate(all="ignore"):  # what overflows is refused by the section, with its key
+        read = kind.read(deck, asked)
+    own = {key: value for key, value in asked.section.items() if key not in ("from", "format", "set", "body")}
+    for where, given, there in (("section.", own, read["section"]), ("", asked.structure, read)):
+        for key in there:
+            if key in given and key not in ("section", *SETTINGS):
+                raise problem(f"{where}{key}", None, f"given twice; {path.name} has it too")
+    settings = {key: asked.structure[key] for key in SETTINGS if key in asked.structure}
+    return {**asked.structure, **read, **settings, "section": {**read["section"], **own}}

@@ -24,11 +24,10 @@ import numpy as np
 
 from rotfem.errors import show
 from rotfem.registry import register
-from rotfem.scene.blades.axes import FROM_HAWC2, about_axis, is_positive, rows_over, shifted, turned_matrix
-from rotfem.scene.blades.deck import Deck, find_file
-from rotfem.scene.blades.formats import Asked, BladeFormat
-from rotfem.scene.reference_line import as_line, line_through
-from rotfem.scene.values import Array, problem
+from rotfem.scene.blades.axes import FROM_HAWC2, about_axis, line_of, rows_over, shifted, turned_matrix
+from rotfem.scene.blades.deck import Asked, BladeFormat, Deck, find_file
+from rotfem.scene.table import problem
+from rotfem.scene.values import Array, is_positive
 
 #: Columns of a row with centres, and with a full matrix.
 CENTRES = [
@@ -38,26 +37,8 @@ CENTRES = [
 FULL = ["r", "m", "x_cg", "y_cg", "ri_x", "ri_y", "pitch", "x_e", "y_e"]
 FULL += [f"K{i + 1}{j + 1}" for i, j in zip(*np.triu_indices(6), strict=True)]
 
-#: Columns that must be greater than 0.
-POSITIVE = (
-    "m",
-    "ri_x",
-    "ri_y",
-    "E",
-    "G",
-    "I_x",
-    "I_y",
-    "I_p",
-    "k_x",
-    "k_y",
-    "A",
-    "K11",
-    "K22",
-    "K33",
-    "K44",
-    "K55",
-    "K66",
-)
+#: Columns that must be greater than 0: sizes of a section, and the diagonal of a matrix.
+POSITIVE = {"m", "ri_x", "ri_y", "E", "G", "I_x", "I_y", "I_p", "k_x", "k_y", "A", *(f"K{i}{i}" for i in range(1, 7))}
 
 #: Part by which the last r may differ from the arc length of the line, above which that is reported. Both describe
 #: one blade; r often counts along its straight axis, which is shorter than a prebent line.
@@ -106,9 +87,7 @@ def _body(deck: Deck, asked: Asked) -> dict[str, Any]:
         extra.fail("concentrated_mass is not read; take it out and give structure.masses in the scene")
     rows, head = _c2_def(body)
     points = np.array(rows)
-    line = (points[:, :3] - points[0, :3]) @ FROM_HAWC2.T
-    through = line_through(as_line(line.tolist()))
-    at = np.array([0.0, *through.knots, through.length])
+    line, through, at = line_of((points[:, :3] - points[0, :3]) @ FROM_HAWC2.T)
     if len(at) != len(line):
         head.fail("two points of c2_def are the same")
     beam = body.block("timoschenko_input")
@@ -126,7 +105,7 @@ def _body(deck: Deck, asked: Asked) -> dict[str, Any]:
         if body.find(name) is not None:
             asked.leaves_out(deck, f"{name} of {body.command('name').words[1]}", "structure.damping")
     section = _section(_up_to(table, through.length))
-    return {"line": line.tolist(), "pretwist": rows_over(at, np.radians(points[:, 3])), "section": section}
+    return {"line": line, "pretwist": rows_over(at, np.radians(points[:, 3])), "section": section}
 
 
 def _up_to(table: dict[str, Array], length: float) -> dict[str, Array]:
@@ -159,11 +138,8 @@ def _table(deck: Deck, wanted: Any, full: bool | None = None) -> dict[str, Array
         kinds = {len(CENTRES): "with centres", len(FULL): "with a full matrix"}
         allowed = ", or ".join(f"{number} {kinds[number]}" for number in known)
         deck.fail(f"has {columns} columns; must be {allowed}" + ("" if full is None else f", as FPM {full:d}"), first)
-    table = dict(zip(known[columns], np.array(deck.rows(first, count, columns)).T, strict=True))
+    table = deck.table(first, count, known[columns], POSITIVE)
     deck.increasing(table["r"], first, what="r")
-    for column, name in enumerate(known[columns], start=1):
-        for i in np.flatnonzero(table[name] <= 0.0) if name in POSITIVE else ():
-            deck.fail(f"{name} must be greater than 0, not {table[name][i]:g}", first + int(i), column)
     for i in range(count) if "K11" in table else ():
         if not is_positive(_stiffness({name: values[i] for name, values in table.items()})):
             deck.fail("the stiffness matrix is not positive definite", first + i)

@@ -22,19 +22,18 @@ import numpy as np
 from rotfem.registry import register
 from rotfem.scene.blades.axes import (
     FROM_IEC,
+    SYMMETRIC,
     coned_root,
     iec_pretwist,
-    is_positive,
     is_symmetric,
+    line_of,
     rows_over,
     scaled_rows,
     symmetric,
     turned_matrix,
 )
-from rotfem.scene.blades.deck import Deck
-from rotfem.scene.blades.formats import Asked, BladeFormat
-from rotfem.scene.reference_line import as_line, line_through
-from rotfem.scene.values import Array
+from rotfem.scene.blades.deck import Asked, BladeFormat, Deck
+from rotfem.scene.values import Array, is_positive
 
 #: Values of CompElast that are known: blades of ElastoDyn, and of BeamDyn on ElastoDyn's hub.
 ELASTODYN, BEAMDYN = 1, 2
@@ -91,7 +90,7 @@ def _elastodyn(deck: Deck, asked: Asked) -> dict[str, Any]:
     """Return section, pretwist and damping; of a main file length, root and tip mass too."""
     if not _is_main(deck):
         return _blade(deck, asked)
-    length, place = deck.number("TipRad") - deck.number("HubRad"), _root(deck, asked)
+    length, place = deck.hub_and_length("HubRad", "TipRad")[1], _root(deck, asked)
     blade = deck.file("BldFile1" if deck.has("BldFile1") else "BldFile(1)")
     return {"length": length, **place, "tip_mass": _tip_mass(deck), **_blade(blade, asked, length)}
 
@@ -108,9 +107,7 @@ def _root(deck: Deck, asked: Asked) -> dict[str, Any]:
     """Return where a main file has the root of blade 1, its precone and its pitch, about −z there."""
     if not _is_main(deck):
         deck.fail("must be ElastoDyn's main file, with a value of TipRad")
-    tip, hub = deck.number("TipRad"), deck.number("HubRad")
-    if not 0.0 <= hub < tip:
-        deck.fail(f"HubRad = {hub:g} must be at least 0 and less than TipRad = {tip:g}", deck.named("HubRad")[0], 1)
+    hub, _ = deck.hub_and_length("HubRad", "TipRad")
     if deck.has("RotSpeed") and (speed := deck.number("RotSpeed")) != 0.0:
         asked.leaves_out(deck, f"RotSpeed = {speed:g} rpm = {speed * np.pi / 30:.6g} rad/s", "motion.speed")
     keys = coned_root(hub, float(np.radians(deck.number("PreCone(1)"))))
@@ -161,11 +158,8 @@ def _columns(deck: Deck, head: int, count: int) -> dict[str, Array]:
     if missing := [name for name in NEEDED if name not in names]:
         deck.fail(f"the columns {', '.join(missing)} are missing", head)
     first = head + 2
-    table = dict(zip(names, np.array(deck.rows(first, count, len(names))).T, strict=True))
+    table = deck.table(first, count, names, NEEDED[2:])
     deck.increasing(table["BlFract"], first, 1.0, "BlFract")
-    for name in ("BMassDen", "FlpStff", "EdgStff"):
-        for i in np.flatnonzero(table[name] <= 0.0):
-            deck.fail(f"{name} must be greater than 0, not {table[name][i]:g}", first + int(i), names.index(name) + 1)
     return table
 
 
@@ -202,14 +196,12 @@ def _primary(deck: Deck, asked: Asked) -> dict[str, Any]:
     line = points[:, :3] @ FROM_IEC.T
     if np.linalg.norm(line[0]) > ORIGIN * np.linalg.norm(line[-1]):
         deck.fail("the first key point must be (0, 0, 0)", first)
-    line -= line[0]
-    through = line_through(as_line(line.tolist()))
-    at = np.array([0.0, *through.knots, through.length])
+    rows, through, at = line_of(line)
     if len(at) != count:
         deck.fail("two key points are the same", first)
     pretwist = iec_pretwist(through.at(at)[1], np.radians(points[:, 3]))
     return {
-        "line": line.tolist(),
+        "line": rows,
         "pretwist": rows_over(at, pretwist),
         **_matrices(deck.file("BldFile"), asked, through.length),
     }
@@ -233,7 +225,7 @@ def _matrices(deck: Deck, asked: Asked, length: float) -> dict[str, Any]:
             matrix = np.array(deck.rows(line, 6, 6))
             if not is_symmetric(matrix):
                 deck.fail(f"the {name} matrix of station {len(stations)} is not symmetric", line)
-            if not is_positive(symmetric(matrix), definite=name == "stiffness"):
+            if not is_positive(symmetric(matrix), name == "stiffness", SYMMETRIC):
                 deck.fail(f"the {name} matrix of station {len(stations)} is not positive definite", line)
             found.append(symmetric(turned_matrix(matrix, FROM_IEC)))
             line += 6

@@ -18,17 +18,16 @@ import numpy as np
 from rotfem.registry import register
 from rotfem.scene.blades.axes import (
     FROM_IEC,
+    SYMMETRIC,
     coned_root,
     iec_pretwist,
-    is_positive,
+    line_of,
     rows_over,
     scaled_rows,
     turned_matrix,
 )
-from rotfem.scene.blades.deck import Deck
-from rotfem.scene.blades.formats import Asked, BladeFormat
-from rotfem.scene.reference_line import as_line, line_through
-from rotfem.scene.values import Array
+from rotfem.scene.blades.deck import Asked, BladeFormat, Deck
+from rotfem.scene.values import Array, is_positive
 
 #: Key that later versions have, and those that are known.
 VERSION, KNOWN = "windIO_version", re.compile(r"2\.[01](\.\d+)?")
@@ -102,13 +101,11 @@ def _axis(axis: YamlNode, twist: YamlNode, degrees: bool) -> tuple[list[Any], fl
     grid = np.unique(np.concatenate([places for places, _ in parts]))
     grid = grid[np.concatenate([[True], np.diff(grid) > SAME])]
     line = np.stack([np.interp(grid, *part) for part in parts], axis=-1) @ FROM_IEC.T
-    line -= line[0]
-    through = line_through(as_line(line.tolist()))
-    at = np.array([0.0, *through.knots, through.length])
+    rows, through, at = line_of(line)
     angles = twist["values"].numbers()
     angles = np.interp(at / through.length, twist["grid"].grid(len(angles)), angles)
     pretwist = iec_pretwist(through.at(at)[1], np.radians(angles) if degrees else angles)
-    return line.tolist(), through.length, rows_over(at, pretwist)
+    return rows, through.length, rows_over(at, pretwist)
 
 
 def _hub(tree: YamlNode, degrees: bool) -> dict[str, Any]:
@@ -190,7 +187,7 @@ def _column_or_zeros(table: YamlNode, name: str, count: int) -> Array:
 def _checked(matrices: Array, places: list[YamlNode], definite: bool) -> Array:
     """Return matrices (n, 6, 6); refuse one that no section has where its numbers stand."""
     for matrix, place in zip(matrices, places, strict=True):
-        if not is_positive(matrix, definite):
+        if not is_positive(matrix, definite, SYMMETRIC):
             place.fail(
                 "is of a matrix that is not positive definite" + ("; nor may shear stiffness be 0" if definite else "")
             )

@@ -1,0 +1,244 @@
+"""A table of the scene: its keys, alternatives among them, and from the errors of validation to one readable error."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
+from typing import TYPE_CHECKING, Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
+
+from rotfem.errors import Problem, SceneError, show
+from rotfem.registry import Registry
+
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+else:
+    ModelMetaclass = type(BaseModel)  # which has no public name
+
+# Names that validation puts into the path of an error to say which kind of table it tried.
+_TAGS = {
+    "structure": {"planar_beam", "spatial_beam", "plate"},
+    "motion": {"constant", "spin_up", "table", "torque", "callable", "law"},
+    "mesh": {"beam", "plate"},
+}
+
+
+def problem(key: str, value: Any, allowed: str) -> PydanticCustomError:
+    """Return a validation error that names a key.
+
+    Args:
+        key: dotted path relative to the table being validated; empty for the validated value itself.
+        value: the offending value, None if the key is absent.
+        allowed: what is wrong and what is allowed.
+    """
+    return PydanticCustomError("scene", "{reason}", {"reason": allowed, "key": key, "value": value})
+
+
+@contextmanager
+def problems_at(key: str, value: Any, before: str = "") -> Iterator[None]:
+    """Let a problem raised inside name a key and its value, with some words before what it says."""
+    try:
+        yield
+    except PydanticCustomError as error:
+        raise problem(key, value, f"{before}{error.message()}") from None
+
+
+def did_you_mean(name: object, names: Iterable[str]) -> str:
+    """Return 'did you mean "x"? ' for the name closest to `name`, or an empty string if none is close."""
+    matches = difflib.get_close_matches(str(name), list(names), n=1)
+    return f'did you mean "{matches[0]}"? ' if matches else ""
+
+
+def as_name(value: Any, registry: Registry[Any], key: str = "") -> str:
+    """Return the value; raise a problem at `key` if it is not the name of an entry."""
+    names = registry.names
+    if isinstance(value, str) and value in names:
+        return value
+    raise problem(key, value, f"{did_you_mean(value, names)}allowed: {', '.join(map(show, names))}")
+
+
+def as_names(value: Any, names: Sequence[str], kind: str, others: str = "") -> tuple[str, ...]:
+    """Return a list of names as a tuple; raise if one is not among `names`, or is listed twice.
+
+    Args:
+        value: the list.
+        names: those that there are.
+        kind: what a name stands for, such as "an effect".
+        others: what is allowed instead of a list, for the error message.
+    """
+    allowed = f"allowed: {others}a list of {', '.join(names)}" if names else "none are registered"
+    if not isinstance(value, list | tuple):
+        raise problem("", value, allowed)
+    for name in value:
+        if name not in names:
+            raise problem("", value, f"{show(name)} is not {kind}; {did_you_mean(name, names)}{allowed}")
+        if list(value).count(name) > 1:
+            raise problem("", value, f"{show(name)} is listed twice")
+    return tuple(value)
+
+
+# --- tables -----------------------------------------------------------------------------------------------------------
+
+
+class InputErrors(ModelMetaclass):
+    """The metaclass of tables: what a script makes of wrong values is an `InputError`, as in a scene."""
+
+    def __call__(cls, *args: Any, **kwargs: Any) -> Any:
+        """Return the table.
+
+        Raises:
+            SceneError: it is not valid; the name of the class stands for that of the file.
+        """
+        try:
+            return super().__call__(*args, **kwargs)
+        except ValidationError as error:
+            raise scene_error(cls.__name__, error) from None
+
+
+class SceneModel(BaseModel, metaclass=InputErrors):
+    """A table of the scene: immutable, and unknown or missing keys are errors that say what is allowed."""
+
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
+
+    @classmethod
+    def keys(cls) -> list[str]:
+        """Return all keys that the table may have."""
+        return list(cls.model_fields)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _check_keys(cls, data: Any) -> Any:
+        if isinstance(data, cls):
+            return data
+        if not isinstance(data, Mapping):
+            raise problem("", data, "must be a table of key = value pairs")
+        names = cls.keys()
+        for key in data:
+            if key not in names:
+                hint = did_you_mean(key, names)
+                raise problem(str(key), None, f"unknown key; {hint}allowed: {', '.join(names)}")
+        for name, field in cls.model_fields.items():
+            if field.is_required() and name not in data:
+                raise problem(name, None, f"required key is missing; must be {field.description or 'given'}")
+        return data
+
+
+@dataclass(frozen=True)
+class Way:
+    """A complete set of keys, of which a table must hold exactly one.
+
+    Attributes:
+        name: what the set is called.
+        required: keys that must be given.
+        optional: keys that may be given.
+        shape: value the key `shape` must have, if it is among the required ones.
+    """
+
+    name: str
+    required: tuple[str, ...]
+    optional: tuple[str, ...] = ()
+    shape: str | None = None
+
+    def __str__(self) -> str:
+        keys = ", ".join(f'shape = "{self.shape}"' if key == "shape" else key for key in self.required)
+        return f"{keys} (optional: {', '.join(self.optional)})" if self.optional else keys
+
+
+def choose_way(given: dict[str, object], ways: Sequence[Way]) -> Way:
+    """Return the way that the given keys make up; raise if none, saying what is missing or does not belong."""
+    keys = set(given)
+
+    def misfit(way: Way) -> tuple[bool, int]:
+        wrong_shape = "shape" in keys and way.shape != given["shape"]
+        return wrong_shape, len(set(way.required) - keys) + len(keys - {*way.required, *way.optional})
+
+    nearest = min(ways, key=misfit)
+    if misfit(nearest) == (False, 0):
+        return nearest
+    parts = [] if given else ["none is given"]
+    if given and (missing := [key for key in nearest.required if key not in keys]):
+        parts.append(f"missing {', '.join(missing)}")
+    if foreign := [key for key in given if key not in {*nearest.required, *nearest.optional}]:
+        parts.append(f"{', '.join(foreign)} cannot be combined with the rest")
+    possible = "".join(f"\n    ({i}) {way}" for i, way in enumerate(ways, start=1))
+    raise problem("", None, f"not a complete set of keys: {'; '.join(parts)}; give exactly one of{possible}")
+
+
+def parameters_of(entry: type) -> dict[str, Field[Any]]:
+    """Return name ↦ field of the parameters of a registered class, which are keys of a table: those of a dataclass."""
+    return {field.name: field for field in fields(entry) if field.init} if is_dataclass(entry) else {}
+
+
+def with_parameters(table: type[SceneModel], data: Mapping[str, Any], key: str, registry: Registry[Any]) -> Any:
+    """Return the data of a table with the parameters that are not given of the class that `key` names.
+
+    Raise where there is no such class, or a parameter without a default is missing.
+    """
+    name, defaults = as_name(data[key], registry, key), dict[str, Any]()
+    for parameter, field in parameters_of(registry[name]).items():
+        if parameter in table.model_fields:
+            raise problem(key, name, f"cannot have a parameter {parameter}, which is a key of the table already")
+        if field.default is not MISSING:
+            defaults[parameter] = field.default
+        elif parameter not in data:
+            raise problem(parameter, None, f'required key is missing; {key} = "{name}" needs it')
+    return {**defaults, **data}
+
+
+def check_parameters(entry: Any, key: str, parameters: Mapping[str, Any]) -> None:
+    """Refuse parameters that the registered class that `key` names does not have, or not allow."""
+    for name, value in parameters.items():
+        if name not in parameters_of(entry):
+            raise problem(name, value, f'has no meaning with {key} = "{entry.name}"')
+    for name, allowed in entry.check(dict(parameters)).items():
+        raise problem(name, parameters[name], allowed)
+
+
+# --- errors -----------------------------------------------------------------------------------------------------------
+
+
+def scene_error(file: str, error: ValidationError) -> SceneError:
+    """Return the problems found by validation as one error."""
+    first, *others = [_problem(dict(details)) for details in error.errors(include_url=False)]
+    return SceneError(file, *first, others)
+
+
+#: Types of pydantic's errors ↦ what is allowed.
+_ALLOWED = {
+    **dict.fromkeys(("model_type", "model_attributes_type", "dict_type"), "must be a table of key = value pairs"),
+    "tuple_type": "must be a list of tables",
+    "bool_type": "must be true or false",
+}
+
+
+def _problem(details: dict[str, Any]) -> Problem:
+    path = list(details["loc"])
+    if len(path) > 1 and path[1] in _TAGS.get(str(path[0]), ()):
+        del path[1]
+    context: dict[str, Any] = details.get("ctx", {})
+    value, kind = details["input"], details["type"]
+    if kind == "scene":
+        if context["key"]:
+            path.append(context["key"])
+        value = context["value"] if context["key"] or context["value"] is None else value
+        reason = context["reason"]
+    elif kind in ("literal_error", "union_tag_invalid"):
+        names = re.findall(r"'([^']*)'", context.get("expected") or context.get("expected_tags", ""))
+        if kind == "union_tag_invalid":
+            path.append("type")
+            value = value.get("type") if isinstance(value, Mapping) else value
+        reason = f"{did_you_mean(value, names)}allowed: {', '.join(show(name) for name in names)}"
+    elif kind == "union_tag_not_found":
+        path.append("type")
+        value, reason = None, f"required key is missing; allowed: {', '.join(map(show, sorted(_TAGS[str(path[0])])))}"
+    else:
+        message = str(details["msg"])
+        reason = _ALLOWED.get(kind, message[0].lower() + message[1:])
+    if isinstance(value, Mapping):
+        value = None  # a whole table says nothing that its key does not
+    return Problem(".".join(str(part) for part in path), value, reason)
