@@ -21,7 +21,7 @@ from rotfem.results import Result
 from rotfem.results.files import json_text, rows_text, write_text
 from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows
 from rotfem.scene import Scene
-from rotfem.scene.beam_files import is_path
+from rotfem.scene.span_tables import is_path
 
 if TYPE_CHECKING:
     import pandas
