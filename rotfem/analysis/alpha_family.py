@@ -54,17 +54,26 @@ class AlphaFamily(Scheme):
         """Return the step that keeps q̈, which is free of residual when the acceleration is constant."""
         alpha_m, alpha_f, beta, gamma = self.coefficients
         old = state.memory
-        a = (state.a - alpha_m * old) / (1 - alpha_m)
-        q = state.q + h * state.v + h * h * ((0.5 - beta) * old + beta * a)
-        v = state.v + h * ((1 - gamma) * old + gamma * a)
+        a = state.a - alpha_m * old
+        a /= 1 - alpha_m
+        q, v = (0.5 - beta) * old, (1 - gamma) * old
+        q += beta * a
+        q *= h * h
+        q += state.q + h * state.v
+        v += gamma * a
+        v *= h
+        v += state.v
         c_a = 1 / (beta * h * h)
         return Stage(end, q, v, state.a.copy(), gamma * h * c_a, (1 - alpha_m) / (1 - alpha_f) * c_a)
 
     def finish(self, state: State, h: float, done: Sequence[Stage]) -> State:
         """Return the state of the one stage; the auxiliary acceleration follows from its definition."""
         s, (alpha_m, alpha_f, _, _) = done[0], self.coefficients
-        mean = (1 - alpha_f) * s.a + alpha_f * state.a
-        return State(s.t, s.q, s.v, s.a, (mean - alpha_m * state.memory) / (1 - alpha_m))
+        memory = (1 - alpha_f) * s.a
+        memory += alpha_f * state.a
+        memory -= alpha_m * state.memory
+        memory /= 1 - alpha_m
+        return State(s.t, s.q, s.v, s.a, memory)
 
     def local_error(self, new: State, old: State) -> Array:
         """Return |β − 1/6| h² |a_{n+1} − a_n|.

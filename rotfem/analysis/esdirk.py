@@ -56,13 +56,12 @@ class ESDIRK4(Scheme):
 
     def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
         """Return stage i + 2 of the method, predicted by the acceleration of the stage before."""
-        row, t = A[i + 1], end if i == self.stages - 1 else state.t + C[i + 1] * h
-        q_known, v_known = state.q + h * row[0] * state.v, state.v + h * row[0] * state.a
-        for weight, before in zip(row[1:], done, strict=False):
-            q_known, v_known = q_known + h * weight * before.v, v_known + h * weight * before.a
-        a = (done[-1] if done else state).a.copy()
-        v = v_known + GAMMA * h * a
-        return Stage(t, q_known + GAMMA * h * v, v, a, 1 / (GAMMA * h), 1 / (GAMMA * h) ** 2)
+        t = end if i == self.stages - 1 else state.t + C[i + 1] * h
+        before: list[State | Stage] = [state, *done]
+        weights, a = h * A[i + 1, : i + 1], before[-1].a.copy()
+        v = state.v + weights @ np.array([s.a for s in before]) + GAMMA * h * a
+        q = state.q + weights @ np.array([s.v for s in before]) + GAMMA * h * v
+        return Stage(t, q, v, a, 1 / (GAMMA * h), 1 / (GAMMA * h) ** 2)
 
     def finish(self, state: State, h: float, done: Sequence[Stage]) -> State:
         """Return the last stage, and with it the local error of q.

@@ -101,25 +101,27 @@ def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State
     Raises:
         ComputationError: the step failed, however short.
     """
-    old, before = None, state
-    finish = View(-1 if leg.lands else 0, (leg.length, 0.0) if leg.averaged else None)
-    if leg.drifts:
-        state = stepper.drift(state, leg.length, leg.end, finish)
+    old = state
+    if leg.free:
+        state = stepper.advance(old, leg.length, leg.end)
+    elif leg.drifts:
+        state = stepper.drift(old, leg.length, leg.end, leg.finish)
     else:
         joined = after is not None and leg.joins(after)
         window = (leg.length, after.length if after is not None and joined else 0.0) if leg.averaged else None
         with seen(stepper.system, View(-1 if leg.lands else 0, window)):
-            old, state = state, stepper.advance(state, leg.length, leg.end)
+            state = stepper.advance(old, leg.length, leg.end)
     if stepper.observer is not None:
-        stepper.observer(before, state, leg)
-    if after is None:
+        stepper.observer(old, state, leg)
+    if after is None or (leg.length == after.length and leg.doubles(after)):
         return state
-    if old is not None and not after.drifts and after.length != leg.length:
+    if not leg.drifts and not after.drifts and after.length != leg.length:
         state = stepper.scheme.resized(state, old, after.length)
     if leg.lands or ((leg.averaged or after.averaged) and not leg.joins(after)):
         ahead = View(1 if leg.lands else 0, (0.0, after.length) if after.averaged else None)
-        state = stepper.restart(state, finish, ahead)
-    if old is not None and not (after.drifts or leg.averaged or after.averaged) and bends(stepper.scheme, leg, after):
+        state = stepper.restart(state, leg.finish, ahead)
+    drifts, averaged = leg.drifts or after.drifts, leg.averaged or after.averaged
+    if not (drifts or averaged) and bends(stepper.scheme, leg, after):
         state = bent(stepper, state, leg.length, after.length)
     return state
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from math import prod
 from typing import Any, ClassVar, Protocol
 
@@ -116,6 +117,10 @@ class Stage:
     def __post_init__(self) -> None:
         self.shifts = (1.0, self.c_v, self.c_a)
 
+    def begin_at(self, values: tuple[Array, Array, Array]) -> None:
+        """Write copies of q, v and a."""
+        self.q[:], self.v[:], self.a[:] = values
+
     def correct(self, dq: Array) -> None:
         """Add a correction of q, and what follows from it to v and a."""
         self.q += dq
@@ -153,10 +158,12 @@ class Equations(Protocol):
 
 def divided_difference(points: Sequence[float], values: Sequence[Array]) -> Array:
     """Return the divided difference of values at distinct points: the derivative of order n − 1 over (n − 1)!."""
-    total = np.zeros_like(values[0])
-    for i, value in enumerate(values):
-        total += value / prod(points[i] - p for j, p in enumerate(points) if j != i)
-    return total
+    return np.asarray(_difference_weights(*points) @ np.array(values))
+
+
+@lru_cache(maxsize=8)
+def _difference_weights(*points: float) -> Array:
+    return np.array([1 / prod(x - p for j, p in enumerate(points) if j != i) for i, x in enumerate(points)])
 
 
 class Scheme(ABC):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -121,9 +122,8 @@ class StageSolver:
 
     def solve(self, stage: Stage, state: State) -> None:
         """Solve a stage of a step from a state, with the factor of an earlier one if that serves."""
-        factor = self._old_factor(stage)
+        factor, predicted = self._old_factor(stage), (stage.q.copy(), stage.v.copy(), stage.a.copy())
         if factor is not None and self.back_off.over():
-            predicted = stage.q.copy(), stage.v.copy(), stage.a.copy()
             try:
                 self._iterate(stage, state, factor)
                 if factor.made and self.newton.diverging:
@@ -131,30 +131,28 @@ class StageSolver:
             except ComputationError:  # the old factor does not serve here; nor will the next ones, perhaps
                 self._factored = None
                 self.back_off.failed()
-                stage.q, stage.v, stage.a = predicted
+                stage.begin_at(predicted)
             else:
                 self.back_off.worked()
                 return
         if self.system.solved_at_once:
             self._iterate(stage, state)
             return
-        move = stage.q - state.q
         if self._share < WHOLE:
-            stage.correct((self._share - 1.0) * move)
-        v, a = stage.v - stage.c_v * stage.q, stage.a - stage.c_a * stage.q
+            stage.correct((self._share - 1.0) * (stage.q - state.q))
         try:
             iterations = self._root(stage, state)
         except ComputationError:
             if self._share == 0.0:
                 raise
-            stage.q[:] = state.q  # from where the step starts, whatever was predicted
+            stage.begin_at(predicted)
+            stage.correct(state.q - stage.q)  # from where the step starts, whatever was predicted
             self._share, self._far = 0.0, True
-            stage.v[:], stage.a[:] = v + stage.c_v * stage.q, a + stage.c_a * stage.q
             iterations = self._root(stage, state)
         self._hard |= self.newton.diverging or iterations > MANY
         self._balanced = stage.over is not None
         if self._share < WHOLE or iterations > MANY:
-            self._share = came_true(self.system, stage.q - state.q, move)
+            self._share = came_true(self.system, stage.q - state.q, predicted[0] - state.q)
 
     def _old_factor(self, stage: Stage) -> OldFactor | None:
         """Return who says for how long a factor serves; None where every iteration of a stage has one of its own.
@@ -230,10 +228,9 @@ class StageSolver:
         for k in range(1, LONG + 3):
             d = increment()
             self.newton.iterations += 1
-            if not np.isfinite(d):
+            if not isfinite(d):
                 raise ComputationError("the solution is not finite")
-            size = self.system.size(stage.q)
-            if not chord or self.system.current or d <= REFINED * size:
+            if not chord or self.system.current or d <= REFINED * (size := self.system.size(stage.q)):
                 return k
             if d > RATE * previous:
                 if d <= ROUND_OFF * size:

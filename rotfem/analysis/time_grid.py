@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.errors import InputError
-from rotfem.mechanics.time_signals import SAME, TimeSignal
+from rotfem.mechanics.time_signals import SAME, TimeSignal, View
 
 Array = npt.NDArray[Any]
 
@@ -60,7 +60,7 @@ SLOPE_LEFT, SURE, ROUND_OFF = 0.4, 3, 4e-16
 FAST = 5e-2
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class Leg:
     """A part of a step.
 
@@ -81,6 +81,16 @@ class Leg:
     drifts: bool = False
     whole: bool = True
     plain: bool = True
+
+    @property
+    def free(self) -> bool:
+        """Whether it is stepped with nothing prescribed in it or at its end."""
+        return not (self.lands or self.averaged or self.drifts)
+
+    @property
+    def finish(self) -> View:
+        """How it sees at its end what is prescribed."""
+        return View(-1 if self.lands else 0, (self.length, 0.0) if self.averaged else None)
 
     def doubles(self, after: Leg) -> bool:
         """Return whether this leg and the one after it may be taken as one: nothing prescribed is between them."""
@@ -183,16 +193,15 @@ class TimeGrid:
     def __iter__(self) -> Iterator[tuple[int, Leg]]:
         """Yield number of the step, from 1, and leg."""
         times = as_list(self.times)
-        length = self.step
-        for i in range(1, len(times)):
-            begin, end = times[i - 1], times[i]
-            if i - 1 in self._special:
-                begin = self._special[i - 1][-1][0]
+        length, begin = self.step, times[0]
+        for i, end in enumerate(times[1:], start=1):
             stops: list[Stop] = self._special.get(i) or [(end, False, False)]
             for stop, lands, averaged in stops:
-                # of one length to the last digit, so that the matrix stays
-                known = (c for c in (self.step, length) if abs(stop - begin - c) <= self.close)
-                length = next(known, stop - begin)
+                gone = stop - begin  # of one length to the last digit, so that the matrix stays
+                if abs(gone - self.step) <= self.close:
+                    length = self.step
+                elif abs(gone - length) > self.close:
+                    length = gone
                 drifts = length < LEAST * self.step * (1 + 1e-6)
                 yield i, Leg(stop, length, lands, averaged, drifts, stop == stops[-1][0], length == self.step)
                 begin = stop

@@ -250,14 +250,14 @@ class AffineSystem(AffineStiffness, AffineEnergies):
         """Set the constants of time t (s) and form M, C, K and f there if their coefficients have changed."""
         super().set_time(t, motion, load_factor)
         c = self._products(np.concatenate([ONE, *(constant.value.ravel() for constant in self._all_constants)]))
-        old = self._coefficients
+        first, self.settled = self._coefficients is None, True
+        changed = np.asarray(c != self._coefficients)
         self._coefficients = c
-        self.settled = True
-        if old is not None and np.array_equal(old, c):
+        if not changed.any():
             return
         for kind, operator in self._operators.items():
             selected, operators = self._by_kind[kind]
-            if old is None or not np.array_equal(old[selected], c[selected]):
+            if first or changed[selected].any():
                 combine(operator, operators, c[selected])
                 self._changed, self.settled = True, False
         self._load.zeroEntries()
@@ -283,8 +283,7 @@ class AffineSystem(AffineStiffness, AffineEnergies):
         """Return −(M a + C v + K q + f), zero at clamped unknowns."""
         self._load.copy(self.b)
         for operator, x in zip((self._operators[k] for k in "KCM"), self._qva, strict=True):
-            operator.multAdd(x, self.b, self._work)
-            self._work.copy(self.b)
+            operator.multAdd(x, self.b, self.b)
         if self.by_mode is not None:
             self.b.array[:] += self.by_mode.times(self._qva[1].array)
         self.b.scale(-1.0)

@@ -24,7 +24,7 @@ from rotfem.equations.model import Model
 from rotfem.equations.solutions import Solutions
 from rotfem.errors import ComputationError
 from rotfem.mechanics.loads import is_moment
-from rotfem.mechanics.motion import IDENTITY, Motion
+from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.sums import added
 from rotfem.mechanics.time_signals import TimeSignal, View
 from rotfem.numerics import compat, forms
@@ -66,7 +66,7 @@ class Readings:
 
     def size(self, x: Array) -> float:
         """Return the largest entry of a local dof array in units of `scale`, over all ranks."""
-        here = float(np.max(np.abs(x) / self.scale)) if x.size else 0.0
+        here = float((np.abs(x) / self.scale).max()) if x.size else 0.0
         return here if self.comm.size == 1 else self.comm.allreduce(here, op=MPI.MAX)
 
     def product(self, x: Array, y: Array) -> float:
@@ -383,20 +383,18 @@ class System(Readings, Solutions, ABC):
         if load_factor != 1.0:
             values = {n: v * load_factor if n in ("a_o", "gravity") else v for n, v in values.items()}
         self.model.frame.set(values)
-        for name, value in self.load_values(t, motion).items():
-            self.structure.load_constants[name][0].value[...] = load_factor * value
-        self.structure.update_loads(motion.rotation(t) if self.model.fixed else None)
+        if self.structure.load_constants:
+            for name, value in self.load_values(t, motion).items():
+                self.structure.load_constants[name][0].value[...] = load_factor * value
+            self.structure.update_loads(motion.rotation(t) if self.model.fixed else None)
 
     def load_values(self, t: float, motion: Motion) -> dict[str, Array]:
         """Return the amplitude of every load constant at time t (s); in a fixed frame dead loads turn with the hub."""
-        if not self.structure.load_constants:
-            return {}
-        Q = motion.rotation(t) if self.model.fixed else IDENTITY
-        turning = {load.name for load in self.model.mechanics.loads if load.dead and self.model.fixed}
+        turn = motion.rotation(t) if self.model.fixed else None
         values = {}
         for name, (amplitude, at) in self.structure.load_constants.items():
             value = np.atleast_1d(np.asarray(at(t), dtype=float))
-            values[name] = amplitude.turned(value, Q) if name in turning else value
+            values[name] = value if turn is None or not amplitude.dead else amplitude.turned(value, turn)
         return values
 
     def driven(self, t: float) -> Array:

@@ -51,7 +51,6 @@ class MotionLaw(ABC):
 Scalar = Callable[[float], float]
 Array = npt.NDArray[np.float64]
 
-IDENTITY = np.eye(3)
 
 #: Parts of a smooth spin-up that are nearly straight.
 SPIN_UP_KNOTS = 16

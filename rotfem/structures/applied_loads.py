@@ -31,12 +31,14 @@ class Amplitude:
     Attributes:
         spread: whether these are factors of shapes over the span, not the components of a vector.
         follows_nodes: whether these are values at the nodes of the mesh, not amplitudes of the load itself.
+        dead: whether it keeps its direction in the frame of the hub.
         value: the amplitudes, the same on every process; what is written there holds after `update`.
         vector: the force in the forms.
     """
 
     spread: ClassVar[bool] = False
     follows_nodes: bool = False
+    dead: bool = True
 
     def __init__(self, constant: fem.Constant):
         self.vector: Any = constant
@@ -232,6 +234,7 @@ class LoadsOfStructure:
             made, at = Amplitude(self.constant(np.zeros(size))), lambda t: first(load.at(t), size)
         else:
             made = SpanField.of_shapes(self, load, size)
+        made.dead = load.kind == "dead"
         self.load_constants[name] = (made, at)
         return made.vector
 
@@ -241,6 +244,5 @@ class LoadsOfStructure:
         Args:
             turn: matrix (3, 3) that turns those of dead loads, in a frame that does not turn with the hub.
         """
-        loads = named(self.problem.loads)
-        for name, (amplitude, _) in self.load_constants.items():
-            amplitude.update(turn if loads[name].kind == "dead" else None)
+        for amplitude, _ in self.load_constants.values():
+            amplitude.update(turn if amplitude.dead else None)
