@@ -20,6 +20,7 @@ from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
 from rotfem.errors import ComputationError
 from rotfem.listeners import Progress
 from rotfem.numerics.eigenproblem import SAME
+from rotfem.structures.mode_names import Wave
 
 
 def root(f: Callable[[float], float], ends: tuple[float, float], at_ends: Sequence[float]) -> float | None:
@@ -73,12 +74,16 @@ class Node:
     Attributes:
         requested: whether the speed was asked for (else it refines a step).
         confidence: squared correlation with the previous node, a branch each.
+        conjugate: of which branches it is λ̄ that goes on with what λ was at the first node: ω has passed zero.
     """
 
     spinning: Spinning
     requested: bool
     order: Array = field(default_factory=lambda: np.empty(0, dtype=int))
     confidence: Array = field(default_factory=lambda: np.empty(0))
+    conjugate: Array = field(default_factory=lambda: np.empty(0, dtype=bool))
+    #: How the modes of a rotor precess; None where that was not asked yet.
+    waves: list[Wave] | None = None
 
     @property
     def speed(self) -> float:
@@ -90,9 +95,15 @@ class Node:
         column = self.order[branch]
         return complex(self.spinning.pairs.values[column]) if column >= 0 else complex(np.nan, np.nan)
 
+    def signed(self, branch: int) -> float:
+        """Return ω of a branch (rad/s), negative from where it has passed zero."""
+        return -self.value(branch).imag if self.conjugate[branch] else self.value(branch).imag
 
-def correlation(a: Spinning, b: Spinning) -> tuple[Array, Array]:
+
+def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Array, Array]:
     """Return the squared correlations of the modes at two speeds, shape (m_a, m_b): 1 for equal modes, 0 for different.
+
+    With `conjugate` they are those of the modes at a with the modes of λ̄ at b: real matrices have both.
 
     That of two modes is |y_i^H [(λ_i + μ_j) M + C] x_j|², scaled. Both pencils serve in turn and the mean is taken, so
     the two speeds are treated alike. The second array is this. In the first, modes with one frequency are not
@@ -101,14 +112,16 @@ def correlation(a: Spinning, b: Spinning) -> tuple[Array, Array]:
     """
     ya, yb, xa, xb = a.pairs.left, b.pairs.left, a.pairs.right, b.pairs.right
     la, lb = a.pairs.values, b.pairs.values
+    if conjugate:
+        yb, xb, lb = yb.conj(), xb.conj(), lb.conj()
     here, there = a.pencil.gram(ya, la, xb, lb), b.pencil.gram(yb, lb, xa, la)
     own_a, own_b = a.pencil.gram(ya, la, xa, la), b.pencil.gram(yb, lb, xb, lb)
     # The two products cancel the unknown scaling of x_b and y_b against each other.
     scale = np.outer(*(np.maximum(np.abs(np.diag(own)), 1e-300) for own in (own_a, own_b)))
     single = np.abs(here) * np.abs(there.T) / scale
     joint = single.copy()
-    for i in twins(la):
-        for j in twins(lb):
+    for i in twins(la, a.pairs.bounds):
+        for j in twins(lb, b.pairs.bounds):
             if len(i) > 1 or len(j) > 1:
                 part_a, part_b = np.linalg.pinv(own_a[np.ix_(i, i)]), np.linalg.pinv(own_b[np.ix_(j, j)])
                 product = part_a @ here[np.ix_(i, j)] @ part_b @ there[np.ix_(j, i)]
@@ -116,9 +129,14 @@ def correlation(a: Spinning, b: Spinning) -> tuple[Array, Array]:
     return joint, single
 
 
-def twins(values: Array) -> list[Array]:
-    """Return the indices of eigenvalues (sorted by size) in groups of those that are one, but for TWIN."""
-    apart = np.abs(np.diff(values)) > TWIN * np.abs(values[1:])
+def twins(values: Array, bounds: Array) -> list[Array]:
+    """Return the indices of eigenvalues (sorted by size) in groups of those that are one.
+
+    Args:
+        values: the eigenvalues, 1/s.
+        bounds: their relative error bounds; what is no farther apart than these, or TWIN, is one.
+    """
+    apart = np.abs(np.diff(values)) > np.maximum(TWIN, bounds[1:] + bounds[:-1]) * np.abs(values[1:])
     return np.split(np.arange(len(values)), np.flatnonzero(apart) + 1)
 
 
@@ -128,23 +146,31 @@ def assign(node: Node, following: Node) -> float:
     A branch whose best partner is a stranger has the order −1 from there on.
     """
     known = np.flatnonzero(node.order >= 0)
-    c, single = (np.clip(x[node.order[known]], 0.0, 1.0) for x in correlation(node.spinning, following.spinning))
+    (c, single), (c_bar, single_bar) = (
+        [np.clip(x[node.order[known]], 0.0, 1.0) for x in correlation(node.spinning, following.spinning, conjugate)]
+        for conjugate in (False, True)
+    )
+    passed = c_bar > c
+    c, single = np.maximum(c, c_bar), np.where(passed, single_bar, single)
     rows, columns = linear_sum_assignment(-c - 1e-3 * single)
     following.order = np.full(len(node.order), -1)
     following.confidence = np.zeros(len(node.order))
+    following.conjugate = node.conjugate.copy()
+    following.conjugate[known[rows]] ^= passed[rows, columns]
     following.confidence[known[rows]] = c[rows, columns]
     kin = c[rows, columns] >= STRANGER
     following.order[known[rows[kin]]] = columns[kin]
     return float(np.min(c[rows, columns], initial=1.0))
 
 
-def swapped(a: Node, b: Node) -> bool:
-    """Return whether two branches change their order by frequency between two nodes."""
+def swapped(a: Node, b: Node, count: int) -> bool:
+    """Return whether one of the first branches changes its order by frequency with another between two nodes."""
     both = [i for i in range(len(a.order)) if a.order[i] >= 0 and b.order[i] >= 0]
     wa, wb = (np.array([n.value(i).imag for i in both]) for n in (a, b))
     da, db = wa[:, None] - wa[None, :], wb[:, None] - wb[None, :]
     level = SAME * max(float(np.max(np.abs(wa), initial=0.0)), float(np.max(np.abs(wb), initial=0.0)))
-    return bool(np.any((da > level) & (db < -level)))
+    asked = np.array(both) < count
+    return bool(np.any((da > level) & (db < -level) & (asked[:, None] | asked[None, :])))
 
 
 class Sweep:
@@ -172,6 +198,7 @@ class Sweep:
         first = self.solve(speeds[0], None, True)
         total = len(first.spinning.pairs.values)
         first.order, first.confidence = np.arange(total), np.ones(total)
+        first.conjugate = np.zeros(total, dtype=bool)
         self.nodes = [first]
         self.finest = FINEST * max(speeds[-1] - speeds[0], 1e-300)
         self.most_solves = min(self.most_solves, ADDED + (1 + ADDED_EACH) * len(speeds))
@@ -184,7 +211,7 @@ class Sweep:
         last = self.nodes[-1]
         confidence = assign(last, target)
         near = self._watched(last, target)
-        if (confidence < SURE and near) or swapped(last, target):
+        if (confidence < SURE and near) or swapped(last, target, self.count):
             self.unresolved |= self.solves >= self.most_solves
             if target.speed - last.speed > 2 * self.finest and not self.unresolved:
                 middle = 0.5 * (last.speed + target.speed)
@@ -209,26 +236,68 @@ class Sweep:
         assign(left, node)
         return node
 
-    def crossings(self, orders: int) -> list[dict[str, Any]]:
-        """Return the speeds where a branch meets k Ω, k = 1 … orders, by root finding on the true frequency."""
+    def wave(self, node: Node, branch: int) -> Wave | None:
+        """Return how the mode of a branch precesses at a node; None where it is lost or no rotor's."""
+        if node.waves is None:
+            node.waves = self.analysis.waves(node.spinning)
+        return node.waves[node.order[branch]] if node.waves and node.order[branch] >= 0 else None
+
+    def direction(self, node: Node, branch: int) -> str:
+        """Return "forward" or "backward", how a branch whirls at a node; "" where it stands or is no rotor's."""
+        wave = self.wave(node, branch)
+        return "" if wave is None else wave.direction(node.value(branch).imag, abs(node.speed))
+
+    def critical_speeds(self, orders: int) -> list[dict[str, Any]]:
+        """Return the critical speeds of the branches: the synchronous ones of a rotor first, each kind by speed.
+
+        - "forward": the frequency in the rotor is zero, so that an unbalance, which rests in it, has no stiffness
+          against it. Order 1.
+        - "backward", order 1: a shaft whirls against the spin at the frequency Ω in the fixed frame, 2Ω in the rotor.
+          Order m: a disk's wave of m diameters against the spin stands still in the fixed frame, mΩ in the disk.
+        - "per_rev": the frequency in the rotor is kΩ, order k = 1 … orders.
+        """
         out = []
-        for left, right in zip(self.nodes[:-1], self.nodes[1:], strict=True):
+        for left, right in pairwise(self.nodes):
             for b in range(self.count):
-                for k in range(1, orders + 1):
-                    gap = [n.value(b).imag - k * abs(n.speed) for n in (left, right)]
-                    if not np.all(np.isfinite(gap)) or gap[0] == 0.0 or gap[0] * gap[1] > 0.0:
-                        continue
-
-                    def f(s: float, left: Node = left, b: int = b, k: int = k) -> float:
-                        return self.between(left, s).value(b).imag - k * abs(s)
-
-                    speed = right.speed if gap[1] == 0.0 else root(f, (left.speed, right.speed), gap)
+                at_zero = self._meeting(left, right, b, None)
+                if at_zero is not None and self.wave(left, b) is not None:
+                    out.append(self._critical(b, "forward", 1, 0, at_zero))
+                wave = self.wave(right, b)
+                against = 0 if wave is None else 2 if wave.shaft else wave.number
+                for k in sorted({*range(1, orders + 1), against} - {0}):
+                    speed = self._meeting(left, right, b, k)
                     if speed is None:
                         continue
-                    out.append(
-                        {"branch": b + 1, "per_rev": k, "speed": float(speed), "frequency": k * abs(float(speed))}
-                    )
-        return sorted(out, key=lambda c: c["speed"])
+                    if k == against and self.direction(right, b) == "backward":
+                        assert wave is not None
+                        out.append(self._critical(b, "backward", wave.number, k, speed))
+                    elif k <= orders:
+                        out.append(self._critical(b, "per_rev", k, k, speed))
+        return sorted(out, key=lambda c: (c["kind"] == "per_rev", c["speed"]))
+
+    def _critical(self, branch: int, kind: str, order: int, k: int, speed: float) -> dict[str, Any]:
+        frequency = k * abs(speed)
+        named = {"kind": kind, "order": order, "per_rev": k}
+        return {"speed": speed, **named, "branch": branch + 1, "frequency": frequency}
+
+    def _meeting(self, left: Node, right: Node, b: int, k: int | None) -> float | None:
+        """Return the speed between two nodes where a branch has the frequency kΩ, or passes zero without k; or None."""
+
+        def gap(node: Node) -> float:
+            return node.signed(b) if k is None else node.value(b).imag - k * abs(node.speed)
+
+        def f(speed: float) -> float:
+            try:
+                return gap(self.between(left, speed))
+            except ComputationError:
+                if k is None:
+                    return 0.0  # K is singular: this is the speed
+                raise
+
+        ends = [gap(node) for node in (left, right)]
+        if not np.all(np.isfinite(ends)) or ends[0] == 0.0 or ends[0] * ends[1] > 0.0:
+            return None
+        return right.speed if ends[1] == 0.0 else root(f, (left.speed, right.speed), ends)
 
     def onsets(self) -> list[dict[str, Any]]:
         """Return the ranges in which a mode is unstable, and how: `speed` where each begins, `kind`, and `until`.

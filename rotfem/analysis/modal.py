@@ -14,7 +14,9 @@ those of all modes that a structure at rest has add up to its mass r_iᵀ M r_i 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
+from string import ascii_lowercase
 from time import perf_counter
 from typing import Any
 
@@ -32,6 +34,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.work import kinetic_parts
 from rotfem.numerics.eigenproblem import SAME, ZERO, Eigenpairs, Pencil
 from rotfem.numerics.newton import Newton
+from rotfem.structures.mode_names import Wave
 
 
 def with_overdamped(names: list[str], values: Array, energies: tuple[Array, Array]) -> list[str]:
@@ -59,6 +62,34 @@ def with_overdamped(names: list[str], values: Array, energies: tuple[Array, Arra
         speed = "slow" if abs(values[j]) ** 2 * mass[j] < stiffness[j] else "fast"
         counted[speed][kind] += 1
         out[j] = f"{kind} {vibrating[kind] + counted[speed][kind]}, {speed}"
+    return out
+
+
+def distinct(names: list[str]) -> list[str]:
+    """Return the names; those that occur more than once with a letter each."""
+    letters = [ascii_lowercase[names[:i].count(n) % 26] for i, n in enumerate(names)]
+    return [n if names.count(n) == 1 else f"{n}{letter}" for n, letter in zip(names, letters, strict=True)]
+
+
+def with_whirl(names: list[str], waves: Sequence[Wave], omega: Array, speed: float) -> list[str]:
+    """Return the names of a rotor's modes with the direction they run in, and those of whirl by their place.
+
+    The number of a whirling mode is not that of its nodes, which a disk on the shaft can move. It is its place among
+    those of its direction, by the frequency in the fixed frame: "bending 2 backward".
+
+    Args:
+        names: "kind n" of every mode.
+        waves: their precession.
+        omega: their frequencies in the rotor, rad/s.
+        speed: Ω ≥ 0, rad/s.
+    """
+    ways = [wave.direction(w, speed) for wave, w in zip(waves, omega, strict=True)]
+    out = [f"{name} {way}".rstrip() for name, way in zip(names, ways, strict=True)]
+    for way in ("forward", "backward"):
+        same = [j for j, wave in enumerate(waves) if wave.shaft and ways[j] == way]
+        same.sort(key=lambda j: abs(waves[j].seen_fixed(float(omega[j]), speed)))
+        for place, j in enumerate(same, start=1):
+            out[j] = f"bending {place} {way}"
     return out
 
 
@@ -356,8 +387,11 @@ class ModalAnalysis:
         return np.asarray(part / total)
 
     def names(self, spinning: Spinning) -> list[str]:
-        """Return "kind n" for every mode, as its structure counts them; mixed ones name both families."""
-        shares, structure = self.shares(spinning), self.structure
+        """Return "kind n" for every mode, as its structure counts them; mixed ones name both families.
+
+        Of a rotor the direction follows: "bending 1 backward".
+        """
+        shares, structure, waves = self.shares(spinning), self.structure, self.waves(spinning)
         families = [name for name in shares if name != "hub"]
         table, right = np.array([shares[name] for name in families]), self.right(spinning)
         out = []
@@ -367,7 +401,9 @@ class ModalAnalysis:
             mixed = len(order) > 1 and table[order[0], j] < PURE
             out.append(f"{kind}–{families[order[1]]} {number}" if mixed else f"{kind} {number}")
         values = spinning.pairs.values
-        return with_overdamped(out, values, self._energies(spinning)) if np.any(values.imag == 0.0) else out
+        if np.any(values.imag == 0.0):
+            out = with_overdamped(out, values, self._energies(spinning))
+        return with_whirl(out, waves, values.imag, abs(spinning.speed)) if waves else out
 
     def _energies(self, spinning: Spinning) -> tuple[Array, Array]:
         """Return x^H M x and x^H K x of every mode, over all ranks, shape (m,) each."""
@@ -376,20 +412,19 @@ class ModalAnalysis:
         mass, stiffness = p.comm.allreduce(local) if p.comm.size > 1 else local
         return mass, stiffness
 
-    def turning(self, spinning: Spinning) -> list[float]:
-        """Return for every mode of a disk whether it travels with its spin (1), against it (−1) or stands (0).
+    def waves(self, spinning: Spinning) -> list[Wave]:
+        """Return how every mode of a shaft or a disk precesses; empty for other structures.
 
-        Empty for other structures. Without spin it is the direction of growing angles that counts.
+        The sense of the spin counts, without spin that of its axis.
         """
-        axis = self.system.motion.axis
-        sign = -1.0 if spinning.speed * axis[2] < 0.0 else 1.0
-        out, right = [], self.right(spinning)
-        for j in range(right.shape[1]):
-            part = self.structure.turning(*self.shape(right[:, j]))
-            if part is None:
+        axis = np.asarray(self.system.motion.axis) * (-1.0 if spinning.speed < 0.0 else 1.0)
+        found = []
+        for x in self.right(spinning).T:
+            wave = self.structure.wave(*self.shape(x), axis)
+            if wave is None:
                 return []
-            out.append(sign * part)
-        return out
+            found.append(wave)
+        return found
 
     def shape(self, x: Array) -> tuple[dict[str, Array], Array]:
         """Return (coordinates of the nodes, m; complex components (n, bs) of a mode), on every rank."""

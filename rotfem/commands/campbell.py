@@ -13,7 +13,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.branches import SPARE, Node, Sweep
-from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
+from rotfem.analysis.modal import ModalAnalysis, Spinning, distinct, self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
 from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.error_report import error_of_modes
@@ -38,6 +38,9 @@ Array = npt.NDArray[Any]
 
 #: What a row of a diagram has of the row of its mode.
 KEPT = ("frequency", "frequency_hz", "damping", "growth", "residual", "error_bound")
+
+#: What it has of the row of a rotor's mode.
+OF_ROTORS = ("turning", "whirl", "frequency_fixed")
 
 
 def parse_speeds(text: str, limits: Limits | None = None) -> list[float]:
@@ -150,11 +153,11 @@ class Diagram:
         fastest = max(abs(values[0]), abs(values[-1]))
         if orders is None:
             orders = int(np.clip(np.ceil(max(found, default=lowest) / max(fastest, 1e-300)), 1, 4))
-        labels = branch_labels(analysis, sweep.nodes[0], count)
+        labels = branch_labels(analysis, sweep, count)
         mesh = branch_errors(analysis, sweep, count) if analysis.estimates else None
         rows = [row for node in sweep.nodes for row in node_rows(analysis, node, labels, mesh)]
         check_rows(rows)
-        crossings, onsets = sweep.crossings(orders), sweep.onsets()
+        crossings, onsets = sweep.critical_speeds(orders), sweep.onsets()
         for crossing in crossings:
             crossing["label"] = labels[crossing["branch"] - 1]
         last = first_modes(sweep.nodes[-1].spinning, count)
@@ -218,10 +221,11 @@ def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends:
     return out + [f"at {last.speed:g} rad/s, {text}" for text in (*instabilities(ends), *doubtful(ends))]
 
 
-def branch_labels(analysis: ModalAnalysis, first: Node, count: int) -> list[str]:
-    """Return the names of the branches, those of the first speed; a name that occurs again gets a letter."""
-    names = analysis.names(first.spinning)[:count]
-    return [n if names.count(n) == 1 else f"{n}{'abcdefgh'[names[:i].count(n)]}" for i, n in enumerate(names)]
+def branch_labels(analysis: ModalAnalysis, sweep: Sweep, count: int) -> list[str]:
+    """Return the names of the branches: of their modes at the first speed, or where these precess first."""
+    moving = [next((n for n in sweep.nodes if sweep.direction(n, b)), sweep.nodes[0]) for b in range(count)]
+    names = {id(node): analysis.names(node.spinning) for node in moving}
+    return distinct([names[id(node)][node.order[b]] for b, node in enumerate(moving)])
 
 
 def branch_summary(sweep: Sweep, b: int) -> dict[str, float | None]:
@@ -265,7 +269,7 @@ def node_rows(
             continue
         row = columns[node.order[b]]
         kept = {k: row[k] for k in KEPT} | ({} if mesh is None else {"mesh_error": mesh[b]})
-        shares = {k: v for k, v in row.items() if k.startswith("share_") or k == "turning"}
+        shares = {k: v for k, v in row.items() if k.startswith("share_") or k in OF_ROTORS}
         rows.append(
             {
                 "speed": node.speed,

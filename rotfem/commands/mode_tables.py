@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
+from rotfem.analysis.modal import ModalAnalysis, Spinning, distinct, stability
 from rotfem.refinement.frequencies import FrequencyErrors
+from rotfem.structures.mode_names import Wave
 
 Array = npt.NDArray[Any]
 
@@ -21,6 +22,10 @@ RELIABLE = 1e-4
 
 #: Relative error that the mesh may cause in a frequency before it is reported.
 RESOLVED = 0.02
+
+
+#: Part of the speed below which the frequency of forward whirl is said to be that of a critical speed.
+CRITICAL = 1e-3
 
 
 @dataclass(frozen=True)
@@ -58,7 +63,7 @@ def mode_tables(analysis: ModalAnalysis, speed: float, count: int, *, keep: bool
     rigid = int(spinning.rigid)
     spinning.pairs = spinning.pairs.select(np.arange(min(count - rigid, len(spinning.pairs.values))))
     rows = mode_rows(analysis, spinning, FrequencyErrors(analysis)(spinning) if analysis.estimates else None)
-    warnings = [*advice(analysis, speed), *instabilities(rows), *doubtful(rows)]
+    warnings = [*advice(analysis, speed), *instabilities(rows), *critical(rows, speed), *doubtful(rows)]
     rows = [{**row, "mode": row["mode"] + rigid} for row in rows]
     scaled = spinning.pairs.right / scales(analysis, spinning)
     titles = [f"mode {row['mode']}: {row['label']}" for row in rows]
@@ -76,8 +81,8 @@ def mode_rows(
         spinning: at the speed.
         mesh: relative errors by the mesh; None where they are not wanted.
     """
-    shares, names, turning = analysis.shares(spinning), analysis.names(spinning), analysis.turning(spinning)
-    rows, pairs = [], spinning.pairs
+    shares, waves = analysis.shares(spinning), analysis.waves(spinning)
+    rows, pairs, names = [], spinning.pairs, distinct(analysis.names(spinning))
     for i, (lam, error, bound) in enumerate(zip(pairs.values, pairs.errors, pairs.bounds, strict=True)):
         size = abs(lam)
         rows.append(
@@ -90,13 +95,20 @@ def mode_rows(
                 "growth": float(lam.real),
                 "stability": stability(lam, float(bound)),
                 **{f"share_{name}": float(share[i]) for name, share in shares.items()},
-                **({"turning": turning[i]} if turning else {}),
+                **(whirl(waves[i], float(lam.imag), abs(spinning.speed)) if waves else {}),
                 "residual": float(error),
                 "error_bound": float(bound),
                 **({} if mesh is None else {"mesh_error": mesh[i]}),
             }
         )
     return rows
+
+
+def whirl(wave: Wave, omega: float, speed: float) -> dict[str, Any]:
+    """Return what a row says of the precession of a mode of a rotor (see `rotfem.CampbellResult`)."""
+    direction = wave.direction(omega, speed)
+    fixed = abs(wave.seen_fixed(omega, speed)) if direction else omega
+    return {"turning": wave.share, "whirl": direction or "standing", "frequency_fixed": fixed}
 
 
 def rigid_row(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -111,6 +123,16 @@ def instabilities(rows: list[dict[str, Any]]) -> list[str]:
         f"{row['stability']}: {row['label']} grows as exp({row['growth']:.6g} t)"
         for row in rows
         if row["stability"].endswith("instability")
+    ]
+
+
+def critical(rows: list[dict[str, Any]], speed: float) -> list[str]:
+    """Return a warning for every mode of a rotor whose forward critical speed is this one, but for CRITICAL of it."""
+    return [
+        f"critical speed: {row['label']} has {row['frequency']:.3g} rad/s in the rotor at {abs(speed):.6g} rad/s; an "
+        "unbalance meets no stiffness there"
+        for row in rows
+        if row.get("whirl") == "forward" and row["frequency"] < CRITICAL * abs(speed)
     ]
 
 

@@ -96,6 +96,14 @@ def modes_report(summary: dict[str, Any], folder: Path) -> list[str]:
     return [*lines, *error_report(summary), f"results in {folder}"]
 
 
+#: How a branch is critical, by the kind of the speed.
+MEETINGS = {
+    "forward": "forward whirl, {label}",
+    "backward": "backward whirl, {label}",
+    "per_rev": "{label} meets {per_rev}Ω",
+}
+
+
 def campbell_report(summary: dict[str, Any], folder: Path) -> list[str]:
     """Return the lines `campbell` prints: branches and critical speeds."""
     units = ShownUnits.of(summary)
@@ -113,7 +121,7 @@ def campbell_report(summary: dict[str, Any], folder: Path) -> list[str]:
         lines.append(f"{b['branch']:>6}  {b['label']:<16}{first:>14}{last:>14}{b['confidence']:>12.3f}")
     for c in summary["critical_speeds"]:
         at = f"{units.speeds(c['speed']):.6f} {units.speed}"
-        lines.append(f"critical speed {at}: {c['label']} meets {c['per_rev']}Ω")
+        lines.append(f"critical speed {at}: {MEETINGS[c['kind']].format(**c)}")
     return [*lines, *error_report(summary), f"results in {folder}"]
 
 

@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csr_array
 from slepc4py import SLEPc
 
@@ -200,7 +201,11 @@ def mirror_error(values: Array) -> float:
 
 
 def _pick(vectors: Array, values: Array, wanted: Array) -> Array:
-    index = np.array([int(np.argmin(np.abs(values - w))) for w in wanted], dtype=int)
+    """Return the vectors of the values nearest to the wanted ones, each once: double values have two vectors."""
+    distance = np.abs(values[None, :] - wanted[:, None])
+    index = np.argmin(distance, axis=1)
+    rows, columns = linear_sum_assignment(distance)
+    index[rows] = columns
     return vectors[:, index]
 
 

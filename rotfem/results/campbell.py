@@ -25,19 +25,24 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class CriticalSpeed:
-    """A speed at which a branch meets a per-rev line kΩ: a force that stands still in space excites it there.
+    """A speed at which the frequency of a branch is a multiple of it.
 
     Attributes:
-        branch: number of the branch, from 1 on.
-        per_rev: k.
         speed: rad/s.
-        frequency: of the branch there, kΩ, rad/s.
+        kind: "forward" of a rotor's whirl that an unbalance excites; "backward" of whirl against the spin at its speed,
+            or a wave of a disk that stands still in the fixed frame; "per_rev" of any other one.
+        order: 1 of whirl, nodal diameters of a disk's wave, k of "per_rev".
+        branch: number of the branch, from 1 on.
+        per_rev: k, the frequency in the rotating frame over the speed; 0 of forward whirl.
+        frequency: of the branch there, in the rotating frame, kΩ, rad/s.
         label: name of the branch.
     """
 
+    speed: float
+    kind: str
+    order: int
     branch: int
     per_rev: int
-    speed: float
     frequency: float
     label: str
 
@@ -66,8 +71,9 @@ class CampbellResult(Result):
         rows: one dictionary a speed and branch: `speed` (rad/s), `branch`, `label`, `mode` (its name at this speed),
             `frequency` (rad/s), `frequency_hz`, `damping`, `growth` (1/s), `residual`, `error_bound`, `mesh_error`,
             `share_…`, `confidence` (squared correlation with the speed before), `refined` (1 where the speed was not
-            asked for); of a disk `turning` (1 for a wave that travels with the spin, −1 against it, 0 for a standing
-            one).
+            asked for); of a shaft or a disk `turning` (1 for a wave that runs with the spin in the rotor, −1 against
+            it, 0 for a standing one), `whirl` ("forward", "backward" or "standing") and `frequency_fixed` (rad/s, in
+            the fixed frame).
     """
 
     rows: list[dict[str, Any]]
@@ -104,7 +110,7 @@ class CampbellResult(Result):
 
     @property
     def critical_speeds(self) -> list[CriticalSpeed]:
-        """Where branches meet the per-rev lines, by increasing speed."""
+        """Critical speeds: the synchronous ones of a rotor by increasing speed, then where branches meet kΩ."""
         return [CriticalSpeed(**crossing) for crossing in self.summary["critical_speeds"]]
 
     @property
@@ -155,12 +161,13 @@ class CampbellResult(Result):
         out: dict[str, dict[str, Array]] = {}
         branches = self.branches()
         for label, a in branches.items():
-            kind, _, number = label.partition(" ")
+            kind, _, rest = label.partition(" ")
+            number, _, way = rest.partition(" ")
             diameters = int(number.split(".")[0]) if kind == "diameters" else 0
-            if diameters == 0 or label[-1] in "bcdefgh":
+            name = f"{kind} {number}"
+            if diameters == 0 or name in out:
                 continue
-            name = label.removesuffix("a")
-            b = branches.get(f"{name}b", a)
+            b = branches.get(f"{name} {'backward' if way == 'forward' else 'forward'}", a)
             speed, here, there = np.intersect1d(a["speed"], b["speed"], return_indices=True)
             first, second = ({k: c[i] for k, c in x.items()} for x, i in ((a, here), (b, there)))
             ahead = first["turning"] >= second["turning"]

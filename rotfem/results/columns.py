@@ -90,6 +90,7 @@ COLUMNS = {
     "error_bound": ("relative error that round-off may cause", "1"),
     "confidence": ("squared correlation with the speed before", "1"),
     "turning": ("wave with the spin (1) or against it (−1)", "1"),
+    "frequency_fixed": ("frequency in the fixed frame", "rad/s"),
     "estimate": ("estimated relative change", "1"),
     "truth": ("relative change of the full models", "1"),
     "worst": ("largest estimated relative change", "1"),

@@ -72,9 +72,7 @@ def modes_figure(result: ModesResult) -> Figure:
     units = ShownUnits.of(result.summary)
     for axis, (title, columns), row in zip(axes, shapes.items(), rows, strict=True):
         name = leading(columns)
-        turning = row.get("turning", 0.0)
-        wave = "" if abs(turning) < 0.5 else (", forward wave" if turning > 0 else ", backward wave")
-        caption = f"{title}{wave}\n{units.frequencies(row['frequency']):.5g} {units.frequency}"
+        caption = f"{title}\n{units.frequencies(row['frequency']):.5g} {units.frequency}"
         map_of(axis, mesh, columns[name], caption, f"{name} (–)")
     return figure
 

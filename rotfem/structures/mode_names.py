@@ -1,7 +1,13 @@
-"""Complex mode shapes: turned to their largest real part, their nodes and nodal lines counted."""
+"""Complex mode shapes: turned to their largest real part, their nodes and nodal lines counted, their precession.
+
+A mode e^{iωt} of a rotor is a sum of two circular waves, a e^{i(mθ + ωt)} with the spin and b e^{i(mθ − ωt)} against
+it, θ the angle about the axis, counted in the sense of the spin; of a shaft z = u_2 + i u_3 = a e^{iωt} + b e^{−iωt},
+m = 1 (Genta, Dynamics of Rotating Systems, 2005, section 2.4). From the fixed frame they have ω + mΩ and ω − mΩ.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,6 +15,59 @@ import numpy.typing as npt
 
 #: Part of the largest amplitude below which a shape counts as zero when its nodes are counted.
 NODE_NOISE = 1e-3
+
+#: Share of a wave below which a mode stands: its orbits are ellipses of an axial ratio below a half of it.
+STANDING = 0.02
+
+
+@dataclass(frozen=True)
+class Wave:
+    """How a mode of a rotor precesses, seen from the rotor.
+
+    Attributes:
+        number: m, nodal diameters of a disk, 1 of a shaft.
+        share: (|a|² − |b|²)/(|a|² + |b|²): 1 for a wave that runs with the spin, −1 against it, 0 for a standing one.
+        shaft: whether it is that of a shaft, which whirls, or of a disk.
+    """
+
+    number: int
+    share: float
+    shaft: bool
+
+    def seen_fixed(self, omega: float, speed: float) -> float:
+        """Return the frequency ω in the fixed frame, rad/s: positive with the spin, negative against it.
+
+        Args:
+            omega: frequency in the rotating frame, rad/s.
+            speed: Ω ≥ 0, rad/s.
+        """
+        return (omega if self.share > 0.0 else -omega) + self.number * speed
+
+    def direction(self, omega: float, speed: float) -> str:
+        """Return "forward", "backward", or "" of a standing wave.
+
+        A shaft's whirl has the direction that the fixed frame sees: forward whirl above its critical speed runs against
+        the spin in the rotor. A disk's wave has that in the disk.
+        """
+        if abs(self.share) < STANDING or self.number == 0 or speed == 0.0:
+            return ""
+        return "forward" if (self.seen_fixed(omega, speed) if self.shaft else self.share) > 0.0 else "backward"
+
+
+def shaft_wave(moves: npt.NDArray[Any], turns: npt.NDArray[Any], axis: npt.NDArray[np.float64]) -> Wave:
+    """Return the whirl of a mode of a shaft; that of torsion and stretch stands.
+
+    Args:
+        moves: complex displacements of the nodes, frame components, (n, 3).
+        turns: rotations there, times the length of the shaft, (n, 3).
+        axis: direction of the spin, a unit vector (3,).
+    """
+    first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    first /= np.linalg.norm(first)
+    y, z = moves @ first, moves @ np.cross(axis, first)
+    a, b = (float(np.sum(np.abs(y + sign * 1j * z) ** 2)) for sign in (1.0, -1.0))
+    along = float(np.sum(np.abs(moves @ axis) ** 2 + np.abs(turns @ axis) ** 2))
+    return Wave(1, (a - b) / (a + b) if a + b > 2.0 * along else 0.0, True)
 
 
 def in_phase(y: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
@@ -55,20 +114,21 @@ def plate_mode_name(family: str, coordinates: dict[str, npt.NDArray[Any]], y: np
     return ("bending", "torsion")[along], str(across + 1)
 
 
-def turning(coordinates: dict[str, npt.NDArray[Any]], w: npt.NDArray[Any]) -> float | None:
-    """Return how a mode w e^{iωt} of a disk travels: 1 towards growing angles, −1 against, 0 standing; None of others.
+def disk_wave(coordinates: dict[str, npt.NDArray[Any]], w: npt.NDArray[Any], axis: float) -> Wave | None:
+    """Return how a mode w e^{iωt} of a disk travels; None of other plates.
 
     Args:
         coordinates: x, y of the nodes, (n,) each.
         w: the transverse displacement at the nodes, complex, (n,).
+        axis: component of the spin's direction along the normal.
     """
     x, y = coordinates["x"] - np.mean(coordinates["x"]), coordinates["y"] - np.mean(coordinates["y"])
     if not _is_disk(x, y):
         return None
     with_it, against = (_diameters(x, y, wave)[1] for wave in (w, w.conj()))
     m = int(np.argmax(with_it + against))
-    total = with_it[m] + against[m]
-    return float((with_it[m] - against[m]) / total) if m > 0 and total > 0.0 else 0.0
+    total, sense = with_it[m] + against[m], -1.0 if axis < 0.0 else 1.0
+    return Wave(m, float(sense * (with_it[m] - against[m]) / total) if m > 0 and total > 0.0 else 0.0, False)
 
 
 def _is_disk(x: npt.NDArray[Any], y: npt.NDArray[Any]) -> bool:

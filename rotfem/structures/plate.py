@@ -27,7 +27,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.numerics import forms
 from rotfem.structures.memory import check_memory
 from rotfem.structures.meshes.plate_mesh import PlateGrid, plate_grid
-from rotfem.structures.mode_names import plate_mode_name, turning
+from rotfem.structures.mode_names import Wave, disk_wave, plate_mode_name
 from rotfem.structures.moderate_turns import check_directors
 from rotfem.structures.points import Points
 from rotfem.structures.reference_rotation import DirectorTurns
@@ -427,9 +427,9 @@ class Plate(Structure):
         """Return "bending", "torsion", … and how many nodal lines, circles or diameters (see `plate_mode_name`)."""
         return plate_mode_name(family, coordinates, values[:, self.families[family][1]])
 
-    def turning(self, coordinates: dict[str, Array], values: Array) -> float | None:
-        """Return 1 for a wave that travels around a disk towards growing angles, −1 against, 0 for a standing one."""
-        return turning(coordinates, values[:, 2])
+    def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:
+        """Return how a mode travels around a disk; None of other plates."""
+        return disk_wave(coordinates, values[:, 2], axis[2])
 
     def check_range(self, q: Array, time: float | None = None) -> None:
         """Refuse a state whose director has come to the pole of its angles, where these have no reference.

@@ -34,6 +34,7 @@ from rotfem.mechanics.bodies import AppliedLoad, Body, Kinematics, Strain
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.rotations import Turn
 from rotfem.structures.beam import Beam
+from rotfem.structures.mode_names import Wave, shaft_wave
 from rotfem.structures.moderate_turns import check_sections
 from rotfem.structures.reference_rotation import SectionTurns
 from rotfem.structures.spatial_section import SectionForms, euler_tensor
@@ -41,6 +42,9 @@ from rotfem.structures.structure import Array
 
 #: Degree of the polynomials the axis of an arc is held in; strains see its exact angle, only inertia sees these.
 AXIS_DEGREE = 5
+
+#: Distance of a shaft from the axis of spin, in lengths of it, that is none: round-off of its directions.
+ON_AXIS = 1e-9
 
 
 def swept_axis(beam: Beam, sweep: Any, line: Any) -> tuple[Any, Any, Any]:
@@ -310,6 +314,13 @@ class SpatialBeam(Beam):
         c, s = np.cos(self.data.precone), np.sin(self.data.precone)
         R = np.kron(np.eye(2), np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]))
         return np.asarray(np.einsum("ij,nj...->ni...", R, values))
+
+    def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:
+        """Return the whirl of a mode where the beam is a shaft: its undeformed axis is that of the spin."""
+        off = np.linalg.norm(np.cross(self.places(coordinates), axis), axis=1)
+        if np.max(off) > ON_AXIS * self.length:
+            return None
+        return shaft_wave(values[:, :3], self.length * values[:, 3:], axis)
 
     # --- kinematics ---------------------------------------------------------------------------------------------
 

@@ -17,6 +17,7 @@ from rotfem.mechanics.bodies import Body, Damping, Kinematics, RootSpring, Strai
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import forms
 from rotfem.structures.applied_loads import LoadsOfStructure
+from rotfem.structures.mode_names import Wave
 from rotfem.structures.reference_rotation import Turns
 from rotfem.structures.tip_values import TipValues
 
@@ -261,8 +262,14 @@ class Structure(LoadsOfStructure):
         """Return kind and number of a mode of a family, from its complex shape at the nodes (n, components)."""
         raise NotImplementedError
 
-    def turning(self, coordinates: dict[str, Array], values: Array) -> float | None:
-        """Return how a complex shape at the nodes travels around a disk; None where there is none (see the plate)."""
+    def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:
+        """Return how a mode e^{iωt} with a complex shape at the nodes precesses about an axis; None unless a rotor.
+
+        Args:
+            coordinates: of the nodes, by name, m.
+            values: the shape, (n, components).
+            axis: direction of the spin, (3,).
+        """
         return None
 
     def oriented(self, values: Array) -> Array:

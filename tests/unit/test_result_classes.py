@@ -78,7 +78,9 @@ def campbell() -> CampbellResult:
         command="campbell",
         branches=[{"branch": 1, "label": "lag 1"}, {"branch": 2, "label": "axial 1"}],
         per_rev=2,
-        critical_speeds=[{"branch": 1, "per_rev": 2, "speed": 3.0, "frequency": 6.0, "label": "lag 1"}],
+        critical_speeds=[
+            {"speed": 3.0, "kind": "per_rev", "order": 2, "branch": 1, "per_rev": 2, "frequency": 6.0, "label": "lag 1"}
+        ],
         instabilities=[{"speed": 8.0, "kind": "dynamic instability", "until": None}],
         ambiguous=[],
     )
@@ -186,7 +188,7 @@ def test_branches_over_speed() -> None:
     assert result.labels == ["lag 1", "axial 1"]
     np.testing.assert_array_equal(result.frequencies, [[3.0, 6.0], [8.0, 16.0], [13.0, np.nan]])
     assert result.growth.shape == result.damping.shape == (3, 2)
-    assert result.critical_speeds == [CriticalSpeed(1, 2, 3.0, 6.0, "lag 1")]
+    assert result.critical_speeds == [CriticalSpeed(3.0, "per_rev", 2, 1, 2, 6.0, "lag 1")]
     assert result.instabilities == [Instability(8.0, "dynamic instability", None)]
     with pytest.raises(KeyError, match="no number 'mode' of the branches; there are frequency, growth"):
         result.column("mode")
