@@ -84,7 +84,8 @@ def steady_state(
         if not loose or growth.start is not None:
             raise
         raise ComputationError(
-            f"nothing holds the root's hinge ({', '.join(loose)}): {error.what}",
+            f"nothing holds the root's hinge ({', '.join(loose)}): no steady state at {omega:g} rad/s: "
+            "the load turns it, and no equilibrium was found that it turns to",
             advice=f"structure.root.{loose[0]}_stiffness, a speed whose tension holds it, or {less(system)}",
         ) from error
 

@@ -29,6 +29,9 @@ SMALLEST_SHARE = 1e-3
 #: Turn of a root (rad) by springs that are as soft as lets it begin to swing when they let go.
 LET_GO = 0.1
 
+#: Stretch (deformed over undeformed length) from which the stretch is why a load cannot be raised farther.
+STRETCHED = 2.0
+
 #: Part of their range from which rotations are counted afresh where the next step of the load leads out of it.
 NEAR = 0.3
 
@@ -143,6 +146,11 @@ def raised(system: System, growth: Growth, newton: Newton) -> Raised:
         if share < SMALLEST_SHARE:
             if other is not None:
                 return other
+            system.count_rotations_from(reference)
+            system.set_state(q)
+            stretch = system.model.stretches()[1]
+            if stretch >= STRETCHED:
+                failure = f"it is stretched to {stretch:.3g} times its length there, and ever farther by more load"
             raise ComputationError(
                 f"no steady state at {growth.omega:g} rad/s: the last equilibrium was at {growth.where(done)}; "
                 f"{failure}",

@@ -6,7 +6,7 @@ Energy and momentum that a history has from nowhere show what steps that are too
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -71,7 +71,8 @@ class Monitor:
         size = self.system.size(state.q)
         if np.isfinite(size) and size <= LARGEST_LINEAR_DEFLECTION:
             return
-        raise diverged(self.system.model.problem.theory, state.t, self.critical, self.since)
+        loose = [hinge.name for hinge in self.system.structure.hinges.values() if hinge.stiffness == 0.0]
+        raise diverged(self.system.model.problem.theory, state.t, self.critical, self.since, loose)
 
     def row(self, state: State) -> None:
         """Take note of a state that is recorded.
@@ -150,7 +151,7 @@ def _said_of_momentum(history: dict[str, Array]) -> str:
     return (
         f"the angular momentum of hub and structure is {off / largest:.2g} of itself off the impulse they were given: "
         "the steps do not resolve how the hub moves, as where it has little inertia of its own; "
-        'give a smaller time.step or time.scheme = "energy_conserving"'
+        'give a smaller time.step, or time.scheme = "radau5" or "energy_conserving"'
     )
 
 
@@ -176,7 +177,9 @@ def with_cause(
     return ComputationError(f"{error.what}; before that {why}", time=error.time, advice=advice.removeprefix("give "))
 
 
-def diverged(theory: Theory, time: float, critical: float | None, since: float | None) -> ComputationError:
+def diverged(
+    theory: Theory, time: float, critical: float | None, since: float | None, loose: Sequence[str] = ()
+) -> ComputationError:
     """Return the error of a linear solution that has diverged.
 
     Args:
@@ -184,8 +187,11 @@ def diverged(theory: Theory, time: float, critical: float | None, since: float |
         time: when (s).
         critical: speed at which its stiffness is singular, rad/s; None if there is none.
         since: from when on (s) the speed was above that; None if it never was.
+        loose: hinges of the root without a spring.
     """
     why = "the motion is unstable or its load too large for a linear theory"
+    if loose:
+        why = f"no spring holds the root's hinge ({', '.join(loose)}), which turns beyond what is linear"
     if since is not None:
         why = f"its stiffness is not definite above {critical:.6g} rad/s, passed at t = {since:.4g} s"
         if not theory.prestress:
@@ -193,14 +199,14 @@ def diverged(theory: Theory, time: float, critical: float | None, since: float |
     return ComputationError(
         f"the {theory.name} solution diverged (a displacement exceeds the length, or a rotation 1 rad; {why})",
         time=time,
-        advice=better_theories(theory),
+        advice=better_theories(theory, turning=bool(loose)),
     )
 
 
-def better_theories(theory: Theory) -> str:
-    """Return which theories to use in the place of a linear one that diverged."""
+def better_theories(theory: Theory, turning: bool = False) -> str:
+    """Return which theories to use in the place of a linear one that diverged, or whose root turns far."""
     exact = richest().name
-    if theory.prestress:
+    if theory.prestress or turning:
         return f'use model.theory = "{exact}", which holds for any deflection'
     stiffened = next(t.name for t in theories() if t.linear and t.prestress)
     return f'use model.theory = "{stiffened}" for small or "{exact}" for any deflection'

@@ -24,12 +24,12 @@ class BySpin:
 
     def __init__(self, model: Any, form: Any):
         self._factors = [model.structure.constant(0.0) for _ in range(2)]
-        parts = []
+        parts, expanded = [], expand_derivatives(form)
         for name, factor in zip(("w", "dw"), self._factors, strict=True):
             constant = model.frame.constants.get(name)
             if constant is None:
                 continue
-            within = [part for part in form.integrals() if constant in extract_constants(part.integrand())]
+            within = [part for part in expanded.integrals() if constant in extract_constants(part.integrand())]
             s = ufl.variable(model.structure.constant(0.0))
             axis = model.motion.axis[-constant.value.size :]
             shifted = ufl.as_vector([constant[i] + s * float(e) for i, e in enumerate(axis)])

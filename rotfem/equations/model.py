@@ -290,12 +290,17 @@ class Model:
 
     def inside_out(self) -> bool:
         """Return whether the structure is anywhere compressed to less than nothing at the state in q: none real is."""
-        mesh = self.structure.mesh
         if self.comm.allreduce(self.structure.hardly_moved(), op=MPI.LAND):
             return False
+        return self.stretches()[0] <= 0.0
+
+    def stretches(self) -> tuple[float, float]:
+        """Return the least and the largest stretch of the axis, or of a plate's area, at the state in q."""
+        mesh = self.structure.mesh
         if self._stretch is None:
             points = forms.quadrature_points(mesh, self.structure.V.element.basix_element.degree)
             self._stretch = forms.expression(self.structure.stretch(self.mechanics.strains), points, self.comm)
         cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local)
-        lowest = float(self._stretch.eval(mesh, cells).min()) if len(cells) else 1.0
-        return bool(self.comm.allreduce(lowest, op=MPI.MIN) <= 0.0)
+        here = self._stretch.eval(mesh, cells) if len(cells) else np.ones(1)
+        least, largest = (self.comm.allreduce(float(f(here)), op) for f, op in ((np.min, MPI.MIN), (np.max, MPI.MAX)))
+        return least, largest

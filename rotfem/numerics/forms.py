@@ -23,7 +23,9 @@ from ufl.constantvalue import Zero
 from ufl.corealg.map_dag import map_expr_dag
 from ufl.corealg.multifunction import MultiFunction
 
-from rotfem.numerics import form_cache
+from rotfem.numerics import form_cache, traversal
+
+traversal.install()
 
 SAME = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 

@@ -89,6 +89,17 @@ class Motion(SceneModel):
         """Return the largest |Ω| (rad/s) that is prescribed until `end` (s), or ever; 0 if it is not known."""
         return 0.0
 
+    @model_validator(mode="before")
+    @classmethod
+    def _check_type(cls, data: Any) -> Any:
+        """Refuse keys of other types of motion, by their types."""
+        if isinstance(data, Mapping) and data.get("type") in BUILT_IN:
+            for key in (key for key in data if key not in cls.model_fields):
+                if types := [show(table.name) for table in _TABLES if key in table.model_fields]:
+                    why = f"has no meaning with type = {show(data['type'])}; it belongs to type = {', '.join(types)}"
+                    raise problem(key, data[key], why)
+        return data
+
 
 class Swept:
     """A motion whose speed is swept: whether it spins does not follow from its own speed."""

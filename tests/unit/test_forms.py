@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,17 @@ from basix.ufl import element
 from dolfinx import fem, mesh
 from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
+from ufl.argument import BaseArgument
+from ufl.coefficient import BaseCoefficient
+from ufl.utils.counted import Counted
 
+import rotfem
+from rotfem.commands.problem import Problem
+from rotfem.equations.compiled import compile_system
 from rotfem.equations.functionals import Functionals
-from rotfem.numerics import forms
+from rotfem.numerics import forms, traversal
 from rotfem.numerics.forms import SAME, Assembler
+from tests.launch import ROOT
 
 
 @pytest.fixture(scope="module")
@@ -101,3 +109,19 @@ def test_functionals_are_those_assembled_one_by_one(space: Any) -> None:
     for name, form in parts.items():
         assert found[name] == pytest.approx(fem.assemble_scalar(fem.form(form)), rel=1e-13)
     assert Functionals({}, space.mesh)() == {}
+
+
+def test_terminals_and_signatures_are_those_of_ufl() -> None:
+    """Traversals done once find what UFL finds, which is loaded anew, without them."""
+    spec = importlib.util.find_spec("ufl.algorithms.signature")
+    assert spec is not None
+    assert spec.loader is not None
+    real = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(real)
+    system = compile_system(Problem.of(rotfem.load_scene(ROOT / "demos" / "spin_up.toml")))
+    for form in (system._residual_form, system._tangent_form):
+        for classes in (ufl.Constant, (BaseArgument, BaseCoefficient), Counted, ufl.classes.SpatialCoordinate):
+            found = traversal.extract_type(form, classes)
+            assert found
+            assert found == traversal._extract_type(form, classes)
+        assert form.signature() == real.compute_form_signature(form, form._compute_renumbering())

@@ -376,6 +376,12 @@ TIME = {"end": 1.0, "step": 0.1}
         ("planar", {"loads__tip_moment": [1, 0, 0]}, "loads.tip_moment", "one component"),
         ("spatial", {"loads__tip_moment": 1}, "loads.tip_moment", "three components"),
         ("plate", {"loads__tip_moment": 1}, "loads.tip_moment", "three components"),
+        (
+            "planar",
+            {"motion__type": "table"},
+            "motion.speed",
+            'it belongs to type = "constant", "spin_up"',
+        ),
         ("planar", {"mesh__elements": 0}, "mesh.elements", "at least 1"),
         ("planar", {"mesh__elements": 2.0}, "mesh.elements", "integer"),
         ("planar", {"mesh__elements": True}, "mesh.elements", "integer"),

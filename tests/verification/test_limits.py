@@ -21,6 +21,7 @@ from rotfem.analysis.schemes import State
 from rotfem.analysis.stepper import Stepper
 from rotfem.commands.problem import Problem
 from rotfem.equations.system import System
+from rotfem.errors import ComputationError
 from rotfem.mechanics.motion import smooth_spin_up
 from rotfem.mechanics.theories import ladder
 from rotfem.numerics.newton import Newton
@@ -254,6 +255,13 @@ def test_spinning_rod(
     with reference("spinning_rod.csv").open(newline="") as file:
         table = {line["case"]: line for line in csv.DictReader(file)}
     assert u1 == pytest.approx(float(table[row]["u1(L) exact"]), rel=1e-9)
+
+
+def test_a_rod_that_spins_faster_than_it_holds_together(spin_up: Any) -> None:
+    """tan(kL)/k − L grows without bound as kL goes to π/2, here at 758.8 rad/s."""
+    fast = spin_up({"model.theory": "reissner"}, motion={"type": "constant", "speed": 900.0})
+    with pytest.raises(ComputationError, match=r"7[345][\d.]* rad/s\); it is stretched to [\d.]+ times its length"):
+        run(fast)
 
 
 @pytest.mark.parametrize("theory", ["consistent_linear", "von_karman_linear"])

@@ -95,6 +95,16 @@ def test_root_moment_of_a_spring_at_rest() -> None:
     assert done.tip["u2"][0] == pytest.approx(0.1 * L * L / 300 + 0.1 * L**3 / 3e7 + 0.1 * L / 1e10, rel=1e-6)
 
 
+def test_a_linear_theory_on_a_hinge_that_a_load_turns_stops_where_it_ends() -> None:
+    blade = {**PLANAR, "section": STIFF, "root": {"lag_stiffness": 0.0}}
+    tables = {"structure": blade, "motion": STILL, "loads": {"tip_force": [0, 0.1]}, "model": {"theory": "linear"}}
+    tables |= {"initial": {"state": "undeformed"}, "mesh": {"elements": 1}, "time": {"end": 100.0, "step": 1.0}}
+    with pytest.raises(rotfem.ComputationError, match="no spring holds the root's hinge") as caught:
+        rotfem.run(tables)
+    assert caught.value.time == pytest.approx(np.sqrt(2 * RHO * L**2 / (3 * 0.1)), abs=1.0)  # ½ (F L/I) t² = 1 rad
+    assert "consistent_linear" not in str(caught.value.advice)
+
+
 @pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
 def test_momentum_of_a_free_hub_with_a_hinged_blade(theory: str) -> None:
     """Spring and damper act between hub and blade: the momentum is the impulse of the torque, to that of the steps."""
