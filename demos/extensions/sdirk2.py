@@ -26,8 +26,7 @@ class SDIRK2(Scheme):
     def stage(self, i, state, h, end, done):
         """Return a stage, predicted by the acceleration before."""
         c, t = (GAMMA, state.t + GAMMA * h) if i == 0 else (1.0, end)
-        q = state.q + c * h * state.v + (c * h) ** 2 / 2 * state.a
-        q_known, v_known = state.q, state.v
+        q, q_known, v_known = state.q + c * h * state.v + (c * h) ** 2 / 2 * state.a, state.q, state.v
         for before in done:
             q_known, v_known = q_known + (1 - GAMMA) * h * before.v, v_known + (1 - GAMMA) * h * before.a
         v = (q - q_known) / (GAMMA * h)
