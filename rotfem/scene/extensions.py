@@ -73,7 +73,7 @@ def load(name: str, path: Path, file: str, key: str) -> None:
         source = read_bytes(path, LARGEST)
         path = path.resolve()
     except (Unreadable, OSError) as error:
-        raise SceneError(file, key, name, getattr(error, "reason", None) or str(error)) from None
+        raise SceneError(file, key, name, str(error)) from None
     if path in _LOADED:
         return
     before = [(kind, kind.names) for kind in registry.ALL]

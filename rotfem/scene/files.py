@@ -25,8 +25,6 @@ from rotfem.scene.values import Array, Matrix, are_numbers, as_increasing_rows, 
 #: What a pipe may keep one waiting (s) before it has anything to say.
 PATIENCE = 10.0
 
-_PIECE = 1 << 20
-
 #: Files that a scene which is being read consists of; None where they are not recorded.
 _read: ContextVar[list[Path] | None] = ContextVar("read", default=None)
 
@@ -34,8 +32,7 @@ _read: ContextVar[list[Path] | None] = ContextVar("read", default=None)
 @contextmanager
 def noted_files() -> Iterator[list[Path]]:
     """Give a list that the paths of all files are in which are read in the meantime."""
-    files: list[Path] = []
-    before = _read.get()
+    files, before = list[Path](), _read.get()
     token = _read.set(files)
     try:
         yield files
@@ -53,26 +50,14 @@ def note(path: Path) -> None:
 
 
 class Unreadable(Exception):
-    """A file cannot be read.
-
-    Attributes:
-        reason: why.
-    """
-
-    def __init__(self, reason: str) -> None:
-        super().__init__(reason)
-        self.reason = reason
+    """A file cannot be read; its words say why."""
 
 
 def read_bytes(path: Path, most: int) -> bytes:
     """Return the content of a file or a pipe.
 
-    Args:
-        path: the file.
-        most: bytes it may have.
-
     Raises:
-        Unreadable: there is none, it is a directory, it has more bytes, or nothing comes out of a pipe.
+        Unreadable: there is none, it is a directory, it has more than `most` bytes, or nothing comes out of a pipe.
     """
     note(path)
     try:
@@ -94,21 +79,18 @@ def read_bytes(path: Path, most: int) -> bytes:
 
 
 def _all(descriptor: int, most: int, waits: bool) -> bytes:
-    pieces: list[bytes] = []
-    size = 0
-    while True:
+    content = bytearray()
+    while len(content) <= most:
         if waits and not select.select([descriptor], [], [], PATIENCE)[0]:
             raise Unreadable(f"nothing can be read from it: no byte came in {PATIENCE:g} s")
         try:
-            piece = os.read(descriptor, _PIECE)
+            piece = os.read(descriptor, 1 << 20)
         except BlockingIOError:
             continue
         if not piece:
-            return b"".join(pieces)
-        pieces.append(piece)
-        size += len(piece)
-        if size > most:
-            raise Unreadable(f"is larger than {most} bytes")
+            return bytes(content)
+        content += piece
+    raise Unreadable(f"is larger than {most} bytes")
 
 
 #: Bytes of a scene file, at most.
@@ -130,10 +112,9 @@ def read_toml(path: Path) -> dict[str, Any]:
         SceneError: the file is missing, cannot be read or is not valid TOML, saying where.
     """
     try:
-        text = read_bytes(path, LARGEST_SCENE).decode("utf-8-sig")
-        return tomllib.loads(text)
+        return tomllib.loads(read_bytes(path, LARGEST_SCENE).decode("utf-8-sig"))
     except Unreadable as error:
-        reason = error.reason
+        reason = str(error)
     except UnicodeDecodeError as error:
         reason = f"not valid TOML: byte {error.start} is not UTF-8 text"
     except tomllib.TOMLDecodeError as error:
@@ -165,16 +146,9 @@ def parse_override(file: str, override: str) -> tuple[str, Any]:
 
 
 def set_key(file: str, data: dict[str, Any], key: str, value: Any) -> dict[str, Any]:
-    """Return a copy of nested tables with one key set, or removed if the value is None.
+    """Return a copy of nested tables with one dotted key set, or removed if the value is None.
 
-    Args:
-        file: name for error messages.
-        data: nested dictionaries; not changed.
-        key: dotted path; missing tables on the way are created.
-        value: new value.
-
-    Raises:
-        SceneError: a part of the path is not a table.
+    Missing tables on the way are created; raise a SceneError of the file where a part of the path is not a table.
     """
     *parents, last = key.split(".")
     result = table = dict(data)
@@ -192,11 +166,7 @@ def set_key(file: str, data: dict[str, Any], key: str, value: Any) -> dict[str, 
 
 
 def check_depth(file: str, data: Any) -> None:
-    """Refuse tables and lists that are nested deeper than a scene can be.
-
-    Raises:
-        SceneError: they are; names the key they are in.
-    """
+    """Refuse tables and lists that are nested deeper than a scene can be, with a SceneError that names their key."""
     for key, value in data.items():
         level, depth = [value], 0
         while level := [entry for one in level for entry in _entries(one) if type(entry) not in PLAIN]:
@@ -231,11 +201,7 @@ def to_builtin(value: Any) -> Any:
 
 
 def apply_overrides(file: str, data: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
-    """Return a copy of the scene's tables with the overrides applied in order.
-
-    Raises:
-        SceneError: an override is malformed or leads through something that is not a table.
-    """
+    """Return a copy of the scene's tables with overrides (see `parse_override`) applied in order."""
     for override in overrides:
         data = set_key(file, data, *parse_override(file, override))
     return data
@@ -249,15 +215,7 @@ SHOWN_CELL = 12
 
 
 def existing_file(value: Any, info: ValidationInfo) -> Path:
-    """Return the absolute path of a file named in the scene.
-
-    Args:
-        value: the path, relative to the scene's directory or absolute.
-        info: validation info; its context holds that directory.
-
-    Raises:
-        PydanticCustomError: it is not a string, or there is no such file.
-    """
+    """Return the absolute path of a file named in the scene, from its directory, which the context of `info` holds."""
     if not isinstance(value, str | Path) or not str(value):
         raise problem("", value, "must be the path of a file")
     directory = Path((info.context or {}).get("directory", "."))
@@ -281,22 +239,20 @@ class Reader(Protocol):
 
 
 def as_time_table(value: Any, info: ValidationInfo, columns: Sequence[int], shape: str) -> Matrix:
-    """Return rows (t, …) with t (s) strictly increasing, at least two.
-
-    Args:
-        value: the rows, or the path of a CSV file holding them.
-        info: validation info; its context holds the scene's directory.
-        columns: allowed numbers of columns.
-        shape: the expected form in words, for the error message.
-
-    Raises:
-        PydanticCustomError: it is not such a table, or the file cannot be read; of a file it names the line.
-    """
+    """Return rows (t, …) with t (s) strictly increasing, at least two (see `as_table`)."""
     return as_table(value, info, columns, shape, as_increasing_rows)
 
 
 def as_table(value: Any, info: ValidationInfo, columns: Sequence[int], shape: str, read: Reader) -> Matrix:
-    """Return the rows of a table that a reader accepts (see `as_time_table`)."""
+    """Return the rows of a table that a reader accepts; messages about a file name the line.
+
+    Args:
+        value: the rows, or the path of a CSV file that holds them.
+        info: of the validation; its context holds the scene's directory.
+        columns: allowed numbers of columns.
+        shape: the expected form in words, for the error message.
+        read: the reader.
+    """
     limits = limits_in(info)
     if not isinstance(value, str | Path):
         if isinstance(value, list | tuple):
@@ -314,19 +270,11 @@ def as_table(value: Any, info: ValidationInfo, columns: Sequence[int], shape: st
 
 
 def read_text(path: Path, most: int) -> str:
-    """Return the text of a table.
-
-    Args:
-        path: file with comma-separated columns.
-        most: bytes that it may have.
-
-    Raises:
-        PydanticCustomError: it cannot be read as text, or has more.
-    """
+    """Return the text of a table of comma-separated columns; raise if it is none, or has more than `most` bytes."""
     try:
         text = read_bytes(path, most).decode("utf-8-sig")
     except Unreadable as error:
-        raise problem("", str(path), f"cannot be read: {error.reason}") from None
+        raise problem("", str(path), f"cannot be read: {error}") from None
     except UnicodeDecodeError as error:
         raise problem("", str(path), f"cannot be read: byte {error.start} is not UTF-8 text") from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
@@ -351,14 +299,8 @@ def quick_rows(text: str) -> Array | None:
 def read_rows(text: str, path: Path) -> dict[int, tuple[float, ...]]:
     """Return number of the line ↦ row of a table of finite numbers, all of one length.
 
-    `#` starts a comment. The first row may be a header, and is one if none of its cells is a number.
-
-    Args:
-        text: content of the file, lines ended by line feeds.
-        path: the file, for errors.
-
-    Raises:
-        PydanticCustomError: it holds anything else or nothing, naming the line and the column.
+    `#` starts a comment. The first row may be a header, and is one if none of its cells is a number. Raise if the text,
+    with lines ended by line feeds, holds anything else or nothing, naming the file at `path`, line and column.
     """
     rows: dict[int, tuple[float, ...]] = {}
     width, top = 0, 0  # columns of the first row, and its line

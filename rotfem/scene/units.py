@@ -15,74 +15,62 @@ from rotfem.units import is_quantity, quantity
 #: A unit of all numbers below a key, or one for each column of its rows.
 Unit: TypeAlias = str | tuple[str, ...]
 
-_STIFFNESS = dict.fromkeys(("EA", "GA", "GA2", "GA3"), "N") | dict.fromkeys(("EI", "EI2", "EI3", "GJ"), "N*m**2")
-_MODULI = dict.fromkeys(("E", "E1", "E2", "G12", "G13", "G23"), "Pa")
-_LENGTHS = ("width", "height", "radius", "outer_radius", "inner_radius", "wall")
-_INERTIAS = dict.fromkeys(("rotary_inertia", "rotary_inertia2", "rotary_inertia3"), "kg*m")
-_MOMENTS_OF_AREA = dict.fromkeys(("second_moment", "second_moment2", "second_moment3", "torsion_constant"), "m**4")
-
-#: Dotted key ↦ its unit. Of a table [[x, value], …] it is that of the values; x is in m, t of motion and loads in s.
-UNITS: dict[str, Unit] = {
-    **{f"structure.{key}": "m" for key in ("length", "width", "thickness", "hub_radius", "hub_offset", "tip_offset")},
-    "structure.line": ("m",),
-    "structure.tip_mass": "kg",
-    "structure.tip_inertia": ("kg*m**2",),
-    **{f"structure.{key}": "rad" for key in ("pretwist", "sweep", "precone")},
-    **{f"structure.section.{key}": "rad" for key in ("pretwist", "precone", "principal_angle")},
-    **{f"structure.{key}": unit for key, unit in _MODULI.items()},
-    "structure.rho": "kg/m**3",
-    "structure.point_masses": ("m", "m", "kg"),
-    "structure.line_masses": "kg/m",
-    **{f"structure.section.{key}": unit for key, unit in (_STIFFNESS | _INERTIAS | _MOMENTS_OF_AREA).items()},
-    **{
-        f"structure.section.{key}": "m"
-        for key in (*_LENGTHS, "mass_center", "shear_center", "tension_center", "polar_radius")
+#: Part of a scene ↦ unit ↦ its keys. Of a table [[x, value], …] it is that of the values; x is in m, t of motion and
+#: loads in s.
+_KEYS: dict[str, dict[Unit, str]] = {
+    "structure": {
+        "m": "length width thickness hub_radius hub_offset tip_offset masses.x masses.offset root.hinge_offset",
+        ("m",): "line",
+        "kg": "tip_mass masses.mass",
+        ("kg*m**2",): "tip_inertia masses.inertia",
+        "rad": "pretwist sweep precone root.pitch section.pretwist section.precone section.principal_angle",
+        "Pa": "E E1 E2 G12 G13 G23 section.E",
+        "kg/m**3": "rho section.rho",
+        ("m", "m", "kg"): "point_masses",
+        "kg/m": "line_masses section.mass_per_length",
+        "s": "damping.kelvin_voigt",
+        ("1/s", "s"): "damping.rayleigh",
+        "dimensionless": "damping.modal",
+        "N*m": "root.lag_stiffness root.flap_stiffness root.pitch_stiffness",
+        "N*m*s": "root.lag_damping root.flap_damping root.pitch_damping",
     },
-    "structure.section.mass_per_length": "kg/m",
-    "structure.section.E": "Pa",
-    "structure.section.rho": "kg/m**3",
-    "structure.section.area": "m**2",
-    "structure.damping.kelvin_voigt": "s",
-    "structure.damping.rayleigh": ("1/s", "s"),
-    "structure.damping.modal": "dimensionless",
-    "accuracy_budget": "s",
-    "motion.speed": "rad/s",
-    "motion.duration": "s",
-    "motion.hub_inertia": "kg*m**2",
-    "motion.hub_damping": "N*m*s",
-    "motion.base_acceleration": "m/s**2",
-    "motion.pulses": ("s", "s", "N*m"),
-    "initial.tip_displacement": "m",
-    "initial.amplitude": "m",
-    "initial.phase": "rad",
-    "initial.velocity": ("m", "m/s"),
-    "loads.gravity": "m/s**2",
-    "loads.tip_force": "N",
-    "loads.tip_moment": "N*m",
-    "loads.distributed_moment": "N",
-    "loads.pressure": "Pa",
-    "loads.at.x": "m",
-    "loads.at.force": "N",
-    "loads.at.moment": "N*m",
-    **{f"structure.root.{name}_stiffness": "N*m" for name in ("lag", "flap", "pitch")},
-    **{f"structure.root.{name}_damping": "N*m*s" for name in ("lag", "flap", "pitch")},
-    "structure.root.hinge_offset": "m",
-    "structure.root.pitch": "rad",
-    "structure.masses.x": "m",
-    "structure.masses.mass": "kg",
-    "structure.masses.offset": "m",
-    "structure.masses.inertia": ("kg*m**2",),
-    "output.stations": "m",
-    **{f"time.{key}": "s" for key in ("end", "step", "max_step", "min_step", "output_step")},
+    "structure.section": {
+        "N": "EA GA GA2 GA3",
+        "N*m**2": "EI EI2 EI3 GJ",
+        "kg*m": "rotary_inertia rotary_inertia2 rotary_inertia3",
+        "m": "width height radius outer_radius inner_radius wall mass_center shear_center tension_center polar_radius",
+        "m**2": "area",
+        "m**4": "second_moment second_moment2 second_moment3 torsion_constant",
+    },
+    "motion": {
+        "rad/s": "speed",
+        "s": "duration",
+        "kg*m**2": "hub_inertia",
+        "N*m*s": "hub_damping",
+        "m/s**2": "base_acceleration",
+        ("s", "s", "N*m"): "pulses",
+    },
+    "initial": {"m": "tip_displacement amplitude", "rad": "phase", ("m", "m/s"): "velocity"},
+    "loads": {
+        "m/s**2": "gravity",
+        "N": "tip_force distributed_moment at.force",
+        "N*m": "tip_moment at.moment",
+        "Pa": "pressure",
+        "m": "at.x",
+    },
+    "output": {"m": "stations"},
+    "time": {"s": "end step max_step min_step output_step"},
 }
+
+#: Dotted key ↦ its unit.
+UNITS: dict[str, Unit] = {
+    f"{part}.{key}": unit for part, units in _KEYS.items() for unit, keys in units.items() for key in keys.split()
+} | {"accuracy_budget": "s"}
 
 #: Keys of whose unit something else of the scene decides: key ↦ (what does, its value ↦ the unit).
 DEPENDING: dict[str, tuple[str, dict[str, Unit]]] = {
     "motion.table": ("motion.type", {"table": "rad/s", "torque": "N*m"}),
-    "loads.distributed": (
-        "structure.type",
-        {"planar_beam": "N/m", "spatial_beam": "N/m", "plate": "N/m**2"},
-    ),
+    "loads.distributed": ("structure.type", {"planar_beam": "N/m", "spatial_beam": "N/m", "plate": "N/m**2"}),
 }
 
 #: What any load, or the pitch, may have below it ↦ its unit; the unit of what is not here is that of the load.
@@ -98,13 +86,10 @@ _ABSCISSAE = {"structure": "m", "motion": "s", "loads": "s", "structure.root.pit
 def in_si(tables: dict[str, Any], file: str) -> dict[str, Any]:
     """Return a scene's tables with every value that has a unit as a number in SI units and radians.
 
-    Args:
-        tables: nested tables of a scene; not changed. Numbers are in SI units already and stay as they are; so does
-            what is no value of a key that has a unit.
-        file: name for error messages.
+    Numbers are in SI units already and stay as they are; so does what is no value of a key that has a unit.
 
     Raises:
-        SceneError: a unit is not known, or is not of the kind that the key needs.
+        SceneError: of the file: a unit is not known, or is not of the kind that the key needs.
     """
     return {
         str(part): _converted(value, (str(part),), lambda key: _unit_of(key, tables), file)
@@ -140,10 +125,8 @@ def _has_text(value: Any) -> bool:
 
 def _unit_of(key: str, tables: Mapping[str, Any]) -> Unit | None:
     """Return the unit of a dotted key, or of the nearest table above that has one; None if there is none."""
-    if (
-        key.startswith(("loads.", "structure.root.pitch."))
-        and (own := HARMONIC.get(".".join(key.split(".")[-2:]))) is not None
-    ):
+    own = HARMONIC.get(".".join(key.split(".")[-2:]))
+    if own is not None and key.startswith(("loads.", "structure.root.pitch.")):
         return own
     while key:
         if key in UNITS:
@@ -158,13 +141,7 @@ def _unit_of(key: str, tables: Mapping[str, Any]) -> Unit | None:
 
 
 def _in_units(value: Any, unit: Unit, first: tuple[str, ...]) -> Any:
-    """Return a value, a vector or a table as numbers.
-
-    Args:
-        value: a text, a number, or lists of them.
-        unit: of the numbers, or of the columns of the rows.
-        first: units of the first columns of a table whose columns have no units of their own.
-    """
+    """Return a value, a vector or a table as numbers; `first` are units of columns before those of one unit."""
     if isinstance(value, str):
         return quantity(value, unit if isinstance(unit, str) else unit[0])
     if not isinstance(value, list | tuple):

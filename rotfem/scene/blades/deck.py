@@ -55,7 +55,7 @@ class Deck:
         try:
             content = read_bytes(path, LARGEST)
         except Unreadable as error:
-            raise problem("", shown(path), f"cannot be read: {error.reason}") from None
+            raise problem("", shown(path), f"cannot be read: {error}") from None
         if b"\0" in content:
             raise problem("", shown(path), "cannot be read: it is no text")
         try:
