@@ -43,11 +43,7 @@ class Extensions(SceneModel):
 
 
 def load_wanted(tables: dict[str, Any], file: str, directory: str) -> None:
-    """Run the files that the [extensions] table of a scene names; what is no list of names is left to its validation.
-
-    Raises:
-        SceneError: one cannot be read, or fails.
-    """
+    """Run the files that the [extensions] table of a scene names; what is no list is left to its validation."""
     table = tables.get("extensions")
     wanted = table.get("load") if isinstance(table, dict) else None
     for name in [wanted] if isinstance(wanted, str) else wanted if isinstance(wanted, list | tuple) else []:
@@ -58,16 +54,8 @@ def load_wanted(tables: dict[str, Any], file: str, directory: str) -> None:
 def load(name: str, path: Path, file: str, key: str) -> None:
     """Run a Python file that registers something, unless it has been run.
 
-    What it has registered is taken back if it fails.
-
-    Args:
-        name: what the user calls the file.
-        path: where it is.
-        file: what the file is named in, for errors.
-        key: by what.
-
-    Raises:
-        SceneError: it cannot be read, or fails: what Python says, with the line.
+    Where it cannot be read, or fails, what it has registered is taken back, and a SceneError says why, with the line:
+    of the key and the file that name it, under the name that the user has given.
     """
     try:
         source = read_bytes(path, LARGEST)

@@ -93,15 +93,7 @@ class OutputTable(SceneModel):
         return self.stations or ()
 
     def check(self, kind: str, length: float | None) -> None:
-        """Refuse stations that a structure has not.
-
-        Args:
-            kind: its type.
-            length: its length, m; None where it is given by a mesh.
-
-        Raises:
-            PydanticCustomError: names the key.
-        """
+        """Refuse quantities and stations that a structure of a type, of a length (m) or None with a mesh, has not."""
         named = [name for name in self.quantities if name not in registry.outputs]
         known = (*FORCES.get(kind, ()), *STRAINS.get(kind, ()), *RESULTANTS.get(kind, ()))
         for name in named:

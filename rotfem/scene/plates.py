@@ -8,11 +8,10 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
-from pydantic_core import PydanticCustomError
 
 from rotfem.scene.files import existing_file
 from rotfem.scene.structure import Damping, StructureTable, check_one_hub
-from rotfem.scene.table import Way, choose_way, problem
+from rotfem.scene.table import Way, choose_way, problem, problems_at
 from rotfem.scene.values import (
     Array,
     Bounds,
@@ -39,10 +38,8 @@ def _as_thickness(value: Any) -> Profile | dict[str, float]:
         if not value:
             raise problem("", value, "must give a thickness for every region")
         for region, thickness in value.items():
-            try:
+            with problems_at(str(region), thickness):
                 positive.number(thickness)
-            except PydanticCustomError as error:
-                raise problem(str(region), thickness, error.message()) from None
         return {str(region): float(thickness) for region, thickness in value.items()}
     if isinstance(value, list | tuple):
         # Whether it must start at x = 0 depends on the geometry: a mesh may lie anywhere.
@@ -62,24 +59,6 @@ def _as_point_masses(value: Any) -> Matrix:
         if mass <= 0.0:
             raise problem("", value, f"the mass of row {i} must be greater than 0")
     return rows
-
-
-def locking(cell: str, degree: int, integration: str) -> str | None:
-    """Return why elements of a degree (with reduced or full integration) are refused; None if they are good.
-
-    Args:
-        cell: "triangle" or "quadrilateral".
-        degree: polynomial degree.
-        integration: "reduced" or "full" membrane and shear integration.
-    """
-    least = {("quadrilateral", "reduced"): 2, ("quadrilateral", "full"): 3, ("triangle", "reduced"): 3}
-    needed = least.get((cell, integration), 4)
-    if degree >= needed:
-        return None
-    return (
-        f"{cell}s of degree {degree} with {integration} integration lock: thin plates come out far too stiff; must be "
-        f"at least {needed} here (defaults: quadrilaterals of degree 2, triangles of degree 3, reduced integration)"
-    )
 
 
 def _as_mesh_file(value: Any, info: ValidationInfo) -> str:
@@ -170,16 +149,7 @@ class PlateStructure(StructureTable):
         return True
 
     def thickness_at(self, x: npt.ArrayLike) -> Array:
-        """Return the thickness (m) at positions along the plate, shape of x.
-
-        Args:
-            x: coordinate from the clamped edge (m), or of the mesh, any shape.
-
-        Raises:
-            TypeError: the thickness is given by region.
-        """
-        if isinstance(self.thickness, dict):
-            raise TypeError("the thickness is given by region of the mesh, not along x")
+        """Return the thickness (m), which is not given by region, at coordinates x (m) along the plate, shape of x."""
         return evaluate(self.thickness, x)
 
     @model_validator(mode="after")

@@ -42,13 +42,11 @@ def as_line(value: Any) -> Matrix:
             raise problem("", list(a), f"rows {number} to {number + 2} are the same; two equal rows are a kink")
     line = ReferenceLine(rows)
     with np.errstate(all="ignore"):  # points whose distances are no numbers have no speed
-        forward = line.slowest > SLOWEST
-    if not forward:
-        raise problem(
-            "", None, "the line turns back on itself between two points; they must follow each other along it"
-        )
-    steep = line.steepest
-    if steep > STEEPEST:
+        if not line.slowest > SLOWEST:
+            why = "the line turns back on itself between two points; they must follow each other along it"
+            raise problem("", None, why)
+    along = np.linspace(0.0, line.length, 8 * len(rows) + 1)
+    if np.max(np.abs(line.at(along)[1][:, 2])) > STEEPEST:
         reason = "runs along direction 3 somewhere, which leaves section axis 2 no direction; choose other axes"
         raise problem("", None, f"the line {reason}")
     return rows
@@ -56,7 +54,7 @@ def as_line(value: Any) -> Matrix:
 
 @lru_cache(maxsize=16)
 def line_through(rows: Matrix) -> ReferenceLine:
-    """Return the line through points, which `as_line` has read."""
+    """Return the line through points that `as_line` has read."""
     return ReferenceLine(rows)
 
 
@@ -111,12 +109,6 @@ class ReferenceLine:
             samples = np.linspace(spline.x[:-1], spline.x[1:], SAMPLES + 1)
             speeds.append(np.min(np.linalg.norm(spline(samples, 1), axis=-1)))
         return float(np.min(speeds))
-
-    @property
-    def steepest(self) -> float:
-        """Largest |t·e₃| of the unit tangent t, sampled at all points and between."""
-        x = np.linspace(0.0, self.length, 8 * len(self.rows) + 1)
-        return float(np.max(np.abs(self.at(x)[1][:, 2])))
 
     def at(self, x: npt.ArrayLike, near: npt.ArrayLike | None = None) -> tuple[Array, Array]:
         """Return (position in m, unit tangent), each (n, 3), at arc lengths x (n,) in m.
@@ -194,8 +186,7 @@ class SweptLine:
 
 def _lengths(spline: Any) -> Array:
     """Return the arc length of each part between two points (m)."""
-    a, b = spline.x[:-1], spline.x[1:]
-    return _arcs(spline, a, b)
+    return _arcs(spline, spline.x[:-1], spline.x[1:])
 
 
 def _arcs(spline: Any, a: Array, b: Array) -> Array:

@@ -70,11 +70,7 @@ class PitchAngle(Given):
         return (self.value or 0.0) + (self.table[0][1] if self.table is not None else 0.0)
 
     def at(self, t: float) -> float:
-        """Return what the function returns at a time (s), rad.
-
-        Raises:
-            InputError: it raises, or returns anything but a finite number.
-        """
+        """Return what the function returns at a time (s), rad; an InputError if that is no finite number."""
         return _number(self.function, t, KEY, "rad")
 
     def rate_at(self, t: float) -> float:

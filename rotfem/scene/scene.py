@@ -243,14 +243,12 @@ class Scene(SceneModel):
             SceneError: there is no [time] table though the motion is not constant, or starts in a way of its own.
         """
         if self.time is None and not self.motion.is_steady:
-            raise SceneError(
-                self._file,
-                "time",
-                None,
+            why = (
                 f'missing; with motion.type = "{self.motion.type}" a run is a time history: give [time] with end and '
                 "step (or tolerance, or neither with accuracy). Only constant motion has a steady state to run "
-                "without it",
+                "without it"
             )
+            raise SceneError(self._file, "time", None, why)
         if self.time is None and (key := self.initial.first) is not None:
             raise SceneError(self._file, f"initial.{key}", None, "needs [time]: a steady state has no beginning")
         self.check_tables("a steady state" if self.time is None else "")

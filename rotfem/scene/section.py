@@ -371,11 +371,7 @@ def _turn(angle: Array) -> Array:
 def _offset(axial: Array, transverse: Array) -> Array:
     """Return B (…, 6, 6): motion (v, ω) of the reference axis ↦ axial motion at one centre, transverse at another.
 
-    It is v + ω×(0, y, z) row by row; the same map holds for strains, with (Γ, K) for (v, ω).
-
-    Args:
-        axial: (y, z) of the one, (…, 2) in m.
-        transverse: (y, z) of the other.
+    It is v + ω×(0, y, z) row by row, with (y, z), (…, 2) in m, of each; strains have the same map, (Γ, K) for (v, ω).
     """
     B = np.broadcast_to(np.eye(6), (*axial.shape[:-1], 6, 6)).copy()
     B[..., 0, 4], B[..., 0, 5] = axial[..., 1], -axial[..., 0]

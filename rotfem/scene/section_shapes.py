@@ -86,12 +86,7 @@ def rectangle(nu: Array, width: Array, height: Array) -> Geometry:
     """Return the geometry of a solid rectangle, shear correction 10(1+ν)/(12+11ν).
 
     The torsion constant is Saint-Venant's series (Timoshenko & Goodier, Theory of Elasticity, §109)
-    J = (a b³/3) [1 − (192/π⁵)(b/a) Σ_{n odd} tanh(nπa/2b)/n⁵] with a ≥ b.
-
-    Args:
-        nu: Poisson's ratio.
-        width: side along axis 2 (m).
-        height: side along axis 3 (m).
+    J = (a b³/3) [1 − (192/π⁵)(b/a) Σ_{n odd} tanh(nπa/2b)/n⁵] with a ≥ b. The width is along axis 2.
     """
     a, b = np.maximum(width, height), np.minimum(width, height)
     series = np.sum(np.tanh(_ODD * np.pi * (a / (2.0 * b))[..., None]) / _ODD**5, axis=-1)
@@ -113,12 +108,7 @@ def tube(nu: Array, outer_radius: Array, inner_radius: Array | None = None, wall
     """Return the geometry of a hollow circle.
 
     The shear correction is 6(1+ν)(1+m²)² / [(7+6ν)(1+m²)² + (20+12ν)m²] with m = inner/outer radius.
-
-    Args:
-        nu: Poisson's ratio.
-        outer_radius: outer radius (m).
-        inner_radius: inner radius (m), or None.
-        wall: thickness of the wall (m), where there is no inner radius.
+    There is a wall thickness (m) where there is no inner radius.
     """
     inner_radius = outer_radius - wall if inner_radius is None else inner_radius
     second_moment = np.pi / 4.0 * (outer_radius**4 - inner_radius**4)

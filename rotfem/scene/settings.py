@@ -10,7 +10,6 @@ from pydantic import ConfigDict, Field, PlainValidator, ValidationInfo, model_va
 from rotfem import registry
 from rotfem.errors import show
 from rotfem.scene.files import as_table
-from rotfem.scene.plates import locking
 from rotfem.scene.table import (
     SceneModel,
     as_name,
@@ -207,8 +206,14 @@ class PlateMesh(SceneModel):
         return 3 if cell == "triangle" and "degree" not in self.model_fields_set else self.degree
 
     def locking_on(self, cell: str) -> str | None:
-        """Return why the elements lock on cells of a shape; None if they do not (see `locking`)."""
-        return locking(cell, self.degree_on(cell), self.integration)
+        """Return why the elements lock on cells of a shape; None if they do not."""
+        least = {("quadrilateral", "reduced"): 2, ("quadrilateral", "full"): 3, ("triangle", "reduced"): 3}
+        needed, degree = least.get((cell, self.integration), 4), self.degree_on(cell)
+        if degree >= needed:
+            return None
+        why = f"{cell}s of degree {degree} with {self.integration} integration lock: thin plates come out far too stiff"
+        defaults = "defaults: quadrilaterals of degree 2, triangles of degree 3, reduced integration"
+        return f"{why}; must be at least {needed} here ({defaults})"
 
 
 def _counts_for(aspect: float) -> tuple[int, int]:

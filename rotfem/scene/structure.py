@@ -43,11 +43,7 @@ def is_design(tables: Mapping[str, Any]) -> bool:
 
 
 def designed(tables: dict[str, Any], file: str) -> dict[str, Any]:
-    """Return the tables of a scene with the structure that a design stands for in its place.
-
-    Raises:
-        SceneError: a key is missing or unknown, or the design refuses the values.
-    """
+    """Return the tables of a scene with the structure that a design stands for in its place."""
     seen = set[str]()
     while is_design(tables):
         given = dict(tables["structure"])

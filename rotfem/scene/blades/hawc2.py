@@ -117,12 +117,9 @@ def _up_to(table: dict[str, Array], length: float) -> dict[str, Array]:
 
 
 def _table(deck: Deck, wanted: Any, full: bool | None = None) -> dict[str, Array]:
-    """Return the columns (n,) of a set, which must be given where there are several.
+    """Return the columns (n,) of a set, [set, part], which must be given where an st file has several.
 
-    Args:
-        deck: the st file.
-        wanted: [set, part], or None.
-        full: whether an htc file says that it has full matrices; None if nothing does.
+    `full` says whether they are full matrices, as far as an htc file does.
     """
     parts = _parts(deck)
     names = ", ".join(f"[{number}, {part}]" for number, part in parts)
@@ -202,8 +199,7 @@ def _with_rows_between(table: dict[str, Array]) -> dict[str, Array]:
     ends, middle = _products(table), _products({name: (c[1:] + c[:-1]) / 2 for name, c in table.items()})
     off = np.max([np.abs((ends[key][1:] + ends[key][:-1]) / (2 * middle[key]) - 1.0) for key in ends], axis=0)
     parts = np.maximum(1, np.ceil(np.sqrt(off / PRODUCT))).astype(int)
-    x = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(r[:-1], r[1:], parts, strict=True)]
-    places = np.append(np.concatenate(x), r[-1])
+    places = np.interp(np.arange(parts.sum() + 1), np.cumsum([0, *parts]), r)
     return {name: np.interp(places, r, column) for name, column in table.items()} | {"r": places}
 
 
@@ -298,11 +294,7 @@ def _is_htc(deck: Deck) -> bool:
 
 
 def _main_body(deck: Deck, wanted: str | None) -> Block:
-    """Return a main body by its name, or the only one there is; a copy is the body that it copies.
-
-    Raises:
-        PydanticCustomError: there is none of that name, or the scene must say which.
-    """
+    """Return a main body by its name, or the only one there is; a copy is the body that it copies."""
     bodies = {block.command("name").words[1]: block for block in _main_bodies(deck)}
     allowed = ", ".join(show(name) for name in bodies)
     if not bodies:
@@ -380,11 +372,7 @@ def _commands(deck: Deck, main: Deck, depth: int) -> Iterator[Command]:
 
 
 def _named_file(command: Command, main: Deck) -> Deck:
-    """Return the file that a command names, from the folder of the main file or from one of the two above.
-
-    Raises:
-        PydanticCustomError: it is in none of them, or there are several.
-    """
+    """Return the one file that a command names, from the folder of the main file or from one of the two above."""
     name = command.words[1].strip("\"'")
     found = sorted({path for folder in list(main.path.parents)[:3] if (path := find_file(folder, name)) is not None})
     if len(found) != 1:

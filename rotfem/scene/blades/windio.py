@@ -66,21 +66,19 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
 def _blade_1(tree: YamlNode) -> dict[str, Any]:
     """Return line, pretwist and section of a file of the first version."""
     properties = tree["components.blade.elastic_properties_mb.six_x_six"]
-    line, length, pretwist = _axis(properties["reference_axis"], properties["twist"], degrees=False)
-    section = {
-        "stiffness": _rows_of_21(properties["stiff_matrix"], length, definite=True),
-        "mass": _rows_of_21(properties["inertia_matrix"], length, definite=False),
-    }
-    return {"line": line, "pretwist": pretwist, "section": section}
+    keys, length = _axis(properties["reference_axis"], properties["twist"], degrees=False)
+    section = {"stiffness": _rows_of_21(properties["stiff_matrix"], length, definite=True)}
+    section["mass"] = _rows_of_21(properties["inertia_matrix"], length, definite=False)
+    return {**keys, "section": section}
 
 
 def _blade_2(blade: YamlNode) -> dict[str, Any]:
-    """Return line, pretwist and section of a file of version 2."""
+    """Return line, pretwist, section and masses of a file of version 2."""
     properties = blade["structure.elastic_properties"]
-    line, length, pretwist = _axis(blade["reference_axis"], blade["outer_shape.twist"], degrees=True)
+    keys, length = _axis(blade["reference_axis"], blade["outer_shape.twist"], degrees=True)
     section = {"stiffness": _stiffness(properties["stiffness_matrix"], length)}
     section["mass"] = _mass(properties["inertia_matrix"], length)
-    return {"line": line, "pretwist": pretwist, "section": section, **_point_masses(properties, length)}
+    return {**keys, "section": section, **_point_masses(properties, length)}
 
 
 def _point_masses(properties: YamlNode, length: float) -> dict[str, Any]:
@@ -92,8 +90,8 @@ def _point_masses(properties: YamlNode, length: float) -> dict[str, Any]:
     return {"masses": [{"x": float(x), "mass": float(m)} for x, m in zip(places, mass, strict=True) if m != 0.0]}
 
 
-def _axis(axis: YamlNode, twist: YamlNode, degrees: bool) -> tuple[list[Any], float, list[list[Any]]]:
-    """Return points of the line, its length and rows of pretwist there; each coordinate has a grid of its own."""
+def _axis(axis: YamlNode, twist: YamlNode, degrees: bool) -> tuple[dict[str, Any], float]:
+    """Return points of the line and rows of pretwist there, and its length; each coordinate has a grid of its own."""
     parts = []
     for name in "xyz":
         values = axis[name]["values"].numbers()
@@ -105,7 +103,7 @@ def _axis(axis: YamlNode, twist: YamlNode, degrees: bool) -> tuple[list[Any], fl
     angles = twist["values"].numbers()
     angles = np.interp(at / through.length, twist["grid"].grid(len(angles)), angles)
     pretwist = iec_pretwist(through.at(at)[1], np.radians(angles) if degrees else angles)
-    return rows, through.length, rows_over(at, pretwist)
+    return {"line": rows, "pretwist": rows_over(at, pretwist)}, through.length
 
 
 def _hub(tree: YamlNode, degrees: bool) -> dict[str, Any]:
@@ -152,7 +150,7 @@ def _stiffness(table: YamlNode, length: float) -> list[list[Any]]:
         )
     upper = np.zeros((count, len(ELEMENTS)))
     for column, name in enumerate(ELEMENTS):
-        upper[:, column] = _column_or_zeros(table, name, count)
+        upper[:, column] = _column(table, name, count, needed=False)
     return scaled_rows(grid, length, _checked(_along_ours(upper), table["K44"].entries(), definite=True))
 
 
@@ -164,24 +162,21 @@ def _mass(table: YamlNode, length: float) -> list[list[Any]]:
     for i in np.flatnonzero(mass <= 0.0):
         table["mass"].entries()[i].fail(f"is {mass[i]:g}; must be greater than 0")
     edge, flap, polar = (_column(table, name, count) for name in ("i_edge", "i_flap", "i_plr"))
-    x, y, cross = (_column_or_zeros(table, name, count) for name in ("cm_x", "cm_y", "i_cp"))
+    x, y, cross = (_column(table, name, count, needed=False) for name in ("cm_x", "cm_y", "i_cp"))
     M = {"K11": mass, "K16": -mass * y, "K22": mass, "K26": mass * x, "K33": mass, "K34": mass * y, "K35": -mass * x}
     M |= {"K44": edge, "K45": -cross, "K55": flap, "K66": polar}
     upper = np.stack([M.get(element, np.zeros(count)) for element in ELEMENTS], axis=-1)
     return scaled_rows(grid, length, _checked(_along_ours(upper), table["mass"].entries(), definite=False))
 
 
-def _column(table: YamlNode, name: str, count: int) -> Array:
-    """Return the values (count,) of an element."""
+def _column(table: YamlNode, name: str, count: int, needed: bool = True) -> Array:
+    """Return the values (count,) of an element; zeros where it need not be given and is not."""
+    if not needed and table.get(name) is None:
+        return np.zeros(count)
     values = table[name].numbers()
     if len(values) != count:
         table[name].fail(f"has {len(values)} values for {count} places")
     return values
-
-
-def _column_or_zeros(table: YamlNode, name: str, count: int) -> Array:
-    """Return the same of an element that is zero where it is not given."""
-    return np.zeros(count) if table.get(name) is None else _column(table, name, count)
 
 
 def _checked(matrices: Array, places: list[YamlNode], definite: bool) -> Array:
@@ -205,11 +200,7 @@ def _along_ours(upper: Array) -> Array:
 
 
 def _yaml_tree(deck: Deck) -> YamlNode:
-    """Return the root of a YAML file.
-
-    Raises:
-        PydanticCustomError: it is not YAML, or empty, or has more characters than are read in ten seconds.
-    """
+    """Return the root of a YAML file; refuse one that is none, or empty, or not read in ten seconds."""
     import yaml
 
     most = MOST_YAML[bool(yaml.__with_libyaml__)]
@@ -255,13 +246,7 @@ def _loader() -> Any:
 
 
 class YamlNode:
-    """A value of a YAML file and its place.
-
-    Args:
-        deck: the file.
-        node: as the parser composes it.
-        path: keys that lead to it, joined by points.
-    """
+    """A value of a YAML file, as the parser composes it, and its place: line, column and keys joined by points."""
 
     def __init__(self, deck: Deck, node: Any, path: str = ""):
         self.deck, self.node, self.path = deck, node, path
