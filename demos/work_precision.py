@@ -47,7 +47,7 @@ def main(figure: Path | None = None) -> float:
     order = math.log2(long / short)
     report("order in the time step", order, REFERENCE, "(–)")
     if figure is not None and FIRST_RANK:
-        from rotfem.commands.cost.plot import cost_figure
+        from rotfem.commands.cost.result import cost_figure
 
         save(cost_figure(result), figure)
     return order

@@ -44,6 +44,9 @@ COARSE = 1e-2
 #: steps take.
 LONG, SHOWN = 5.0, 1 / 3
 
+#: Ratio of steps and cells of two answers whose difference is the error of the finer one, or more, by order 2 or more.
+RATIO = math.sqrt(2.0)
+
 #: Highest degree of elements that a scene may ask for.
 HIGHEST = 6
 
@@ -160,12 +163,12 @@ class Setting:
         error. Steps of a fourth-order scheme are r times as long at r⁴ times the tolerance. Cells of a mesh file have
         one degree less instead.
         """
-        ratio, out = math.sqrt(2.0), dict[str, Self]()
+        out = dict[str, Self]()
         if self.tolerance is not None:
-            out["time"] = replace(self, tolerance=ratio**4 * self.tolerance)
+            out["time"] = replace(self, tolerance=RATIO**4 * self.tolerance)
         if self.elements is None:
             return out | {"space": replace(self, degree=self.degree - 1)} if self.degree > 1 else out
-        fewer = grown(self.elements, 1.0 / ratio, math.floor)
+        fewer = grown(self.elements, 1.0 / RATIO, math.floor)
         return out if fewer == self.elements else out | {"space": replace(self, elements=fewer)}
 
     def unknowns(self) -> float:

@@ -102,7 +102,10 @@ def test_an_accuracy_out_of_reach(rotfem: Rotfem, folder: Path) -> None:
         (("--of", "campbell", "--set", "motion.speed=0.0"), "the scene has no speed to go up to"),
         (("--degrees", "9"), "cost --degrees = 9: must be"),
         # adaptive steps, of which the mean is measured first
-        (("--elements", "-1", "--set", "time={end=0.4, tolerance=1e-3}"), "cost --elements = -1: must be integers"),
+        (
+            ("--elements", "-1", "--set", "time={end=0.4, tolerance=1e-3}"),
+            "cost --elements = -1: must be an integer at least 1",
+        ),
         (("--theories", "linear", "--set", "model.frame=inertial"), 'cost --theories = "linear"'),
         (("--write", "no/where.toml"), '--write = "no/where.toml": there is no folder no'),
         (("--write", "results"), '--write = "results": is a folder'),

@@ -1,4 +1,4 @@
-"""What a study of cost returns: rows, Pareto front, recommendation, summary, files, a tuned scene. No dolfinx in it."""
+"""What a study of cost returns: rows, Pareto front, recommendation, files, figure, tuned scene. No dolfinx in it."""
 
 from __future__ import annotations
 
@@ -36,6 +36,19 @@ DECADES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
 #: Rows of a table that is printed in full.
 LONGEST_TABLE = 40
+
+#: Least error that a figure shows.
+TINY = 1e-16
+
+#: A marker a scheme, or, where there are none, a degree.
+MARKERS = "osD^Pv*X<>"
+
+#: What an output's error is relative to.
+ERRORS = {
+    "tip": "error of the tip's motion, relative to its largest displacement (–)",
+    "frequencies": "largest relative error of a frequency (–)",
+    "campbell": "largest relative error of a frequency at any speed (–)",
+}
 
 #: Keys whose value, where it is a string, is the path of a file, whatever it ends with.
 FILE_KEYS = {
@@ -303,8 +316,6 @@ class CostResult(Result):
 
     def drawings(self) -> dict[str, Callable[[], Figure]]:
         """Return cost.png."""
-        from rotfem.commands.cost.plot import cost_figure
-
         return {"cost.png": partial(cost_figure, self)}
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -353,3 +364,57 @@ def _moved(tables: Mapping[str, Any], start: Path, goal: Path) -> dict[str, Any]
         else:
             out[key] = value
     return out
+
+
+# --- the figure ------------------------------------------------------------------------------------------------------
+
+
+def cost_figure(result: CostResult) -> Figure:
+    """Return error over time: points by theory and scheme, Pareto front, errors of the models, uncertainty.
+
+    A full point holds the error of the model; the faint ring is the error of its discretisation alone.
+    """
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator
+
+    figure, summary = Figure(figsize=(10.5, 6), layout="constrained"), result.summary
+    axis, known = figure.add_subplot(), summary["uncertainty"]
+    kinds = list(dict.fromkeys(str(row["scheme"] or f"degree {row['degree']}") for row in result.rows))
+    for i, theory in enumerate(dict.fromkeys(row["theory"] for row in result.rows)):
+        colour = f"C{i}"
+        for kind, marker in zip(kinds, MARKERS, strict=False):
+            mine = [r for r in result.rows if r["theory"] == theory and kind in (r["scheme"], f"degree {r['degree']}")]
+            done = [r for r in mine if judged(r) is not None]
+            style: dict[str, Any] = {"marker": marker, "color": colour, "ls": "none"}
+            costs = [r["cost"] for r in done]
+            axis.plot(costs, [r["error"] or math.nan for r in done], mfc="none", ms=5, alpha=0.35, **style)
+            axis.plot(costs, [judged(r) or math.nan for r in done], ms=6, label=f"{theory}, {kind}", **style)
+        if error := summary["model_errors"].get(theory):
+            axis.axhline(error, color=colour, ls="--", lw=1.0, label=f"error of {theory}")
+        failed = [
+            r["cost"] for r in result.rows if r["theory"] == theory and r["status"] == "failed" and r["cost"] > 0.0
+        ]
+        if failed:
+            top, label = axis.get_xaxis_transform(), f"{theory}, failed at that time"
+            axis.plot(failed, [0.98] * len(failed), "x", color=colour, transform=top, clip_on=False, label=label)
+    axis.set(xscale="log", yscale="log", xlabel="CPU time of one run with its set-up, median (s)")
+    front = sorted((row for row in result.rows if row["pareto"]), key=lambda row: float(row["cost"]))
+    errors = [max(judged(r) or 0.0, TINY) for r in front]
+    axis.plot([r["cost"] for r in front], errors, "k-", lw=1.2, drawstyle="steps-post", zorder=0, label="Pareto front")
+    for row, error in zip(front, errors, strict=True):
+        name = f"{mesh_name(row)} P{row['degree']}" + ("" if row["scheme"] is None else f", {step_name(row)}")
+        axis.annotate(name, (row["cost"], error), (5, 5), textcoords="offset points", size="x-small")
+    if (chosen := summary["recommended"]) is not None:
+        circle: dict[str, Any] = {"ms": 14, "mfc": "none", "mec": "black", "mew": 1.2, "ls": "none", "marker": "o"}
+        label = f"recommended for {summary['accuracy']:g}"
+        axis.plot(chosen["cost"], max(judged(chosen) or 0.0, TINY), label=label, **circle)
+    if known:
+        axis.axhspan(0.0, known, color="0.85", zorder=-1, label=f"uncertainty {known:.0e}")
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_minor_formatter("")
+    axis.set_ylabel(ERRORS[summary["output"]])
+    axis.set_title(f"{summary['name']}: what accuracy costs")
+    axis.grid(True, which="both", lw=0.3, alpha=0.5)
+    axis.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    return figure

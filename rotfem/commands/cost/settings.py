@@ -7,13 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 from rotfem import registry
-from rotfem.commands.accuracy import changes_of
 from rotfem.errors import SceneError
-from rotfem.mechanics.theories import ladder, theories
+from rotfem.mechanics.theories import theories
 from rotfem.refinement.refine import Setting, grown
 from rotfem.scene import Scene
 from rotfem.scene.settings import estimates_error
-from rotfem.scene.table import did_you_mean
 
 #: What errors may be of: the tip's motion, eigenvalues at the scene's speed, frequencies over a range of speeds.
 OUTPUTS = ("tip", "frequencies", "campbell")
@@ -132,52 +130,24 @@ def sweep_speeds(scene: Scene) -> list[float]:
 
 
 def check_choice(scene: Scene, chosen: Chosen) -> None:
-    """Check the values that are to replace the default grid.
+    """Check the values that are to replace the default grid, each on its own.
 
     Raises:
-        SceneError: one is of the wrong kind, or has no meaning for this scene.
-    """
-    for name, allowed in (("theories", ladder()), ("schemes", registry.schemes.names)):
-        for value in chosen.get(name) or ():
-            if value not in allowed:
-                reason = f"{did_you_mean(value, allowed)}allowed: {', '.join(allowed)}"
-                raise SceneError(scene.file, f"cost --{name}", value, reason)
-    for name, kind in (("elements", int), ("degrees", int), ("steps", float)):
-        for value in chosen.get(name) or ():
-            parts = value if isinstance(value, tuple | list) else (value,)
-            if not all(isinstance(v, int | kind) and not isinstance(v, bool) and v > 0 for v in parts):
-                what = "numbers greater than 0 (s)" if kind is float else "integers greater than 0"
-                raise SceneError(scene.file, f"cost --{name}", value, f"must be {what}")
-    if scene.time is None and (chosen.get("steps") or chosen.get("schemes")):
-        raise SceneError(scene.file, "time", None, "missing; steps and schemes have a meaning only with [time]")
-    end = scene.time.end if scene.time is not None else 0.0
-    too_long = [h for h in chosen.get("steps") or () if h > end]
-    if too_long:
-        raise SceneError(scene.file, "cost --steps", too_long[0], f"must be at most time.end = {end:g}")
-    for name, values in chosen.items():
-        for value in values or ():
-            _check_value(scene, name, value)
-
-
-def _check_value(scene: Scene, name: str, value: Any) -> None:
-    """Check that the scene allows a value on its own.
-
-    Raises:
-        SceneError: it does not.
+        SceneError: one is not allowed, or has no meaning for this scene.
     """
     own = own_setting(scene)
-    if name == "elements" and own.elements is None:
-        raise SceneError(scene.file, "cost --elements", value, "has no meaning with structure.mesh; leave it out")
-    fields = {"elements": "elements", "degrees": "degree", "schemes": "scheme", "steps": "step"}
-    if name == "theories":
-        changed = with_theory(own, value)
-    else:
-        change: dict[str, Any] = {fields[name]: tuple(value) if isinstance(value, list) else value}
-        changed = replace(own, **change)
-    adapts = name != "steps" and (name != "schemes" or estimates_error(registry.schemes[value]))
-    if scene.time is not None and not adapts:
-        changed = replace(changed, tolerance=None, step=changed.step or scene.time.end)
-    try:
-        scene.replace(changes_of(scene, changed))
-    except SceneError as error:
-        raise SceneError(scene.file, f"cost --{name}", value, error.allowed) from None
+    keys = {"theories": "model.theory", "elements": "mesh.elements", "degrees": "mesh.degree"}
+    keys |= {"schemes": "time.scheme", "steps": "time.step"}
+    for name, value in ((name, value) for name, values in chosen.items() for value in values or ()):
+        if name in ("steps", "schemes") and scene.time is None:
+            raise SceneError(scene.file, "time", None, "missing; steps and schemes have a meaning only with [time]")
+        if name == "elements" and own.elements is None:
+            raise SceneError(scene.file, "cost --elements", value, "has no meaning with structure.mesh; leave it out")
+        changes: dict[str, Any] = {keys[name]: value}
+        if name in ("steps", "schemes") and scene.time is not None:
+            changes |= {f"time.{key}": None for key in ("tolerance", "max_step", "min_step", *scene.time.parameters)}
+            changes = {"time.step": scene.time.step or scene.time.end} | changes
+        try:
+            scene.replace(changes)
+        except SceneError as error:
+            raise SceneError(scene.file, f"cost --{name}", value, error.allowed) from None

@@ -5,7 +5,9 @@ in steps h and n cells has the error
 
     |u(h, n) − u(rh, n)| + |u(h, n) − u(h, n/r)|,    r = √2,
 
-at most, and is refined until that is a part of the accuracy. The error of a setting is the distance of its answer from
+at most, as r² − 1 = 1 is the least by which errors of order p ≥ 2 differ (Richardson); of adaptive steps the first
+difference is divided by r² − 1, r the ratio of the numbers of steps, where that is less. It is refined until that is a
+part of the accuracy. The error of a setting is the distance of its answer from
 the reference. Settings are computed from the cheapest on, those first that may be within the accuracy: errors of
 theory, mesh and steps add up, and each is no larger than the least error of a setting with this theory, mesh or steps.
 """
@@ -59,6 +61,7 @@ from rotfem.refinement.refine import (
     AIM,
     COARSE,
     HIGHEST,
+    RATIO,
     Clock,
     Refinement,
     Setting,
@@ -345,20 +348,21 @@ class Study:
             self.failures[theory] = "its error is unknown"
 
     def _paired(self, setting: Setting) -> tuple[Array, dict[str, float | None]]:
-        """Return the output of a setting, and its differences from those of coarser ones."""
-        error: dict[str, float | None] = {"time": 0.0} if setting.moving else {}
-        error |= {"space": None} | ({} if self.output == "tip" else {"round_off": 0.0})
+        """Return the output of a setting, and its errors by its differences from those of coarser ones.
+
+        Unknown is what another tolerance, or cells that knots fix, do not change.
+        """
         coarser = {name: self._computed(other) for name, other in setting.coarser().items()}
-        here = self._computed(setting)
-        for name, there in coarser.items():
-            if there.values is not None and (
-                name == "time" or there.dofs < here.dofs
-            ):  # knots may have fixed the cells
-                error[name] = self.apart(here.values, there.values)
-            else:
-                error[name] = None
+        here, error = self._computed(setting), dict[str, float | None]()
+        for name in ("time", "space") if setting.moving else ("space",):
+            there, error[name] = coarser.get(name), None
+            if there is not None and (here.dofs, here.steps) != (there.dofs, there.steps):
+                ratio = here.steps / there.steps if name == "time" else RATIO
+                if ratio > 1.0:
+                    error[name] = self.apart(here.values, there.values) / min(1.0, ratio**2 - 1.0)
         known = [part for part in error.values() if part is not None]
-        return here.values, {**error, "total": sum(known) if len(known) == len(error) else None}
+        error["total"] = sum(known) if len(known) == len(error) else None
+        return here.values, error if self.output == "tip" else {**error, "round_off": 0.0}
 
     def _computed(self, setting: Setting) -> Any:
         """Return the measurement of a setting.
