@@ -17,6 +17,8 @@ from rotfem.scene.span_tables import with_tables
 from rotfem.scene.structure import Damping, MeanBeam, apart, check_one_hub, means
 from rotfem.scene.table import SceneModel, problem, problems_at
 from rotfem.scene.values import (
+    DIGITS,
+    ROUND_OFF,
     AnyProfile,
     Array,
     Bounds,
@@ -32,10 +34,6 @@ from rotfem.scene.values import (
     check_magnitudes,
     check_profile_length,
 )
-
-#: Part of the length by which a place may be beside the beam, and by which the end of a table may miss its end: where
-#: the length is given, and where it is the arc length of a line, whose points have the digits of a file.
-NEAR, ARC = 1e-9, 1e-6
 
 
 def _as_inertia(value: Any) -> float | Matrix:
@@ -129,7 +127,7 @@ class BeamStructure(RootedStructure):
         mass = section["mass_per_length"] + (self.tip_mass + sum(body.mass for body in self.masses)) / self.length
         return MeanBeam(self.length, self.root_position[0], section["EA"], mass, bending)
 
-    def _check_tables(self, slack: float = NEAR) -> None:
+    def _check_tables(self, slack: float = ROUND_OFF) -> None:
         """Refuse tapers of the section that end elsewhere, properties of a size that cannot be, masses elsewhere."""
         section = self._section
         for name, taper in section.tapers.items():
@@ -139,7 +137,7 @@ class BeamStructure(RootedStructure):
             check_magnitudes(lambda: properties(section.knots), "section")
         for i, body in enumerate(self.masses):
             key = f"masses.{i}"
-            if not -NEAR <= body.x / self.length <= 1 + NEAR:
+            if not -ROUND_OFF <= body.x / self.length <= 1 + ROUND_OFF:
                 raise problem(f"{key}.x", body.x, f"must be from 0 to the length {self.length:g}")
             if self.is_planar and body.offset[2] != 0.0:
                 raise problem(f"{key}.offset", list(body.offset), "the third component must be 0 for a planar_beam")
@@ -308,7 +306,7 @@ class SpatialBeamStructure(BeamStructure):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        slack = NEAR if self.line is None else ARC
+        slack = ROUND_OFF if self.line is None else DIGITS
         check_profile_length("pretwist", self.pretwist, self.length, slack)
         check_profile_length("sweep", self.sweep, self.length)
         if self.line is not None and self.sweep != 0.0:
@@ -331,6 +329,6 @@ def _with_length(data: Any) -> Any:
     except PydanticCustomError as error:
         raise problem("line", (error.context or {}).get("value"), error.message()) from None
     given = data.get("length", arc)
-    if isinstance(given, int | float) and not isinstance(given, bool) and abs(given - arc) > ARC * arc:
+    if isinstance(given, int | float) and not isinstance(given, bool) and abs(given - arc) > DIGITS * arc:
         raise problem("length", given, f"is not the arc length of the line, {arc:.9g}; it may be left out")
     return data | {"length": arc}

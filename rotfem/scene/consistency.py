@@ -11,7 +11,7 @@ from rotfem.scene.motion import Motion, TorqueMotion
 from rotfem.scene.settings import BeamMesh, Initial, Model, PlateMesh
 from rotfem.scene.span_tables import FORCE
 from rotfem.scene.table import problem
-from rotfem.scene.values import Matrix
+from rotfem.scene.values import ROUND_OFF, Matrix
 
 
 def check_together(scene: Any) -> None:
@@ -148,7 +148,7 @@ def _check_velocity(structure: Any, rows: Matrix) -> None:
     why = None
     if structure.type == "plate":
         why = "is available for beams only; a plate may start in a mode"
-    elif rows[0][0] != 0.0 or abs(rows[-1][0] - length) > 1e-9 * length:
+    elif rows[0][0] != 0.0 or abs(rows[-1][0] - length) > ROUND_OFF * length:
         why = f"the table must run from x = 0 to the length {length:g}"
     elif any(rows[0][1:]):
         why = "must be zero at x = 0, where the root is held"

@@ -15,11 +15,8 @@ from pydantic import PlainValidator
 
 from rotfem import registry
 from rotfem.errors import SceneError
-from rotfem.scene.files import Unreadable, read_bytes
+from rotfem.scene.files import LARGEST, Unreadable, read_bytes
 from rotfem.scene.table import SceneModel, problem
-
-#: Bytes of a file, at most.
-LARGEST = 10_000_000
 
 #: Resolved paths of the files that have been run.
 _LOADED: set[Path] = set()

@@ -93,8 +93,8 @@ def _all(descriptor: int, most: int, waits: bool) -> bytes:
     raise Unreadable(f"is larger than {most} bytes")
 
 
-#: Bytes of a scene file, at most.
-LARGEST_SCENE = 50_000_000
+#: Bytes of a file that is no table, at most.
+LARGEST = 50_000_000
 
 #: Tables and lists within each other, at most; the deepest that a scene has is six: rows with a matrix in a table.
 DEEPEST = 30
@@ -112,7 +112,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         SceneError: the file is missing, cannot be read or is not valid TOML, saying where.
     """
     try:
-        return tomllib.loads(read_bytes(path, LARGEST_SCENE).decode("utf-8-sig"))
+        return tomllib.loads(read_bytes(path, LARGEST).decode("utf-8-sig"))
     except Unreadable as error:
         reason = str(error)
     except UnicodeDecodeError as error:

@@ -12,10 +12,7 @@ from rotfem.scene.motion import Motion
 from rotfem.scene.signals import Given, TimeFunction, arguments
 from rotfem.scene.span_tables import FORCE, MOMENT, PRESSURE, Kind, Over
 from rotfem.scene.table import SceneModel, problem
-from rotfem.scene.values import Matrix, Number, PaddedVector, Positive, as_number, as_vector
-
-#: Part of the length by which a place may be off the structure.
-NEAR = 1e-9
+from rotfem.scene.values import ROUND_OFF, Matrix, Number, PaddedVector, Positive, as_number, as_vector
 
 #: How tables are written that are not mistaken for others.
 KEYS = "write over_time = [[t, …], …], over_span = [[x, …], …] or over_span_and_time = [[x, t, …], …]"
@@ -294,7 +291,7 @@ def check_loads(structure: Any, motion: Motion, loads: Loads) -> None:
         if load.VECTORS is MOMENT:
             _check_moment(key, structure, load)
         for x, *_ in load.span_rows:
-            if structure.length is not None and not -NEAR <= x / structure.length <= 1 + NEAR:
+            if structure.length is not None and not -ROUND_OFF <= x / structure.length <= 1 + ROUND_OFF:
                 raise problem(
                     key, None, f"x = {x:g} is not on the structure, which runs from 0 to {structure.length:g}"
                 )
@@ -334,7 +331,7 @@ def check_place(key: str, structure: Any, x: tuple[float, ...]) -> None:
     if len(x) != (2 if structure.type == "plate" else 1):
         allowed = "[x, y], m, for a plate" if structure.type == "plate" else f"a number, m, for a {structure.type}"
         raise problem(key, list(x), f"must be {allowed}")
-    if structure.length is not None and not -NEAR <= x[0] / structure.length <= 1 + NEAR:
+    if structure.length is not None and not -ROUND_OFF <= x[0] / structure.length <= 1 + ROUND_OFF:
         raise problem(key, x[0] if len(x) == 1 else list(x), f"must be from 0 to the length {structure.length:g}")
 
 

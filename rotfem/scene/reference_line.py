@@ -16,9 +16,6 @@ from rotfem.scene.values import Array, Matrix, as_rows
 #: Gauss points for the arc length between two points: the speed along a cubic is smooth there.
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
 
-#: Steps of Newton's method for the place of an arc length, which doubles its digits with each.
-STEPS = 8
-
 #: Cosine of the smallest angle to direction 3 that the line may have: section axis 2 is across both.
 STEEPEST = 1 - 1e-6
 
@@ -202,6 +199,6 @@ def _places(spline: Any, s: Array) -> Array:
     part = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(knots) - 2)
     a, b = spline.x[part], spline.x[part + 1]
     u = a + (b - a) * (s - knots[part]) / (knots[part + 1] - knots[part])
-    for _ in range(STEPS):
+    for _ in range(8):  # the digits double with each
         u = np.clip(u - (_arcs(spline, a, u) - (s - knots[part])) / np.linalg.norm(spline(u, 1), axis=-1), a, b)
     return np.asarray(u)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
@@ -11,7 +11,7 @@ from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 from rotfem.errors import InputError
 from rotfem.scene.files import as_time_table
 from rotfem.scene.loads import Harmonic
-from rotfem.scene.signals import Given, arguments
+from rotfem.scene.signals import Given, TimeFunction
 from rotfem.scene.structure import StructureTable
 from rotfem.scene.table import SceneModel, problem
 from rotfem.scene.values import Matrix, NonNegative, Number
@@ -21,13 +21,6 @@ KEY = "structure.root.pitch"
 
 def _as_rows(value: Any, info: ValidationInfo) -> Matrix:
     return as_time_table(value, info, (2,), "a table [[t, angle], …]")
-
-
-def _as_function(value: Any) -> Callable[[float], float]:
-    if not callable(value) or arguments(value) != 1:
-        raise problem("", value, "must be a Python function of the time t (s)")
-    function: Callable[[float], float] = value
-    return function
 
 
 class HarmonicAngle(Harmonic):
@@ -54,8 +47,8 @@ class PitchAngle(Given):
 
     value: Number | None = None
     table: Annotated[Matrix, PlainValidator(_as_rows)] | None = None
-    function: Annotated[Callable[[float], float], PlainValidator(_as_function)] | None = None
-    rate: Annotated[Callable[[float], float], PlainValidator(_as_function)] | None = None
+    function: TimeFunction | None = None
+    rate: TimeFunction | None = None
     harmonic: tuple[HarmonicAngle, ...] = ()
 
     @property

@@ -22,6 +22,7 @@ from rotfem.scene.section_shapes import MATERIAL_AND_SHAPE, Geometry, Shape
 from rotfem.scene.span_tables import MatrixTable, Point, PointTable, as_matrix_or_table, as_point_or_table
 from rotfem.scene.table import SceneModel, Way, as_name, choose_way, problem
 from rotfem.scene.values import (
+    ROUND_OFF,
     AnyProfile,
     Array,
     Bounds,
@@ -194,9 +195,6 @@ class PlanarSection(Section):
 
 # --- spatial beams ----------------------------------------------------------------------------------------------------
 
-#: Part of the largest entry of a mass matrix by which it may differ from one that rigid mass has.
-MASS_SLACK = 1e-9
-
 
 def _as_stiffness(value: Any) -> Matrix | MatrixTable:
     return as_matrix_or_table(value, definite=True)
@@ -207,8 +205,8 @@ def _as_mass(value: Any) -> Matrix | MatrixTable:
     read = as_matrix_or_table(value, definite=False)
     for x, M in [(row[0], row[1]) for row in read] if is_table(read) else [(None, read)]:
         rows = np.array(M)
-        m, coupling, size = rows[0, 0], rows[:3, 3:], MASS_SLACK * np.max(np.abs(rows))
-        rigid = np.allclose(rows[:3, :3], m * np.eye(3), rtol=0, atol=MASS_SLACK * abs(m))
+        m, coupling, size = rows[0, 0], rows[:3, 3:], ROUND_OFF * np.max(np.abs(rows))
+        rigid = np.allclose(rows[:3, :3], m * np.eye(3), rtol=0, atol=ROUND_OFF * abs(m))
         if m <= 0.0 or not rigid or not np.allclose(coupling, -coupling.T, rtol=0, atol=size):
             where = "" if x is None else f"at x = {x:g} it "
             reason = (

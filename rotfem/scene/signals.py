@@ -16,17 +16,18 @@ from rotfem.scene.values import Array, Matrix, as_padded_vector3
 
 
 def arguments(function: Callable[..., Any]) -> int:
-    """Return how many arguments a function must be given; 1 where that is unknown."""
+    """Return how many arguments a function must be given; 1 where that is unknown, or any number will do."""
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):
         return 1
-    return sum(p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) and p.default is p.empty for p in parameters)
+    needed = sum(p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) and p.default is p.empty for p in parameters)
+    return needed or int(any(p.kind is p.VAR_POSITIONAL for p in parameters))
 
 
 def as_function(value: Any) -> Callable[[float], Any]:
-    """Return the value; raise if it is not callable."""
-    if not callable(value):
+    """Return the value; raise if it is no function of one argument."""
+    if not callable(value) or arguments(value) != 1:
         raise problem("", value, "must be a Python function of the time t (s)")
     function: Callable[[float], Any] = value
     return function

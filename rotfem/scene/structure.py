@@ -158,9 +158,6 @@ class Damping(SceneModel):
 
 # --- what structures share --------------------------------------------------------------------------------------------
 
-#: Places along a beam that a mean of its section is taken over.
-PLACES = 33
-
 #: Part of the length within which two places along a beam are one.
 SAME_PLACE = 1e-7
 
@@ -184,8 +181,8 @@ class MeanBeam(NamedTuple):
 
 
 def means(properties: Callable[[npt.ArrayLike], dict[str, Array]], length: float) -> dict[str, float]:
-    """Return the means over a length (m) of section properties, a function of the places (m)."""
-    return {name: float(np.mean(values)) for name, values in properties(np.linspace(0.0, length, PLACES)).items()}
+    """Return the means of section properties, a function of the places (m), at 33 of them over a length (m)."""
+    return {name: float(np.mean(values)) for name, values in properties(np.linspace(0.0, length, 33)).items()}
 
 
 def apart(places: Collection[float], length: float) -> tuple[float, ...]:

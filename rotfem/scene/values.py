@@ -31,6 +31,9 @@ SMALLEST, LARGEST = 1e-100, 1e100
 #: The same of a stiffness or a mass made of them: its square is a double, as elements multiply two of them.
 SMALLEST_PROPERTY, LARGEST_PROPERTY = 1e-140, 1e140
 
+#: Part by which two numbers of a scene that mean the same may differ, and two of another program's file.
+ROUND_OFF, DIGITS = 1e-9, 1e-6
+
 #: Properties of a section without which it moves all the same.
 MAY_BE_ZERO = ("rotary_inertia", "rotary_inertia2", "rotary_inertia3")
 
@@ -218,7 +221,7 @@ def as_taper(value: Any) -> Taper:
     return tuple((x, number) for x, number in as_increasing_rows(value, (2,), "a taper [[x, value], …]"))
 
 
-def is_positive(matrix: Array, definite: bool = True, slack: float = 1e-9) -> bool:
+def is_positive(matrix: Array, definite: bool = True, slack: float = ROUND_OFF) -> bool:
     """Return whether a symmetric matrix is positive definite, or semidefinite to a slack, as mass without inertias is.
 
     It is judged with ones on its diagonal, as its entries have different units and sizes: otherwise a soft direction
@@ -242,7 +245,7 @@ def as_symmetric_matrix(value: Any, size: int, *, definite: bool) -> Matrix:
     if len(rows) != size:
         raise problem("", value, f"must be {shape}; it has {len(rows)} rows")
     matrix = np.array(rows)
-    if not np.allclose(matrix, matrix.T, rtol=0.0, atol=1e-9 * np.max(np.abs(matrix))):
+    if not np.allclose(matrix, matrix.T, rtol=0.0, atol=ROUND_OFF * np.max(np.abs(matrix))):
         raise problem("", value, f"must be {shape}; it is not symmetric")
     if not is_positive(matrix, definite):
         raise problem("", value, f"must be {shape}, positive {'definite' if definite else 'semidefinite'}")
@@ -270,7 +273,7 @@ def evaluate(value: Any, x: npt.ArrayLike) -> Array:
     return np.asarray(values.reshape((*positions.shape, *entries.shape[1:])))
 
 
-def check_profile_length(key: str, profile: Profile, length: float, slack: float = 1e-9) -> None:
+def check_profile_length(key: str, profile: Profile, length: float, slack: float = ROUND_OFF) -> None:
     """Refuse a taper that does not end at the length (m), to a relative slack; the problem is at `key`."""
     if isinstance(profile, tuple) and not math.isclose(profile[-1][0], length, rel_tol=slack):
         reason = f"the taper must run from x = 0 to the length {length:.9g}; it ends at {profile[-1][0]:.9g}"

@@ -21,7 +21,8 @@ from rotfem.mechanics.effects import Effect, present_effects
 from rotfem.mechanics.outputs import Output
 from rotfem.mechanics.theories import Theory, ladder
 from rotfem.registry import Registry, register
-from rotfem.scene import Geometry, Scene, Shape
+from rotfem.scene import Scene
+from rotfem.scene.section_shapes import Geometry, Shape
 
 ROOT = Path(__file__).resolve().parents[2]
 SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2}
@@ -179,17 +180,6 @@ def test_what_a_user_registered_is_suggested(add: Add) -> None:
     message = refusal(model={"theory": "cubic_curvatur"})
     assert 'did you mean "cubic_curvature"? allowed: "linear", ' in message
     assert message.endswith(', "reissner", "cubic_curvature"')
-
-
-def test_names_of_the_scene_are_those_of_now(add: Add) -> None:
-    before = rotfem.scene.THEORIES
-    assert before == ladder()
-    add(Theory("mine", 0.5, {}))
-    assert (before[0], "mine", *before[1:]) == rotfem.scene.THEORIES
-    add(Effect("lift"))
-    assert (*registry.effects.names[:-1], "lift") == rotfem.scene.EFFECTS
-    with pytest.raises(AttributeError, match="no attribute 'SHAPES'"):
-        _ = rotfem.scene.SHAPES  # type: ignore[attr-defined]
 
 
 def test_a_scene_is_validated_without_fenicsx() -> None:

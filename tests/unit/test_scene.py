@@ -20,16 +20,15 @@ from rotfem.errors import ComputationError, Problem, SceneError
 from rotfem.mechanics.loads import Loads
 from rotfem.mechanics.motion import Motion
 from rotfem.scene import (
-    EFFECTS,
     BeamMesh,
     PlanarBeamStructure,
     PlateMesh,
     PlateStructure,
     Scene,
     SpatialBeamStructure,
-    TableMotion,
     load_scene,
 )
+from rotfem.scene.motion import TableMotion
 
 SECTION = {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4}
 PLANAR = {"type": "planar_beam", "length": 10.0, "section": SECTION}
@@ -281,7 +280,7 @@ def test_replace() -> None:
 def test_effective_effects(changes: dict[str, Any], expected: set[str]) -> None:
     effects = scene(**changes).effective_effects()
     assert set(effects) == expected
-    assert list(effects) == [name for name in EFFECTS if name in expected]
+    assert list(effects) == [name for name in rotfem.registry.effects.names if name in expected]
 
 
 def test_a_speed_sweep_spins_even_a_scene_at_rest() -> None:

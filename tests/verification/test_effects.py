@@ -9,11 +9,10 @@ import numpy.typing as npt
 import pytest
 import ufl
 
-from rotfem import Scene, run
+from rotfem import Scene, registry, run
 from rotfem.commands.problem import Problem
 from rotfem.equations.model import Model
 from rotfem.numerics.forms import integral_count
-from rotfem.scene import EFFECTS
 
 Array = npt.NDArray[np.float64]
 
@@ -25,7 +24,7 @@ ALL: dict[str, Any] = {
     "motion": {"type": "spin_up", "speed": 3.0, "duration": 1.0, "base_acceleration": [0.2, 0.1]},
     "loads.gravity": [0.0, -0.3],
 }
-PRESENT = tuple(name for name in EFFECTS if name not in ("hub_coupling", "trapeze"))
+PRESENT = tuple(name for name in registry.effects.names if name not in ("hub_coupling", "trapeze"))
 TIME = {"end": 0.02, "step": 0.01}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.scene.reference_line import ReferenceLine, as_line, line_through
-from rotfem.scene.values import Array
+from rotfem.scene.values import DIGITS, Array
 
 #: Components along our axes 1, 2, 3 from those along x (flapwise, downwind), y (to the trailing edge), z (to the tip)
 #: of IEC 61400-13 and OpenFAST.
@@ -16,9 +16,6 @@ FROM_IEC = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
 
 #: The same from x (to the leading edge), y (downwind, suction side), z (to the tip) of HAWC2.
 FROM_HAWC2 = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-
-#: Part of the largest entry by which a matrix of a file may be asymmetric: its digits are those of another program.
-SYMMETRIC = 1e-6
 
 
 def turned_matrix(matrix: npt.ArrayLike, axes: Array) -> Array:
@@ -29,7 +26,7 @@ def turned_matrix(matrix: npt.ArrayLike, axes: Array) -> Array:
 
 def is_symmetric(matrix: Array) -> bool:
     """Return whether a matrix is symmetric to what another program may have left."""
-    return bool(np.max(np.abs(matrix - matrix.T)) <= SYMMETRIC * np.max(np.abs(matrix)))
+    return bool(np.max(np.abs(matrix - matrix.T)) <= DIGITS * np.max(np.abs(matrix)))
 
 
 def symmetric(matrix: Array) -> Array:

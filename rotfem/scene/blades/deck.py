@@ -14,12 +14,9 @@ import numpy as np
 from rotfem.errors import show, shown
 from rotfem.registry import Registry
 from rotfem.registry import blade_formats as registered
-from rotfem.scene.files import SHOWN_CELL, Unreadable, read_bytes
+from rotfem.scene.files import LARGEST, SHOWN_CELL, Unreadable, read_bytes
 from rotfem.scene.table import as_name, problem
-from rotfem.scene.values import Array
-
-#: Bytes of a blade file, at most.
-LARGEST = 50_000_000
+from rotfem.scene.values import DIGITS, Array
 
 
 def find_file(folder: Path, name: str) -> Path | None:
@@ -166,7 +163,7 @@ class Deck:
         for i in range(1, len(values)):
             if values[i] <= values[i - 1]:
                 self.fail(f"{what} must increase: {values[i]:g} ≤ {values[i - 1]:g}", first + i, 1)
-        if last is not None and not math.isclose(values[-1], last, rel_tol=1e-6):
+        if last is not None and not math.isclose(values[-1], last, rel_tol=DIGITS):
             self.fail(f"{what} must end at {last:g}, not at {values[-1]:g}", first + len(values) - 1, 1)
 
 

@@ -26,8 +26,9 @@ from rotfem.errors import show
 from rotfem.registry import register
 from rotfem.scene.blades.axes import FROM_HAWC2, about_axis, line_of, rows_over, shifted, turned_matrix
 from rotfem.scene.blades.deck import Asked, BladeFormat, Deck, find_file
+from rotfem.scene.files import DEEPEST
 from rotfem.scene.table import problem
-from rotfem.scene.values import Array, is_positive
+from rotfem.scene.values import DIGITS, Array, is_positive
 
 #: Columns of a row with centres, and with a full matrix.
 CENTRES = [
@@ -40,15 +41,12 @@ FULL += [f"K{i + 1}{j + 1}" for i, j in zip(*np.triu_indices(6), strict=True)]
 #: Columns that must be greater than 0: sizes of a section, and the diagonal of a matrix.
 POSITIVE = {"m", "ri_x", "ri_y", "E", "G", "I_x", "I_y", "I_p", "k_x", "k_y", "A", *(f"K{i}{i}" for i in range(1, 7))}
 
-#: Part by which the last r may differ from the arc length of the line, above which that is reported. Both describe
-#: one blade; r often counts along its straight axis, which is shorter than a prebent line.
-LONGER, SAID = 1e-2, 1e-6
+#: Part by which the last r may differ from the arc length of the line. Both describe one blade; r often counts along
+#: its straight axis, which is shorter than a prebent line.
+LONGER = 1e-2
 
 #: Part of its middle value by which a product of columns may be off between rows: a frequency goes with its root.
 PRODUCT = 1e-4
-
-#: Files within files, at most.
-DEEPEST = 8
 
 
 def recognises(deck: Deck) -> bool:
@@ -96,7 +94,7 @@ def _body(deck: Deck, asked: Asked) -> dict[str, Any]:
     table = _table(st, [which.whole(2), which.whole(3)], None if full is None else bool(full.whole(2)))
     if abs(table["r"][-1] / through.length - 1.0) > LONGER:
         which.fail(f"its sections end at r = {table['r'][-1]:g} m, and the line of c2_def at {through.length:g} m")
-    if abs(table["r"][-1] / through.length - 1.0) > SAID:
+    if abs(table["r"][-1] / through.length - 1.0) > DIGITS:
         asked.hints.append(
             f"{st.path.name}: its sections end at r = {table['r'][-1]:g} m and the line of c2_def at "
             f"{through.length:g} m: the last section holds up to there"
@@ -111,7 +109,7 @@ def _body(deck: Deck, asked: Asked) -> dict[str, Any]:
 def _up_to(table: dict[str, Array], length: float) -> dict[str, Array]:
     """Return the columns up to a length (m) beyond which nothing is; the last row holds where they end before."""
     r = table["r"]
-    inside = r < length * (1.0 - SAID)
+    inside = r < length * (1.0 - DIGITS)
     x = np.append(r[inside], length)
     return {name: np.interp(x, r, values) for name, values in table.items()} | {"r": x}
 

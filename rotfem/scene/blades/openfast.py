@@ -22,7 +22,6 @@ import numpy as np
 from rotfem.registry import register
 from rotfem.scene.blades.axes import (
     FROM_IEC,
-    SYMMETRIC,
     coned_root,
     iec_pretwist,
     is_symmetric,
@@ -33,10 +32,7 @@ from rotfem.scene.blades.axes import (
     turned_matrix,
 )
 from rotfem.scene.blades.deck import Asked, BladeFormat, Deck
-from rotfem.scene.values import Array, is_positive
-
-#: Values of CompElast that are known: blades of ElastoDyn, and of BeamDyn on ElastoDyn's hub.
-ELASTODYN, BEAMDYN = 1, 2
+from rotfem.scene.values import DIGITS, ROUND_OFF, Array, is_positive
 
 #: Columns of ElastoDyn's blade file that must be there.
 NEEDED = ("BlFract", "StrcTwst", "BMassDen", "FlpStff", "EdgStff")
@@ -50,9 +46,6 @@ LEFT_OUT = ("Alpha", "PrecrvRef", "PreswpRef", "FlpcgOf", "EdgcgOf", "FlpEAOf", 
 #: Those that the motion does not depend on.
 PASSED_OVER = ("PitchAxis", "AeroCent")
 
-#: Part of the length by which BeamDyn's first key point may miss the origin: files have round-off.
-ORIGIN = 1e-9
-
 
 # --- OpenFAST's main file -----------------------------------------------------------------------------------------
 
@@ -64,11 +57,11 @@ def _is_openfast(deck: Deck) -> bool:
 def _openfast(deck: Deck, asked: Asked) -> dict[str, Any]:
     """Return what the files of blade 1 have; of BeamDyn's, with root and precone of ElastoDyn's main file."""
     which = deck.count("CompElast", 0)
-    if which not in (ELASTODYN, BEAMDYN):
+    if which not in (1, 2):
         line, _ = deck.named("CompElast")
         deck.fail(f"CompElast = {which} is not known; known: 1 (ElastoDyn) and 2 (BeamDyn)", line, 1)
     main = deck.file("EDFile")
-    if which == ELASTODYN:
+    if which == 1:
         return _elastodyn(main, asked)
     if (mass := _tip_mass(main)) > 0.0:
         asked.leaves_out(main, f"TipMass(1) = {mass:g} kg, as the blade is BeamDyn's", "structure.tip_mass")
@@ -194,7 +187,7 @@ def _primary(deck: Deck, asked: Asked) -> dict[str, Any]:
     first = deck.find("kp_xr kp_yr kp_zr initial_twist") + 2
     points = np.array(deck.rows(first, count, 4))
     line = points[:, :3] @ FROM_IEC.T
-    if np.linalg.norm(line[0]) > ORIGIN * np.linalg.norm(line[-1]):
+    if np.linalg.norm(line[0]) > ROUND_OFF * np.linalg.norm(line[-1]):
         deck.fail("the first key point must be (0, 0, 0)", first)
     rows, through, at = line_of(line)
     if len(at) != count:
@@ -225,7 +218,7 @@ def _matrices(deck: Deck, asked: Asked, length: float) -> dict[str, Any]:
             matrix = np.array(deck.rows(line, 6, 6))
             if not is_symmetric(matrix):
                 deck.fail(f"the {name} matrix of station {len(stations)} is not symmetric", line)
-            if not is_positive(symmetric(matrix), name == "stiffness", SYMMETRIC):
+            if not is_positive(symmetric(matrix), name == "stiffness", DIGITS):
                 deck.fail(f"the {name} matrix of station {len(stations)} is not positive definite", line)
             found.append(symmetric(turned_matrix(matrix, FROM_IEC)))
             line += 6

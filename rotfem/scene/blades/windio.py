@@ -18,7 +18,6 @@ import numpy as np
 from rotfem.registry import register
 from rotfem.scene.blades.axes import (
     FROM_IEC,
-    SYMMETRIC,
     coned_root,
     iec_pretwist,
     line_of,
@@ -27,7 +26,7 @@ from rotfem.scene.blades.axes import (
     turned_matrix,
 )
 from rotfem.scene.blades.deck import Asked, BladeFormat, Deck
-from rotfem.scene.values import Array, is_positive
+from rotfem.scene.values import DIGITS, Array, is_positive
 
 #: Key that later versions have, and those that are known.
 VERSION, KNOWN = "windIO_version", re.compile(r"2\.[01](\.\d+)?")
@@ -35,9 +34,6 @@ VERSION, KNOWN = "windIO_version", re.compile(r"2\.[01](\.\d+)?")
 #: Characters of a file, at most, without libyaml and with it. A list of single digits, the slowest content, then takes
 #: ten seconds: 90 and 450 characters are read in a millisecond, of a blade 550 and 3500. A blade has some 800 000.
 MOST_YAML = (900_000, 4_500_000)
-
-#: Parts of the length that are one place where axes have grids of their own.
-SAME = 1e-6
 
 UPPER = np.triu_indices(6)
 
@@ -97,7 +93,7 @@ def _axis(axis: YamlNode, twist: YamlNode, degrees: bool) -> tuple[dict[str, Any
         values = axis[name]["values"].numbers()
         parts.append((axis[name]["grid"].grid(len(values)), values))
     grid = np.unique(np.concatenate([places for places, _ in parts]))
-    grid = grid[np.concatenate([[True], np.diff(grid) > SAME])]
+    grid = grid[np.concatenate([[True], np.diff(grid) > DIGITS])]
     line = np.stack([np.interp(grid, *part) for part in parts], axis=-1) @ FROM_IEC.T
     rows, through, at = line_of(line)
     angles = twist["values"].numbers()
@@ -182,7 +178,7 @@ def _column(table: YamlNode, name: str, count: int, needed: bool = True) -> Arra
 def _checked(matrices: Array, places: list[YamlNode], definite: bool) -> Array:
     """Return matrices (n, 6, 6); refuse one that no section has where its numbers stand."""
     for matrix, place in zip(matrices, places, strict=True):
-        if not is_positive(matrix, definite, SYMMETRIC):
+        if not is_positive(matrix, definite, DIGITS):
             place.fail(
                 "is of a matrix that is not positive definite" + ("; nor may shear stiffness be 0" if definite else "")
             )
@@ -300,7 +296,7 @@ class YamlNode:
         grid = self.numbers()
         if len(grid) != count or len(grid) < 2:
             self.fail(f"has {len(grid)} places for {count} values")
-        if grid[0] != 0.0 or not np.isclose(grid[-1], 1.0, rtol=1e-6) or np.any(np.diff(grid) <= 0.0):
+        if grid[0] != 0.0 or not np.isclose(grid[-1], 1.0, rtol=DIGITS) or np.any(np.diff(grid) <= 0.0):
             self.fail("must rise from 0 to 1")
         return grid
 
