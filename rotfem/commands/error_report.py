@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.equilibrium import steady_state
+from rotfem.analysis.phase_drift import drift
 from rotfem.analysis.reduced.defect import error_by_defect
 from rotfem.analysis.reduced.response import Response, reduced_response
 from rotfem.analysis.schemes import State
@@ -36,6 +37,9 @@ WANTED, AIM = 0.01, 0.5
 
 #: What the error of a theory is estimated by where its foreshortening is computed.
 OF_FORESHORTENING = "its foreshortening, which is given back, changes it by that"
+
+#: What it is estimated by where the phase of a vibration counts.
+OF_DRIFT = "its frequencies and strains against the exact ones"
 
 #: What it is estimated by where an exact theory's equations were evaluated at the motion.
 OF_DEFECT = "what it leaves of the exact equations changes it by that"
@@ -129,7 +133,7 @@ class RunErrors:
         from_rest = self.scene.time is not None and initial.state == "undeformed" and initial.first is None
         richer = richer_problem(self.problem)
         if richer is None:
-            return self.farthest.error(self.system, tips, from_rest)
+            return self._drifting(self.farthest.error(self.system, tips, from_rest))
         if not self.wanted:
             return None
         try:
@@ -149,6 +153,22 @@ class RunErrors:
         each = zip(moves, components, sizes, resolved, strict=True)
         own = {f"tip_{names[i]}": d / size for i, d, size, known in each if known}
         return base.of_poorer(self.problem.theory, apart, own)
+
+    def _drifting(self, found: TheoryError | None) -> TheoryError | None:
+        """Return the error of a linear theory with that of the phase of a vibration that nothing drives."""
+        own = self.system
+        free = self.scene.time is not None and own.hub is None and own.linear and own.model.closed
+        if found is None or not (free and self.wanted):
+            return found
+        system = own.twin()
+        start = self.start(system)
+        q, v = (system.zeros() if x is None else x for x in (start.q, start.v))
+        try:
+            off = drift(self.problem, system, (q, v), self.history["t"][-1], Newton.of(self.scene.solver))
+        except (ComputationError, InputError):
+            return None
+        part = _relative(off, self._scale)
+        return replace(found, estimate=found.estimate + part, basis=OF_DRIFT) if part > 0.0 else found
 
     def _of_foreshortened(self, response: Response) -> tuple[float, str]:
         """Return the error of a motion with its foreshortening, and what it is estimated by."""

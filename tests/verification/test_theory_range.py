@@ -155,6 +155,22 @@ def test_an_error_of_third_order_grows_as_a_phase() -> None:
     assert found.summary["error"]["model"] == pytest.approx(true, rel=0.3)
 
 
+@pytest.mark.parametrize("theory", ["consistent_linear", "von_karman_linear"])
+def test_stress_stiffness_of_the_undeformed_structure_drifts_as_a_phase(theory: str) -> None:
+    """A blade that its spin stretches by 1 % swings left alone: by the distance of both frequencies times the time."""
+    tables = {"motion": {"type": "constant", "speed": 12.0}, "mesh": {"elements": 4}}
+    tables |= {"initial": {"mode": 1, "amplitude": 0.05}, "time": {"end": 10.0, "step": 0.01}}
+    blades = {name: beam(name, {}, **tables) for name in (theory, "reissner")}
+    for blade in blades.values():
+        blade["structure"]["section"] = {**blade["structure"]["section"], "EA": 7e5}
+    found, exact = (rotfem.run(blade) for blade in blades.values())
+    true = np.max(np.abs(found.history["tip_u2"] - exact.history["tip_u2"]))
+    one, other = (rotfem.modes(blade).frequencies[0] for blade in blades.values())
+    assert true == pytest.approx(0.05 * 2 * np.sin(5.0 * abs(one - other)), rel=0.2)
+    error = found.summary["error"]
+    assert error["model"] * error["scale"] == pytest.approx(true, rel=0.3)
+
+
 def test_frequencies_without_stiffening() -> None:
     motion = {"type": "constant", "speed": 3.0}
     rows = {
