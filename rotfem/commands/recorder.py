@@ -16,7 +16,7 @@ from rotfem.equations.plate_resultants import PlateResultants
 from rotfem.equations.stations import Stations
 from rotfem.errors import InputError
 from rotfem.results.run import RunResult, StationHistory, Table
-from rotfem.scene.output import OutputTable
+from rotfem.scene.settings import OutputTable
 from rotfem.structures.paraview import Snapshots
 
 #: What the equivalent stress is called.

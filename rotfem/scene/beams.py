@@ -295,7 +295,8 @@ class SpatialBeamStructure(BeamStructure):
         if not isinstance(section, dict):
             return data
         lifted = {}
-        for key, read in {"pretwist": Bounds().profile, "precone": Bounds().number}.items():
+        readers: dict[str, Any] = {"pretwist": Bounds().profile, "precone": Bounds().number}
+        for key, read in readers.items():
             if key not in section:
                 continue
             if key in data:

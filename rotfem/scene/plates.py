@@ -25,7 +25,6 @@ from rotfem.scene.values import (
     Taper,
     Vector,
     as_rows,
-    as_taper,
     check_magnitudes,
     check_profile_length,
     evaluate,
@@ -41,14 +40,7 @@ def _as_thickness(value: Any) -> Profile | dict[str, float]:
             with problems_at(str(region), thickness):
                 positive.number(thickness)
         return {str(region): float(thickness) for region, thickness in value.items()}
-    if isinstance(value, list | tuple):
-        # Whether it must start at x = 0 depends on the geometry: a mesh may lie anywhere.
-        taper = as_taper(value)
-        for x, thickness in taper:
-            if thickness <= 0.0:
-                raise problem("", value, f"the thickness {thickness:g} at x = {x:g} must be greater than 0")
-        return taper
-    return positive.number(value)
+    return positive.profile(value, anywhere=True)  # a mesh may lie anywhere
 
 
 def _as_point_masses(value: Any) -> Matrix:

@@ -98,14 +98,14 @@ class Bounds:
             raise problem("", value, f"must be an integer {self}")
         return value
 
-    def profile(self, value: Any) -> Profile:
-        """Return a number or a taper ((x, value), …) with x from 0 upwards; raise on anything else."""
+    def profile(self, value: Any, anywhere: bool = False) -> Profile:
+        """Return a number or a taper ((x, value), …) with x from 0, or anywhere, upwards; raise on anything else."""
         if not isinstance(value, list | tuple):
             if not isinstance(value, int | float) or isinstance(value, bool):
                 raise problem("", value, f"must be {f'a number {self}'.rstrip()}, or a taper [[x, value], …]")
             return self.number(value)
         taper = as_taper(value)
-        if taper[0][0] != 0.0:
+        if taper[0][0] != 0.0 and not anywhere:
             raise problem("", value, f"the taper must start at x = 0, not at {taper[0][0]:g}")
         for x, number in taper:
             if not self.contains(number):

@@ -72,11 +72,10 @@ def read(deck: Deck, asked: Asked) -> dict[str, Any]:
             deck.fail(f"the version of BModes' main file is {named}; known: {', '.join(VERSIONS)}", 1)
     for name, value in ONLY.items():
         if (found := deck.number(name)) != value:
-            deck.fail(f"{name} = {found:g} is not known; only {value:g}", deck.named(name)[0], 1)
+            deck.refuse(name, f"{name} = {found:g} is not known; only {value:g}")
     for name in NO_TIP:
         if deck.number(name) != 0.0:
-            reason = f"{name} is not read; set it to 0 and give tip_offset and tip_inertia in the scene"
-            deck.fail(reason, deck.named(name)[0], 1)
+            deck.refuse(name, f"{name} is not read; set it to 0 and give tip_offset and tip_inertia in the scene")
     hub, length = deck.hub_and_length("hub_rad", "radius")
     factors = {column: deck.number(factor) for factor, column in FACTORS.items()}
     properties = deck.file("sec_props_file")

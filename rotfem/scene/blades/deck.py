@@ -67,6 +67,10 @@ class Deck:
         where = "" if line is None else f"line {line}: " if column is None else f"line {line}, column {column}: "
         raise problem("", shown(self.path), f"{where}{reason}")
 
+    def refuse(self, name: str, reason: str) -> NoReturn:
+        """Refuse the value of the line `value  name …`."""
+        self.fail(reason, self.named(name)[0], 1)
+
     def find(self, words: str, start: int = 1) -> int:
         """Return the number of the first line, not before start, in which all words stand, whatever their case."""
         wanted = words.lower().split()
@@ -150,8 +154,7 @@ class Deck:
         """Return the radius of the hub and the length beyond it (m) of lines `value  name …`."""
         inner, outer = self.number(hub), self.number(tip)
         if not 0.0 <= inner < outer:
-            reason = f"{hub} = {inner:g} must be at least 0 and less than {tip} = {outer:g}"
-            self.fail(reason, self.named(hub)[0], 1)
+            self.refuse(hub, f"{hub} = {inner:g} must be at least 0 and less than {tip} = {outer:g}")
         return inner, outer - inner
 
     def increasing(

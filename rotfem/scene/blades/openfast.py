@@ -58,8 +58,7 @@ def _openfast(deck: Deck, asked: Asked) -> dict[str, Any]:
     """Return what the files of blade 1 have; of BeamDyn's, with root and precone of ElastoDyn's main file."""
     which = deck.count("CompElast", 0)
     if which not in (1, 2):
-        line, _ = deck.named("CompElast")
-        deck.fail(f"CompElast = {which} is not known; known: 1 (ElastoDyn) and 2 (BeamDyn)", line, 1)
+        deck.refuse("CompElast", f"CompElast = {which} is not known; known: 1 (ElastoDyn) and 2 (BeamDyn)")
     main = deck.file("EDFile")
     if which == 1:
         return _elastodyn(main, asked)
@@ -92,7 +91,7 @@ def _tip_mass(deck: Deck) -> float:
     """Return the mass at the tip of blade 1, kg."""
     mass = deck.number("TipMass(1)")
     if mass < 0.0:
-        deck.fail(f"TipMass(1) = {mass:g} must be at least 0", deck.named("TipMass(1)")[0], 1)
+        deck.refuse("TipMass(1)", f"TipMass(1) = {mass:g} must be at least 0")
     return mass
 
 
@@ -182,8 +181,8 @@ def _primary(deck: Deck, asked: Asked) -> dict[str, Any]:
     """Return line, pretwist, section and damping of a primary file."""
     members, count = deck.count("member_total", 1), deck.count("kp_total", 3)
     if members != 1:
-        line, _ = deck.named("member_total")
-        deck.fail(f"has {members} members; only blades of one member are known, as a line of splines", line, 1)
+        why = f"has {members} members; only blades of one member are known, as a line of splines"
+        deck.refuse("member_total", why)
     first = deck.find("kp_xr kp_yr kp_zr initial_twist") + 2
     points = np.array(deck.rows(first, count, 4))
     line = points[:, :3] @ FROM_IEC.T
