@@ -9,35 +9,13 @@ from pydantic import Field, PlainValidator, ValidationInfo, field_validator, mod
 from pydantic_core import PydanticCustomError
 
 from rotfem.scene.motion import Motion
-from rotfem.scene.signals import Given, TimeFunction, arguments
+from rotfem.scene.signals import Given, Harmonic, TimeFunction, arguments
 from rotfem.scene.span_tables import FORCE, MOMENT, PRESSURE, Kind, Over
 from rotfem.scene.table import SceneModel, problem
-from rotfem.scene.values import ROUND_OFF, Matrix, Number, PaddedVector, Positive, as_number, as_vector
+from rotfem.scene.values import ROUND_OFF, Matrix, PaddedVector, as_number, as_vector
 
 #: How tables are written that are not mistaken for others.
 KEYS = "write over_time = [[t, …], …], over_span = [[x, …], …] or over_span_and_time = [[x, t, …], …]"
-
-
-class Harmonic(SceneModel):
-    """amplitude · cos(frequency · t + phase), or cos(per_rev · ψ + phase) with the angle ψ of the hub.
-
-    Attributes:
-        amplitude: components, as those of the load's value; of a load over the span also rows (x, components).
-        frequency: rad/s; or
-        per_rev: periods in a revolution of the hub.
-        phase: rad.
-    """
-
-    amplitude: Any = Field(description="given")
-    frequency: Positive | None = None
-    per_rev: Positive | None = None
-    phase: Number = 0.0
-
-    @model_validator(mode="after")
-    def _check_one(self) -> Self:
-        if (self.frequency is None) == (self.per_rev is None):
-            raise problem("frequency", self.frequency, "give exactly one of frequency and per_rev")
-        return self
 
 
 class Load(Given):
@@ -113,20 +91,6 @@ class Load(Given):
         yield from () if self.value is None else (self.value,)
         yield from (row[1:] for row in (*(self.time_table or ()), *self.span_rows))
         yield from (h.amplitude for h in self.harmonic if not isinstance(h.amplitude[0], tuple))
-
-    @model_validator(mode="before")
-    @classmethod
-    def _list_harmonics(cls, data: Any) -> Any:
-        if isinstance(data, Mapping) and isinstance(data.get("harmonic"), Mapping | Harmonic):
-            return {**data, "harmonic": [data["harmonic"]]}
-        return data
-
-    @model_validator(mode="after")
-    def _check_one(self) -> Self:
-        if len(self.given) > 1 or not (self.given or self.harmonic):
-            why = f"give exactly one of {self.alternatives()}; harmonic may stand beside"
-            raise problem("", ", ".join(self.given) or None, why)
-        return self
 
 
 class MomentLoad(Load):

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from rotfem.errors import InputError
 from rotfem.scene.files import as_time_table
-from rotfem.scene.loads import Harmonic
-from rotfem.scene.signals import Given, TimeFunction
+from rotfem.scene.signals import Given, Harmonic, TimeFunction
 from rotfem.scene.structure import StructureTable
 from rotfem.scene.table import SceneModel, problem
 from rotfem.scene.values import Matrix, NonNegative, Number
@@ -70,17 +68,8 @@ class PitchAngle(Given):
         """Return what the function of the rate returns at a time (s), rad/s, as `at` does."""
         return _number(self.rate, t, f"{KEY}.rate", "rad/s")
 
-    @model_validator(mode="before")
-    @classmethod
-    def _list_harmonics(cls, data: Any) -> Any:
-        one = isinstance(data, Mapping) and isinstance(data.get("harmonic"), Mapping | Harmonic)
-        return {**data, "harmonic": [data["harmonic"]]} if one else data
-
     @model_validator(mode="after")
-    def _check_one(self) -> Self:
-        if len(self.given) > 1 or not (self.given or self.harmonic):
-            why = "give exactly one of value, table and function; harmonic may stand beside"
-            raise problem("", ", ".join(self.given) or None, why)
+    def _check_rate(self) -> Self:
         if self.rate is not None and self.function is None:
             raise problem("rate", None, "is that of a function; tables and harmonics have their own")
         return self

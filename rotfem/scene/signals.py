@@ -8,11 +8,11 @@ from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
-from pydantic import PlainValidator, ValidationInfo, model_validator
+from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from rotfem.scene.files import as_time_table
 from rotfem.scene.table import SceneModel, problem
-from rotfem.scene.values import Array, Matrix, as_padded_vector3
+from rotfem.scene.values import Array, Matrix, Number, Positive, as_padded_vector3
 
 
 def arguments(function: Callable[..., Any]) -> int:
@@ -42,6 +42,28 @@ def _as_rows4(value: Any, info: ValidationInfo) -> Matrix:
 TimeFunction = Annotated[Callable[[float], Any], PlainValidator(as_function)]
 
 
+class Harmonic(SceneModel):
+    """amplitude · cos(frequency · t + phase), or cos(per_rev · ψ + phase) with the angle ψ of the hub.
+
+    Attributes:
+        amplitude: components, as those of the load's value; of a load over the span also rows (x, components).
+        frequency: rad/s; or
+        per_rev: periods in a revolution of the hub.
+        phase: rad.
+    """
+
+    amplitude: Any = Field(description="given")
+    frequency: Positive | None = None
+    per_rev: Positive | None = None
+    phase: Number = 0.0
+
+    @model_validator(mode="after")
+    def _check_one(self) -> Self:
+        if (self.frequency is None) == (self.per_rev is None):
+            raise problem("frequency", self.frequency, "give exactly one of frequency and per_rev")
+        return self
+
+
 class Given(SceneModel):
     """A quantity that is given in one of several ways.
 
@@ -69,12 +91,23 @@ class Given(SceneModel):
     @model_validator(mode="before")
     @classmethod
     def _from_bare(cls, data: Any) -> Any:
-        if isinstance(data, Mapping | Given):
+        if isinstance(data, Given):
             return data
+        if isinstance(data, Mapping):
+            one = isinstance(data.get("harmonic"), Mapping | Harmonic)
+            return {**data, "harmonic": [data["harmonic"]]} if one else data
         if callable(data):
             return {"function": data}
         rows = isinstance(data, list | tuple) and bool(data) and isinstance(data[0], list | tuple)
         return {"table" if rows or isinstance(data, str) else "value": data}
+
+    @model_validator(mode="after")
+    def _check_one(self) -> Self:
+        harmonic = vars(self).get("harmonic")
+        if len(self.given) > 1 or not (self.given or harmonic):
+            beside = "" if harmonic is None else "; harmonic may stand beside"
+            raise problem("", ", ".join(self.given) or None, f"give exactly one of {self.alternatives()}{beside}")
+        return self
 
     def alternatives(self) -> str:
         """Return the keys of which one is to be given, for messages."""
@@ -131,9 +164,3 @@ class Signal(Given):
     def _columns(self) -> tuple[Array, ...]:
         """Columns of the table as arrays; kept, because a time history asks for them at every step."""
         return tuple(np.ascontiguousarray(np.array(self.table, dtype=np.float64).T))
-
-    @model_validator(mode="after")
-    def _check_one(self) -> Self:
-        if len(self.given) != 1:
-            raise problem("", ", ".join(self.given) or None, f"give exactly one of {self.alternatives()}")
-        return self
