@@ -2,7 +2,7 @@
 
 import sys
 
-from rotfem.commands.signals import held_back
+from rotfem.commands.interrupts import held_back
 
 
 def main() -> None:

@@ -12,9 +12,9 @@ from typing import Annotated, Any
 import typer
 
 from rotfem.commands.console import Session, missing
+from rotfem.commands.interrupts import held_back
 from rotfem.commands.options import as_path, folder_name, seconds_of
 from rotfem.commands.result_folder import ResultFolder, Writer
-from rotfem.commands.signals import held_back
 from rotfem.errors import ComputationError, InputError, Stopped
 from rotfem.scene import Scene, load_scene
 from rotfem.scene.extensions import load

@@ -9,17 +9,15 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
-from rotfem.errors import OutputError, SceneError
+from rotfem.errors import SceneError
 from rotfem.results.files import CHECKPOINT_MAGIC as MAGIC
-from rotfem.results.files import PART
+from rotfem.results.files import write_whole
 
 #: Number of the format; another one is refused.
 FORMAT = 1
@@ -36,25 +34,7 @@ def write_checkpoint(path: Path, tree: dict[str, Any]) -> None:
     """
     content = content_of(tree)
     head = f"{MAGIC} {FORMAT}\n{len(content)}\n{hashlib.sha256(content).hexdigest()}\n".encode().ljust(HEAD, b"\0")
-    try:
-        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f"{PART}{path.name}-", suffix=".part")
-        try:
-            with os.fdopen(descriptor, "wb") as file:
-                file.write(head)
-                file.write(content)
-                file.flush()
-                os.fsync(descriptor)
-            os.replace(name, path)
-        except BaseException:
-            os.unlink(name)
-            raise
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
-    except OSError as error:
-        raise OutputError(path, error.strerror or str(error)) from None
+    write_whole(path, head, content, durable=True)
 
 
 def content_of(tree: dict[str, Any]) -> bytes:

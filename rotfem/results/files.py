@@ -122,22 +122,36 @@ def write_text(path: Path, text: str) -> Path:
     return write_whole(path, text.encode())
 
 
-def write_whole(path: Path, content: bytes) -> Path:
+def write_whole(path: Path, *content: bytes, durable: bool = False) -> Path:
     """Write a file whole or not at all (temporary file in the same folder, then renamed); return its path.
 
+    Args:
+        path: the file.
+        content: of it, in parts.
+        durable: whether to wait until it is on the disk.
+
     Raises:
-        OutputError: it cannot be written.
+        OutputError: it cannot be written; the one before is still there.
     """
     try:
         descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f"{PART}{path.name}-", suffix=".part")
         try:
             with os.fdopen(descriptor, "wb") as file:
-                file.write(content)
+                file.writelines(content)
+                if durable:
+                    file.flush()
+                    os.fsync(descriptor)
             os.chmod(name, 0o666 & ~_umask())
             os.replace(name, path)
         except BaseException:
             os.unlink(name)
             raise
+        if durable:
+            folder = os.open(path.parent, os.O_RDONLY)
+            try:
+                os.fsync(folder)
+            finally:
+                os.close(folder)
     except OSError as error:
         raise OutputError(path, error.strerror or str(error)) from None
     return path

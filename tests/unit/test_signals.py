@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from rotfem.commands.signals import SIGNALS, held_back
+from rotfem.commands.interrupts import SIGNALS, held_back
 
 #: Runs the command line with Ctrl-C in the middle of its imports.
 INTERRUPTED = """

@@ -23,9 +23,9 @@ from rotfem.analysis.equilibrium import check_steady
 from rotfem.commands.accuracy import changes_of
 from rotfem.commands.campbell import Diagram
 from rotfem.commands.cost.settings import sweep_speeds
+from rotfem.commands.interrupts import held_back
 from rotfem.commands.modes import analysis_of
 from rotfem.commands.problem import Problem
-from rotfem.commands.signals import held_back
 from rotfem.commands.simulation import Simulation
 from rotfem.errors import ComputationError, InputError, OutputError, input_of
 from rotfem.refinement.distance import COLUMNS
