@@ -11,6 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from rotfem.analysis.march import Steps
+from rotfem.commands.first_state import first_state
 from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.modes import modes
 from rotfem.commands.problem import Problem, first_motion, scheme_of
@@ -75,18 +76,22 @@ def explain(
 
 def case_of(scene: Scene, terms: Mapping[str, Work] | None = None) -> Case:
     """Return the case of a scene: its problem, and what is to be computed of it."""
-    time, initial, unsteady = scene.time, scene.initial, ""
+    time, unsteady = scene.time, ""
     try:
         scene.check_run()
     except SceneError as error:
         unsteady = str(error)
+
+    def first(system: Any) -> tuple[Any, Any]:
+        start = first_state(scene, system.model.problem, system, judged=False)
+        return start.q, start.v
+
     return Case(
         problem=Problem.of(scene, terms=terms),
         steps=None if time is None else Steps.of(time),
         scheme=None if time is None else scheme_of(time),
-        tip_displacement=initial.tip_displacement,
-        from_steady=initial.state == "steady",
-        first=first_motion(scene),
+        first=first,
+        symmetric=first_motion(scene) is None and scene.initial.tip_displacement is None,
         mode_count=scene.modes.count,
         about=scene.modes.about,
         newton=lambda: Newton.of(scene.solver),

@@ -27,7 +27,7 @@ def like(system: Any, problem: Problem, moving: bool = True) -> Any:
     return other
 
 
-def on_other_mesh(problem: Problem, system: Any, moving: bool = True) -> tuple[Any, float] | None:
+def on_other_mesh(problem: Problem, system: Any, moving: bool = True, finer: bool = False) -> tuple[Any, float] | None:
     """Return a system of a problem on half the cells or a finer mesh, and the ratio of its cell sizes to the own ones.
 
     Where the nodes that a section, a mass or a load asks for fix the cells they are halved in length, and those of a
@@ -37,11 +37,14 @@ def on_other_mesh(problem: Problem, system: Any, moving: bool = True) -> tuple[A
         problem: what is computed.
         system: the problem's system on its own mesh.
         moving: whether the other one will be stepped in time.
+        finer: whether only a finer mesh will do.
     """
     problem = problem.replace(outputs={})
     nodes = system.V.dofmap.index_map.size_global
     cells = system.structure.mesh.topology.index_map(system.structure.mesh.topology.dim).size_global
     for mesh, ratio in _meshes(problem, cells):
+        if finer and ratio > 1.0:
+            continue
         try:
             other = like(system, problem.replace(mesh=mesh), moving)
         except InputError:

@@ -21,8 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.equilibrium import check_steady, static_tip_shape, steady_state
-from rotfem.analysis.first_motion import FirstMotion
+from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION, March, Steps
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import Scheme, State
@@ -33,7 +32,7 @@ from rotfem.mechanics.theories import Theory, theories
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.companion import Companion
-from rotfem.refinement.discretisation import ASYMPTOTIC, HistoryErrors, error_by_cells
+from rotfem.refinement.discretisation import ASYMPTOTIC, HistoryErrors, Start, error_by_cells
 from rotfem.refinement.distance import distance, distance_each, tip
 from rotfem.structures.symmetry import inactive_unknowns
 
@@ -74,9 +73,8 @@ class Case:
         problem: what moves, and how.
         steps: end and steps of the history; None where a steady state is wanted.
         scheme: time-stepping scheme of the history.
-        tip_displacement: u_2 (m) of the tip of the static shape it starts from, or None.
-        from_steady: whether it starts from the equilibrium at its speed.
-        first: the mode or the velocities it starts with in addition; None where it starts at rest.
+        first: system ↦ its (q, q̇) at t = 0, local dof arrays; None where it is undeformed, or at rest.
+        symmetric: whether the start leaves unknowns at zero that nothing else moves.
         mode_count: number of modes that are wanted.
         about: the state that modes are about: "steady" or "undeformed".
         newton: iteration control, of which everything takes its own.
@@ -87,9 +85,8 @@ class Case:
     problem: Problem
     steps: Steps | None = None
     scheme: Scheme | None = None
-    tip_displacement: float | None = None
-    from_steady: bool = False
-    first: FirstMotion | None = None
+    first: Start
+    symmetric: bool = True
     mode_count: int = 6
     about: str = "steady"
     newton: Callable[[], Newton] = Newton
@@ -121,16 +118,7 @@ class Case:
         Raises:
             ComputationError: there is no such state.
         """
-        problem, q = system.model.problem, None
-        if self.tip_displacement is not None:
-            return static_tip_shape(problem, self.tip_displacement, self.newton(), system.comm), None
-        if self.from_steady:
-            q = self.equilibrium(system, problem.motion.speed(0.0))
-        if self.first is None:
-            return q, None
-        about = "steady" if self.from_steady else "undeformed"
-        modal, first = ModalAnalysis(problem, about, self.newton(), system.comm, system), self.first
-        return plainly(system, lambda: first.about(q, modal, self.newton()))
+        return plainly(system, lambda: self.first(system))
 
     def eigenvalues(self, system: Any, speed: float) -> Array:
         """Return λ of the wanted modes at a speed (rad/s): no rigid body, of an overdamped mode the slow one.
@@ -245,7 +233,7 @@ class Explanation:
         named = {t.name: t for t in theories() if t.holds_for(kind)} | {problem.theory.name: problem.theory}
         self.theories: tuple[Theory, ...] = tuple(sorted(named.values(), key=lambda t: t.rank))
         self.moving = HISTORY in self.wanted
-        if self.moving and case.first is None and case.tip_displacement is None:
+        if self.moving and case.symmetric:
             of_each = [set(inactive_unknowns(problem.replace(theory=t))) for t in self.theories]
             problem = problem.replace(inactive=tuple(sorted(set.intersection(*of_each))))
         self.problem = problem
@@ -423,9 +411,10 @@ class Explanation:
         coarse: Any,
         ratio: float,
     ) -> None:
-        """Write the changes of an output that needs no history, on half the cells.
+        """Write the changes of an output that needs no history.
 
-        Where these have errors that are not negligible, they are computed on all cells as well.
+        They are computed on half the cells. Where these have errors that are not negligible, they are computed on all
+        cells instead, whose own error is then seen on finer ones.
 
         Args:
             name: of the output.
@@ -436,44 +425,25 @@ class Explanation:
         """
         try:
             own = of(self.system)
-            other = own if coarse is self.system else of(coarse)
+            there = own if coarse is self.system else of(coarse)
+            apart, at = measure(own, there), coarse if ratio > 1.0 else self.system
+            if at is coarse and apart > NOTICEABLE:
+                at, other = self.system, on_other_mesh(self.problem, self.system, self.moving, finer=True)
+                if other is not None:
+                    apart, ratio = measure(own, of(other[0])), other[1]
         except ComputationError as error:
             self._fails(name, error.what)
             return
         if name == MODES:
             self.values = own
-        apart = measure(own, other)
         self.mesh.estimate[name] = error_by_cells(apart, ratio) if coarse is not self.system else None
-        levels = [(own, self.system)]
-        if ratio > 1.0:
-            levels = [(other, coarse), *levels] if apart > NOTICEABLE else [(other, coarse)]
-        found = [self._measured(name, level, system, of, measure) for level, system in levels]
-        for change in self.changes:
-            if change.name in found[0]:
-                change.settle(name, found[0][change.name], found[-1][change.name])
-
-    def _measured(
-        self, name: str, own: Array, there: Any, of: Callable[[Any], Array], measure: Callable[[Array, Array], float]
-    ) -> dict[str, float]:
-        """Return the name of each change ↦ its size on a mesh (see `_compare`); infinite where a model fails.
-
-        Args:
-            name: of the output.
-            own: output of the own model on that mesh.
-            there: system of the own model there.
-            of: system ↦ its output.
-            measure: distance of two of them, relative to the first.
-        """
-        out = {}
-        systems = self._variants(there.model.problem.mesh, self.changes)
-        for change, system in zip(self.changes, systems, strict=True):
+        for change, system in zip(self.changes, self._variants(at.model.problem.mesh, self.changes), strict=True):
             if system is None:
                 continue
             try:
-                out[change.name] = measure(own, of(system))
+                change.estimate[name] = measure(there if at is coarse else own, of(system))
             except ComputationError as error:
-                out[change.name], change.notes[name] = np.inf, error.what
-        return out
+                change.estimate[name], change.notes[name] = np.inf, error.what
 
     def _fails(self, name: str, what: str) -> None:
         """Note that the own model has no such output."""

@@ -121,8 +121,7 @@ class Bench:
         """
         out = before or Measurement()
         try:
-            variant = self.scene.replace(changes_of(self.scene, setting))
-            self._compile(variant, setting)
+            variant = self.compiled(setting)
             for _ in range(repeat - len(out.wall)):
                 self._once(variant, out, clock)
         except TooDear as error:
@@ -133,18 +132,25 @@ class Bench:
             out.status, out.reason, out.values = "failed", "the output is not finite", None
         return out
 
-    def _compile(self, variant: Scene, setting: Setting) -> None:
-        """Compile the forms of a theory, degree and scheme."""
-        key = (setting.theory, setting.degree, setting.scheme)
+    def compiled(self, setting: Setting) -> Scene:
+        """Return the scene in a setting, the forms of its theory, degree and scheme compiled.
+
+        Raises:
+            SceneError: the scene cannot be computed so.
+            ComputationError: its first steps fail.
+        """
+        variant = self.scene.replace(changes_of(self.scene, setting))
+        key, time = (setting.theory, setting.degree, setting.scheme), variant.time
         if key in self._warm:
-            return
-        started, short, time = cpu_time(), variant, variant.time
+            return variant
+        started, short = cpu_time(), variant
         if setting.moving and time is not None:
             few = FIRST_STEPS * time.step if time.step is not None else time.output_step or time.end
             short = variant.replace({"time.end": min(few, time.end)})
         self._prepared(short, None, "frequencies" if self.output == "campbell" else self.output)()
         self._warm.add(key)
         self.compiling += cpu_time() - started
+        return variant
 
     def _once(self, variant: Scene, out: Measurement, clock: Clock) -> None:
         restart_memory()

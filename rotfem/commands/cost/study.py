@@ -336,6 +336,7 @@ class Study:
         if own.moving:
             first = Setting(first.models, elements, degree, ADAPTIVE, max(accuracy, COARSE))
         try:
+            self.bench.compiled(first)  # so that the first answer shows what the next ones take
             refine(first, self._paired, goal, self.clock, found)
         except (ComputationError, InputError) as error:
             self.failures[theory] = str(error)
