@@ -405,31 +405,18 @@ def check_frame(structure: Any, motion: Motion, model: Model) -> None:
         return
     if not structure.is_planar or not registry.theories[model.theory].exact:
         exact = (show(theory.name) for theory in registry.theories if theory.exact and theory.holds_for("planar_beam"))
-        raise problem(
-            "model.frame",
-            model.frame,
+        why = (
             f'needs structure.type = "planar_beam" and model.theory = {" or ".join(exact)}: displacements relative to '
-            "the inertial frame are large, which only exact strains allow",
+            "the inertial frame are large, which only exact strains allow"
         )
+        raise problem("model.frame", model.frame, why)
     if motion.is_free:
         raise problem("model.frame", model.frame, 'is not available with motion.type = "torque"; use "rotating"')
-    if structure.damping.rayleigh[0] > 0.0:
-        raise problem(
-            "structure.damping.rayleigh",
-            list(structure.damping.rayleigh),
-            'the mass-proportional part must be 0 with frame = "inertial", where it would brake the revolution itself',
-        )
-    if structure.damping.has_modal:
-        why = 'is not available with frame = "inertial", where the modes at rest turn; use "rotating"'
-        raise problem("structure.damping.modal", structure.damping.modal, why)
+    structure.damping.check_inertial()
     for effect in registry.effects:
         if effect.of_rotation and model.effects != "auto" and effect.name in model.effects:
-            raise problem(
-                "model.effects",
-                list(model.effects),
-                f'"{effect.name}" is not a separate effect with frame = "inertial"; it comes from the motion of the '
-                "clamp",
-            )
+            why = 'is not a separate effect with frame = "inertial"; it comes from the motion of the clamp'
+            raise problem("model.effects", list(model.effects), f'"{effect.name}" {why}')
 
 
 def check_initial(structure: Any, motion: Motion, model: Model, initial: Initial) -> None:

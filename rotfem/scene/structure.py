@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from inspect import Parameter, signature
-from typing import Annotated, Any, ClassVar, NamedTuple, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import ConfigDict, PlainValidator, model_validator
+from pydantic import ConfigDict, PlainValidator
 
 from rotfem.errors import SceneError, show
 from rotfem.registry import Registry, damping_models, register, structures
@@ -132,12 +132,15 @@ class Damping(SceneModel):
         """Return the keys of the table and those of all registered models."""
         return [*super().keys(), *damping_models.names]
 
-    @model_validator(mode="after")
-    def _check_models(self) -> Self:
-        for name in self.models:
-            if name not in damping_models:
-                raise problem(name, self.models[name], "is no registered damping model")
-        return self
+    @property
+    def viscosity(self) -> float:
+        """η (s) of the stress C η ε̇, of Kelvin–Voigt's model and Rayleigh's stiffness-proportional part."""
+        return self.kelvin_voigt + self.rayleigh[1]
+
+    @property
+    def mass_rate(self) -> float:
+        """Mass-proportional rate (1/s)."""
+        return self.rayleigh[0]
 
     @property
     def models(self) -> dict[str, float]:
@@ -147,13 +150,22 @@ class Damping(SceneModel):
     @property
     def is_zero(self) -> bool:
         """Whether there is no damping at all."""
-        return self.kelvin_voigt == 0.0 and self.rayleigh == (0.0, 0.0) and not self.has_modal and not self.models
+        return not (self.viscosity or self.mass_rate or self.has_modal or self.models)
 
     @property
     def has_modal(self) -> bool:
         """Whether modes at rest have ratios that are not zero."""
         families = self.modal.values() if isinstance(self.modal, dict) else [self.modal]
         return any(bool(np.any(np.asarray(ratios))) for ratios in families)
+
+    def check_inertial(self) -> None:
+        """Refuse what has no meaning in the inertial frame."""
+        if self.mass_rate > 0.0:
+            why = 'must be 0 with frame = "inertial", where it would brake the revolution itself'
+            raise problem("structure.damping.rayleigh", list(self.rayleigh), f"the mass-proportional part {why}")
+        if self.has_modal:
+            why = 'is not available with frame = "inertial", where the modes at rest turn; use "rotating"'
+            raise problem("structure.damping.modal", self.modal, why)
 
 
 # --- what structures share --------------------------------------------------------------------------------------------

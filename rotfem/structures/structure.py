@@ -220,9 +220,8 @@ class Structure(LoadsOfStructure):
     def damping(self) -> Damping:
         """Return Kelvin–Voigt plus stiffness-proportional viscosity, the mass-proportional rate, and further models."""
         d = self.data.damping
-        eta, a0 = d.kelvin_voigt + d.rayleigh[1], d.rayleigh[0]
-        further = {name: self.scalar(f"damping_{name}", c) for name, c in d.models.items()}
-        return Damping(self.constant(eta) if eta > 0 else None, self.constant(a0) if a0 > 0 else None, further)
+        eta, a0 = (self.constant(c) if c > 0 else None for c in (d.viscosity, d.mass_rate))
+        return Damping(eta, a0, {name: self.scalar(f"damping_{name}", c) for name, c in d.models.items()})
 
     # --- values -------------------------------------------------------------------------------------------------
 
