@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import weakref
+from functools import partial
 from typing import Any
 
 import ufl
@@ -60,8 +61,13 @@ def terminals(root: Any) -> list[Any] | None:
         else:
             leaves.append(node)
     out = None if any(issubclass(kind, BaseFormOperator) for kind in classes) else leaves
-    _known[key] = weakref.ref(root, lambda _: _known.pop(key, None)), out
+    _known[key] = weakref.ref(root, partial(_forget, _known, key)), out
     return out
+
+
+def _forget(known: dict[int, Any], key: int, _: Any) -> None:
+    """Forget an expression that has gone; given what it is in, as modules may go before it where Python ends."""
+    known.pop(key, None)
 
 
 def compute_expression_hashdata(expression: Any, terminal_hashdata: dict[Any, Any]) -> bytes:
