@@ -12,7 +12,7 @@ times its impulse with ρ∞ = 0. So the memory is put on the line that the acce
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,7 +41,6 @@ class Steps:
         step: fixed step, s; None for adaptive ones.
         tolerance: error of all adaptive steps together, relative to the largest displacement; None for fixed ones.
         max_step, min_step: bounds of an adaptive step, s; None for those of the program.
-        parts: in how many equal steps each fixed step is gone; in one, if None.
     """
 
     end: float
@@ -49,11 +48,10 @@ class Steps:
     tolerance: float | None = None
     max_step: float | None = None
     min_step: float | None = None
-    parts: Sequence[int] | None = None
 
     @classmethod
     def of(cls, time: Any) -> Steps:
-        """Return the steps of anything with these attributes but the parts, as a scene's [time] table."""
+        """Return the steps of anything with these attributes, as a scene's [time] table."""
         return cls(time.end, time.step, time.tolerance, time.max_step, time.min_step)
 
 
@@ -64,30 +62,24 @@ def fixed_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[State]
         ComputationError: a step failed, however short.
     """
     assert steps.step is not None
-    ahead, reached = TimeGrid(stepper.system.signals, *grid(steps), stepper.scheme.order), state.t
-    legs = ((number, leg) for number, leg in ahead if leg.end > reached)
-    wanted = None if steps.parts is None else set(np.cumsum(steps.parts).tolist())
-    after: Leg | None
-    number, after = next(legs, (0, None))
-    if after is not None and reached == 0.0:
-        state = started(stepper, state, after)
-    while after is not None:
-        now, leg = number, after
-        number, after = next(legs, (0, None))
+    reached = state.t
+    legs = (leg for leg in TimeGrid(stepper.system.signals, *grid(steps), stepper.scheme.order) if leg.end > reached)
+    leg = next(legs, None)
+    if leg is not None and reached == 0.0:
+        state = started(stepper, state, leg)
+    while leg is not None:
+        after = next(legs, None)
         state = travel(stepper, state, leg, after)
-        if leg.whole and (wanted is None or now in wanted):
+        if leg.whole:
             yield state
+        leg = after
 
 
 def grid(steps: Steps) -> tuple[Array, float]:
     """Return the ends of fixed steps, the first at 0, and their length (s)."""
     assert steps.step is not None
     n = int(np.ceil(steps.end / steps.step - 1e-9))
-    times = np.append(np.arange(n) * steps.step, steps.end)
-    if steps.parts is None:
-        return times, steps.step
-    cut = [np.linspace(a, b, m, endpoint=False) for a, b, m in zip(times, times[1:], steps.parts, strict=False)]
-    return np.append(np.concatenate(cut), steps.end), steps.step
+    return np.append(np.arange(n) * steps.step, steps.end), steps.step
 
 
 def started(stepper: Stepper, state: State, first: Leg) -> State:
@@ -219,14 +211,16 @@ class March:
         yield from steps(self.stepper, state, self.steps)
 
 
-#: Safety factor, smallest change, changes that need no new factorisation, smallest relative scale.
-SAFETY, SHRINK, KEEP, FLOOR = 0.9, 0.2, (0.9, 1.25), 1e-6
+#: Safety factor, smallest change, smallest relative scale.
+SAFETY, SHRINK, FLOOR = 0.9, 0.2, 1e-6
+
+#: Both gains of the controller H211PI: h' = h (r_n r_{n−1})^(−GAIN/k) with errors r ∝ hᵏ, parts of what is allowed. It
+#: filters what vibrations make of them (Söderlind, ACM Trans. Math. Softw. 29 (2003) 1, table 1). No step grows after
+#: one that was taken back (Hairer, Nørsett & Wanner 1993, section II.4).
+GAIN = 1 / 6
 
 #: Local errors are estimates: the tolerance is divided by this.
 MARGIN = 7.0
-
-#: Growth, from step to step, of what errors allow: those of a vibration are small twice in a period, wherever it is.
-SMOOTHER = 1.2
 
 #: Steps by which the scale of a motion is found, how alike their results must be, and errors that are noise, in units
 #: of Newton's tolerance.
@@ -271,7 +265,7 @@ class AdaptiveSteps:
     """
 
     def __init__(self, stepper: Stepper, state: State, steps: Any):
-        self.stepper, self.state, self.steps, self.end = stepper, state, steps, float(steps.end)
+        self.stepper, self.state, self.end = stepper, state, float(steps.end)
         self.tolerance = float(steps.tolerance)
         self.longest = steps.max_step or LONGEST * self.end
         self.shortest = steps.min_step or SHORTEST * self.end
@@ -280,9 +274,9 @@ class AdaptiveSteps:
         self.cells = TimeGrid(stepper.system.signals, cells, CELL * self.end, fixed=False)
         self.landings, self.dense = self.cells.landings()
         self.least = NOISE * stepper.newton.tolerance
-        self.wanted, self.allowed = min(self.longest, FIRST * self.end), np.inf
+        self.wanted, self.before = min(self.longest, FIRST * self.end), 1.0
         if stepper.pace is not None:
-            self.wanted, self.largest, self.allowed = stepper.pace
+            self.wanted, self.largest, self.before = stepper.pace
             return
         self.largest = self.measure.displacement(state)
         if self.largest < FLOOR:
@@ -295,7 +289,8 @@ class AdaptiveSteps:
         Raises:
             ComputationError: a step failed, or would have to be shorter than allowed, or there are too many.
         """
-        state, wanted, stepper, allowed = self.state, self.wanted, self.stepper, self.allowed
+        state, wanted, stepper, before = self.state, self.wanted, self.stepper, self.before
+        order, most = stepper.scheme.estimate[1] - 1, stepper.scheme.growth
         least, switches = self.cells.step, watched_switches(stepper.system)
         began = state.t
         for number in range(1, MOST_STEPS + 1):
@@ -310,20 +305,18 @@ class AdaptiveSteps:
             finish = View(-1 if lands else 0, (h, 0.0) if averaged else None)
             drifts = h <= LEAST * (1 + 1e-6) * min(self.cells.step, wanted)
             new, ratio = (stepper.drift(start, h, stop, finish), 0.0) if drifts else self._tried(start, h, stop, finish)
-            power, most = 1 / (stepper.scheme.estimate[1] - 1), stepper.scheme.growth
             if averaged and ratio > 1.0 and ratio != FAILED and h <= self.cells.step * (1 + 1e-9):
                 ratio = 1.0  # the time grid has nothing finer; shorter steps would follow each breakpoint after all
-            factor = float(np.clip(SAFETY * max(ratio, 1e-12) ** -power, SHRINK, most))
             if ratio > 1.0:
                 stepper.rejected += 1
-                allowed, least = (h, 0.0) if ratio == FAILED else (allowed, least)
-                wanted = self._shorter(state.t, h * min(factor, SAFETY))
+                least = 0.0 if ratio == FAILED else least
+                wanted, most = self._shorter(state.t, h * max(SAFETY * ratio ** (-1 / order), SHRINK)), 1.0
                 continue
-            least = self.cells.step
-            allowed = min(h * max(ratio, 1e-12) ** -power, SMOOTHER * allowed)
-            factor = min(factor, max(SAFETY * allowed / h, SHRINK))
+            least, ratio = self.cells.step, max(ratio / SAFETY**order, 1e-12)
+            factor = float(np.clip((ratio * before) ** (-GAIN / order), SHRINK, most))
+            most = stepper.scheme.growth
             if h >= wanted or factor < 1.0:
-                wanted = min(self.longest, h if KEEP[0] <= factor <= KEEP[1] else h * factor)
+                wanted, before = min(self.longest, h * factor), ratio
             if switches is not None:
                 switches.passed(number, start, new)
             if stepper.observer is not None:
@@ -333,7 +326,7 @@ class AdaptiveSteps:
                 new = stepper.scheme.resized(new, start, following)
             if lands or averaged:
                 new = stepper.restart(new, finish, View(1 if lands else 0))
-            state, stepper.pace = new, (wanted, self.largest, allowed)
+            state, stepper.pace = new, (wanted, self.largest, before)
             yield state
         raise ComputationError(f"{MOST_STEPS} steps have not reached the end", time=state.t, advice=QUICKER)
 

@@ -190,8 +190,8 @@ class TimeGrid:
         if self._data:
             self._plan()
 
-    def __iter__(self) -> Iterator[tuple[int, Leg]]:
-        """Yield number of the step, from 1, and leg."""
+    def __iter__(self) -> Iterator[Leg]:
+        """Yield the legs of all steps."""
         times = as_list(self.times)
         length, begin = self.step, times[0]
         for i, end in enumerate(times[1:], start=1):
@@ -203,7 +203,7 @@ class TimeGrid:
                 elif abs(gone - length) > self.close:
                     length = gone
                 drifts = length < LEAST * self.step * (1 + 1e-6)
-                yield i, Leg(stop, length, lands, averaged, drifts, stop == stops[-1][0], length == self.step)
+                yield Leg(stop, length, lands, averaged, drifts, stop == stops[-1][0], length == self.step)
                 begin = stop
 
     def landings(self) -> tuple[Array, Array]:
