@@ -13,7 +13,7 @@ from types import ModuleType
 import pytest
 
 import rotfem
-from rotfem import scene
+from rotfem.scene import beams, loads, motion, plates, settings
 from rotfem.scene.section import PlanarSection, SpatialSection
 from rotfem.scene.structure import Damping
 from rotfem.scene.table import SceneModel
@@ -54,11 +54,11 @@ NUMBERS = [
 
 
 TABLES: list[type[SceneModel]] = [
-    *(scene.PlanarBeamStructure, scene.SpatialBeamStructure, scene.PlateStructure, Damping),
+    *(beams.PlanarBeamStructure, beams.SpatialBeamStructure, plates.PlateStructure, Damping),
     *(PlanarSection, SpatialSection),
-    *(scene.ConstantMotion, scene.SpinUpMotion, scene.TableMotion, scene.TorqueMotion, scene.CallableMotion),
-    *(scene.Model, scene.Initial, scene.Loads, scene.Load, scene.BeamMesh, scene.PlateMesh),
-    *(scene.Time, scene.Modes, scene.Solver, Limits),
+    *(motion.ConstantMotion, motion.SpinUpMotion, motion.TableMotion, motion.TorqueMotion, motion.CallableMotion),
+    *(settings.Model, settings.Initial, loads.Loads, loads.Load, settings.BeamMesh, settings.PlateMesh),
+    *(settings.Time, settings.Modes, settings.Solver, settings.OutputTable, Limits),
 ]
 
 
