@@ -42,7 +42,8 @@ T = TypeVar("T")
 #: Names of the outputs that models are compared by.
 HISTORY, STEADY, MODES = "history", "steady", "modes"
 
-#: Factor within which a change is known; a relative change that is not negligible; one that is large.
+#: Factor within which a change is to be known, so that of two that differ by more the larger one is a bound; a relative
+#: change that is not negligible; one that is large. The three words of a verdict are defined by them.
 SAFETY, NOTICEABLE, LARGE = 3.0, 1e-2, 1e-1
 
 #: Changes below are not distinguished from none: Newton's increments, and round-off of eigenvalues.
@@ -437,13 +438,21 @@ class Explanation:
         if name == MODES:
             self.values = own
         self.mesh.estimate[name] = error_by_cells(apart, ratio) if coarse is not self.system else None
-        for change, system in zip(self.changes, self._variants(at.model.problem.mesh, self.changes), strict=True):
+        off, known = set(self.effects) - set(self.own), (self.size, self.scale)
+        others = [change for change in self.changes if change.kind == "theory"]
+        systems = dict(zip((t.name for t in others), self._variants(at.model.problem.mesh, others), strict=True))
+        for change in self.changes:
+            system = systems.get(change.name) if change in others else at
             if system is None:
                 continue
             try:
+                if system is at:
+                    at.leave_out(off ^ {change.name})
                 change.estimate[name] = measure(there if at is coarse else own, of(system))
             except ComputationError as error:
                 change.estimate[name], change.notes[name] = np.inf, error.what
+        at.leave_out(off)
+        self.size, self.scale = known
 
     def _fails(self, name: str, what: str) -> None:
         """Note that the own model has no such output."""
