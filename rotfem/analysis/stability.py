@@ -67,7 +67,7 @@ class Stability:
         if self.held_by_spin:
             return (
                 "the equilibrium is no minimum of the energy (negative eigenvalues of the stiffness: "
-                f"{self.negative}): gyroscopic forces alone hold it, and any damping makes it unstable"
+                f"{self.negative}): gyroscopic forces alone hold it, and damping in the structure makes it unstable"
             )
         if self.stable:
             return ""

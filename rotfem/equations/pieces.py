@@ -478,11 +478,11 @@ class Pieces:
         """Return the `material` without what these effects add to the strains."""
         parts = [p for p in self.all if p.kind == "K" and "internal" in p.of and PRESTRESS not in p.of]
         K, *others = [p.operator for p in parts if p.of.isdisjoint(without)]
-        if others or self.structure.hinges:
+        if others or self.structure.released:
             K = K.copy()
         for other in others:
             K.axpy(1.0, other, SAME)
-        if self.structure.hinges:
+        if self.structure.released:
             restrained(K, self._hinged)
         return K
 

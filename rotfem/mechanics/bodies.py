@@ -155,6 +155,38 @@ class RootSpring:
 
 
 @dataclass(frozen=True)
+class Support:
+    """A spring and a damper between a section of a shaft and the fixed frame, the same in all directions across it.
+
+    Attributes:
+        x: displacement across the axis as an expression of q, three frame components (m).
+        stiffness: k and the cross-coupling c of [[k, c], [−c, k]] (N/m), constants or 0.
+        damping: likewise (N·s/m).
+        axis: direction 1 of the shaft, about which the matrices turn y towards z.
+        measure: UFL measure of its place.
+    """
+
+    x: Any
+    stiffness: tuple[Any, Any]
+    damping: tuple[Any, Any]
+    axis: Any
+    measure: Any
+
+    def variation(self, k: Kinematics) -> Any:
+        """Return δx."""
+        return k.variation(self.x)
+
+    def rigid_turn(self, e: Any) -> Any:
+        """Return the change of x in a unit rigid turn about the axis e, e×x."""
+        return ufl.cross(e, self.x)
+
+    def times(self, coefficients: tuple[Any, Any], v: Any) -> Any:
+        """Return [[a, b], [−b, a]] v of a vector across the axis, a v − b e×v."""
+        a, b = coefficients
+        return a * v - b * ufl.cross(self.axis, v)
+
+
+@dataclass(frozen=True)
 class Damping:
     """Viscosity η (s) of the strains and mass-proportional rate a0 (1/s), constants or None.
 

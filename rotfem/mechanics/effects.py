@@ -11,6 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from rotfem.mechanics.pitch import is_beside
 from rotfem.registry import Registry, damping_models, register, resolved
 from rotfem.registry import effects as registered
@@ -206,6 +208,24 @@ for _effect in (
         internal=True,
         passive=True,
         at_root=True,
+    ),
+    Effect(
+        "supports",
+        _work("supports"),
+        lambda problem: bool(getattr(problem.structure, "supports", ())),
+        ("a shaft has supports", "no supports"),
+        (),
+        passive=True,
+        potential=_work("potential_of_supports"),
+    ),
+    Effect(
+        "support_dampers",
+        _work("support_dampers"),
+        lambda problem: any(
+            np.any(support.damping) or support.stiffness[0][1] != 0.0
+            for support in getattr(problem.structure, "supports", ())
+        ),
+        ("supports have dampers or cross-coupling", "supports have no dampers"),
     ),
     Effect(
         "trapeze",

@@ -19,7 +19,7 @@ from typing import Any
 import ufl
 from ufl import cross
 
-from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, RootSpring, Strain
+from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, RootSpring, Strain, Support
 from rotfem.mechanics.frame import Frame
 from rotfem.mechanics.sums import added
 from rotfem.registry import damping_models, resolved
@@ -32,7 +32,7 @@ class Variation:
     k: Kinematics
     within_frame = True
 
-    def of(self, moving: Body | AppliedLoad) -> Any:
+    def of(self, moving: Body | AppliedLoad | Support) -> Any:
         """Return δx of a body, or of what a load works on."""
         return moving.variation(self.k)
 
@@ -44,7 +44,7 @@ class RigidTurn:
     e: Any
     within_frame = False
 
-    def of(self, moving: Body | AppliedLoad) -> Any:
+    def of(self, moving: Body | AppliedLoad | Support) -> Any:
         """Return e×x of a body, or of what a load works on."""
         return moving.rigid_turn(self.e)
 
@@ -176,6 +176,21 @@ def root_dampers(m: Mechanics, delta: Variation) -> Any:
     return added(s.damping * (m.k.rate(s.turn) + s.drift) * m.k.variation(s.turn) * s.measure for s in m.springs())
 
 
+def supports(m: Mechanics, delta: Any) -> Any:
+    """Return Σ k x·δx over the displacements x of a shaft in its supports."""
+    return added(s.stiffness[0] * ufl.inner(s.x, delta.of(s)) * s.measure for s in m.structure.supports())
+
+
+def support_dampers(m: Mechanics, delta: Any) -> Any:
+    """Return Σ (D (ẋ + w×x) + c-part of K x)·δx: their forces of rates in the fixed frame, and the circulatory ones."""
+    work = []
+    for s in m.structure.supports():
+        rate = m.k.rate(s.x) + cross(m.frame.w, s.x)
+        force = s.times(s.damping, rate) + s.times((0, s.stiffness[1]), s.x)
+        work.append(ufl.inner(force, delta.of(s)) * s.measure)
+    return added(work)
+
+
 def loads(m: Mechanics, delta: Any) -> Any:
     """Return −Σ ∫ (force · δx) over applied forces and moments."""
     return added(-ufl.inner(load.force, delta.of(load)) * load.measure for load in m.loads)
@@ -236,6 +251,11 @@ def potential_of_gravity(m: Mechanics) -> Any:
 def potential_of_root_springs(m: Mechanics) -> Any:
     """Return Σ ½ k φ² over the springs of the root."""
     return added(s.stiffness * s.turn**2 / 2 * s.measure for s in m.springs())
+
+
+def potential_of_supports(m: Mechanics) -> Any:
+    """Return Σ ½ k |x|² over the supports of a shaft."""
+    return added(s.stiffness[0] * ufl.inner(s.x, s.x) / 2 * s.measure for s in m.structure.supports())
 
 
 def potential_of_loads(m: Mechanics) -> Any:

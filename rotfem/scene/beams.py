@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_through
-from rotfem.scene.root import Root, RootedStructure, SpatialRoot
+from rotfem.scene.root import Root, RootedStructure, SpatialRoot, Support
 from rotfem.scene.section import PlanarSection, SpatialSection
 from rotfem.scene.span_tables import with_tables
 from rotfem.scene.structure import Damping, MeanBeam, apart, check_one_hub, means
@@ -223,6 +223,7 @@ class SpatialBeamStructure(BeamStructure):
         precone: angle of the beam axis out of the plane (1, 2), towards direction 3 (rad). May also stand in the
             section table.
         root: hinges, springs, dampers and pitch angle at the clamp.
+        supports: bearings along a shaft.
     """
 
     type: Literal["spatial_beam"] = "spatial_beam"
@@ -235,6 +236,7 @@ class SpatialBeamStructure(BeamStructure):
     line: Annotated[Matrix, PlainValidator(as_line)] | None = None
     precone: Number = 0.0
     root: SpatialRoot = SpatialRoot()
+    supports: tuple[Support, ...] = ()
 
     @property
     def reference_line(self) -> ReferenceLine | SweptLine | None:
@@ -254,9 +256,12 @@ class SpatialBeamStructure(BeamStructure):
 
     @property
     def nodes(self) -> tuple[float, ...]:
-        """Places (m) of masses, of kinks of the line, and of the ends of arcs."""
+        """Places (m) of masses, of supports, of kinks of the line, and of the ends of arcs."""
         line = self.reference_line
-        return apart((*super().nodes, *(line.kinks if line is not None else ())), self.length)
+        return apart(
+            (*super().nodes, *(support.x for support in self.supports), *(line.kinks if line is not None else ())),
+            self.length,
+        )
 
     @property
     def tip_inertia_matrix(self) -> Array:
@@ -280,8 +285,8 @@ class SpatialBeamStructure(BeamStructure):
         return self.section.polar_radius != 0.0
 
     def mean_beam(self) -> MeanBeam | None:
-        """Return the uniform beam with the mean of its section; None if that is given by full matrices."""
-        if self.section.given.keys() & {"stiffness", "mass"}:
+        """Return the uniform beam with the mean of its section; None with full matrices or supports."""
+        if self.section.given.keys() & {"stiffness", "mass"} or self.supports:
             return None
         s = means(self.section.central, self.length)
         return self._mean(s, {"flap": (s["EI2"], 1.0), "lag": (s["EI3"], 0.0)})
@@ -315,7 +320,20 @@ class SpatialBeamStructure(BeamStructure):
         check_one_hub(self.hub_radius, self.hub_offset)
         self._check_tables(slack)
         self.root.check(self.precone)
+        self._check_supports()
         return self
+
+    def _check_supports(self) -> None:
+        """Refuse supports elsewhere or of a beam that is no straight shaft, and too few for a driven root."""
+        straight = self.precone == 0.0 and self.reference_line is None and not any(self.root_position[1:])
+        for i, support in enumerate(self.supports):
+            if not -NEAR <= support.x / self.length <= 1 + NEAR:
+                raise problem(f"supports.{i}.x", support.x, f"must be from 0 to the length {self.length:g}")
+        if self.supports and not straight:
+            why = "hold straight shafts: without precone, sweep, line, and hub_offset across the axis"
+            raise problem("supports", None, why)
+        if self.root.driven and len({support.x for support in self.supports if support.stiffness[0][0] > 0.0}) < 2:
+            raise problem("root.driven", True, "needs structure.supports with a stiffness at two places at least")
 
 
 Structure = Annotated[PlanarBeamStructure | SpatialBeamStructure | PlateStructure, Field(discriminator="type")]

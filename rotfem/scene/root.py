@@ -1,10 +1,11 @@
-"""The [structure.root] table of beams: hinges, springs and dampers between hub and blade, and the pitch angle."""
+"""What holds a beam: hinges, springs, dampers and pitch angle of its root, and the supports of a shaft."""
 
 from __future__ import annotations
 
 import math
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
+import numpy as np
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from rotfem.errors import InputError
@@ -12,7 +13,7 @@ from rotfem.scene.files import as_time_table
 from rotfem.scene.signals import Given, Harmonic, TimeFunction
 from rotfem.scene.structure import StructureTable
 from rotfem.scene.table import SceneModel, problem
-from rotfem.scene.values import Matrix, NonNegative, Number
+from rotfem.scene.values import Bounds, Matrix, NonNegative, Number, as_rows
 
 KEY = "structure.root.pitch"
 
@@ -140,6 +141,7 @@ class SpatialRoot(Root):
         pitch_stiffness: against turns about the axis of the blade (N·m/rad), or None: rigid.
         pitch_damping: against their rate (N·m·s/rad).
         pitch: angle that the whole blade is turned by about its axis at the root (rad), a number or over time.
+        driven: whether the drive of a shaft holds it along and about its axis alone; `supports` hold the rest.
     """
 
     AXES: ClassVar[dict[str, int]] = {"pitch": 1, "flap": 2, "lag": 3}
@@ -149,15 +151,59 @@ class SpatialRoot(Root):
     pitch_stiffness: NonNegative | None = None
     pitch_damping: NonNegative = 0.0
     pitch: PitchAngle = PitchAngle(value=0.0)
+    driven: bool = False
 
     def check(self, precone: float) -> None:
-        """Refuse one spring of the two whose axes the precone (rad), or a pitch over time, turns, the other rigid."""
+        """Refuse one spring of the two whose axes the precone (rad), or a pitch over time, turns, the other rigid.
+
+        And springs of a root that a drive leaves free.
+        """
+        if self.driven and (self.hinges or self.pitch.changes):
+            why = "leaves the root free to turn, without hinges and a pitch over time; structure.supports hold it"
+            raise problem("root.driven", self.driven, why)
         pairs = [(1, 3, "a precone")] if precone != 0.0 else []
         for first, second, what in [*pairs, (2, 3, "a pitch over time")] if self.pitch.changes else pairs:
             if (first in self.hinges) != (second in self.hinges):
                 missing = next(name for name, axis in self.AXES.items() if axis in {first, second} - self.hinges.keys())
                 why = f"must be given too with {what}, which turns the axes of both; a large number holds it"
                 raise problem(f"root.{missing}_stiffness", None, why)
+
+
+def _as_isotropic(value: Any) -> Matrix:
+    """Return a matrix [[a, b], [−b, a]], a ≥ 0, of a number a or of these rows: the same in all directions."""
+    rows = as_rows(value, (2,), "a number or [[a, b], [-b, a]]") if isinstance(value, list | tuple) else None
+    if rows is None:
+        number = Bounds(ge=0.0).number(value)
+        return (number, 0.0), (0.0, number)
+    if len(rows) != 2 or rows[0][0] != rows[1][1] or rows[0][1] != -rows[1][0] or rows[0][0] < 0.0:
+        why = (
+            "must be a number ≥ 0 or [[a, b], [-b, a]], a ≥ 0: a support that is not the same in all directions makes "
+            "coefficients of the rotating frame that change with time"
+        )
+        raise problem("", value, why)
+    return rows
+
+
+class Support(SceneModel):
+    """A bearing of a shaft: a spring and a damper between a section and the fixed frame, across the axis of spin.
+
+    Forces along directions 2 and 3 of the fixed frame are −stiffness · (y, z) − damping · (ẏ, ż).
+
+    Attributes:
+        x: place along the beam (m).
+        stiffness: N/m, a number or [[k, c], [−c, k]] with the cross-coupling c of a fluid film.
+        damping: N·s/m, likewise.
+    """
+
+    x: Number = Field(description="a place along the beam (m)")
+    stiffness: Annotated[Matrix, PlainValidator(_as_isotropic)] = ((0.0, 0.0), (0.0, 0.0))
+    damping: Annotated[Matrix, PlainValidator(_as_isotropic)] = ((0.0, 0.0), (0.0, 0.0))
+
+    @model_validator(mode="after")
+    def _check_any(self) -> Self:
+        if not np.any(self.stiffness) and not np.any(self.damping):
+            raise problem("stiffness", None, "give stiffness, damping, or both")
+        return self
 
 
 class RootedStructure(StructureTable):

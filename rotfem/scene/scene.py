@@ -330,6 +330,7 @@ def check_together(scene: Scene) -> None:
     structure, motion, model = scene.structure, scene.motion, scene.model
     if structure.is_planar:
         check_planar(motion, scene.loads)
+    check_supports(structure, motion)
     check_loads(structure, motion, scene.loads)
     check_mesh(structure, scene.mesh)
     check_theory(structure, model)
@@ -352,6 +353,12 @@ def check_planar(motion: Motion, loads: Loads) -> None:
             raise problem(key, value, "the third component must be 0 for a planar_beam")
     if loads.gravity[2] != 0.0:
         raise problem("loads.gravity", list(loads.gravity), "the third component must be 0 for a planar_beam")
+
+
+def check_supports(structure: Any, motion: Motion) -> None:
+    """Refuse supports of a beam that spins about another axis than its own."""
+    if getattr(structure, "supports", ()) and (motion.axis[1] != 0.0 or motion.axis[2] != 0.0):
+        raise problem("motion.axis", list(motion.axis), "must be [1, 0, 0] or [-1, 0, 0] with structure.supports")
 
 
 def check_mesh(structure: Any, mesh: BeamMesh | PlateMesh) -> None:

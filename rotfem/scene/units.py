@@ -19,7 +19,7 @@ Unit: TypeAlias = str | tuple[str, ...]
 #: loads in s.
 _KEYS: dict[str, dict[Unit, str]] = {
     "structure": {
-        "m": "length width thickness hub_radius hub_offset tip_offset masses.x masses.offset root.hinge_offset",
+        "m": "length width thickness hub_radius hub_offset tip_offset masses.x masses.offset root.hinge_offset supports.x",
         ("m",): "line",
         "kg": "tip_mass masses.mass",
         ("kg*m**2",): "tip_inertia masses.inertia",
@@ -32,6 +32,8 @@ _KEYS: dict[str, dict[Unit, str]] = {
         ("1/s", "s"): "damping.rayleigh",
         "dimensionless": "damping.modal",
         "N*m": "root.lag_stiffness root.flap_stiffness root.pitch_stiffness",
+        "N/m": "supports.stiffness",
+        "N*s/m": "supports.damping",
         "N*m*s": "root.lag_damping root.flap_damping root.pitch_damping",
     },
     "structure.section": {

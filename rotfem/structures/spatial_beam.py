@@ -30,7 +30,7 @@ from mpi4py import MPI
 from ufl import cross
 
 from rotfem.errors import InputError
-from rotfem.mechanics.bodies import AppliedLoad, Body, Kinematics, Strain
+from rotfem.mechanics.bodies import AppliedLoad, Body, Kinematics, Strain, Support
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.rotations import Turn
 from rotfem.structures.beam import Beam
@@ -225,7 +225,7 @@ class SpatialBeam(Beam):
             self._root = ufl.as_vector(parts)
         self._pretwist: Any = 0
         self._triad = self._undeformed_triad()
-        whole = self.size == len(self.components) and not self.hinges  # whose turns are counted from the hub
+        whole = self.size == len(self.components) and not self.released  # whose turns are counted from the hub
         self.turns = SectionTurns.of(self) if whole else None
 
     @classmethod
@@ -331,6 +331,29 @@ class SpatialBeam(Beam):
     def turned(self, q: Any, v: Any) -> Any:
         """Return Λ v = exp(θ) R v."""
         return SectionTurn(rotation_part(q), self._turn.exact).rotate(self._from_reference(v))
+
+    @property
+    def released(self) -> set[int]:
+        """Turns in hinges; of the root of a driven shaft all that is across its axis."""
+        return {1, 2, 4, 5} if self.data.root.driven else super().released
+
+    def supports(self) -> list[Support]:
+        """Return the bearings of a shaft, which is along direction 1."""
+        across, e = ufl.as_vector((0, self.k.q[1], self.k.q[2])), ufl.as_vector((1, 0, 0))
+
+        def constants(name: str, matrix: Any) -> tuple[Any, Any]:
+            return tuple(self.scalar(f"{name}_{i}", c) if c != 0.0 else 0 for i, c in enumerate(matrix[0]))  # type: ignore[return-value]
+
+        return [
+            Support(
+                across,
+                constants(f"supports_{i}_stiffness", support.stiffness),
+                constants(f"supports_{i}_damping", support.damping),
+                e,
+                self.points.measure((support.x,)),
+            )
+            for i, support in enumerate(self.data.supports)
+        ]
 
     def root_turn(self, axis: int) -> Any:
         """Return θ·e at the root, e the axis of the blade there (1), the flap axis (2) or the lag axis (3)."""

@@ -13,7 +13,7 @@ from dolfinx import default_scalar_type, fem
 from mpi4py import MPI
 
 from rotfem.errors import InputError, shown
-from rotfem.mechanics.bodies import Body, Damping, Kinematics, RootSpring, Strain
+from rotfem.mechanics.bodies import Body, Damping, Kinematics, RootSpring, Strain, Support
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import forms
 from rotfem.structures.applied_loads import LoadsOfStructure
@@ -149,9 +149,18 @@ class Structure(LoadsOfStructure):
         """Return what holds the hinges; none here."""
         return []
 
+    def supports(self) -> list[Support]:
+        """Return the supports between the structure and the fixed frame; none here."""
+        return []
+
+    @property
+    def released(self) -> set[int]:
+        """Numbers of the components that the clamp leaves free: turns in hinges."""
+        return {self.turns_of[axis] for axis in self.hinges}
+
     def _clamped_components(self) -> list[int]:
         """Return which of the unknowns of a node the clamp holds."""
-        free = {self.turns_of[axis] for axis in self.hinges}
+        free = self.released
         return [place for place, i in enumerate(self.active) if i not in free]
 
     def clamped_unknowns(self, nodes: npt.NDArray[np.int32] | None = None) -> npt.NDArray[np.int32]:
@@ -163,7 +172,7 @@ class Structure(LoadsOfStructure):
         return self._numbers(nodes, self._clamped_components())
 
     def hinged_unknowns(self, nodes: npt.NDArray[np.int32] | None = None) -> npt.NDArray[np.int32]:
-        """Return the local numbers of those that turn in hinges of the clamp, in order (see `clamped_unknowns`)."""
+        """Return the local numbers of those that the clamp leaves free, in order (see `clamped_unknowns`)."""
         held = self._clamped_components()
         return self._numbers(nodes, [i for i in range(self.size) if i not in held])
 

@@ -99,3 +99,98 @@ def test_left_vectors_of_double_modes_are_independent() -> None:
     for i in twins:
         pair = left[:, i : i + 2] / np.linalg.norm(left[:, i : i + 2], axis=0)
         assert np.linalg.svd(pair, compute_uv=False)[-1] > 1e-3
+
+
+# --- supports ---------------------------------------------------------------------------------------------------------
+
+
+def shaft_on_bearings(stiffness: Any, damping: Any = 0.0, **changes: Any) -> dict[str, Any]:
+    """Return a disk in the middle of a shaft without mass, shear and stretch, that two bearings hold at its ends."""
+    section = {"EA": 1e8, "GA2": 1e9, "GA3": 1e9, "GJ": 1e3, "EI2": EI, "EI3": EI, "mass_per_length": 1e-4}
+    structure = {"type": "spatial_beam", "length": 1.0, "section": section, "masses": [{"x": 0.5, "mass": 10.0}]}
+    supports = [{"x": x, "stiffness": stiffness, "damping": damping} for x in (0.0, 1.0)]
+    return {
+        "structure": structure | {"supports": supports, "root": {"driven": True}},
+        "motion": {"type": "constant", "speed": 50.0, "axis": [1, 0, 0]},
+        "mesh": {"elements": 2, "degree": 3},
+        "modes": {"count": 2},
+    } | changes
+
+
+def test_jeffcott_rotor() -> None:
+    """On rigid bearings the disk whirls at √(48 EI/(m L³)), both critical speeds: 5e-5, as stiff as they are."""
+    diagram = rotfem.campbell(shaft_on_bearings(1e9), "0:150:6")
+    expected = np.sqrt(48.0 * EI / 10.0)
+    assert [c.kind for c in diagram.critical_speeds[:2]] == ["backward", "forward"]
+    np.testing.assert_allclose([c.speed for c in diagram.critical_speeds[:2]], expected, rtol=5e-5)
+    whirl = np.array([row["frequency_fixed"] for row in diagram.rows if row["whirl"] != "standing"])
+    np.testing.assert_allclose(whirl, expected, rtol=5e-5)
+
+
+@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
+@pytest.mark.parametrize("speed", [0.0, 40.0, 200.0])
+def test_damped_bearings(theory: str, speed: float) -> None:
+    """Bearings that yield: the eigenvalues in the fixed frame do not depend on the speed, and none grows.
+
+    Closed form: half the disk on the shaft's spring k_s = 24 EI/L³ in series with a bearing k + cλ,
+    m/2 λ² (k_s + k + cλ) + k_s (k + cλ) = 0; 5e-5, the shaft's own mass and shear.
+    """
+    k, c, k_s, half = 2e4, 150.0, 24.0 * EI, 5.0
+    motion = {"type": "constant", "speed": speed, "axis": [1, 0, 0]}
+    rows = rotfem.modes(shaft_on_bearings(k, c, motion=motion, model={"theory": theory})).rows
+    roots = np.roots([half * c, half * (k_s + k), k_s * c, k_s * k])
+    expected = roots[np.argmax(roots.imag)]
+    for row in rows:
+        fixed = abs(row["frequency_fixed"]) if speed else row["frequency"]
+        np.testing.assert_allclose([fixed, row["growth"]], [expected.imag, expected.real], rtol=5e-5)
+
+
+def test_cross_coupling_makes_forward_whirl_grow() -> None:
+    """[[k, q], [−q, k]]: m/2 λ² + K z with K = k_s(k − iq)/(k_s + k − iq) in z = y + iz; the pair is λ = ±√(−2K/m)."""
+    k, q, k_s, half = 2e4, 500.0, 24.0 * EI, 5.0
+    rows = rotfem.modes(shaft_on_bearings([[k, q], [-q, k]])).rows
+    K = k_s * (k - 1j * q) / (k_s + k - 1j * q)
+    root = np.sqrt(-K / half)
+    growing = root if root.real > 0 else -root
+    by_whirl = {row["whirl"]: row for row in rows}
+    grows = "forward" if growing.imag > 0 else "backward"
+    assert grows == "forward"
+    for way, sign in ((grows, 1.0), ("backward", -1.0)):
+        row = by_whirl[way]
+        np.testing.assert_allclose(row["growth"], sign * growing.real, rtol=2e-4)
+        np.testing.assert_allclose(row["frequency_fixed"], abs(growing.imag), rtol=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("change", "key"),
+    [
+        ({"motion": {"type": "constant", "speed": 5.0}}, "motion.axis"),
+        ({"supports": [{"x": 0.0, "stiffness": 1.0}]}, "structure.root.driven"),
+        ({"supports": [{"x": 2.0, "stiffness": 1.0}]}, "structure.supports.0.x"),
+        ({"supports": [{"x": 0.5}]}, "structure.supports.0.stiffness"),
+        ({"supports": [{"x": 0.5, "stiffness": [[1.0, 0.0], [0.0, 2.0]]}]}, "structure.supports.0.stiffness"),
+        ({"precone": 0.1}, "structure.supports"),
+        ({"root": {"driven": True, "lag_stiffness": 1.0}}, "structure.root.driven"),
+    ],
+)
+def test_supports_that_cannot_be(change: dict[str, Any], key: str) -> None:
+    tables = shaft_on_bearings(1.0)
+    tables = tables | change if "motion" in change else tables | {"structure": tables["structure"] | change}
+    with pytest.raises(rotfem.SceneError, match=key):
+        rotfem.Scene.from_dict(tables)
+
+
+def test_a_shaft_on_bearings_in_time() -> None:
+    """A force that rests in the rotor, as of an unbalance, bends the shaft for good: a history stays there, 2e-4.
+
+    Half the disk: z = (F/2)/(k_s k̂/(k_s + k̂) − m/2 Ω²) in the rotor, where the damper sees Ω: k̂ = k + iΩc. Of the
+    bearing z k_s/(k_s + k̂).
+    """
+    k, c, k_s, half, speed, force = 2e4, 150.0, 24.0 * EI, 5.0, 50.0, 3.0
+    load = {"at": [{"x": 0.5, "force": [0.0, force, 0.0], "kind": "follower"}]}
+    result = rotfem.run(shaft_on_bearings(k, c, loads=load, time={"end": 0.2, "step": 0.002}))
+    bearing = k + 1j * speed * c
+    disk = 0.5 * force / (k_s * bearing / (k_s + bearing) - half * speed**2)
+    end = disk * k_s / (k_s + bearing)
+    for name, value in (("u2", end.real), ("u3", end.imag)):
+        np.testing.assert_allclose(result.tip[name], value, atol=2e-4 * abs(end))
