@@ -137,7 +137,8 @@ def write_whole(path: Path, *content: bytes, durable: bool = False) -> Path:
         descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f"{PART}{path.name}-", suffix=".part")
         try:
             with os.fdopen(descriptor, "wb") as file:
-                file.writelines(content)
+                for part in content:
+                    file.write(part)
                 if durable:
                     file.flush()
                     os.fsync(descriptor)
