@@ -327,7 +327,7 @@ class SpatialBeamStructure(BeamStructure):
         """Refuse supports elsewhere or of a beam that is no straight shaft, and too few for a driven root."""
         straight = self.precone == 0.0 and self.reference_line is None and not any(self.root_position[1:])
         for i, support in enumerate(self.supports):
-            if not -NEAR <= support.x / self.length <= 1 + NEAR:
+            if not -ROUND_OFF <= support.x / self.length <= 1 + ROUND_OFF:
                 raise problem(f"supports.{i}.x", support.x, f"must be from 0 to the length {self.length:g}")
         if self.supports and not straight:
             why = "hold straight shafts: without precone, sweep, line, and hub_offset across the axis"
