@@ -19,7 +19,8 @@ Unit: TypeAlias = str | tuple[str, ...]
 #: loads in s.
 _KEYS: dict[str, dict[Unit, str]] = {
     "structure": {
-        "m": "length width thickness hub_radius hub_offset tip_offset masses.x masses.offset root.hinge_offset supports.x",
+        "m": "length width thickness hub_radius hub_offset tip_offset masses.x masses.offset supports.x "
+        "root.hinge_offset",
         ("m",): "line",
         "kg": "tip_mass masses.mass",
         ("kg*m**2",): "tip_inertia masses.inertia",
