@@ -9,7 +9,7 @@ from __future__ import annotations
 import pytest
 
 from tests.pairs.covering import Row
-from tests.pairs.trying import Trial, parameters, rows_of
+from tests.pairs.trying import RANKED, Trial, parameters, rows_of
 
 ROWS = list(rows_of(2, seed=1))
 
@@ -22,6 +22,12 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> Trial:
 @pytest.mark.parametrize("row", parameters(ROWS))
 def test_pairs(trial: Trial, row: Row) -> None:
     trial(row)
+
+
+@pytest.mark.mpi
+@RANKED
+def test_two_processes(trial: Trial) -> None:
+    trial.on_ranks()
 
 
 def test_every_pair_was_computed(trial: Trial) -> None:

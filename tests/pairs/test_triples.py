@@ -9,7 +9,7 @@ from itertools import islice
 import pytest
 
 from tests.pairs.covering import Row
-from tests.pairs.trying import Trial, parameters, rows_of
+from tests.pairs.trying import RANKED, Trial, parameters, rows_of
 
 #: Scenes that are tried each day, chosen by the day, or by ROTFEM_PAIRS_SEED; names of tests have the number.
 SAMPLE, SEED = 100, int(os.environ.get("ROTFEM_PAIRS_SEED", date.today().toordinal()))
@@ -31,6 +31,12 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> Trial:
 
 def test_triples(trial: Trial, row: Row) -> None:
     trial(row)
+
+
+@pytest.mark.mpi
+@RANKED
+def test_two_processes(trial: Trial) -> None:
+    trial.on_ranks()
 
 
 @pytest.mark.nightly

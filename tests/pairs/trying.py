@@ -38,13 +38,13 @@ def rows_of(strength: int, seed: int) -> Iterator[Row]:
     return (row for row, _ in covering(strength, shuffled, ACTIVE, CONFLICTS, seed, ALSO))
 
 
+#: Mark of tests on two processes.
+RANKED = pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")
+
+
 def parameters(rows: Sequence[Row], before: str = "", marks: Sequence[Any] = ()) -> list[Any]:
-    """Return rows as parameters of a test, those of two processes where there is mpirun."""
-    ranked = [pytest.mark.mpi, pytest.mark.skipif(MPIRUN is None, reason="there is no mpirun")]
-    return [
-        pytest.param(row, id=before + name_of(row), marks=[*marks, *(ranked if row["ranks"] == "2" else [])])
-        for row in rows
-    ]
+    """Return rows as parameters of a test."""
+    return [pytest.param(row, id=before + name_of(row), marks=marks) for row in rows]
 
 
 class Trial:
@@ -58,7 +58,8 @@ class Trial:
     def __init__(self, rows: Sequence[Row], folder: Path):
         self.rows, self.folder = list(rows), folder
         self.done: list[Row] = []
-        self._ranked: Path | None = None
+        #: Rows of two processes, and their answers on one.
+        self.alone: list[tuple[Row, dict[str, Any]]] = []
 
     def __call__(self, row: Row) -> None:
         """Try a row.
@@ -69,12 +70,32 @@ class Trial:
         try:
             result = answer(row, self.folder)
             check_answer(row, result, self.folder)
-            if row["ranks"] == "2":
-                self._check_ranks(row, result)
         except Exception as error:
-            scene = as_toml(row, tables_of(row, self.folder))
-            raise AssertionError(f"{type(error).__name__}: {error}\n{scene}") from error
+            raise AssertionError(self._failure(row, error)) from error
+        if row["ranks"] == "2":
+            self.alone.append((row, answers(columns_of(result))))
         self.done.append(row)
+
+    def on_ranks(self) -> None:
+        """See that the rows of two processes have the same answers there; their forms are compiled by then.
+
+        Raises:
+            AssertionError: with the scenes, what is wrong.
+        """
+        folder = self.folder / "ranks"
+        folder.mkdir()
+        compute_on_ranks([row for row, _ in self.alone], folder)
+        failures = []
+        for number, (row, alone) in enumerate(self.alone):
+            try:
+                done = folder / f"{number}.npz"
+                assert done.exists(), f"on two processes: {(folder / f'{number}.txt').read_text()}"
+                with np.load(done) as file:
+                    there = {name: file[name] for name in file.files}
+                check_same(alone, answers(there), DIGITS.get(row["time"], 1e-5), "one process and two")
+            except AssertionError as error:
+                failures.append(self._failure(row, error))
+        assert not failures, "\n\n".join(failures)
 
     def check_complete(self, strength: int) -> None:
         """See that every set of so many choices that can occur together was in a row that has been computed."""
@@ -82,18 +103,8 @@ class Trial:
             pytest.skip(f"{len(self.done)} of {len(self.rows)} rows were computed")
         assert missing(self.done, strength, LEVELS, ACTIVE, CONFLICTS, ALSO) == []
 
-    def _check_ranks(self, row: Row, result: Any) -> None:
-        if self._ranked is None:
-            self._ranked = self.folder / "ranks"
-            self._ranked.mkdir()
-            compute_on_ranks([other for other in self.rows if other["ranks"] == "2"], self._ranked)
-        number = [other for other in self.rows if other["ranks"] == "2"].index(row)
-        done = self._ranked / f"{number}.npz"
-        assert done.exists(), f"on two processes: {(self._ranked / f'{number}.txt').read_text()}"
-        with np.load(done) as file:
-            there = {name: file[name] for name in file.files}
-        digits = DIGITS.get(row["time"], 1e-5)
-        check_same(answers(columns_of(result)), answers(there), digits, "one process and two")
+    def _failure(self, row: Row, error: Exception) -> str:
+        return f"{type(error).__name__}: {error}\n{as_toml(row, tables_of(row, self.folder))}"
 
 
 def answers(columns: Mapping[str, Any]) -> dict[str, Any]:
