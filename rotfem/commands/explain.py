@@ -14,7 +14,7 @@ from rotfem.analysis.march import Steps
 from rotfem.commands.first_state import first_state
 from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.modes import modes
-from rotfem.commands.problem import Problem, first_motion, scheme_of
+from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.run import run
 from rotfem.commands.summary import summary
 from rotfem.errors import ComputationError, SceneError, input_of
@@ -91,7 +91,6 @@ def case_of(scene: Scene, terms: Mapping[str, Work] | None = None) -> Case:
         steps=None if time is None else Steps.of(time),
         scheme=None if time is None else scheme_of(time),
         first=first,
-        symmetric=first_motion(scene) is None and scene.initial.tip_displacement is None,
         mode_count=scene.modes.count,
         about=scene.modes.about,
         newton=lambda: Newton.of(scene.solver),

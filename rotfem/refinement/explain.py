@@ -34,7 +34,6 @@ from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.companion import Companion
 from rotfem.refinement.discretisation import ASYMPTOTIC, HistoryErrors, Start, error_by_cells
 from rotfem.refinement.distance import distance, distance_each, tip
-from rotfem.structures.symmetry import inactive_unknowns
 
 Array = npt.NDArray[Any]
 T = TypeVar("T")
@@ -75,7 +74,6 @@ class Case:
         steps: end and steps of the history; None where a steady state is wanted.
         scheme: time-stepping scheme of the history.
         first: system ↦ its (q, q̇) at t = 0, local dof arrays; None where it is undeformed, or at rest.
-        symmetric: whether the start leaves unknowns at zero that nothing else moves.
         mode_count: number of modes that are wanted.
         about: the state that modes are about: "steady" or "undeformed".
         newton: iteration control, of which everything takes its own.
@@ -87,7 +85,6 @@ class Case:
     steps: Steps | None = None
     scheme: Scheme | None = None
     first: Start
-    symmetric: bool = True
     mode_count: int = 6
     about: str = "steady"
     newton: Callable[[], Newton] = Newton
@@ -234,9 +231,6 @@ class Explanation:
         named = {t.name: t for t in theories() if t.holds_for(kind)} | {problem.theory.name: problem.theory}
         self.theories: tuple[Theory, ...] = tuple(sorted(named.values(), key=lambda t: t.rank))
         self.moving = HISTORY in self.wanted
-        if self.moving and case.symmetric:
-            of_each = [set(inactive_unknowns(problem.replace(theory=t))) for t in self.theories]
-            problem = problem.replace(inactive=tuple(sorted(set.intersection(*of_each))))
         self.problem = problem
         self.system = self._compiled(problem, comm, set(self.effects) - set(self.own))
         self.speed, self.failed = self._reached(), dict[str, str]()

@@ -520,3 +520,17 @@ def test_a_blow_of_four_milliseconds_does_not_cost_the_tolerance(motion: dict[st
 def test_a_tolerance_that_cannot_be_kept_is_refused(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(SceneError, match=message):
         scene(SPIN_UP, {"model.tolerance": 1e-2} | changes)
+
+
+def test_a_history_in_a_plane_is_explained_with_the_modes_of_all_unknowns() -> None:
+    """A plate that spins up moves in its plane alone; its modes bend out of it."""
+    plate = {"type": "plate", "length": 2.0, "width": 0.6, "thickness": 0.01, "E": 7e9, "nu": 0.3, "rho": 2700.0}
+    scene = {"structure": plate, "motion": {"type": "spin_up", "speed": 3.0, "duration": 0.24}, "modes": {"count": 2}}
+    scene |= {"model": {"theory": "consistent_linear"}, "mesh": {"elements": [2, 1]}}
+    found = rotfem.explain({**scene, "time": {"end": 0.12, "step": 0.04}})
+    stiffened = next(row for row in found.rows if row["name"] == "linear")
+    first = [
+        rotfem.modes({**scene, "motion": {"type": "constant", "speed": 3.0}, "model": {"theory": name}}).frequencies[0]
+        for name in ("linear", "consistent_linear")
+    ]
+    assert stiffened["estimate"][MODES] == pytest.approx(1 - first[0] / first[1], rel=0.05)
