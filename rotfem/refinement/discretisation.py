@@ -25,7 +25,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.theories import compared
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
-from rotfem.refinement.companion import Companion
+from rotfem.refinement.companion import LEFT, Companion, FinerMesh
 from rotfem.refinement.distance import Output, tip
 
 #: Relative difference of two answers up to which their order is believed.
@@ -61,9 +61,7 @@ def error_by_cells(difference: float, ratio: float) -> float:
         difference: to an answer on another mesh, relative.
         ratio: of the cell sizes of the other mesh to the own ones; below 1 the other one is the finer of the two.
     """
-    if ratio > 1.0:
-        return error_of(difference, OF_ELEMENTS, ratio)
-    return difference + error_of(difference, OF_ELEMENTS, 1.0 / ratio)
+    return error_of(difference, OF_ELEMENTS, ratio) if ratio > 1.0 else difference / (1.0 - ratio**OF_ELEMENTS)
 
 
 def richer_problem(problem: Problem) -> Problem | None:
@@ -83,11 +81,12 @@ class HistoryErrors:
         start: what it starts from.
         output: whose errors these are.
         richer: the problem in the theory that its answers are compared with; None for none.
+        fine: whether a beam is compared with that on a finer mesh.
 
     Attributes:
         steps: companion in steps of twice the length; followed by the two others.
-        mesh: companion in the same long steps on another mesh, and the ratio of its cell sizes to the own ones; None
-            without one.
+        mesh: companion on a finer mesh, or in the same long steps on a coarser one, and the ratio of its cell sizes to
+            the own ones; None without one.
         order: companion in steps of four times the length; None where the order is certain.
         theory: companion in the same long steps in the richer theory, compared at the tip; None without one.
     """
@@ -101,24 +100,37 @@ class HistoryErrors:
         start: Start,
         output: Output = tip,
         richer: Problem | None = None,
+        fine: bool = True,
     ):
         self.scheme = scheme
 
-        same, other = system.twin(), on_other_mesh(problem, system)
+        turns = system.structure.turns is not None and system.clamp is not None  # rotations are counted afresh
+        fine = fine and not turns and system.comm.size == 1 and system.structure.mesh.topology.dim == 1
+        same, other = system.twin(), on_other_mesh(problem, system, finer=fine)
         self.mesh: tuple[Companion, float] | None = None
         self.order: Companion | None = None
         self.theory: Companion | None = None
         if other is not None:
-            self.mesh = Companion(other[0], same, scheme, newton, doubles=False, output=output), other[1]
+            self.mesh = (
+                (
+                    FinerMesh(other[0], system, scheme, newton, output)
+                    if fine
+                    else Companion(other[0], same, scheme, newton, doubles=False, output=output)
+                ),
+                other[1],
+            )
         if scheme.order > CERTAIN:
             self.order = Companion(system.twin(), same, scheme, newton, output=output)
         if richer is not None:
             self.theory = Companion(
                 compile_system(richer.replace(outputs={}), system.comm), same, scheme, newton, doubles=False
             )
-        others = (None if self.mesh is None else self.mesh[0], self.order, self.theory)
-        further = [companion for companion in others if companion is not None]
+        further = [companion for companion in (self.order, self.theory) if companion is not None]
         self.steps = Companion(same, system, scheme, newton, further=further, output=output)
+        if self.mesh is not None:
+            (self.steps.abreast if fine else self.steps.further).append(self.mesh[0])
+        if fine and self.theory is None:
+            self.steps.part = LEFT
         for companion in self.companions:
             try:
                 companion.begin(*start(companion.system))
@@ -128,7 +140,7 @@ class HistoryErrors:
     @property
     def companions(self) -> list[Companion]:
         """All of them, each after the one that it follows."""
-        return [self.steps, *self.steps.further]
+        return [self.steps, *self.steps.abreast, *self.steps.further]
 
     def __call__(self, old: State, new: State, leg: Leg) -> None:
         """Take note of a step of the march."""
@@ -160,9 +172,11 @@ class HistoryErrors:
         return float(min(self.scheme.order, np.log2(coarser / finer)))
 
     def _of_mesh(self, scale: float) -> float | None:
-        if self.mesh is None or not self.steps.sound or not self.mesh[0].sound:
+        if self.mesh is None or not self.mesh[0].sound:
             return None
         companion, ratio = self.mesh
+        if ratio > 1.0 and not self.steps.sound:
+            return None
         return error_by_cells(_relative(companion.difference[0], scale), ratio)
 
 
@@ -179,7 +193,7 @@ def error_of_shape(
         output: of a state.
     """
     here = output(system, State.at_rest(system, *system.start(q.copy())))
-    other = on_other_mesh(problem, system, moving=False)
+    other = on_other_mesh(problem, system, moving=False, finer=system.structure.mesh.topology.dim == 1)
     if other is None:
         return None
     coarse, ratio = other
