@@ -1,12 +1,13 @@
 """Scenes of different character, and what their runs say of their error against the error they have.
 
-    ./with-fenicsx python benchmarks/accuracy_scenes.py [--cache FOLDER] [--set known|held_out|unseen] [NAME …]
+    ./with-fenicsx python benchmarks/accuracy_scenes.py [--cache FOLDER] [--set known|held_out|unseen|further] [NAME …]
 
 prints, for every scene, estimated and true error of steps, mesh and in all, and the median and the worst of their
 ratios. The truth is computed once and kept in the folder: of the steps from eight times as many, of the mesh from
 twice the elements (of a mesh file from one degree more), in all from both together with the exact theory. `SCENES`
-is for others too: name ↦ tables. Those of held_out_scenes.py and unseen_scenes.py are of other kinds. The price of an
-estimate is the CPU time it adds, over that of the run without: the median of so many pairs, turn by turn.
+is for others too: name ↦ tables. The scenes of held_out_scenes.py, unseen_scenes.py and further_scenes.py are of other
+kinds. The price of an estimate is the CPU time it adds, over that of the run without: the median of so many pairs, turn
+by turn.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from further_scenes import SCENES as FURTHER
 from held_out_scenes import SCENES as HELD_OUT
 from scipy.interpolate import CubicSpline
 from unseen_scenes import SCENES as UNSEEN
@@ -213,7 +215,7 @@ def finer(tables: Tables, steps: int = 1, mesh: int = 1, theory: str | None = No
 
 
 #: Sets of scenes by their names, and pairs of runs with and without an estimate.
-SETS, PAIRS = {"known": SCENES, "held_out": HELD_OUT, "unseen": UNSEEN}, 3
+SETS, PAIRS = {"known": SCENES, "held_out": HELD_OUT, "unseen": UNSEEN, "further": FURTHER}, 3
 
 
 class Truth:

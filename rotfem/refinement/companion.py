@@ -188,7 +188,9 @@ class Companion:
         """Take note of a step of the march that is followed, and take all those whose way on is known by it."""
         if not (self.sound or any(companion.sound for companion in self.abreast)):
             return
-        step, (single, _) = Followed(leg, ((copy(old), copy(new)),)), self.waiting
+        if self.system.structure.turns is not None:  # rotations are counted afresh in the state itself
+            old, new = copy(old), copy(new)
+        step, (single, _) = Followed(leg, ((old, new),)), self.waiting
         if single is not None:
             self.waiting[0] = None
             if single.leg.doubles(leg):
@@ -253,7 +255,7 @@ class Companion:
             self.stepper.newton.tolerance = max(self.stepper.newton.tolerance, least)
 
 
-#: Part of the largest difference so far to which differences of steps and meshes are solved.
+#: Part of the largest difference so far to which that of two meshes is solved.
 LEFT = 1e-3
 
 
@@ -295,7 +297,7 @@ class FinerMesh(Companion):
         try:
             with seen(self.system, view_of(step.leg, after)):
                 for known, following in zip(instants, t[2:], strict=True):
-                    there = State(known.t, carried(known.q), carried(known.v), carried(known.a))
+                    there = State(known.t, *carried(np.column_stack((known.q, known.v, known.a))).T)
                     self._advance(there, following - known.t)
         except ComputationError:
             self.sound = False

@@ -25,7 +25,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.theories import compared
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
-from rotfem.refinement.companion import LEFT, Companion, FinerMesh
+from rotfem.refinement.companion import Companion, FinerMesh
 from rotfem.refinement.distance import Output, tip
 
 #: Relative difference of two answers up to which their order is believed.
@@ -129,8 +129,6 @@ class HistoryErrors:
         self.steps = Companion(same, system, scheme, newton, further=further, output=output)
         if self.mesh is not None:
             (self.steps.abreast if fine else self.steps.further).append(self.mesh[0])
-        if fine and self.theory is None:
-            self.steps.part = LEFT
         for companion in self.companions:
             try:
                 companion.begin(*start(companion.system))
