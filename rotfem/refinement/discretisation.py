@@ -4,10 +4,11 @@ Let u_h be the tip's displacement in steps of length h of a scheme of order p. I
 
     |u_h − u| = |u_h − u_2h| / (2^p − 1)
 
-(Richardson's extrapolation; Hairer, Nørsett & Wanner 1993, section II.4), and likewise in the size of the cells. The
-order of a scheme above 2 may be reduced by stiff components (Hairer & Wanner 1996, section IV.15), so that it is
-observed, 2^p = |u_2h − u_4h| / |u_h − u_2h|. Elements converge at least with order 2. Beyond ASYMPTOTIC, or where no
-order is known, the error reported is the difference itself. What cannot be computed is unknown.
+(Richardson's extrapolation; Hairer, Nørsett & Wanner 1993, section II.4), and likewise in the size of the cells. Stiff
+components reduce the order of a scheme to that of its stages (Hairer & Wanner 1996, section IV.15), 2 of those here, or
+below: of schemes of higher order it is observed, 2^p = |u_2h − u_4h| / |u_h − u_2h|, and not believed above 2. Elements
+converge at least with order 2. Beyond ASYMPTOTIC, or where no order is known, the error reported is the difference
+itself. What cannot be computed is unknown.
 """
 
 from __future__ import annotations
@@ -87,7 +88,7 @@ class HistoryErrors:
         steps: companion in steps of twice the length; followed by the two others.
         mesh: companion on a finer mesh, or in the same long steps on a coarser one, and the ratio of its cell sizes to
             the own ones; None without one.
-        order: companion in steps of four times the length; None where the order is certain.
+        order: companion in steps of four times the length; None of schemes whose order is certain.
         theory: companion in the same long steps in the richer theory, compared at the tip; None without one.
     """
 
@@ -161,13 +162,13 @@ class HistoryErrors:
         return error_of(_relative(whole, scale), self._observed())
 
     def _observed(self) -> float:
-        """Return the order of the scheme, as far as it is certain or observed; 0 where it is not."""
+        """Return the order of the scheme up to CERTAIN, of higher ones as far as it is observed; 0 where it is not."""
         if self.order is None:
             return float(self.scheme.order)
         finer, coarser = self.steps.difference[0], self.order.difference[0]
         if not self.order.sound or not coarser > finer > 0.0:
             return 0.0
-        return float(min(self.scheme.order, np.log2(coarser / finer)))
+        return float(min(CERTAIN, np.log2(coarser / finer)))
 
     def _of_mesh(self, scale: float) -> float | None:
         if self.mesh is None or not self.mesh[0].sound:
