@@ -81,7 +81,7 @@ SCENES: dict[str, Tables] = {
         {**SPAR, "damping": DAMPED, "masses": [{"x": 5.0, "mass": 10.0}]}, TURNING, 4, _fixed(3.0, 0.02), loads=FLAP
     ),
     "spar pitched": _scene(
-        SPAR, {**TURNING, "pitch": {"table": [[0.0, 0.0], [0.5, 0.0], [1.0, 0.2], [3.0, 0.2]]}}, 4, _fixed(3.0, 0.02)
+        {**SPAR, "root": {"pitch": [[0.0, 0.0], [0.5, 0.0], [1.0, 0.2], [3.0, 0.2]]}}, TURNING, 4, _fixed(3.0, 0.02)
     ),
     "spar at rest under load": _scene(SPAR, TURNING, 2, None, loads={"tip_force": [0.0, 50.0, 200.0]}),
     "spar energy-conserving": _scene(SPAR, TURNING, 3, _fixed(3.0, 0.02, "energy_conserving"), loads=FLAP),

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from rotfem.analysis.alpha_family import AlphaFamily, GeneralisedAlpha
+from rotfem.analysis.alpha_family import GeneralisedAlpha
 from rotfem.analysis.dense_output import between
 from rotfem.analysis.march import started, travel, view_of
 from rotfem.analysis.schemes import Array, Scheme, Stage, State
@@ -278,7 +278,7 @@ class FinerMesh(Companion):
     """
 
     def __init__(self, system: Any, followed: Any, scheme: Scheme, newton: Newton, output: Output = tip):
-        own = scheme if isinstance(scheme, AlphaFamily) else GeneralisedAlpha()
+        own = scheme if scheme.stages == 1 and scheme.balanced_at_end else GeneralisedAlpha()
         super().__init__(system, followed, own, newton, output=output)
         self.balanced, self.begun, self.largest, self.tolerance = scheme.balanced_at_end, False, 0.0, newton.tolerance
 
