@@ -189,11 +189,11 @@ class CampbellResult(Result):
         }
 
     def drawings(self) -> dict[str, Callable[[], Figure]]:
-        """Return campbell.png and, of a disk, travelling_waves.png."""
+        """Return campbell.png and, of a rotor, campbell_fixed.png."""
         from rotfem.results import plots
 
-        waves = {"travelling_waves.png": partial(plots.travelling_waves_figure, self)}
-        return {"campbell.png": partial(plots.campbell_figure, self), **(waves if self.travelling_waves() else {})}
+        fixed = {"campbell_fixed.png": partial(plots.fixed_frame_figure, self)}
+        return {"campbell.png": partial(plots.campbell_figure, self), **(fixed if "whirl" in self.rows[0] else {})}
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return one row a speed and branch, indexed by `speed` (rad/s) and `label`, as in campbell.csv.

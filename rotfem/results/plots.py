@@ -81,18 +81,8 @@ def campbell_figure(result: CampbellResult) -> Figure:
     units, branches = ShownUnits.of(result.summary), shown_branches(result)
     top = 1.05 * max(float(np.max(b["frequency"])) for b in branches.values())
     last = max(float(b["speed"][-1]) for b in branches.values())
-    heights = spread([float(b["frequency"][-1]) for b in branches.values()], 0.022 * top)
-    for i, (name, b) in enumerate(branches.items()):
-        axis.plot(b["speed"], b["frequency"], lw=1.6, color=f"C{i % 10}")
-        axis.annotate(
-            name,
-            (float(b["speed"][-1]), heights[i]),
-            (5, -3),
-            textcoords="offset points",
-            annotation_clip=False,
-            fontsize=8,
-            color=f"C{i % 10}",
-        )
+    named_at_ends(axis, branches, "frequency", top)
+    for i, b in enumerate(branches.values()):
         unstable = b["unstable"]
         axis.plot(b["speed"][unstable], b["frequency"][unstable], "x", ms=5, color=f"C{i % 10}")
     rise = float(units.frequencies(1.0) / units.speeds(1.0))  # of the line 1Ω
@@ -115,17 +105,17 @@ def campbell_figure(result: CampbellResult) -> Figure:
     axis.set_ylabel(label("frequency", units.frequency))
     axis.set_title(result.title)
     axis.grid(True, lw=0.4, alpha=0.6)
-    figure.subplots_adjust(left=0.09, right=0.86, top=0.94, bottom=0.08)  # the labels stand outside on the right
+    figure.subplots_adjust(left=0.09, right=0.84, top=0.94, bottom=0.08)  # the labels stand outside on the right
     return figure
 
 
 def shown_branches(result: CampbellResult) -> dict[str, dict[str, Any]]:
-    """Return label ↦ `speed`, `frequency` in the units that are shown, and `unstable`, whether the mode grows there."""
+    """Return label ↦ `speed`, frequencies in the units that are shown, and `unstable`, whether the mode grows there."""
     units = ShownUnits.of(result.summary)
     return {
         name: {
             "speed": units.speeds(b["speed"]),
-            "frequency": units.frequencies(b["frequency"]),
+            **{k: units.frequencies(b[k]) for k in ("frequency", "frequency_fixed") if k in b},
             "unstable": b["growth"] > 1e-6 * (np.abs(b["frequency"]) + np.abs(b["growth"])),
         }
         for name, b in result.branches().items()
@@ -140,27 +130,45 @@ def spread(values: list[float], gap: float) -> list[float]:
     return out
 
 
-def travelling_waves_figure(result: CampbellResult) -> Figure:
-    """Return the forward and backward waves of a disk over speed, as seen from the fixed frame."""
-    figure = Figure(figsize=(9, 6.5))
-    axis = figure.add_subplot()
-    units = ShownUnits.of(result.summary)
-    for i, (name, waves) in enumerate(result.travelling_waves().items()):
-        speed, forward, backward = (
-            units.speeds(waves["speed"]),
-            *(units.frequencies(waves[which]) for which in ("forward", "backward")),
+def named_at_ends(axis: Any, branches: Mapping[str, Mapping[str, Any]], column: str, top: float) -> None:
+    """Draw branches over speed, their names at their ends on the right: dashed where they run against the spin."""
+    heights = spread([float(b[column][-1]) for b in branches.values()], 0.022 * top)
+    for i, (name, b) in enumerate(branches.items()):
+        style, color = ("--" if name.endswith("backward") else "-"), f"C{i % 10}"
+        axis.plot(b["speed"], b[column], lw=1.6, ls=style, color=color)
+        axis.annotate(
+            name,
+            (float(b["speed"][-1]), heights[i]),
+            (5, -3),
+            textcoords="offset points",
+            annotation_clip=False,
+            fontsize=8,
+            color=color,
         )
-        axis.plot(speed, forward, lw=1.4, color=f"C{i % 10}", label=name)
-        axis.plot(speed, backward, lw=1.4, ls="--", color=f"C{i % 10}")
-    axis.axhline(0.0, color="0.4", lw=0.7)
+
+
+def fixed_frame_figure(result: CampbellResult) -> Figure:
+    """Return the frequencies of a rotor in the fixed frame over speed, and its synchronous critical speeds."""
+    figure = Figure(figsize=(9, 6.5))
+    axis, units, branches = figure.add_subplot(), ShownUnits.of(result.summary), shown_branches(result)
+    top = 1.05 * max(float(np.max(b["frequency_fixed"])) for b in branches.values())
+    last = max(float(b["speed"][-1]) for b in branches.values())
+    named_at_ends(axis, branches, "frequency_fixed", top)
+    rise = float(units.frequencies(1.0) / units.speeds(1.0))
+    end = min(last, top / rise)
+    axis.plot([0, end], [0, rise * end], lw=0.7, ls=":", color="0.4")
+    axis.annotate("Ω", (end, rise * end), (-2, 3), textcoords="offset points", fontsize=7, color="0.4", ha="right")
+    for c in result.critical_speeds:
+        if c.kind != "per_rev":
+            fixed = 0.0 if c.per_rev == c.order else c.speed  # a wave of a disk stands still
+            axis.plot(units.speeds(c.speed), units.frequencies(fixed), "ko", ms=4, mfc="none", clip_on=False)
+    axis.set_xlim(min(0.0, *(float(b["speed"][0]) for b in branches.values())), last)
+    axis.set_ylim(0, top)
     axis.set_xlabel(label("psi_dot", units.speed))
-    axis.set_ylabel(f"frequency in the fixed frame ({units.frequency})")
-    axis.set_title(
-        f"{result.title}; forward waves solid, backward dashed (standing still at a critical speed)", size=10
-    )
-    axis.legend(fontsize=8)
+    axis.set_ylabel(label("frequency_fixed", units.frequency))
+    axis.set_title(f"{result.title}; backward dashed, synchronous critical speeds circled", size=10)
     axis.grid(True, lw=0.4, alpha=0.6)
-    figure.subplots_adjust(left=0.09, right=0.97, top=0.94, bottom=0.08)
+    figure.subplots_adjust(left=0.09, right=0.84, top=0.94, bottom=0.08)
     return figure
 
 

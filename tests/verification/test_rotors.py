@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -73,6 +74,25 @@ def test_critical_speeds_of_an_overhung_disk(count: int) -> None:
     assert not diagram.summary["ambiguous"]
     assert all(b["frequency_last"] is not None for b in diagram.summary["branches"])
     assert len(set(diagram.labels)) == count
+
+
+def test_diagram_in_the_fixed_frame(tmp_path: Path) -> None:
+    """Both figures have every branch by name and the synchronous speeds; no two names overlap."""
+    diagram = rotfem.campbell(overhung(modes={"count": 4}), "0:200:5")
+    drawings = diagram.drawings()
+    assert set(drawings) == {"campbell.png", "campbell_fixed.png"}
+    for draw in drawings.values():
+        figure = draw()
+        figure.savefig(tmp_path / "figure.png")
+        names = [text for text in figure.axes[0].texts if text.get_text() in diagram.labels]
+        boxes = [text.get_window_extent() for text in names]
+        assert {text.get_text() for text in names} == set(diagram.labels)
+        assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+        assert all(figure.bbox.contains(box.x1, box.y0) for box in boxes)
+        assert all("rad/s" in axis for axis in (figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()))
+    circles = [line.get_xydata()[0] for line in figure.axes[0].lines if line.get_marker() == "o"]
+    np.testing.assert_allclose([c[0] for c in circles], [c[1] for c in circles])  # whirl as fast as the spin
+    assert len(circles) == 2
 
 
 def test_critical_speed_is_said_by_modes() -> None:
