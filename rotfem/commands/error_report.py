@@ -272,13 +272,14 @@ class RunErrors:
 
     def _why_unknown(self, error: ErrorEstimate) -> str:
         """Return why a contribution is unknown."""
-        if self.companions is None and error.contributions["space"] is None:
-            return "there is no other mesh to compare with"
-        if self.companions is None or error.contributions["time"] is not None:
-            return "the same in a richer theory fails"
-        if self.companions.steps.sound:
-            return "what is prescribed leaves no room for steps of twice the length"
-        return "steps of twice the length fail, so that these are hardly short enough"
+        known = {name: share is not None for name, share in error.contributions.items()}
+        if self.companions is not None and not known["time"]:
+            if self.companions.steps.sound:
+                return "what is prescribed leaves no room for steps of twice the length"
+            return "steps of twice the length fail, so that these are hardly short enough"
+        if not known["space"]:
+            return "there is no other mesh to compare with, or the same fails there"
+        return "the same in a richer theory fails"
 
 
 def _relative(apart: float, scale: float) -> float:

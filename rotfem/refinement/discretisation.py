@@ -5,10 +5,9 @@ Let u_h be the tip's displacement in steps of length h of a scheme of order p. I
     |u_h − u| = |u_h − u_2h| / (2^p − 1)
 
 (Richardson's extrapolation; Hairer, Nørsett & Wanner 1993, section II.4), and likewise in the size of the cells. Stiff
-components reduce the order of a scheme to that of its stages (Hairer & Wanner 1996, section IV.15), 2 of those here, or
-below: of schemes of higher order it is observed, 2^p = |u_2h − u_4h| / |u_h − u_2h|, and not believed above 2. Elements
-converge at least with order 2. Beyond ASYMPTOTIC, or where no order is known, the error reported is the difference
-itself. What cannot be computed is unknown.
+components reduce the order of a scheme to that of its stages (Hairer & Wanner 1996, section IV.15), or below: no order
+is known of schemes that have more. Elements converge at least with order 2. Beyond ASYMPTOTIC, or where no order is
+known, the error reported is the difference itself. What cannot be computed is unknown.
 """
 
 from __future__ import annotations
@@ -85,10 +84,9 @@ class HistoryErrors:
         fine: whether a beam is compared with that on a finer mesh.
 
     Attributes:
-        steps: companion in steps of twice the length; followed by the two others.
+        steps: companion in steps of twice the length; followed by the others.
         mesh: companion on a finer mesh, or in the same long steps on a coarser one, and the ratio of its cell sizes to
             the own ones; None without one.
-        order: companion in steps of four times the length; None of schemes whose order is certain.
         theory: companion in the same long steps in the richer theory, compared at the tip; None without one.
     """
 
@@ -109,7 +107,6 @@ class HistoryErrors:
         fine = fine and not turns and system.comm.size == 1 and system.structure.mesh.topology.dim == 1
         same, other = system.twin(), on_other_mesh(problem, system, finer=fine)
         self.mesh: tuple[Companion, float] | None = None
-        self.order: Companion | None = None
         self.theory: Companion | None = None
         if other is not None:
             self.mesh = (
@@ -120,13 +117,11 @@ class HistoryErrors:
                 ),
                 other[1],
             )
-        if scheme.order > CERTAIN:
-            self.order = Companion(system.twin(), same, scheme, newton, output=output)
         if richer is not None:
             self.theory = Companion(
                 compile_system(richer.replace(outputs={}), system.comm), same, scheme, newton, doubles=False
             )
-        further = [companion for companion in (self.order, self.theory) if companion is not None]
+        further = [] if self.theory is None else [self.theory]
         self.steps = Companion(same, system, scheme, newton, further=further, output=output)
         if self.mesh is not None:
             (self.steps.abreast if fine else self.steps.further).append(self.mesh[0])
@@ -159,16 +154,8 @@ class HistoryErrors:
         if not steps.sound or state is None or not steps.doubled > MOST_OF_IT * state.t:
             return None
         whole = steps.difference[0] * max(1.0, state.t / steps.doubled)  # as if all of it had been doubled
-        return error_of(_relative(whole, scale), self._observed())
-
-    def _observed(self) -> float:
-        """Return the order of the scheme up to CERTAIN, of higher ones as far as it is observed; 0 where it is not."""
-        if self.order is None:
-            return float(self.scheme.order)
-        finer, coarser = self.steps.difference[0], self.order.difference[0]
-        if not self.order.sound or not coarser > finer > 0.0:
-            return 0.0
-        return float(min(CERTAIN, np.log2(coarser / finer)))
+        order = self.scheme.order if self.scheme.order <= CERTAIN else 0
+        return error_of(_relative(whole, scale), order)
 
     def _of_mesh(self, scale: float) -> float | None:
         if self.mesh is None or not self.mesh[0].sound:
