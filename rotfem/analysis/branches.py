@@ -56,6 +56,11 @@ STRANGER = 0.02
 TWIN = 1e-6
 
 
+#: Largest |dω/dΩ| in the rotor of a mode whose ω may pass zero: 1 of the frame, and at most 2 of gyroscopic moments, as
+#: the polar moment of inertia of a body is at most twice its diametral one.
+STEEPEST = 3.0
+
+
 #: Smallest refined step as a part of the speed range: a veering narrower than this passes as a crossing.
 FINEST = 1e-5
 
@@ -150,8 +155,10 @@ def assign(node: Node, following: Node) -> float:
         [np.clip(x[node.order[known]], 0.0, 1.0) for x in correlation(node.spinning, following.spinning, conjugate)]
         for conjugate in (False, True)
     )
-    passed = c_bar > c
-    c, single = np.maximum(c, c_bar), np.where(passed, single_bar, single)
+    a, b = node.spinning.pairs.values[node.order[known]], following.spinning.pairs.values
+    may_pass = a.imag[:, None] + b.imag[None, :] <= STEEPEST * abs(following.speed - node.speed)
+    passed = may_pass & (c_bar > c)
+    c, single = np.where(passed, c_bar, c), np.where(passed, single_bar, single)
     rows, columns = linear_sum_assignment(-c - 1e-3 * single)
     following.order = np.full(len(node.order), -1)
     following.confidence = np.zeros(len(node.order))

@@ -233,9 +233,12 @@ class SpatialBeam(Beam):
         """Return whether the undeformed beam is symmetric about the plane through its root with this normal, 1 or 2.
 
         Its axis is in the plane then, section axis `normal` + 1 is the normal all along, and no entry of section
-        matrices and inertia tensors couples what a reflection turns round, of (Γ, K) or (v, ω), with the rest.
+        matrices and inertia tensors couples what a reflection turns round, of (Γ, K) or (v, ω), with the rest. Supports
+        have no cross-coupling.
         """
         if np.any(np.atleast_2d(data.pretwist)[:, -1]) or data.pitches or data.root.pitch.constant != 0.0:
+            return False
+        if any(support.stiffness[0][1] != 0.0 or support.damping[0][1] != 0.0 for support in data.supports):
             return False
         leaves = {1: data.sweep, 2: data.precone}[normal]  # the plane (1, 3) by sweep, the plane (1, 2) by precone
         if np.any(np.atleast_2d(leaves)[:, -1]) or np.any(np.array(data.line or [(0.0, 0.0, 0.0)])[:, normal]):

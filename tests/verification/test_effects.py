@@ -16,7 +16,7 @@ from rotfem.numerics.forms import integral_count
 
 Array = npt.NDArray[np.float64]
 
-#: A planar beam with data for every effect of a prescribed motion; trapeze is of spatial ones.
+#: A planar beam with data for every effect of a prescribed motion; trapeze and supports are of spatial ones.
 ALL: dict[str, Any] = {
     "structure.damping.kelvin_voigt": 0.01,
     "structure.tip_mass": 0.2,
@@ -24,7 +24,8 @@ ALL: dict[str, Any] = {
     "motion": {"type": "spin_up", "speed": 3.0, "duration": 1.0, "base_acceleration": [0.2, 0.1]},
     "loads.gravity": [0.0, -0.3],
 }
-PRESENT = tuple(name for name in registry.effects.names if name not in ("hub_coupling", "trapeze"))
+NOT_PLANAR = ("hub_coupling", "trapeze", "supports", "support_dampers")
+PRESENT = tuple(name for name in registry.effects.names if name not in NOT_PLANAR)
 TIME = {"end": 0.02, "step": 0.01}
 
 

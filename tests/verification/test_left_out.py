@@ -14,7 +14,7 @@ from rotfem.registry import damping_models
 from rotfem.scene import as_scene
 from rotfem.scene.beams import PointMass, SpatialBeamStructure
 from rotfem.scene.plates import PlateStructure
-from rotfem.scene.root import SpatialRoot
+from rotfem.scene.root import SpatialRoot, Support
 from rotfem.structures.symmetry import inactive_unknowns
 
 BEAM: dict[str, Any] = {
@@ -211,13 +211,14 @@ def test_what_a_script_adds_is_not_known_to_be_symmetric() -> None:
 KNOWN = {
     SpatialBeamStructure: {
         *("type", "length", "hub_radius", "hub_offset", "tip_mass", "tip_inertia", "tip_offset", "masses", "section"),
-        *("pretwist", "sweep", "line", "precone", "root", "damping"),
+        *("pretwist", "sweep", "line", "precone", "root", "supports", "damping"),
     },
     SpatialRoot: {
         *("lag_stiffness", "lag_damping", "hinge_offset", "flap_stiffness", "flap_damping", "pitch_stiffness"),
-        *("pitch_damping", "pitch"),
+        *("pitch_damping", "pitch", "driven"),
     },
     PointMass: {"x", "mass", "offset", "inertia"},
+    Support: {"x", "stiffness", "damping"},
     PlateStructure: {
         *("type", "length", "width", "mesh", "thickness", "E", "nu", "E1", "E2", "nu12", "G12", "G13", "G23", "rho"),
         *("shear_correction", "hub_radius", "hub_offset", "point_masses", "line_masses", "damping"),

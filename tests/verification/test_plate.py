@@ -563,7 +563,7 @@ def test_annular_disk(tmp_path: Path) -> None:
         scene = square(h, structure__length=None, structure__width=None, structure__mesh=str(mesh), modes__count=7)
         found.append(defaultdict(list))
         for row in rotfem.modes(scene).rows:
-            found[-1][row["label"]].append(row["frequency"] / unit(h) * outer**2)
+            found[-1][row["label"].rstrip("ab")].append(row["frequency"] / unit(h) * outer**2)
     coarse, fine = found
     for m in range(4):
         pair = np.array(fine[f"diameters {m}.1"])
