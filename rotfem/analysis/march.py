@@ -99,7 +99,9 @@ def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State
     elif leg.drifts:
         state = stepper.drift(old, leg.length, leg.end, leg.finish)
     else:
-        with seen(stepper.system, view_of(leg, after)):
+        joined = after is not None and leg.joins(after)
+        window = (leg.length, after.length if after is not None and joined else 0.0) if leg.averaged else None
+        with seen(stepper.system, View(-1 if leg.lands else 0, window)):
             state = stepper.advance(old, leg.length, leg.end)
     if stepper.observer is not None:
         stepper.observer(old, state, leg)
@@ -114,13 +116,6 @@ def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State
     if not (drifts or averaged) and bends(stepper.scheme, leg, after):
         state = bent(stepper, state, leg.length, after.length)
     return state
-
-
-def view_of(leg: Leg, after: Leg | None) -> View:
-    """Return how a leg, from which another one goes on, sees at its end what is prescribed."""
-    joined = after is not None and leg.joins(after)
-    window = (leg.length, after.length if after is not None and joined else 0.0) if leg.averaged else None
-    return View(-1 if leg.lands else 0, window)
 
 
 def bends(scheme: Scheme, leg: Leg, after: Leg) -> bool:

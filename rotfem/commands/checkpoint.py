@@ -44,12 +44,10 @@ OF_LOG, OF_MONITOR = ("steps", "warnings", "resumed"), ("since",)
 
 #: By class, attributes that a run makes anew or that have a place of their own in a checkpoint.
 _STEPPER = ("system", "newton", "back_off", "scheme", "scheme_back_off", "observer", "_linearised", "_about")
-_COMPANION = ("system", "followed", "output", "stepper", "further", "abreast", "state", "waiting")
 APART = {
     "Stepper": _STEPPER,
     "FollowingStepper": (*_STEPPER, "followed", "carried", "differences", "_there"),
-    "Companion": _COMPANION,
-    "FinerMesh": _COMPANION,
+    "Companion": ("system", "followed", "output", "stepper", "further", "state", "waiting"),
 }
 
 Tree = dict[str, Any]

@@ -224,7 +224,7 @@ class RunErrors:
 
     def _space_of_reduced(self, scale: float) -> float | None:
         """Return the error of a reduced answer by the mesh: its difference to a reduced answer on another one."""
-        other = on_other_mesh(self.problem, self.system, finer=self.system.structure.mesh.topology.dim == 1)
+        other = on_other_mesh(self.problem, self.system)
         if not scale > 0.0:
             return 0.0  # nothing moves it, on no mesh
         if self.reduced is None or other is None:

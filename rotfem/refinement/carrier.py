@@ -17,9 +17,7 @@ CLOSE = 1e-8
 
 
 def carrier(of: Any, to: Any) -> Callable[[Array], Array] | None:
-    """Return what makes local dof arrays of one system, or columns of them, such of another one; None where none does.
-
-    It interpolates.
+    """Return what makes local dof arrays of one system such of another one by interpolation; None where none does.
 
     Args:
         of: system of the arrays.

@@ -1,4 +1,4 @@
-"""Companions of a march: the same problem in steps of twice the length, on another mesh, or in a richer theory.
+"""Companions of a march: the same problem in steps of twice the length, on a coarser mesh, or in a richer theory.
 
 A companion is one more march on a system of its own. It takes two steps of the march that it follows as one, wherever
 nothing prescribed lies between them, or the same ones as another companion; so it meets the same instants. Its first
@@ -15,11 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from rotfem.analysis.alpha_family import GeneralisedAlpha
 from rotfem.analysis.dense_output import between
-from rotfem.analysis.march import started, travel, view_of
+from rotfem.analysis.march import started, travel
 from rotfem.analysis.schemes import Array, Scheme, Stage, State
-from rotfem.analysis.stepper import Stepper, seen
+from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.time_grid import Leg
 from rotfem.errors import ComputationError
 from rotfem.numerics.newton import Newton
@@ -136,7 +135,6 @@ class Companion:
         output: that the two are compared by.
 
     Attributes:
-        abreast: companions that take the same steps of the same march.
         state: reached; None before `begin`.
         difference: largest distance of the two outputs so far, and when, s.
         components: largest difference of every component of them.
@@ -164,7 +162,6 @@ class Companion:
         own = Newton(newton.tolerance, newton.max_iterations, foreseeing=True)
         self.stepper = FollowingStepper(system, scheme, own, carrier(followed, system))
         self.further, self.stepper.observer = list(further), self._passed_on
-        self.abreast: list[Companion] = []
         self.state: State | None = None
         self.difference, self.doubled, self.sound = (0.0, 0.0), 0.0, True
         self.components: tuple[float, ...] = (0.0,)
@@ -186,11 +183,9 @@ class Companion:
 
     def __call__(self, old: State, new: State, leg: Leg) -> None:
         """Take note of a step of the march that is followed, and take all those whose way on is known by it."""
-        if not (self.sound or any(companion.sound for companion in self.abreast)):
+        if not self.sound:
             return
-        if self.system.structure.turns is not None:  # rotations are counted afresh in the state itself
-            old, new = copy(old), copy(new)
-        step, (single, _) = Followed(leg, ((old, new),)), self.waiting
+        step, (single, _) = Followed(leg, ((copy(old), copy(new)),)), self.waiting
         if single is not None:
             self.waiting[0] = None
             if single.leg.doubles(leg):
@@ -225,8 +220,6 @@ class Companion:
 
     def _take(self, step: Followed, after: Leg | None) -> None:
         """Take a step, from which the next leg goes on."""
-        for companion in self.abreast:
-            companion._take(step, after)
         if not self.sound or self.state is None:
             self.sound = False
             return
@@ -242,103 +235,16 @@ class Companion:
             return
         stepper.arrived(self.state)
         self.doubled += step.leg.length if step.doubled else 0.0
-        self._compare(step.end.t, self.output(self.system, self.state) - self.output(self.followed, step.end))
+        self._compare(step.end)
 
-    def _compare(self, t: float, apart: Array) -> None:
-        """Take note of the difference of the outputs at t (s)."""
+    def _compare(self, there: State) -> None:
+        """Take note of the distance of the outputs."""
+        assert self.state is not None
+        apart = self.output(self.system, self.state) - self.output(self.followed, there)
         size = sqrt(apart @ apart)
         self.sound = size <= self.limit  # not where it is no number
         self.components = tuple(np.maximum(self.components, np.abs(apart)).tolist())
         if size > self.difference[0]:
-            self.difference = size, t
+            self.difference = size, there.t
             least = self.part * size / self.system.structure.length
             self.stepper.newton.tolerance = max(self.stepper.newton.tolerance, least)
-
-
-#: Part of the largest difference so far to which that of two meshes is solved.
-LEFT = 1e-3
-
-
-class FinerMesh(Companion):
-    """The difference e of a march from that on a finer mesh.
-
-    The motion I u that is followed meets the equations on the finer mesh but for a defect, which drives e:
-
-        F(I u + e, I v + ė, I a + ë) = 0
-
-    at instants at which the march meets its own (defect correction: Zadunaisky 1976; Stetter 1978). So the errors of
-    the steps are in both motions, and in e only as a part of itself. A scheme whose stages are one advances e as it
-    advances u, of others generalised-α does from stage to stage. Newton's method ends where its next increment would be
-    below a part of the largest e so far.
-
-    Attributes:
-        state: e and its rates in the place of q and its rates.
-        begun: whether e is known.
-        largest: e so far, in the units of the unknowns.
-    """
-
-    def __init__(self, system: Any, followed: Any, scheme: Scheme, newton: Newton, output: Output = tip):
-        own = scheme if scheme.stages == 1 and scheme.balanced_at_end else GeneralisedAlpha()
-        super().__init__(system, followed, own, newton, output=output)
-        self.balanced, self.begun, self.largest, self.tolerance = scheme.balanced_at_end, False, 0.0, newton.tolerance
-
-    def _take(self, step: Followed, after: Leg | None) -> None:
-        carried, scheme = self.stepper.carried, self.stepper.scheme
-        if not self.sound or self.state is None or carried is None or step.end.reference is not None:
-            self.sound = False
-            return
-        if not self.begun:
-            own, its = self.state, step.start
-            q, v, a = own.q - carried(its.q), own.v - carried(its.v), own.a - carried(its.a)
-            self.state, self.begun = scheme.start(own.changed(q=q, v=v, a=a)), True
-        instants = self._instants(step)
-        t = [self.state.t, *(instant.t for instant in instants)]
-        t.append(t[-1] + (t[1] - t[0]) * (1.0 if after is None else after.length / step.leg.length))
-        try:
-            with seen(self.system, view_of(step.leg, after)):
-                for known, following in zip(instants, t[2:], strict=True):
-                    there = State(known.t, *carried(np.column_stack((known.q, known.v, known.a))).T)
-                    self._advance(there, following - known.t)
-        except ComputationError:
-            self.sound = False
-            return
-        e = self.state
-        here = State(known.t, there.q + e.q, there.v + e.v, there.a + e.a)
-        self._compare(known.t, self.output(self.system, here) - self.output(self.followed, known))
-
-    def _instants(self, step: Followed) -> list[State]:
-        """Return instants of a step at which the march that is followed meets its equations."""
-        if self.balanced:
-            return [state for _, new in step.steps for state in (*(State(*i) for i in new.inner), new)]
-        return [
-            State(0.5 * (old.t + new.t), 0.5 * (old.q + new.q), 0.5 * (old.v + new.v), new.a) for old, new in step.steps
-        ]
-
-    def _advance(self, there: State, after: float) -> None:
-        """Advance e to an instant of the motion that is followed, carried here; a step of another length follows (s).
-
-        Raises:
-            ComputationError: it is not found.
-        """
-        assert self.state is not None
-        s, scheme, newton, old = self.system, self.stepper.scheme, self.stepper.newton, self.state
-        h = there.t - old.t
-        stage = scheme.stage(0, old, h, there.t, ())
-        stage.correct(old.q - stage.q)
-        newton.tolerance = max(self.tolerance, LEFT * self.largest)
-        s.set_time(there.t)
-
-        def increment() -> float:
-            s.set_state(there.q + stage.q, there.v + stage.v, there.a + stage.a)
-            dq = s.correction(stage.shifts)
-            stage.correct(dq)
-            return float(s.increment_size(dq))
-
-        if s.solved_at_once:
-            increment()
-        else:
-            newton.solve(increment, lambda: s.size(there.q))
-        new = scheme.finish(old, h, [stage])
-        new.given = old.given
-        self.largest = max(self.largest, float(s.increment_size(new.q)))
-        self.state = scheme.resized(new, old, after)

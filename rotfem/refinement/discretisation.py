@@ -25,7 +25,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.theories import compared
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
-from rotfem.refinement.companion import Companion, FinerMesh
+from rotfem.refinement.companion import Companion
 from rotfem.refinement.distance import Output, tip
 
 #: Relative difference of two answers up to which their order is believed.
@@ -61,7 +61,9 @@ def error_by_cells(difference: float, ratio: float) -> float:
         difference: to an answer on another mesh, relative.
         ratio: of the cell sizes of the other mesh to the own ones; below 1 the other one is the finer of the two.
     """
-    return error_of(difference, OF_ELEMENTS, ratio) if ratio > 1.0 else difference / (1.0 - ratio**OF_ELEMENTS)
+    if ratio > 1.0:
+        return error_of(difference, OF_ELEMENTS, ratio)
+    return difference + error_of(difference, OF_ELEMENTS, 1.0 / ratio)
 
 
 def richer_problem(problem: Problem) -> Problem | None:
@@ -81,12 +83,11 @@ class HistoryErrors:
         start: what it starts from.
         output: whose errors these are.
         richer: the problem in the theory that its answers are compared with; None for none.
-        fine: whether a beam is compared with that on a finer mesh.
 
     Attributes:
         steps: companion in steps of twice the length; followed by the others.
-        mesh: companion on a finer mesh, or in the same long steps on a coarser one, and the ratio of its cell sizes to
-            the own ones; None without one.
+        mesh: companion in the same long steps on another mesh, and the ratio of its cell sizes to the own ones; None
+            without one.
         theory: companion in the same long steps in the richer theory, compared at the tip; None without one.
     """
 
@@ -99,32 +100,21 @@ class HistoryErrors:
         start: Start,
         output: Output = tip,
         richer: Problem | None = None,
-        fine: bool = True,
     ):
         self.scheme = scheme
 
-        turns = system.structure.turns is not None and system.clamp is not None  # rotations are counted afresh
-        fine = fine and not turns and system.comm.size == 1 and system.structure.mesh.topology.dim == 1
-        same, other = system.twin(), on_other_mesh(problem, system, finer=fine)
+        same, other = system.twin(), on_other_mesh(problem, system)
         self.mesh: tuple[Companion, float] | None = None
         self.theory: Companion | None = None
         if other is not None:
-            self.mesh = (
-                (
-                    FinerMesh(other[0], system, scheme, newton, output)
-                    if fine
-                    else Companion(other[0], same, scheme, newton, doubles=False, output=output)
-                ),
-                other[1],
-            )
+            self.mesh = Companion(other[0], same, scheme, newton, doubles=False, output=output), other[1]
         if richer is not None:
             self.theory = Companion(
                 compile_system(richer.replace(outputs={}), system.comm), same, scheme, newton, doubles=False
             )
-        further = [] if self.theory is None else [self.theory]
+        others = (None if self.mesh is None else self.mesh[0], self.theory)
+        further = [companion for companion in others if companion is not None]
         self.steps = Companion(same, system, scheme, newton, further=further, output=output)
-        if self.mesh is not None:
-            (self.steps.abreast if fine else self.steps.further).append(self.mesh[0])
         for companion in self.companions:
             try:
                 companion.begin(*start(companion.system))
@@ -134,7 +124,7 @@ class HistoryErrors:
     @property
     def companions(self) -> list[Companion]:
         """All of them, each after the one that it follows."""
-        return [self.steps, *self.steps.abreast, *self.steps.further]
+        return [self.steps, *self.steps.further]
 
     def __call__(self, old: State, new: State, leg: Leg) -> None:
         """Take note of a step of the march."""
@@ -158,11 +148,9 @@ class HistoryErrors:
         return error_of(_relative(whole, scale), order)
 
     def _of_mesh(self, scale: float) -> float | None:
-        if self.mesh is None or not self.mesh[0].sound:
+        if self.mesh is None or not self.steps.sound or not self.mesh[0].sound:
             return None
         companion, ratio = self.mesh
-        if ratio > 1.0 and not self.steps.sound:
-            return None
         return error_by_cells(_relative(companion.difference[0], scale), ratio)
 
 
@@ -179,7 +167,7 @@ def error_of_shape(
         output: of a state.
     """
     here = output(system, State.at_rest(system, *system.start(q.copy())))
-    other = on_other_mesh(problem, system, moving=False, finer=system.structure.mesh.topology.dim == 1)
+    other = on_other_mesh(problem, system, moving=False)
     if other is None:
         return None
     coarse, ratio = other

@@ -310,7 +310,7 @@ class Explanation:
         case, system, newton = self.case, self.system, self.case.newton()
         assert case.scheme is not None
         try:
-            errors = HistoryErrors(self.problem, system, case.scheme, newton, case.start, fine=False)
+            errors = HistoryErrors(self.problem, system, case.scheme, newton, case.start)
             own = errors.mesh[0] if errors.mesh is not None and errors.mesh[1] > 1.0 else errors.steps
             rough = self._march(errors.steps, own, newton, self.changes)
             known, apart = errors.errors(self.scale), errors.steps.difference[0] + own.difference[0]

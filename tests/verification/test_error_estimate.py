@@ -156,26 +156,6 @@ def test_mesh_of_a_beam_is_judged(load: dict[str, Any], mesh: dict[str, int]) ->
     assert 0.5 * true < run.summary["error"]["space"] < 4 ** mesh["degree"] * true
 
 
-@pytest.mark.parametrize(
-    ("mesh", "more"),
-    [
-        ({"elements": 8, "degree": 1}, {"loads": PULSE}),
-        ({"elements": 2, "degree": 2}, {"loads": PULSE, "time": {"scheme": "newmark"}}),
-        ({"elements": 2, "degree": 2}, {"loads": PULSE, "model": {"theory": "consistent_linear"}}),
-        ({"elements": 2, "degree": 2}, {"motion": {"type": "torque", "hub_inertia": 60.0, "pulses": [[0, 0.3, 100]]}}),
-        ({"elements": 2, "degree": 2}, {"loads": PULSE, "time": {"scheme": "esdirk4"}}),
-    ],
-    ids=["linear elements", "newmark", "linear theory", "free hub", "stages"],
-)
-def test_mesh_of_a_moving_beam_is_judged(mesh: dict[str, int], more: dict[str, Any]) -> None:
-    """The difference from elements of half the length, by a third too large: d/(1 − 1/4), within a quarter."""
-    tables = scene(0.02, mesh=mesh, **more)
-    run, fine = rotfem.run(tables), rotfem.run({**tables, "mesh": {**mesh, "elements": 2 * mesh["elements"]}})
-    d = off(tip(run), tip(fine))
-    assert d > 1e-4
-    assert run.summary["error"]["space"] == pytest.approx(4 / 3 * d, rel=0.25)
-
-
 def test_reduced_answers_are_compared_on_two_meshes() -> None:
     """The error of a reduced model by a coarse mesh is not under that between it and eight times the elements by 2."""
     tables = scene(
