@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 from importlib import metadata
 
-__version__ = "0.5.0"
+__version__ = "0.6.0"
 
 
 def versions() -> dict[str, str]:
