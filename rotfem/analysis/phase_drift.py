@@ -27,7 +27,7 @@ from rotfem.numerics.newton import Newton
 
 Array = npt.NDArray[np.float64]
 
-#: Modes that are looked at: those of higher ones are small in what is left alone.
+#: Number of modes whose phase is compared: a free vibration from a smooth start has little of higher ones.
 MODES = 8
 
 #: Difference of two vibrations of one size, relative to it, that are out of phase.

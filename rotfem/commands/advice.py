@@ -1,4 +1,4 @@
-"""Hints at the start of a computation: settings that will disappoint, seen beforehand..
+"""Hints at the start of a computation: settings that will disappoint, seen beforehand.
 
 Frequencies are those of a uniform Euler–Bernoulli cantilever and rod with the mean section, raised by the spin; what is
 reported of them is rounded to its accuracy.

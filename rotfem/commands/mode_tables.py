@@ -24,7 +24,7 @@ RELIABLE = 1e-4
 RESOLVED = 0.02
 
 
-#: Part of the speed below which the frequency of forward whirl is said to be that of a critical speed.
+#: Part of the speed below which the frequency of forward whirl counts as zero: the speed is critical to 0.1 %.
 CRITICAL = 1e-3
 
 

@@ -106,19 +106,19 @@ MEETINGS = {
 
 def campbell_report(summary: dict[str, Any], folder: Path) -> list[str]:
     """Return the lines `campbell` prints: branches and critical speeds."""
-    units = ShownUnits.of(summary)
+    units, width = ShownUnits.of(summary), max(16, *(len(b["label"]) for b in summary["branches"]))
     ends = "".join(f"{f'{end} {units.frequency}':>14}" for end in ("first", "last"))
     lines = [
         f"{summary['name']}: {summary['theory']}, {summary['speeds']} speeds ({summary['speeds_solved']} solved), "
         f"{summary['dofs']} dofs, in {summary['timings']['total']:.2f} s",
         *choice_report(summary),
-        f"{'branch':>6}  {'label':<16}{ends}{'confidence':>12}",
+        f"{'branch':>6}  {'label':<{width}}{ends}{'confidence':>12}",
     ]
     for b in summary["branches"]:
         first, last = (
             "lost" if b[k] is None else f"{units.frequencies(b[k]):.6f}" for k in ("frequency_first", "frequency_last")
         )
-        lines.append(f"{b['branch']:>6}  {b['label']:<16}{first:>14}{last:>14}{b['confidence']:>12.3f}")
+        lines.append(f"{b['branch']:>6}  {b['label']:<{width}}{first:>14}{last:>14}{b['confidence']:>12.3f}")
     for c in summary["critical_speeds"]:
         at = f"{units.speeds(c['speed']):.6f} {units.speed}"
         lines.append(f"critical speed {at}: {MEETINGS[c['kind']].format(**c)}")

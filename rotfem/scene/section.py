@@ -114,7 +114,7 @@ class Section(SceneModel):
         return {name: self._at(name, x) for name in self.way.required if name not in MATERIAL_AND_SHAPE}
 
     def _geometry(self, x: Array) -> Geometry:
-        """Return the geometry of the shape, or as it is given beside a material."""
+        """Return the geometry of the shape, or as it is given with a material."""
         if self.shape is not None:
             shape: Shape = registry.shapes[self.shape]
             return shape.geometry(self._at("nu", x), **self._dimensions(x))
@@ -209,9 +209,8 @@ def _as_mass(value: Any) -> Matrix | MatrixTable:
         rigid = np.allclose(rows[:3, :3], m * np.eye(3), rtol=0, atol=ROUND_OFF * abs(m))
         if m <= 0.0 or not rigid or not np.allclose(coupling, -coupling.T, rtol=0, atol=size):
             where = "" if x is None else f"at x = {x:g} it "
-            reason = (
-                f"{where}must be that of rigid mass: m 1 with m > 0 for velocities, m times a skew matrix beside it"
-            )
+            rigid_mass = "m 1 with m > 0 for velocities, m times a skew matrix off the diagonal"
+            reason = f"{where}must be that of rigid mass: {rigid_mass}"
             raise problem("", rows.tolist(), reason)
     return read
 

@@ -105,8 +105,8 @@ class Given(SceneModel):
     def _check_one(self) -> Self:
         harmonic = vars(self).get("harmonic")
         if len(self.given) > 1 or not (self.given or harmonic):
-            beside = "" if harmonic is None else "; harmonic may stand beside"
-            raise problem("", ", ".join(self.given) or None, f"give exactly one of {self.alternatives()}{beside}")
+            added = "" if harmonic is None else "; harmonic may be given in addition"
+            raise problem("", ", ".join(self.given) or None, f"give exactly one of {self.alternatives()}{added}")
         return self
 
     def alternatives(self) -> str:

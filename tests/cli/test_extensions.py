@@ -120,7 +120,7 @@ def test_scheme(rotfem: Rotfem, by: str) -> None:
     ],
 )
 def test_section(rotfem: Rotfem, by: str, shape: str, dimensions: str, centre: float, area: float) -> None:
-    """Mass and centre of mass: ρ A L; the centroid of a channel is beside the line that the web stands on."""
+    """Mass and centre of mass: ρ A L; the centroid of a channel is off the line that the web stands on."""
     head, tail = SCENE.replace("planar_beam", "spatial_beam").split("EA =")[0], SCENE[SCENE.index("[motion]") :]
     Path("beam.toml").write_text(f'{head}E = 7e10\nnu = 0.3\nrho = 2700.0\nshape = "{shape}"\n{dimensions}{tail}')
     found = summary(rotfem, by, shape, "check")

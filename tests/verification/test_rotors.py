@@ -7,9 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from scipy.linalg import eig
 
 import rotfem
+from rotfem.commands.modes import analysis_of
+from rotfem.commands.problem import Problem
+from rotfem.structures.symmetry import inactive_unknowns
 
 EI, LENGTH, MASS, POLAR, DIAMETRAL = 1649.0, 0.4, 5.0, 0.04, 0.02
 
@@ -108,11 +112,6 @@ def test_critical_speed_is_said_by_modes() -> None:
 
 def test_left_vectors_of_double_modes_are_independent() -> None:
     """Two modes of one frequency have two left vectors; one and the same twice loses a branch."""
-    from mpi4py import MPI
-
-    from rotfem.commands.modes import analysis_of
-    from rotfem.commands.problem import Problem
-
     scene = rotfem.Scene.from_dict(overhung(modes={"count": 5}))
     spinning = analysis_of(scene, Problem.of(scene).spinning(), MPI.COMM_WORLD).at(0.0, 8)
     values, left = spinning.pairs.values, spinning.pairs.left
@@ -181,6 +180,15 @@ def test_cross_coupling_makes_forward_whirl_grow() -> None:
         row = by_whirl[way]
         np.testing.assert_allclose(row["growth"], sign * growing.real, rtol=2e-4)
         np.testing.assert_allclose(row["frequency_fixed"], abs(growing.imag), rtol=5e-5)
+
+
+def test_cross_coupling_leaves_no_plane() -> None:
+    """At rest a shaft stays in the plane of its load, unless its bearings couple the two directions."""
+    still = {"type": "constant", "speed": 0.0, "axis": [1, 0, 0]}
+    for coupling, inactive in ((0.0, {"u3", "theta1", "theta2"}), (500.0, set())):
+        stiffness = [[2e4, coupling], [-coupling, 2e4]]
+        tables = shaft_on_bearings(stiffness, motion=still, loads={"tip_force": [0.0, 1.0, 0.0]})
+        assert set(inactive_unknowns(Problem.of(rotfem.Scene.from_dict(tables)))) == inactive
 
 
 @pytest.mark.parametrize(

@@ -172,7 +172,7 @@ class Deck:
 
 # --- formats ---------------------------------------------------------------------------------------------------------
 
-#: Keys of [structure] that a scene may give beside a file that has them: they say how the blade is used.
+#: Keys of [structure] that a scene may give although the file has them: they say how the blade is used.
 SETTINGS = ("damping", "root")
 
 
@@ -194,14 +194,14 @@ class Asked:
         """Return structure.length (m), which the file does not have; refuse a scene without."""
         length = self.structure.get("length")
         if not isinstance(length, int | float) or isinstance(length, bool) or not length > 0.0:
-            raise problem("length", length, f"must be given, greater than 0 (m), beside {deck.path.name}: {why}")
+            raise problem("length", length, f"must be given, greater than 0 (m), with {deck.path.name}: {why}")
         return float(length)
 
     def needs(self, deck: Deck, keys: tuple[str, ...], why: str) -> None:
         """Refuse a file that leaves properties open which the scene does not give."""
         missing = [key for key in keys if key not in self.section]
         if missing:
-            raise problem("section", None, f"must have {', '.join(missing)} beside {deck.path.name}: {why}")
+            raise problem("section", None, f"must have {', '.join(missing)} with {deck.path.name}: {why}")
 
     def leaves_out(self, deck: Deck, what: str, key: str = "") -> None:
         """Say what a file has that is not taken, and the key of the scene that takes its place."""
@@ -216,7 +216,7 @@ class BladeFormat:
         name: what `section.format` calls it.
         what: which files these are, in words.
         recognises: whether a file says that it is one of these.
-        read: (file, what the scene says beside it) ↦ keys of [structure], section among them.
+        read: (file, what the scene gives in addition) ↦ keys of [structure], section among them.
     """
 
     registry: ClassVar[Registry[BladeFormat]] = registered
