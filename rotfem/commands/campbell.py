@@ -32,6 +32,7 @@ from rotfem.refinement.refine import Clock, Setting
 from rotfem.results import CampbellResult
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.values import LARGEST, Limits
+from rotfem.structures.mode_names import engineers_name
 from rotfem.units import split_unit
 
 Array = npt.NDArray[Any]
@@ -159,7 +160,8 @@ class Diagram:
         check_rows(rows)
         crossings, onsets = sweep.critical_speeds(orders), sweep.onsets()
         for crossing in crossings:
-            crossing["label"] = labels[crossing["branch"] - 1]
+            label = labels[crossing["branch"] - 1]
+            crossing |= {"label": label, "name": engineers_name(label)}
         last = first_modes(sweep.nodes[-1].spinning, count)
         of_last = {} if mesh is None else dict(zip(sweep.nodes[-1].order, mesh, strict=False))
         known = None if mesh is None else [of_last.get(i) for i in range(len(last.pairs.values))]
@@ -173,7 +175,10 @@ class Diagram:
         warnings += [off.warning()] if off and off.warning() else []
         summary = {
             **modal_summary("campbell", analysis, self.scene, started),
-            "branches": [{"branch": b + 1, "label": labels[b], **branch_summary(sweep, b)} for b in range(count)],
+            "branches": [
+                {"branch": b + 1, "label": labels[b], "name": engineers_name(labels[b]), **branch_summary(sweep, b)}
+                for b in range(count)
+            ],
             "per_rev": orders,
             "critical_speeds": crossings,
             "instabilities": onsets,

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning, distinct, stability
 from rotfem.refinement.frequencies import FrequencyErrors
-from rotfem.structures.mode_names import Wave
+from rotfem.structures.mode_names import Wave, engineers_name
 
 Array = npt.NDArray[Any]
 
@@ -89,6 +89,7 @@ def mode_rows(
             {
                 "mode": i + 1,
                 "label": names[i],
+                "name": engineers_name(names[i]),
                 "frequency": float(lam.imag),
                 "frequency_hz": float(lam.imag / (2 * np.pi)),
                 "damping": float(-lam.real / size) if size > 0 else 0.0,
@@ -114,7 +115,7 @@ def whirl(wave: Wave, omega: float, speed: float) -> dict[str, Any]:
 def rigid_row(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Return the row of the rigid-body mode: hub and structure turn together, λ = 0."""
     row: dict[str, Any] = dict.fromkeys(rows[0] if rows else (), 0.0)
-    return {**row, "mode": 1, "label": "rigid body", "stability": "neutral", "share_hub": 1.0}
+    return {**row, "mode": 1, "label": "rigid body", "name": "rigid body", "stability": "neutral", "share_hub": 1.0}
 
 
 def instabilities(rows: list[dict[str, Any]]) -> list[str]:

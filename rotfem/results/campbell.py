@@ -35,7 +35,8 @@ class CriticalSpeed:
         branch: number of the branch, from 1 on.
         per_rev: k, the frequency in the rotating frame over the speed; 0 of forward whirl.
         frequency: of the branch there, in the rotating frame, kΩ, rad/s.
-        label: name of the branch.
+        label: of the branch.
+        name: what an engineer calls it, as "1st flapwise".
     """
 
     speed: float
@@ -45,6 +46,7 @@ class CriticalSpeed:
     per_rev: int
     frequency: float
     label: str
+    name: str
 
 
 @dataclass(frozen=True)

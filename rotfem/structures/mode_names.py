@@ -7,11 +7,52 @@ m = 1 (Genta, Dynamics of Rotating Systems, 2005, section 2.4). From the fixed f
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+#: Family of a beam's modes ↦ what blade engineers call it.
+ENGINEERS_WORDS = {"flap": "flapwise", "lag": "edgewise"}
+
+#: Kind, number, circles of a disk, letter of one of several, and what follows, as in "lag–flap 3a, slow".
+LABEL = re.compile(r"(?P<kind>\D+) (?P<number>\d+)(?:\.(?P<circle>\d+))?(?P<letter>[a-z]?),?(?P<rest>(?: .*)?)")
+
+
+def engineers_name(label: str) -> str:
+    """Return what an engineer calls a mode.
+
+    "flap 1" is "1st flapwise", "lag–flap 2" "2nd edgewise–flapwise", "torsion 1" "1st torsion", "bending 1 backward"
+    "1st backward whirl"; "diameters 2.1 forward" of a disk "2 diameters, forward", "diameters 0.2" "0 diameters,
+    1 circle".
+
+    Args:
+        label: as results have it; one of another form is returned as it is.
+    """
+    found = LABEL.fullmatch(label)
+    if found is None:
+        return label
+    kind, number, circle, letter, rest = found.group("kind", "number", "circle", "letter", "rest")
+    rest = rest.strip()
+    if kind == "bending" and rest in ("forward", "backward"):  # of a shaft
+        kind, rest = f"{rest} whirl", ""
+    after = [word for word in (letter, rest) if word]
+    if circle is None:
+        words = "–".join(ENGINEERS_WORDS.get(word, word) for word in kind.split("–"))
+        return ", ".join([f"{number}{ordinal_ending(int(number))} {words}", *after])
+    if kind != "diameters":
+        return label
+    circles = int(circle) - 1
+    lines = [f"{number} diameter{'s' * (number != '1')}", *([f"{circles} circle{'s' * (circles > 1)}"] * (circles > 0))]
+    return ", ".join([*lines, *after])
+
+
+def ordinal_ending(number: int) -> str:
+    """Return "st", "nd", "rd" or "th", as follows a number in English."""
+    return "th" if number % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
+
 
 #: Part of the largest amplitude below which a shape counts as zero when its nodes are counted.
 NODE_NOISE = 1e-3

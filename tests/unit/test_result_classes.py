@@ -76,10 +76,14 @@ def campbell() -> CampbellResult:
     ]
     said = summary(
         command="campbell",
-        branches=[{"branch": 1, "label": "lag 1"}, {"branch": 2, "label": "axial 1"}],
+        branches=[
+            {"branch": 1, "label": "lag 1", "name": "1st edgewise"},
+            {"branch": 2, "label": "axial 1", "name": "1st axial"},
+        ],
         per_rev=2,
         critical_speeds=[
             {"speed": 3.0, "kind": "per_rev", "order": 2, "branch": 1, "per_rev": 2, "frequency": 6.0, "label": "lag 1"}
+            | {"name": "1st edgewise"}
         ],
         instabilities=[{"speed": 8.0, "kind": "dynamic instability", "until": None}],
         ambiguous=[],
@@ -188,7 +192,7 @@ def test_branches_over_speed() -> None:
     assert result.labels == ["lag 1", "axial 1"]
     np.testing.assert_array_equal(result.frequencies, [[3.0, 6.0], [8.0, 16.0], [13.0, np.nan]])
     assert result.growth.shape == result.damping.shape == (3, 2)
-    assert result.critical_speeds == [CriticalSpeed(3.0, "per_rev", 2, 1, 2, 6.0, "lag 1")]
+    assert result.critical_speeds == [CriticalSpeed(3.0, "per_rev", 2, 1, 2, 6.0, "lag 1", "1st edgewise")]
     assert result.instabilities == [Instability(8.0, "dynamic instability", None)]
     with pytest.raises(KeyError, match="no number 'mode' of the branches; there are frequency, growth"):
         result.column("mode")
