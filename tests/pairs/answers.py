@@ -20,7 +20,7 @@ import rotfem
 from tests.balances import FORCES
 from tests.finite import check_finite
 from tests.pairs.covering import Row
-from tests.pairs.scenes import SPEED, Tables, tables_of
+from tests.pairs.scenes import SPEED, TOLERANCE, Tables, tables_of
 
 Array = npt.NDArray[np.float64]
 #: Name ↦ values.
@@ -164,7 +164,8 @@ def check_answer(row: Row, result: Any, folder: Path) -> None:
         tables = with_errors(row, folder, False)
         tables["model"]["all_unknowns"] = True
         every = columns_of(rotfem.run(tables))
-        digits = 1e-3 if row["time"] == "tolerance" else 1e-6
+        # The round-off of other unknowns may choose another factor of the filters, and so other adaptive steps.
+        digits = TOLERANCE if row["time"] == "tolerance" else 1e-6
         check_same(every, {**every, **columns}, digits, "all unknowns and few", ("history",))
 
 

@@ -82,6 +82,8 @@ ALSO: list[Levels] = [
 
 #: Time that is computed (s), and the number of fixed steps.
 END, STEPS = 0.12, 6
+#: Tolerance of adaptive steps.
+TOLERANCE = 0.03
 #: Highest speed, rad/s; the lowest frequencies of bending are 9 rad/s of beams, 26 rad/s of plates.
 SPEED = 3.0
 LENGTH, WIDTH = 2.0, 0.6
@@ -129,7 +131,7 @@ def tables_of(row: Row, folder: Path) -> Tables:
     if row["time"] == "accuracy":
         tables |= {"accuracy": 0.5, "time": {"end": END}}
     elif row["time"] == "tolerance":
-        tables["time"] = {"end": END, "tolerance": 0.03}
+        tables["time"] = {"end": END, "tolerance": TOLERANCE}
     elif row["time"] != "steady":
         tables["time"] = {"end": END, "step": END / STEPS, "scheme": row["time"]}
     output: Tables = {"plain": {}, "fields": {"fields": ["xdmf", "vtx"]}, "error off": {"error": False}}
