@@ -1,9 +1,9 @@
 """rotfem: rotating beams and plates with FEniCSx.
 
 One noun, the scene (`Scene`, `load_scene`), and verbs on it (`check`, `run`, `modes`, `campbell`, `response`,
-`explain`, `cost`); between scene and equations stands the `Problem`, which a script can build too. `register` adds a
-`Theory`, `Effect`, `Scheme`, `MotionLaw`, `DampingModel`, `StructureKind`, `Shape`, `Output` or
-`BladeFormat` of a user's own. What computes loads FEniCSx when first used.
+`explain`, `cost`), and on results `compare`. Between scene and equations stands the `Problem`, which a script can
+build too. `register` adds a `Theory`, `Effect`, `Scheme`, `MotionLaw`, `DampingModel`, `StructureKind`, `Shape`,
+`Output` or `BladeFormat` of a user's own. What computes loads FEniCSx when first used.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from rotfem.mechanics.outputs import Output
     from rotfem.mechanics.theories import Theory
     from rotfem.results import CampbellResult, CheckResult, ExplainResult, ModesResult, ResponseResult, RunResult
+    from rotfem.results.compare import CompareResult, compare
     from rotfem.scene import BeamMesh, PlateMesh
     from rotfem.scene.beams import PlanarBeamStructure as PlanarBeam
     from rotfem.scene.beams import SpatialBeamStructure as SpatialBeam
@@ -67,6 +68,7 @@ _HOMES = {
     "mechanics.theories": ("Theory",),
     "commands.cost.result": ("CostResult",),
     "results": ("CampbellResult", "CheckResult", "ExplainResult", "ModesResult", "ResponseResult", "RunResult"),
+    "results.compare": ("CompareResult", "compare"),
     "scene": ("BeamMesh", "PlateMesh"),
     "scene.blades.deck": ("Asked", "BladeFormat", "Deck"),
     "scene.structure": ("StructureKind",),
@@ -86,6 +88,7 @@ __all__ = [
     "BladeFormat",
     "CampbellResult",
     "CheckResult",
+    "CompareResult",
     "ComputationError",
     "ConstantLoad",
     "CostResult",
@@ -123,6 +126,7 @@ __all__ = [
     "__version__",
     "campbell",
     "check",
+    "compare",
     "cost",
     "explain",
     "import_blade",

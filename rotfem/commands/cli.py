@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+import rotfem.commands.compare  # noqa: F401  a verb
 from rotfem.commands.console import Session, missing
 from rotfem.commands.job import Job, app, command
 from rotfem.commands.options import as_path, listed

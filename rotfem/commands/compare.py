@@ -1,0 +1,62 @@
+"""`rotfem compare`: results of two or more folders side by side."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rotfem.commands.console import Session
+from rotfem.commands.job import app
+from rotfem.commands.options import as_path
+
+#: Exit status where results are farther apart than the tolerance, as diff(1) has it.
+DIFFERENT = 1
+
+
+@app.command()
+def compare(
+    folders: Annotated[list[str], typer.Argument(metavar="FOLDER FOLDER…", help="result folders, the reference first")],
+    tolerance: Annotated[
+        float | None, typer.Option("--tolerance", metavar="E", help="exit with status 1 if anything differs by more")
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", parser=as_path, help="result folder [results/compare]"),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="print the summary as JSON on stdout")] = False,
+    no_plots: Annotated[bool, typer.Option("--no-plots", help="write no figure")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False,
+) -> None:
+    """Say how far the results in folders are from those in the first one: histories, modes, branches, peaks."""
+    from rotfem.results.compare import compare as distances
+
+    with Session(as_json, quiet, debug) as session:
+        result = distances(*folders)
+        inputs = [Path(folder) / "summary.json" for folder in folders]
+        folder = session.folder(output or Path("results/compare"), "compare", inputs)
+        session.write(result, not no_plots)
+        session.say(compare_report(result.summary, folder.path))
+        if tolerance is not None and not result.summary["worst"] <= tolerance:
+            session.say([f"farther apart than {tolerance:g}"])
+            raise SystemExit(DIFFERENT)
+
+
+def compare_report(summary: dict[str, Any], folder: Path) -> list[str]:
+    """Return the lines that `compare` prints: a table for each result but the reference."""
+    lines = []
+    for title in summary["results"][1:]:
+        rows = [row for row in summary["rows"] if row["result"] == title]
+        width = max([16, *(len(row["quantity"]) for row in rows)])
+        second = "mac" if summary["compared"] == "modes" else "rms"
+        lines += [
+            f"{title} beside {summary['name']}, relative to the largest of the latter",
+            f"{'':<{width}}{'reference':>14}{'value':>14} {'unit':<6}{'difference':>11}{second:>10}",
+        ]
+        for row in rows:
+            last = f"{row[second]:>10.2g}" if second in row else ""
+            values = f"{row['reference']:>14.6g}{row['value']:>14.6g} {row['unit']:<6}"
+            lines.append(f"{row['quantity']:<{width}}{values}{row['difference']:>11.2g}{last}")
+    return [*lines, f"largest difference {summary['worst']:.2g}", f"results in {folder}"]

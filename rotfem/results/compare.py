@@ -1,0 +1,322 @@
+"""Results side by side: how far others are from a reference, in curves, modes, branches and critical speeds.
+
+Modes are matched by the modal assurance criterion, MAC = |a^H b|²/((a^H a)(b^H b)), 1 for equal shapes (Allemang &
+Brown, "A correlation coefficient for modal vector analysis", Proc. 1st Int. Modal Analysis Conf., 1982, pp. 110–116).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from math import inf
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline, NearestNDInterpolator
+from scipy.optimize import linear_sum_assignment
+
+from rotfem.errors import InputError
+from rotfem.results.columns import described, label
+from rotfem.results.files import json_text, read_csv, rows_text
+from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows
+from rotfem.results.result import Result
+from rotfem.results.result_set import read_summary
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.figure import Figure
+
+Values = npt.NDArray[Any]
+Row = dict[str, Any]
+
+#: Commands whose results can be compared ↦ the file that is read.
+COMPARABLE = {"run": "history.csv", "modes": "modes.json", "campbell": "campbell.json", "response": "response.csv"}
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A quantity `y` over `x`: a column over time, a complex amplitude over frequency, a branch over speed."""
+
+    name: str
+    unit: str
+    x: Values
+    y: Values
+
+    @property
+    def vector(self) -> tuple[str, str]:
+        """Name of the vector that the quantity is a component of, and unit: what has one scale. A branch is its own."""
+        return self.name if self.unit == "rad/s" else self.name.rstrip("123"), self.unit
+
+    def at(self, x: Values) -> Values:
+        """Return the values at other places, by a cubic spline between its own; a steady state has but one."""
+        if len(self.x) == 1 or np.array_equal(x, self.x):
+            return np.broadcast_to(self.y[-1], x.shape) if len(self.x) == 1 else self.y
+        return np.asarray(CubicSpline(self.x, self.y)(x))
+
+    def within(self, other: Curve) -> Curve:
+        """Return the part where there is another curve too."""
+        if len(self.x) == 1 or len(other.x) == 1:
+            return Curve(self.name, self.unit, self.x[-1:], self.y[-1:])
+        both = (self.x >= other.x[0]) & (self.x <= other.x[-1])
+        if not np.any(both):
+            said = f"{self.x[0]:g} … {self.x[-1]:g} and {other.x[0]:g} … {other.x[-1]:g}"
+            raise InputError(self.name, said, "must overlap")
+        return Curve(self.name, self.unit, self.x[both], self.y[both])
+
+
+class Compared:
+    """What is compared of a result: its `curves` by their names, or its modes with their `shapes` at `nodes`.
+
+    Args:
+        result: it, or the folder where it is.
+
+    Raises:
+        InputError: it is not complete, cannot be read, or is none that can be compared.
+    """
+
+    def __init__(self, result: Result | str | Path):
+        if isinstance(result, Result):
+            with TemporaryDirectory() as folder:
+                result.write(folder)
+                self._read(Path(folder))
+        else:
+            self._read(Path(result))
+        self.title = str(result.summary["name"] if isinstance(result, Result) else result)
+
+    def _read(self, folder: Path) -> None:
+        self.summary, self.curves, self.modes = read_summary(folder), dict[str, Curve](), list[Row]()
+        self.command, status = (str(self.summary.get(key, "no result")) for key in ("command", "status"))
+        if self.command not in COMPARABLE or status != "done":
+            allowed = f"is of {self.command}, {status}; must be finished results of {', '.join(COMPARABLE)}"
+            raise InputError("compare", str(folder), allowed)
+        try:
+            if self.command in ("run", "response"):
+                curves = _curves(read_csv(folder / COMPARABLE[self.command]))
+            else:
+                found = json.loads((folder / COMPARABLE[self.command]).read_text(encoding="utf-8"))
+                self.modes, curves = found.get("modes", []), _branches(found.get("rows", []))
+            self.curves = {curve.name: curve for curve in curves}
+            if self.modes:
+                self.nodes, self.shapes = _shapes(read_csv(folder / "mode_shapes.csv"), len(self.modes))
+        except (OSError, ValueError, LookupError) as error:
+            raise InputError("compare", str(folder), f"its results cannot be read: {error}") from None
+
+
+@dataclass
+class CompareResult(Result):
+    """Outcome of `rotfem compare`.
+
+    Attributes:
+        summary: what was compared, the largest difference (`worst`), warnings; JSON-able.
+        rows: one dictionary a result and quantity: `result`, `quantity`, `unit`, `reference` and `value` (peaks of
+            curves, frequencies, critical speeds), `difference` (the largest one, relative to the largest value of the
+            reference, of a vector's components to that of all of them), `rms` (its root mean square) and `mac`.
+        compared: what is drawn, the reference first.
+    """
+
+    rows: list[Row]
+    compared: list[Compared]
+
+    def files(self) -> dict[str, str]:
+        """Return compare.csv and summary.json."""
+        return {"compare.csv": rows_text(self.rows), "summary.json": json_text(self.summary)}
+
+    def drawings(self) -> dict[str, Callable[[], Figure]]:
+        """Return compare.png: the results over each other."""
+        return {"compare.png": partial(compare_figure, self)}
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the rows, indexed by `result` and `quantity`; raise ImportError without pandas."""
+        return frame_of_rows(self.rows, ["result", "quantity"])
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the columns of the rows over `row`; raise ImportError without xarray."""
+        names = dict.fromkeys(name for row in self.rows for name in row)
+        over: dict[str, Variable] = {name: (("row",), column_of_rows(self.rows, name)) for name in names}
+        return dataset(over, {}, self._attributes())
+
+
+def compare(*results: Result | str | Path) -> CompareResult:
+    """Return how far results are from the first one, at its times, frequencies or speeds as far as both have them.
+
+    Args:
+        results: results of one command (`run`, `modes`, `campbell` or `response`), or their folders; two at least.
+
+    Raises:
+        InputError: there are fewer, they are of different commands, or one cannot be compared.
+    """
+    if len(results) < 2:
+        raise InputError("compare", len(results), "must be two results at least")
+    reference, *others = compared = [Compared(result) for result in results]
+    rows: list[Row] = []
+    warnings: list[str] = []
+    for other in others:
+        if other.command != reference.command:
+            allowed = f"must be of {reference.command}, as {reference.title} is"
+            raise InputError("compare", f"{other.title}: {other.command}", allowed)
+        pairs = _pairs(reference.curves, other.curves, by_name=reference.command != "campbell")
+        found = [*(_modes(reference, other) if reference.command == "modes" else _distances(pairs))]
+        if reference.command == "campbell":
+            found += _critical(reference, other, {(a.name, b.name) for a, b in pairs})
+        rows += [{"result": other.title, **row} for row in found]
+        names = [{curve.name for curve in curves} for curves in zip(*pairs, strict=True)] or [set(), set()]
+        alone = sorted({*reference.curves} - names[0] | {*other.curves} - names[1])
+        if alone:
+            warnings.append(f"{other.title} and {reference.title}: only one of them has {', '.join(alone)}")
+    summary = {
+        "command": "compare",
+        "status": "done",
+        "name": reference.title,
+        "compared": reference.command,
+        "results": [one.title for one in compared],
+        "worst": max((row["difference"] for row in rows), default=0.0),
+        "rows": rows,
+        "warnings": warnings,
+        "versions": reference.summary["versions"],
+    }
+    return CompareResult(summary, rows, compared)
+
+
+def _pairs(a: Mapping[str, Curve], b: Mapping[str, Curve], by_name: bool) -> list[tuple[Curve, Curve]]:
+    """Return pairs of one name and, unless only these are wanted, of the others those of the nearest values."""
+    ones, others = list(a.values()), list(b.values())
+    far = np.zeros((len(ones), len(others)))
+    for i, one in enumerate(ones):
+        for j, other in enumerate(others):
+            if by_name or one.name == other.name:
+                far[i, j] = one.name != other.name
+            else:
+                part = one.within(other)
+                far[i, j] = 1.0 + _relative(float(np.mean(np.abs(other.at(part.x) - part.y))), float(np.max(one.y)))
+    pairs = [(ones[i], others[j]) for i, j in zip(*linear_sum_assignment(np.minimum(far, 9.0)), strict=True)]
+    return [(one, other) for one, other in pairs if not by_name or one.name == other.name]
+
+
+def _distances(pairs: list[tuple[Curve, Curve]]) -> Iterator[Row]:
+    """Yield a row for each pair of curves."""
+    scales: dict[tuple[str, str], float] = {}
+    parts = [(a.within(b), b) for a, b in pairs]
+    for a, _ in parts:
+        scales[a.vector] = max(scales.get(a.vector, 0.0), float(np.max(np.abs(a.y))))
+    for a, b in parts:
+        there = b.at(a.x)
+        off = np.abs(there - a.y)
+        rms = np.sqrt(np.trapezoid(off**2, a.x) / np.ptp(a.x)) if np.ptp(a.x) > 0.0 else off[-1]
+        yield {
+            "quantity": a.name,
+            "unit": a.unit,
+            "reference": _peak(a.y),
+            "value": _peak(there),
+            "difference": _relative(float(np.max(off)), scales[a.vector]),
+            "rms": _relative(float(rms), scales[a.vector]),
+        }
+
+
+def _modes(a: Compared, b: Compared) -> Iterator[Row]:
+    """Yield a row for each pair of modes: of like shapes, and among those of like frequencies."""
+    ones, others = a.modes, b.modes
+    mac, far = np.zeros((len(ones), len(others))), np.zeros((len(ones), len(others)))
+    for i, j in np.ndindex(far.shape):
+        u, v = a.shapes[i], b.shapes[j]
+        there = [name for name in u if name in v]
+        if there:
+            x = np.concatenate([u[name] for name in there])
+            y = np.concatenate([_moved(b.nodes, v[name], a.nodes) for name in there])
+            mac[i, j] = _relative(float(np.abs(np.vdot(x, y)) ** 2), float(np.vdot(x, x).real * np.vdot(y, y).real))
+        here = ones[i]["frequency"]
+        far[i, j] = _relative(abs(others[j]["frequency"] - here), here)
+    for i, j in zip(*linear_sum_assignment(np.minimum(far, 1.0) - mac), strict=True):
+        frequencies = {"reference": ones[i]["frequency"], "value": others[j]["frequency"]}
+        differences = {"difference": float(far[i, j]), "mac": float(mac[i, j])}
+        yield {"quantity": ones[i]["label"], "unit": "rad/s", **frequencies, **differences}
+
+
+def _critical(a: Compared, b: Compared, branches: set[tuple[str, str]]) -> Iterator[Row]:
+    """Yield a row for each critical speed that both have: of one kind and order, on branches that are paired."""
+    there = list(b.summary["critical_speeds"])
+    for one in a.summary["critical_speeds"]:
+        same = [o for o in there if all(one[k] == o[k] for k in ("kind", "order", "per_rev"))]
+        like = [o for o in same if (one["label"], o["label"]) in branches]
+        if like:
+            other = min(like, key=lambda o: abs(o["speed"] - one["speed"]))
+            there.remove(other)
+            name = f"critical speed, {one['kind']} {one['order']}, {one['label']}"
+            off = _relative(abs(other["speed"] - one["speed"]), abs(one["speed"]))
+            values = {"reference": one["speed"], "value": other["speed"], "difference": off}
+            yield {"quantity": name, "unit": "rad/s", **values}
+
+
+def _moved(nodes: Values, values: Values, to: Values) -> Values:
+    """Return values at other nodes: along a beam by straight lines, of a plate those of the nearest node."""
+    if np.array_equal(nodes, to):
+        return values
+    if nodes.shape[1] == to.shape[1] == 1:
+        return np.asarray(np.interp(to[:, 0], nodes[:, 0], values))
+    return np.asarray(NearestNDInterpolator(nodes, values)(to))
+
+
+def _relative(off: float, size: float) -> float:
+    return off / size if size > 0.0 else 0.0 if off == 0.0 else inf
+
+
+def _peak(y: Values) -> float:
+    """Return the value of the largest amount; of amplitudes that itself."""
+    largest = y[np.argmax(np.abs(y))]
+    return float(np.abs(largest) if np.iscomplexobj(y) else largest)
+
+
+def _curves(columns: dict[str, Values]) -> Iterator[Curve]:
+    """Yield the columns of a history over time, or the complex amplitudes of a response over frequency."""
+    x = columns.pop("t" if "t" in columns else "frequency")
+    last = np.append(np.diff(x) > 0.0, True)  # of two rows at one time
+    waves = {n: columns[n] * np.exp(1j * columns[f"{n}_phase"]) for n in columns if f"{n}_phase" in columns}
+    for name, y in (waves or columns).items():
+        yield Curve(name, described(name)[1], x[last], y[last])
+
+
+def _branches(rows: list[Row]) -> Iterator[Curve]:
+    for name in dict.fromkeys(row["label"] for row in rows):
+        x, y = np.array(sorted((row["speed"], row["frequency"]) for row in rows if row["label"] == name)).T
+        yield Curve(name, "rad/s", x, y)
+
+
+def _shapes(columns: dict[str, Values], count: int) -> tuple[Values, list[dict[str, Values]]]:
+    """Return nodes and, for each mode, its complex components; a rigid-body mode comes first and has none."""
+    nodes = np.stack([columns[name] for name in ("x", "y") if name in columns] or [np.ones(1)], axis=-1)
+    shapes: list[dict[str, Values]] = []
+    for i in range(1, count + 1):
+        names = [n.removesuffix(f"_imag_{i}") for n in columns if n.endswith(f"_imag_{i}")]
+        shapes.append({n: columns[f"{n}_{i}"] + 1j * columns[f"{n}_imag_{i}"] for n in names})
+    return nodes / np.max(np.abs(nodes)), [{}] * sum(not s for s in shapes) + [s for s in shapes if s]
+
+
+def compare_figure(result: CompareResult) -> Figure:
+    """Return the curves over each other, the reference solid and the others dashed; of modes their differences."""
+    from matplotlib.figure import Figure
+
+    reference, command = result.compared[0], result.compared[0].command
+    names = [n for n in reference.curves if n.startswith(("tip_", "psi_dot"))]
+    figure = Figure(figsize=(9, 1.7 * len(names) + 4.5 * (len(names) < 2)), layout="constrained")
+    axes = figure.subplots(max(len(names), 1), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, name in zip(axes, names or ["frequency"], strict=True):
+        for k, one in enumerate(result.compared):
+            for curve in (c for c in one.curves.values() if c.name == name or not names):
+                values, mark = np.abs(curve.y) if command == "response" else curve.y, "." * (len(curve.x) == 1)
+                axis.plot(curve.x, values, f"C{k}{mark}{'--' if k else '-'}", lw=1.3, label=one.title)
+        axis.set(ylabel=label(name), yscale="log" if command == "response" else "linear")
+        axis.grid(True, lw=0.4, alpha=0.6)
+    axes[-1].set_xlabel(label({"campbell": "psi_dot", "response": "frequency"}.get(command, "t")))
+    if command == "modes":
+        for k, one in enumerate(result.compared[1:]):
+            off = {row["quantity"]: 100 * row["difference"] for row in result.rows if row["result"] == one.title}
+            axes[0].plot([*off.values()], [*off], "o", color=f"C{k + 1}", label=one.title)
+        axes[0].set(xlabel="difference of the frequency (%)", ylabel="")
+    handles = {line.get_label(): line for line in axes[0].get_lines()}
+    figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=3, frameon=False)
+    return figure
