@@ -1,0 +1,193 @@
+"""The cases that Exudyn can compute; run by `run.py` in an environment that has it.
+
+Its elements are in inertial coordinates q = R(Ωt) p. As rotations commute with the mass matrix and leave the elastic
+forces f as they are, small motions about the steady state of the spinning structure have
+
+    f(p̄) = Ω² M p̄,   (λ² M + 2Ωλ M J + ∂f/∂p − Ω² M) x = 0,
+
+J the quarter turn about the axis, which is normal to the plane of all displacements. M and ∂f/∂p are Exudyn's.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from itertools import pairwise
+from time import perf_counter
+from typing import Any
+
+import exudyn as exu
+import exudyn.itemInterface as item
+import numpy as np
+from exudyn import symbolic
+from exudyn.utilities import CreateSymbolicUserFunction
+
+SPEED, DURATION, LENGTH, END = 6.0, 15.0, 10.0, 20.0
+
+
+def cables(mbs: Any, elements: int, length: float, EA: float, EI: float, mass: float) -> list[Any]:
+    """Add a straight beam along x of cubic elements without shear; return its nodes."""
+    h = length / elements
+    nodes = [mbs.AddNode(item.NodePoint2DSlope1(referenceCoordinates=[i * h, 0, 1, 0])) for i in range(elements + 1)]
+    stiffness = {"bendingStiffness": EI, "axialStiffness": EA, "massPerLength": mass}
+    for pair in pairwise(nodes):
+        mbs.AddObject(
+            item.ObjectANCFCable2D(length=h, nodeNumbers=list(pair), useReducedOrderIntegration=1, **stiffness)
+        )
+    return nodes
+
+
+def psi(t: Any) -> Any:
+    """Return the angle of the spin-up as a symbolic expression."""
+    k = 2 * np.pi / DURATION
+    rising = (t * t * 0.5 + (symbolic.cos(t * k) - 1.0) * (1 / k**2)) * (SPEED / DURATION)
+    return symbolic.IfThenElse(t < DURATION, rising, (t - 0.5 * DURATION) * SPEED)
+
+
+def cosine(mbs: Any, t: Any, number: Any, offset: Any) -> Any:
+    """Return what the first slope of the root changes by."""
+    return symbolic.cos(psi(t)) - 1.0
+
+
+def sine(mbs: Any, t: Any, number: Any, offset: Any) -> Any:
+    """Return what the second one changes by."""
+    return symbolic.sin(psi(t))
+
+
+def spin_up(elements: int, steps: int, tolerance: float) -> tuple[float, Any]:
+    """Return seconds of the time loop, and rows of t, u₂ of the tip in the rotating frame."""
+    mbs = exu.SystemContainer().AddSystem()
+    nodes = cables(mbs, elements, LENGTH, 2.8e7, 1.4e4, 1.2)
+    ground = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(item.NodePointGround()), coordinate=0))
+    for coordinate, turned in ((0, None), (1, None), (2, cosine), (3, sine)):
+        own = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=nodes[0], coordinate=coordinate))
+        constraint = mbs.AddObject(item.CoordinateConstraint(markerNumbers=[ground, own]))
+        if turned is not None:
+            function = CreateSymbolicUserFunction(mbs, turned, "offsetUserFunction", constraint)
+            mbs.SetObjectParameter(constraint, "offsetUserFunction", function)
+    tip = mbs.AddSensor(
+        item.SensorNode(nodeNumber=nodes[-1], outputVariableType=exu.OutputVariableType.Position, storeInternal=True)
+    )
+    mbs.Assemble()
+    settings = exu.SimulationSettings()
+    settings.timeIntegration.numberOfSteps, settings.timeIntegration.endTime = steps, END
+    settings.timeIntegration.generalizedAlpha.spectralRadius = 0.9
+    settings.timeIntegration.automaticStepSize = False
+    newton = settings.timeIntegration.newton
+    newton.useModifiedNewton = newton.modifiedNewtonJacUpdatePerStep = True
+    newton.relativeTolerance = newton.absoluteTolerance = tolerance
+    settings.solution.file.write = False
+    settings.solution.sensors.writePeriod = 0.5
+    dense = elements < 12
+    settings.linearSolver.solverType = exu.LinearSolverType.EXUdense if dense else exu.LinearSolverType.EigenSparse
+    started = perf_counter()
+    mbs.SolveDynamic(settings)
+    seconds = perf_counter() - started
+    t, x, y, _ = np.asarray(mbs.GetSensorStoredData(tip)).T
+    k = 2 * np.pi / DURATION
+    angle = np.where(
+        t < DURATION, SPEED / DURATION * (t * t / 2 + (np.cos(k * t) - 1) / k**2), SPEED * (t - DURATION / 2)
+    )
+    return seconds, np.column_stack([t, -np.sin(angle) * x + np.cos(angle) * y]).tolist()
+
+
+def spinning(mbs: Any, held: Any, turns: tuple[Any, Any], speeds: list[float], count: int) -> list[list[float]]:
+    """Return the first frequencies at each speed (rad/s), about the steady state.
+
+    Args:
+        mbs: assembled system.
+        held: coordinates that are clamped.
+        turns: those along the first and along the second axis of the plane of rotation.
+        speeds: Ω, rad/s.
+        count: number of frequencies.
+    """
+    settings, solver = exu.SimulationSettings(), exu.MainSolverStatic()
+    settings.solution.file.write = False
+    reference = mbs.systemData.GetODE2Coordinates(configuration=exu.ConfigurationType.Reference)
+    n = len(reference)
+    free, p, found = np.setdiff1d(np.arange(n), held), np.zeros(n), []
+    solver.InitializeSolver(mbs, settings)
+    solver.ComputeMassMatrix(mbs)
+    M = np.array(solver.GetSystemMassMatrix())[:n, :n]
+    first, second = turns
+    J, plane = np.zeros((n, n)), np.zeros(n)
+    J[first, second], J[second, first] = -1.0, 1.0
+    plane[first] = plane[second] = 1.0
+    inner = np.ix_(free, free)
+
+    def stiffness() -> Any:
+        solver.ComputeJacobianODE2RHS(mbs, scalarFactor_ODE2=-1.0, scalarFactor_ODE2_t=0.0, scalarFactor_ODE1=0.0)
+        return np.array(solver.GetSystemJacobian())[:n, :n]
+
+    for speed in speeds:
+        for _ in range(20):
+            mbs.systemData.SetODE2Coordinates(p)
+            K = stiffness() - speed**2 * M * plane
+            solver.ComputeODE2RHS(mbs)
+            force = np.array(solver.GetSystemResidual())[:n] + speed**2 * M @ (plane * (reference + p))
+            step = np.linalg.solve(K[inner], force[free])
+            p[free] += step
+            if np.linalg.norm(step) < 1e-9 * np.linalg.norm(reference):
+                break
+        C = 2 * speed * M @ J
+        size, identity = len(free), np.eye(len(free))
+        A = np.block(
+            [[np.zeros((size, size)), identity], [-np.linalg.solve(M[inner], np.hstack([K[inner], C[inner]]))]]
+        )
+        values = np.linalg.eigvals(A)
+        found.append(np.sort(values.imag[values.imag > 0])[:count].tolist())
+    return found
+
+
+def lag(elements: int, speeds: list[float]) -> tuple[float, Any]:
+    """Return seconds, and three frequencies at each speed of a thin beam in its plane, L = EI = ρA = 1, EA = 1e6."""
+    started = perf_counter()
+    mbs = exu.SystemContainer().AddSystem()
+    nodes = cables(mbs, elements, 1.0, 1e6, 1.0, 1.0)
+    mbs.Assemble()
+    place = np.array([mbs.GetNodeODE2Index(n) for n in nodes])
+    held = place[0] + np.array([0, 1, 3])
+    found = spinning(mbs, held, (np.r_[place, place + 2], np.r_[place + 1, place + 3]), speeds, 3)
+    return perf_counter() - started, found
+
+
+def plate(cells: int, speeds: list[float]) -> tuple[float, Any]:
+    """Return seconds, and five frequencies at each speed (rad/s) of a thin square plate that turns in its plane."""
+    E, nu, rho, h = 70e9, 0.3, 2700.0, 0.01
+    started = perf_counter()
+    mbs = exu.SystemContainer().AddSystem()
+    grid = np.linspace(0.0, 1.0, cells + 1)
+    nodes = np.array(
+        [
+            [mbs.AddNode(item.NodePointSlope12(referenceCoordinates=[x, y, 0, 1, 0, 0, 0, 1, 0])) for x in grid]
+            for y in grid - 0.5
+        ]
+    )
+    law = np.array([[1.0, nu, 0.0], [nu, 1.0, 0.0], [0.0, 0.0, (1 - nu) / 2]]) * E / (1 - nu**2)
+    for i in range(cells):
+        for j in range(cells):
+            corners = [nodes[i, j], nodes[i, j + 1], nodes[i + 1, j + 1], nodes[i + 1, j]]
+            mbs.AddObject(
+                item.ObjectANCFThinPlate(
+                    thickness=h,
+                    density=rho,
+                    strainCoefficients=law * h,
+                    curvatureCoefficients=law * h**3 / 12,
+                    nodeNumbers=corners,
+                )
+            )
+    mbs.Assemble()
+    place = np.array([mbs.GetNodeODE2Index(n) for n in nodes.ravel()])
+    clamped = np.array([mbs.GetNodeODE2Index(n) for n in nodes[:, 0]])
+    # the slope along the edge follows from the positions; that across it may stretch
+    held = np.r_[clamped, clamped + 1, clamped + 2, clamped + 5, clamped + 6, clamped + 7, clamped + 8]
+    first, second = (np.r_[place + i, place + 3 + i, place + 6 + i] for i in (0, 1))
+    found = spinning(mbs, held, (first, second), speeds, 5)
+    return perf_counter() - started, found
+
+
+if __name__ == "__main__":
+    case, arguments = globals()[sys.argv[1]], json.loads(sys.argv[2])
+    case(**arguments)  # the first time is not measured
+    seconds, values = case(**arguments)
+    print(json.dumps({"seconds": seconds, "values": values}))

@@ -1,0 +1,96 @@
+"""The cases as rotfem computes them; run by `run.py`. Every function returns seconds, and values to be judged."""
+
+from __future__ import annotations
+
+import json
+import sys
+from time import perf_counter
+from typing import Any
+
+import rotfem
+from rotfem.analysis.march import March, Steps
+from rotfem.commands.problem import Problem
+from rotfem.numerics.newton import Newton
+from rotfem.registry import schemes
+
+Values = list[list[float]]
+
+SPIN_UP = {
+    "structure": {
+        "type": "planar_beam",
+        "length": 10.0,
+        "section": {"EA": 2.8e7, "GA": 1.0e7, "EI": 1.4e4, "mass_per_length": 1.2, "rotary_inertia": 6.0e-4},
+    },
+    "motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0},
+    "model": {"theory": "reissner"},
+}
+THIN = {"EA": 1e6, "GA": 1e6, "EI": 1.0, "mass_per_length": 1.0}
+PLATE = {"type": "plate", "length": 1.0, "width": 1.0, "thickness": 0.01, "E": 70e9, "nu": 0.3, "rho": 2700.0}
+
+
+def spin_up(elements: int, steps: int, scheme: str) -> tuple[float, Values]:
+    """March; rows of t, u₂ of the tip. Seconds are those of the time loop."""
+    tables = {"mesh": {"elements": elements, "degree": 3}, "time": {"end": 20.0, "step": 20.0 / steps}}
+    system = Problem.of(SPIN_UP | tables).system()
+    march = March(system, schemes[scheme](), Steps(20.0, 20.0 / steps), Newton())
+    started = perf_counter()
+    rows = [[state.t, float(system.tip(state.q, state.t)[1])] for state in march]
+    return perf_counter() - started, rows
+
+
+def accuracy(wanted: float) -> tuple[float, Values]:
+    """Run with `accuracy` alone, its choice of mesh, scheme and steps included; rows as above."""
+    tables = {"time": {"end": 20.0, "step": 0.5}, "accuracy": wanted}
+    started = perf_counter()
+    history = rotfem.run(SPIN_UP | tables).history
+    rows = [[float(t), float(u)] for t, u in zip(history["t"], history["tip_u2"], strict=True)]
+    return perf_counter() - started, rows
+
+
+def lag(elements: int, speeds: list[float]) -> tuple[float, Values]:
+    """Three frequencies at each speed of a thin beam in its plane, L = EI = ρA = 1."""
+    tables = {
+        "structure": {"type": "planar_beam", "length": 1.0, "section": THIN},
+        "motion": {"type": "constant", "speed": 0.0},
+        "model": {"theory": "consistent_linear"},
+        "mesh": {"elements": elements, "degree": 3},
+        "modes": {"count": 3},
+    }
+    return diagram(tables, speeds, 3)
+
+
+def plate(cells: int, speeds: list[float]) -> tuple[float, Values]:
+    """Five frequencies at each speed of a thin square plate that turns in its plane."""
+    tables = {
+        "structure": PLATE,
+        "motion": {"type": "constant", "speed": 0.0, "axis": [0, 0, 1]},
+        "model": {"theory": "consistent_linear"},
+        "mesh": {"elements": [cells, cells]},
+        "modes": {"count": 5},
+    }
+    return diagram(tables, speeds, 5)
+
+
+def blade(main: str, elements: int, speeds: list[float]) -> tuple[float, Values]:
+    """Five frequencies at each speed of the blade of an ElastoDyn main file, with its precone."""
+    stiff = ("EA", "GA2", "GA3", "GJ")
+    changes = [f"structure.section.{name}=1e12" for name in stiff]
+    scene = rotfem.import_blade(main, changes=changes)
+    more = {"model": {"theory": "consistent_linear"}, "mesh": {"elements": elements, "degree": 3}}
+    return diagram({**scene.tables, **more, "modes": {"count": 5}}, speeds, 5)
+
+
+def diagram(tables: dict[str, Any], speeds: list[float], count: int) -> tuple[float, Values]:
+    """Return seconds of a Campbell diagram, and its frequencies (rad/s)."""
+    started = perf_counter()
+    result = rotfem.campbell(tables, speeds, orders=0)
+    seconds = perf_counter() - started
+    rows = [[row["frequency"] for row in result.rows if row["speed"] == speed] for speed in speeds]
+    return seconds, [sorted(row)[:count] for row in rows]
+
+
+if __name__ == "__main__":
+    case, arguments = globals()[sys.argv[1]], json.loads(sys.argv[2])
+    case(**arguments)  # the first time is not measured
+    seconds, values = case(**arguments)
+    print(json.dumps({"seconds": seconds, "values": values}))

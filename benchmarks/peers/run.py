@@ -1,0 +1,238 @@
+"""rotfem and other programs on the same cases, in turn, with their errors: a table, peers.csv and peers.png.
+
+    ./with-fenicsx python3 benchmarks/peers/run.py [-o FOLDER] [--repetitions 5] [--case NAME …]
+
+The other programs are installed from PyPI into an environment of their own, `peers` in the cache folder. Every
+repetition of a case runs each program once, in a process of its own, one thread; in it the case runs twice, and the
+second time is measured: of histories the time loop, of frequencies all of it. Errors are relative: of a history the
+largest of the tip's u₂ over the instants of the table by the largest |u₂|, of frequencies the largest one at the
+first and the last speed. References share no code with any of the programs (`tests/reference`); for the blade it
+is pyBModes with 800 elements (`docs/blades.md`). What each program is given (mesh, steps, tolerance) is in `CASES`:
+by trial, the cheapest that meets the error in the case's name, of frequencies about one error for both.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import os
+import platform
+import subprocess
+import sys
+import venv
+from dataclasses import dataclass, field
+from datetime import date
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+HERE = Path(__file__).parent
+REFERENCE = HERE.parent.parent / "tests" / "reference"
+FOLDER = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "rotfem" / "peers"
+
+#: Programs, and what pip is asked for; None is this one.
+PROGRAMS = {"rotfem": None, "exudyn": "exudyn", "pybmodes": "pybmodes"}
+
+#: Programs that are not run, and why.
+MISSING = {
+    "CalculiX": "Debian 13 has no package of it (calculix-ccx), PyPI neither",
+    "ROSS": "it computes shafts on bearings, none of these cases",
+}
+
+SPEEDS = [float(s) for s in np.linspace(0.0, 12.0, 50)]
+RATED = 12.1 * np.pi / 30  # rad/s
+UNIT = np.sqrt(70e9 * 0.01**2 / (12 * (1 - 0.3**2) * 2700.0))  # of the plate, rad/s
+DECK = "nrel5mw_land/NRELOffshrBsline5MW_Onshore_ElastoDyn.dat"
+
+#: Case ↦ (function of the program's script, what it is called with), by program, or why it has none.
+CASES: dict[str, dict[str, tuple[str, dict[str, Any]] | str]] = {
+    "spin-up to 1e-3": {
+        "rotfem": ("spin_up", {"elements": 2, "steps": 80, "scheme": "esdirk4"}),
+        "exudyn": ("spin_up", {"elements": 5, "steps": 3200, "tolerance": 1e-6}),
+    },
+    "spin-up to 1e-4": {
+        "rotfem": ("spin_up", {"elements": 3, "steps": 130, "scheme": "esdirk4"}),
+        "exudyn": ("spin_up", {"elements": 8, "steps": 8000, "tolerance": 1e-7}),
+    },
+    "spin-up to 1e-6": {
+        "rotfem": ("spin_up", {"elements": 6, "steps": 250, "scheme": "radau5"}),
+        "exudyn": "its cubic elements have no shear, which is 4e-5 here; those with shear are linear",
+    },
+    "spin-up, accuracy = 1e-4": {
+        "rotfem": ("accuracy", {"wanted": 1e-4}),
+        "exudyn": "it does not choose mesh and steps",
+    },
+    "lag frequencies, 50 speeds": {
+        "rotfem": ("lag", {"elements": 4, "speeds": SPEEDS}),
+        "exudyn": ("lag", {"elements": 8, "speeds": SPEEDS}),
+    },
+    "plate 6×6, 3 speeds × 5 modes": {
+        "rotfem": ("plate", {"cells": 6, "speeds": [0.0, 2.0 * UNIT, 10.0 * UNIT]}),
+        "exudyn": ("plate", {"cells": 6, "speeds": [0.0, 2.0 * UNIT, 10.0 * UNIT]}),
+    },
+    "5 MW blade, 50 speeds": {
+        "rotfem": ("blade", {"elements": 16, "speeds": [float(s) for s in np.linspace(0.0, RATED, 50)]}),
+        "pybmodes": ("blade", {"elements": 100, "speeds": [float(s) for s in np.linspace(0.0, RATED, 50)]}),
+    },
+}
+
+
+@dataclass
+class Measured:
+    """What one program has done on a case: seconds of every repetition, the error, or why there is none."""
+
+    seconds: list[float] = field(default_factory=list)
+    error: float = np.nan
+    why: str = ""
+
+
+def install() -> dict[str, str]:
+    """Make the environment of the other programs; return program ↦ why it is not there."""
+    python, missing = FOLDER / "bin" / "python", {}
+    if not python.exists():
+        venv.create(FOLDER, with_pip=True)
+    for program, package in PROGRAMS.items():
+        if package is None or subprocess.run([python, "-c", f"import {program}"], capture_output=True).returncode == 0:
+            continue
+        done = subprocess.run([python, "-m", "pip", "install", "-q", package], capture_output=True, text=True)
+        if done.returncode:
+            missing[program] = (done.stderr.strip().splitlines() or ["pip failed"])[-1]
+    return missing
+
+
+def once(program: str, function: str, arguments: dict[str, Any]) -> dict[str, Any]:
+    """Run one case in a process; return its seconds and values."""
+    python = sys.executable if PROGRAMS[program] is None else FOLDER / "bin" / "python"
+    if function == "blade":
+        [deck] = FOLDER.glob(f"lib/*/site-packages/pybmodes/_examples/reference_decks/{DECK}")
+        arguments = arguments | {"main": str(deck)}
+    command = [python, "-W", "ignore", HERE / f"{program}_cases.py", function, json.dumps(arguments)]
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+    done = subprocess.run(command, capture_output=True, text=True, env=os.environ | threads, timeout=600)
+    if done.returncode:
+        raise RuntimeError((done.stderr.strip().splitlines() or ["no message"])[-1])
+    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return found
+
+
+def exact(case: str) -> list[list[float]]:
+    """Return rows of t, u₂ of the spin-up, or frequencies (rad/s) at the first and the last speed."""
+    if case.startswith("spin-up"):
+        table = json.loads((REFERENCE / "spin_up.json").read_text())["reissner"]["table t,u1,u2,alpha"]
+        return [[row[0], row[2]] for row in table]
+    if case.startswith("5 MW"):
+        hertz = [[0.6777, 1.0864, 1.9543, 4.0090, 4.5556], [0.7291, 1.0954, 2.0135, 4.0315, 4.6100]]
+        return [[2 * np.pi * f for f in row] for row in hertz]
+    if case.startswith("plate"):
+        return [plate_at(0.0), plate_at(10.0)]
+    with (REFERENCE / "euler_bernoulli_rotating.csv").open(encoding="utf-8") as file:
+        rows = {row["eta"]: row for row in csv.DictReader(file) if row["delta"] == "0"}
+    return [[float(rows[eta][f"lag{i}"]) for i in (1, 2, 3)] for eta in ("0", "12")]
+
+
+def plate_at(gamma: float) -> list[float]:
+    """Return the frequencies of the plate of thickness 0.01 (rad/s) at a speed in its own unit."""
+    name = "plate_mindlin_coriolis.csv" if gamma else "plate_mindlin_h0.01.csv"
+    with (REFERENCE / name).open(encoding="utf-8") as file:
+        key = {"h/a": "0.01", "spin": "e3", "delta": "0", "gamma": f"{gamma:g}"} | ({} if gamma else {"geo": "vk"})
+        rows = [row for row in csv.DictReader(file) if key.items() <= row.items()]
+    return [float(UNIT) * float(row["extrapolated"] if not gamma else list(row.values())[-1]) for row in rows][:5]
+
+
+def error(case: str, values: list[list[float]]) -> float:
+    """Return the relative error of what a program has computed."""
+    reference = np.array(exact(case))
+    if not case.startswith("spin-up"):
+        return float(np.max(np.abs(np.array([values[0], values[-1]]) / reference - 1)))
+    t, u = np.array(values).T
+    at, wanted = reference.T
+    nearest = np.abs(t[None, :] - at[:, None]).argmin(axis=1)
+    there = np.abs(t[nearest] - at) < 1e-6
+    return float(np.max(np.abs(u[nearest] - wanted)[there]) / np.max(np.abs(wanted)))
+
+
+def measure(case: str, repetitions: int, missing: dict[str, str]) -> dict[str, Measured]:
+    """Return program ↦ what was measured; programs take turns."""
+    found = {program: Measured() for program in PROGRAMS}
+    for program, measured in found.items():
+        given = CASES[case].get(program, "it does not compute this")
+        measured.why = missing.get(program, given if isinstance(given, str) else "")
+    for _ in range(repetitions):
+        for program, measured in found.items():
+            given = CASES[case].get(program)
+            if measured.why or given is None or isinstance(given, str):
+                continue
+            try:
+                done = once(program, *given)
+            except (RuntimeError, subprocess.TimeoutExpired) as failure:
+                measured.why = str(failure)
+                continue
+            measured.seconds.append(done["seconds"])
+            measured.error = error(case, done["values"])
+    return found
+
+
+def draw(results: dict[str, dict[str, Measured]], path: Path) -> None:
+    """Draw the least seconds of every program, a group of bars a case."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, axis = plt.subplots(figsize=(8.0, 0.6 + 0.6 * len(results)))
+    for i, program in enumerate(PROGRAMS):
+        bars = [
+            (y + (i - 1) * 0.27, min(r[program].seconds), f"{r[program].error:.0e}")
+            for y, r in enumerate(results.values())
+            if r[program].seconds
+        ]
+        axis.barh([b[0] for b in bars], [b[1] for b in bars], height=0.25, label=program)
+        for y, seconds, label in bars:
+            axis.annotate(label, (seconds, y), xytext=(3, 0), textcoords="offset points", va="center", fontsize=7)
+    axis.set_yticks(range(len(results)), list(results))
+    axis.set(xscale="log", xlabel="least seconds; the number is the error")
+    axis.invert_yaxis()
+    axis.legend(fontsize=8)
+    figure.tight_layout()
+    figure.savefig(path, dpi=130)
+
+
+def main() -> None:
+    """Print the table, and write peers.csv and peers.png."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--folder", type=Path, default=Path("results/peers"))
+    parser.add_argument("--repetitions", type=int, default=5)
+    parser.add_argument("--case", nargs="+", default=list(CASES), choices=list(CASES), metavar="NAME")
+    given = parser.parse_args()
+    missing, results = install(), {}
+    print(f"{date.today()}, {platform.processor() or platform.machine()}, {os.cpu_count()} cores, one thread\n")
+    print("| case | program | least s | median s | error | rotfem / it |\n|---|---|---|---|---|---|")
+    rows: list[dict[str, Any]] = []
+    for case in given.case:
+        results[case] = measure(case, given.repetitions, missing)
+        own = min(results[case]["rotfem"].seconds, default=np.nan)
+        for program, m in results[case].items():
+            if not m.seconds:
+                print(f"| {case} | {program} | – | – | – | {m.why} |", flush=True)
+                continue
+            row = {"case": case, "program": program, "least": min(m.seconds), "median": median(m.seconds)}
+            rows.append(row | {"error": m.error, "ratio": own / min(m.seconds), "repetitions": len(m.seconds)})
+            print(
+                f"| {case} | {program} | {row['least']:.3g} | {row['median']:.3g} | {m.error:.1e} | "
+                f"{rows[-1]['ratio']:.2f} |",
+                flush=True,
+            )
+    print("\n" + "\n".join(f"{program} is not run: {why}." for program, why in (MISSING | missing).items()))
+    given.folder.mkdir(parents=True, exist_ok=True)
+    with (given.folder / "peers.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]) if rows else ["case"])
+        writer.writeheader()
+        writer.writerows(rows)
+    draw(results, given.folder / "peers.png")
+
+
+if __name__ == "__main__":
+    main()
