@@ -25,7 +25,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.theories import richest
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
-from rotfem.refinement.discretisation import HistoryErrors, error_by_cells, error_of_shape, richer_problem
+from rotfem.refinement.discretisation import HistoryErrors, error_of_shape, richer_problem
 from rotfem.refinement.distance import COLUMNS, OUTPUTS, largest, tip
 from rotfem.refinement.estimate import ErrorEstimate, percent
 from rotfem.scene import Scene
@@ -229,13 +229,13 @@ class RunErrors:
             return 0.0  # nothing moves it, on no mesh
         if self.reduced is None or other is None:
             return None
-        (system, ratio), own = other, self.reduced
+        own = self.reduced
         try:
-            start, bent = self.start(system).q, own.manifold is not None
-            there = reduced_response(system, own.times, start, accuracy_of(self.scene), bent)
+            start, bent = self.start(other.system).q, own.manifold is not None
+            there = reduced_response(other.system, own.times, start, accuracy_of(self.scene), bent)
         except ComputationError:
             return None
-        return error_by_cells(own.model.largest(there.tips - own.tips) / scale, ratio)
+        return other.error(own.model.largest(there.tips - own.tips) / scale)
 
     def warnings(self, error: ErrorEstimate) -> list[str]:
         """Return what is to be known of an error; nothing where it is small, asked for, or reported already."""

@@ -1,13 +1,8 @@
 """The errors of a history and of a steady state by steps and mesh, as differences of two computed answers.
 
-Let u_h be the tip's displacement in steps of length h of a scheme of order p. In the asymptotic range
-
-    |u_h − u| = |u_h − u_2h| / (2^p − 1)
-
-(Richardson's extrapolation; Hairer, Nørsett & Wanner 1993, section II.4), and likewise in the size of the cells. Stiff
+Differences become errors by an order (see `rotfem.refinement.estimate`): that of elements, or that of the scheme. Stiff
 components reduce the order of a scheme to that of its stages (Hairer & Wanner 1996, section IV.15), or below: no order
-is known of schemes that have more. Elements converge at least with order 2. Beyond ASYMPTOTIC, or where no order is
-known, the error reported is the difference itself. What cannot be computed is unknown.
+is known of schemes that have more.
 """
 
 from __future__ import annotations
@@ -27,43 +22,16 @@ from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.companion import Companion
 from rotfem.refinement.distance import Output, tip
+from rotfem.refinement.estimate import error_of
 
-#: Relative difference of two answers up to which their order is believed.
-ASYMPTOTIC = 0.05
-
-#: Order of a scheme up to which it is that of all motions, and lowest order of elements.
-CERTAIN, OF_ELEMENTS = 2, 2
+#: Order of a scheme up to which it is that of all motions.
+CERTAIN = 2
 
 #: Part of a history that must have been taken in doubled steps for their difference to stand for the whole.
 MOST_OF_IT = 0.5
 
 #: Shape and velocities at t = 0 of a system, local dof arrays; None where it is undeformed, or at rest.
 Start = Callable[[Any], tuple[Array | None, Array | None]]
-
-
-def error_of(difference: float, order: float, ratio: float = 2.0) -> float:
-    """Return the error of the finer of two answers.
-
-    Args:
-        difference: relative.
-        order: of convergence; 0 where none is known.
-        ratio: of their step or cell sizes.
-    """
-    if difference > ASYMPTOTIC or order < 1.0:
-        return difference
-    return float(difference / (ratio**order - 1.0))
-
-
-def error_by_cells(difference: float, ratio: float) -> float:
-    """Return the error of an answer by its mesh.
-
-    Args:
-        difference: to an answer on another mesh, relative.
-        ratio: of the cell sizes of the other mesh to the own ones; below 1 the other one is the finer of the two.
-    """
-    if ratio > 1.0:
-        return error_of(difference, OF_ELEMENTS, ratio)
-    return difference + error_of(difference, OF_ELEMENTS, 1.0 / ratio)
 
 
 def richer_problem(problem: Problem) -> Problem | None:
@@ -86,8 +54,8 @@ class HistoryErrors:
 
     Attributes:
         steps: companion in steps of twice the length; followed by the others.
-        mesh: companion in the same long steps on another mesh, and the ratio of its cell sizes to the own ones; None
-            without one.
+        mesh: companion in the same long steps on another mesh; None without one.
+        other: that mesh; None without one.
         theory: companion in the same long steps in the richer theory, compared at the tip; None without one.
     """
 
@@ -103,17 +71,16 @@ class HistoryErrors:
     ):
         self.scheme = scheme
 
-        same, other = system.twin(), on_other_mesh(problem, system)
-        self.mesh: tuple[Companion, float] | None = None
+        same, self.other = system.twin(), on_other_mesh(problem, system)
+        self.mesh: Companion | None = None
         self.theory: Companion | None = None
-        if other is not None:
-            self.mesh = Companion(other[0], same, scheme, newton, doubles=False, output=output), other[1]
+        if self.other is not None:
+            self.mesh = Companion(self.other.system, same, scheme, newton, doubles=False, output=output)
         if richer is not None:
             self.theory = Companion(
                 compile_system(richer.replace(outputs={}), system.comm), same, scheme, newton, doubles=False
             )
-        others = (None if self.mesh is None else self.mesh[0], self.theory)
-        further = [companion for companion in others if companion is not None]
+        further = [companion for companion in (self.mesh, self.theory) if companion is not None]
         self.steps = Companion(same, system, scheme, newton, further=further, output=output)
         for companion in self.companions:
             try:
@@ -148,10 +115,9 @@ class HistoryErrors:
         return error_of(_relative(whole, scale), order)
 
     def _of_mesh(self, scale: float) -> float | None:
-        if self.mesh is None or not self.steps.sound or not self.mesh[0].sound:
+        if self.mesh is None or self.other is None or not self.steps.sound or not self.mesh.sound:
             return None
-        companion, ratio = self.mesh
-        return error_by_cells(_relative(companion.difference[0], scale), ratio)
+        return self.other.error(_relative(self.mesh.difference[0], scale))
 
 
 def error_of_shape(
@@ -170,12 +136,11 @@ def error_of_shape(
     other = on_other_mesh(problem, system, moving=False)
     if other is None:
         return None
-    coarse, ratio = other
     try:
-        there = output(coarse, State.at_rest(coarse, *coarse.start(solve(coarse))))
+        there = output(other.system, State.at_rest(other.system, *other.system.start(solve(other.system))))
     except ComputationError:
         return None
-    return error_by_cells(_relative(float(np.linalg.norm(there - here)), float(np.linalg.norm(here))), ratio)
+    return other.error(_relative(float(np.linalg.norm(there - here)), float(np.linalg.norm(here))))
 
 
 def _relative(size: float, scale: float) -> float:

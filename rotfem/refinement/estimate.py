@@ -1,15 +1,39 @@
-"""What a result says of its own error: shares of time, space, model and round-off, each relative, and their sum."""
+"""The error of an answer by its distance to a coarser one, and what a result says of its own error.
+
+Let u_h be an answer in steps or cells of size h, of order p. In the asymptotic range
+
+    |u_h − u| = |u_h − u_rh| / (r^p − 1)
+
+(Richardson's extrapolation; Hairer, Nørsett & Wanner 1993, section II.4). Beyond it, or where no order is known, the
+error reported is the difference itself. What cannot be computed is unknown.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import Any
 
+#: Relative difference of two answers up to which their order is believed.
+ASYMPTOTIC = 0.05
+
 #: Sum of the contributions above which it is reported, where no accuracy was asked for.
 NOTICED = 0.01
 
 #: What the shares are called in text.
 WORDS = {"time": "steps", "space": "mesh", "model": "model", "round_off": "round-off"}
+
+
+def error_of(difference: float, order: float, ratio: float = 2.0) -> float:
+    """Return the error of the finer of two answers.
+
+    Args:
+        difference: relative.
+        order: of convergence; 0 where none is known.
+        ratio: of their step or cell sizes.
+    """
+    if difference > ASYMPTOTIC or order < 1.0:
+        return difference
+    return float(difference / (ratio**order - 1.0))
 
 
 @dataclass(frozen=True)

@@ -30,10 +30,11 @@ from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.theories import Theory, theories
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.coarser import on_other_mesh
+from rotfem.refinement.coarser import OtherMesh, on_other_mesh
 from rotfem.refinement.companion import Companion
-from rotfem.refinement.discretisation import ASYMPTOTIC, HistoryErrors, Start, error_by_cells
+from rotfem.refinement.discretisation import HistoryErrors, Start
 from rotfem.refinement.distance import distance, distance_each, tip
+from rotfem.refinement.estimate import ASYMPTOTIC
 
 Array = npt.NDArray[Any]
 T = TypeVar("T")
@@ -246,10 +247,10 @@ class Explanation:
         """Return every effect there are data for, then every other theory, the steps of a history, and the mesh."""
         steps, from_file = self.case.steps, getattr(self.problem.structure, "mesh", None) is not None
         self.mesh.name = "mesh.degree" if from_file else "mesh.elements"
-        coarse, ratio = self._history() if self.moving else self._coarser()
+        other = self._history() if self.moving else on_other_mesh(self.problem, self.system, moving=False)
         for name, of, measure in ((STEADY, self._tip, distance), (MODES, self._modes, distance_each)):
             if name in self.wanted:
-                self._compare(name, of, measure, coarse, ratio)
+                self._compare(name, of, measure, other)
         if steps is None:
             return [*self.changes, self.mesh]
         self.steps.name = "time.tolerance" if steps.step is None else "time.step"
@@ -264,11 +265,6 @@ class Explanation:
         if without:
             system.leave_out(without)
         return system
-
-    def _coarser(self) -> tuple[Any, float]:
-        """Return the own model's system on half the cells, and the ratio of cell sizes; on its own mesh without one."""
-        other = on_other_mesh(self.problem, self.system, self.moving)
-        return other if other is not None else (self.system, 1.0)
 
     def _variants(self, mesh: Any, changes: Sequence[Change]) -> list[Any]:
         """Return the systems of changes on a mesh; None of a theory that cannot have all terms."""
@@ -301,8 +297,8 @@ class Explanation:
 
     # --- a history ----------------------------------------------------------------------------------------------------
 
-    def _history(self) -> tuple[Any, float]:
-        """March the own model with its companions, and write what they say; return a system on half the cells.
+    def _history(self) -> OtherMesh | None:
+        """March the own model with its companions, and write what they say; return the problem on another mesh.
 
         Where steps of twice the length fail, or their error is beyond the asymptotic range, models are marched again in
         the case's own steps. A change that is not the same in both within a factor of SAFETY is below the larger one.
@@ -311,7 +307,7 @@ class Explanation:
         assert case.scheme is not None
         try:
             errors = HistoryErrors(self.problem, system, case.scheme, newton, case.start)
-            own = errors.mesh[0] if errors.mesh is not None and errors.mesh[1] > 1.0 else errors.steps
+            own = errors.mesh if errors.mesh and errors.other and errors.other.ratio > 1.0 else errors.steps
             rough = self._march(errors.steps, own, newton, self.changes)
             known, apart = errors.errors(self.scale), errors.steps.difference[0] + own.difference[0]
             if not own.sound or apart > FAR * self.scale:
@@ -326,12 +322,12 @@ class Explanation:
                     fine = dict.fromkeys(fine)
         except ComputationError as error:
             self._fails(HISTORY, error.what)
-            return self._coarser()
+            return on_other_mesh(self.problem, self.system)
         self.mesh.estimate[HISTORY] = known["space"]
         self.steps.estimate[HISTORY] = known["time"]
         for change in self.changes:
             change.settle(HISTORY, rough[change.name], fine.get(change.name, rough[change.name]))
-        return (self.system, 1.0) if errors.mesh is None else (errors.mesh[0].system, errors.mesh[1])
+        return errors.other
 
     def _march(
         self, first: Companion, own: Companion, newton: Newton, changes: Sequence[Change]
@@ -403,8 +399,7 @@ class Explanation:
         name: str,
         of: Callable[[Any], Array],
         measure: Callable[[Array, Array], float],
-        coarse: Any,
-        ratio: float,
+        other: OtherMesh | None,
     ) -> None:
         """Write the changes of an output that needs no history.
 
@@ -415,23 +410,23 @@ class Explanation:
             name: of the output.
             of: system ↦ its output.
             measure: distance of two of them, relative to the first.
-            coarse: system of the own model on another mesh.
-            ratio: of its cell sizes to the own ones.
+            other: the own model on another mesh; None without one.
         """
         try:
             own = of(self.system)
-            there = own if coarse is self.system else of(coarse)
-            apart, at = measure(own, there), coarse if ratio > 1.0 else self.system
-            if at is coarse and apart > NOTICEABLE:
-                at, other = self.system, on_other_mesh(self.problem, self.system, self.moving, finer=True)
-                if other is not None:
-                    apart, ratio = measure(own, of(other[0])), other[1]
+            there = own if other is None else of(other.system)
+            apart, at = measure(own, there), self.system
+            if other is not None and other.ratio > 1.0 and apart <= NOTICEABLE:
+                at = other.system
+            elif other is not None and other.ratio > 1.0:
+                other = on_other_mesh(self.problem, self.system, self.moving, finer=True) or other
+                apart = measure(own, of(other.system))
         except ComputationError as error:
             self._fails(name, error.what)
             return
         if name == MODES:
             self.values = own
-        self.mesh.estimate[name] = error_by_cells(apart, ratio) if coarse is not self.system else None
+        self.mesh.estimate[name] = None if other is None else other.error(apart)
         off, known = set(self.effects) - set(self.own), (self.size, self.scale)
         others = [change for change in self.changes if change.kind == "theory"]
         systems = dict(zip((t.name for t in others), self._variants(at.model.problem.mesh, others), strict=True))
@@ -442,7 +437,7 @@ class Explanation:
             try:
                 if system is at:
                     at.leave_out(off ^ {change.name})
-                change.estimate[name] = measure(there if at is coarse else own, of(system))
+                change.estimate[name] = measure(own if at is self.system else there, of(system))
             except ComputationError as error:
                 change.estimate[name], change.notes[name] = np.inf, error.what
         at.leave_out(off)

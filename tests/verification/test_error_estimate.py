@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import rotfem
-from rotfem.refinement.discretisation import ASYMPTOTIC, error_of
+from rotfem.refinement.estimate import ASYMPTOTIC, error_of
 
 BEAM = {
     "type": "planar_beam",

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rotfem import ModesResult, campbell, modes
-from rotfem.refinement.discretisation import ASYMPTOTIC
+from rotfem.refinement.estimate import ASYMPTOTIC
 
 BEAM = {
     "type": "planar_beam",
