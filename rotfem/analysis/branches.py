@@ -262,22 +262,25 @@ class Sweep:
         - "backward", order 1: a shaft whirls against the spin at the frequency Ω in the fixed frame, 2Ω in the rotor.
           Order m: a disk's wave of m diameters against the spin stands still in the fixed frame, mΩ in the disk.
         - "per_rev": the frequency in the rotor is kΩ, order k = 1 … orders.
+
+        Modes in the fixed frame are synchronous where their frequency is Ω, and per_rev where it is kΩ.
         """
         out = []
         for left, right in pairwise(self.nodes):
             for b in range(self.count):
                 at_zero = self._meeting(left, right, b, None)
-                if at_zero is not None and self.wave(left, b) is not None:
+                wave = self.wave(left, b)
+                if at_zero is not None and wave is not None and not wave.fixed:
                     out.append(self._critical(b, "forward", 1, 0, at_zero))
                 wave = self.wave(right, b)
-                against = 0 if wave is None else 2 if wave.shaft else wave.number
+                against = 0 if wave is None else wave.at_rest
                 for k in sorted({*range(1, orders + 1), against} - {0}):
                     speed = self._meeting(left, right, b, k)
                     if speed is None:
                         continue
-                    if k == against and self.direction(right, b) == "backward":
-                        assert wave is not None
-                        out.append(self._critical(b, "backward", wave.number, k, speed))
+                    way = self.direction(right, b)
+                    if wave is not None and k == against and (way == "backward" or (wave.fixed and way)):
+                        out.append(self._critical(b, way, wave.number, k, speed))
                     elif k <= orders:
                         out.append(self._critical(b, "per_rev", k, k, speed))
         return sorted(out, key=lambda c: (c["kind"] == "per_rev", c["speed"]))

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from string import ascii_lowercase
 from time import perf_counter
 from typing import Any
@@ -25,6 +25,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import steady_state
+from rotfem.analysis.fixed_frame import FixedFrame, check_rotating, has_anisotropic_supports
 from rotfem.analysis.mixed_modes import KeptDigits
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.functionals import Functionals
@@ -150,7 +151,8 @@ def self_checks(analysis: ModalAnalysis, spinning: Spinning) -> dict[str, float]
     out = {f"asymmetry_{name}": value for name, value in spinning.pencil.asymmetries().items()}
     if spinning.pencil.spectrum_error is not None:
         out["spectrum"] = spinning.pencil.spectrum_error
-    if not analysis.system.linear:  # a linear system's residual is made of these very matrices
+    # A linear system's residual is made of these very matrices.
+    if not analysis.system.linear and analysis.fixed is None:
         out["linearisation"] = linearisation_error(analysis, spinning)
     return out
 
@@ -234,6 +236,7 @@ class ModalAnalysis:
 
     Attributes:
         free: whether the hub is free, so that its angle is one more unknown.
+        fixed: change to the fixed frame, in which modes are then; None where they are in the rotating one.
         past_limits: whether the path to an equilibrium is followed past maxima of the load.
         estimates: whether the error by the mesh is wanted.
         notes: remarks on these paths.
@@ -253,6 +256,7 @@ class ModalAnalysis:
         self.model, self.structure = self.system.model, self.system.structure
         self.structure.check_shared()  # SLEPc waits for ever where a process has no unknowns
         self.free = self.system.hub is not None
+        self.fixed = FixedFrame(self.system) if has_anisotropic_supports(self.problem) else None
         self.newton = newton or Newton()
         self._unit: float | None = None
         self._kept = KeptDigits(self.system)
@@ -289,6 +293,8 @@ class ModalAnalysis:
         q = self.equilibrium(speed, start)
         t1 = perf_counter()
         matrices = self.system.mass_damping_stiffness(keep)
+        if self.fixed is not None:
+            matrices = self.fixed(matrices, speed)
         clamped = Pencil(*matrices)
         pencil = Pencil(*self.system.with_hub(matrices)) if self.free else clamped
         t2 = perf_counter()
@@ -331,11 +337,12 @@ class ModalAnalysis:
         return np.asarray(sizes)
 
     def needs_fixed_hub(self, what: str) -> None:
-        """Refuse what is not there for a free hub.
+        """Refuse what is not there for a free hub, nor for modes in the fixed frame.
 
         Raises:
-            InputError: the hub is free.
+            InputError: the hub is free, or a support differs by direction.
         """
+        check_rotating(self.problem, what)
         if self.free:
             raise InputError("motion.type", "torque", f"{what} cannot be computed for a free hub yet")
 
@@ -423,7 +430,7 @@ class ModalAnalysis:
             wave = self.structure.wave(*self.shape(x), axis)
             if wave is None:
                 return []
-            found.append(wave)
+            found.append(wave if self.fixed is None else replace(wave, fixed=True))
         return found
 
     def shape(self, x: Array) -> tuple[dict[str, Array], Array]:

@@ -227,10 +227,15 @@ def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends:
 
 
 def branch_labels(analysis: ModalAnalysis, sweep: Sweep, count: int) -> list[str]:
-    """Return the names of the branches: of their modes at the first speed, or where these precess first."""
-    moving = [next((n for n in sweep.nodes if sweep.direction(n, b)), sweep.nodes[0]) for b in range(count)]
-    names = {id(node): analysis.names(node.spinning) for node in moving}
-    return distinct([names[id(node)][node.order[b]] for b, node in enumerate(moving)])
+    """Return the names of the branches: of their modes at the first speed, of a rotor where most of them precess."""
+
+    def precessing(node: Node) -> tuple[int, int]:
+        there = [b for b in range(count) if node.order[b] >= 0]
+        return len(there), sum(sweep.direction(node, b) != "" for b in there)
+
+    node = max(sweep.nodes, key=precessing)  # the first of several
+    names = analysis.names(node.spinning)
+    return distinct([names[node.order[b]] for b in range(count)])
 
 
 def branch_summary(sweep: Sweep, b: int) -> dict[str, float | None]:

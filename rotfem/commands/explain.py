@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from rotfem.analysis.fixed_frame import check_rotating
 from rotfem.analysis.march import Steps
 from rotfem.commands.first_state import first_state
 from rotfem.commands.loads import frozen_inputs
@@ -86,8 +87,10 @@ def case_of(scene: Scene, terms: Mapping[str, Work] | None = None) -> Case:
         start = first_state(scene, system.model.problem, system, judged=False)
         return start.q, start.v
 
+    problem = Problem.of(scene, terms=terms)
+    check_rotating(problem, "explain")
     return Case(
-        problem=Problem.of(scene, terms=terms),
+        problem=problem,
         steps=None if time is None else Steps.of(time),
         scheme=None if time is None else scheme_of(time),
         first=first,

@@ -63,7 +63,8 @@ def mode_tables(analysis: ModalAnalysis, speed: float, count: int, *, keep: bool
     rigid = int(spinning.rigid)
     spinning.pairs = spinning.pairs.select(np.arange(min(count - rigid, len(spinning.pairs.values))))
     rows = mode_rows(analysis, spinning, FrequencyErrors(analysis)(spinning) if analysis.estimates else None)
-    warnings = [*advice(analysis, speed), *instabilities(rows), *critical(rows, speed), *doubtful(rows)]
+    synchronous = critical(rows, speed, analysis.fixed is not None)
+    warnings = [*advice(analysis, speed), *instabilities(rows), *synchronous, *doubtful(rows)]
     rows = [{**row, "mode": row["mode"] + rigid} for row in rows]
     scaled = spinning.pairs.right / scales(analysis, spinning)
     titles = [f"mode {row['mode']}: {row['label']}" for row in rows]
@@ -127,13 +128,22 @@ def instabilities(rows: list[dict[str, Any]]) -> list[str]:
     ]
 
 
-def critical(rows: list[dict[str, Any]], speed: float) -> list[str]:
-    """Return a warning for every mode of a rotor whose forward critical speed is this one, but for CRITICAL of it."""
+def critical(rows: list[dict[str, Any]], speed: float, fixed: bool) -> list[str]:
+    """Return a warning for every mode of a rotor whose forward critical speed is this one, but for CRITICAL of it.
+
+    Args:
+        rows: of the modes.
+        speed: rad/s.
+        fixed: whether frequencies are those in the fixed frame.
+    """
+    in_rotor = {
+        row["label"]: abs(row["frequency"] - fixed * abs(speed)) for row in rows if row.get("whirl") == "forward"
+    }
     return [
-        f"critical speed: {row['label']} has {row['frequency']:.3g} rad/s in the rotor at {abs(speed):.6g} rad/s; an "
-        "unbalance meets no stiffness there"
-        for row in rows
-        if row.get("whirl") == "forward" and row["frequency"] < CRITICAL * abs(speed)
+        f"critical speed: {label} has {omega:.3g} rad/s in the rotor at {abs(speed):.6g} rad/s; an unbalance meets no "
+        "stiffness there"
+        for label, omega in in_rotor.items()
+        if omega < CRITICAL * abs(speed)
     ]
 
 

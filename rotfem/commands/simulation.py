@@ -13,6 +13,7 @@ from mpi4py import MPI
 from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.dense_output import RowTimes
 from rotfem.analysis.equilibrium import steady_state
+from rotfem.analysis.fixed_frame import check_rotating
 from rotfem.analysis.march import March, Steps
 from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.schemes import State
@@ -75,6 +76,7 @@ class Simulation:
         if scene.time is None and problem.frame == "inertial":
             problem = problem.replace(frame="rotating")
             self.log.warnings.append("a steady state is one only in the rotating frame, where it was computed")
+        check_rotating(problem, "a run")
         self.problem = problem = of_active_unknowns(scene, problem)
         self.system: Any = compile_system(problem, comm, moving=scene.time is not None)
         self.system.compile_readings()

@@ -222,7 +222,7 @@ for _effect in (
         "support_dampers",
         _work("support_dampers"),
         lambda problem: any(
-            np.any(support.damping) or support.stiffness[0][1] != 0.0
+            np.any(support.damping) or support.isotropic[0][1] != 0.0
             for support in getattr(problem.structure, "supports", ())
         ),
         ("supports have dampers or cross-coupling", "supports have no dampers"),

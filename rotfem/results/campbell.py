@@ -97,7 +97,10 @@ class CampbellResult(Result):
 
     @property
     def frequencies(self) -> Array:
-        """Frequencies in the rotating frame, shape (speeds, branches), rad/s; NaN where a branch is lost."""
+        """Frequencies in the rotating frame, shape (speeds, branches), rad/s; NaN where a branch is lost.
+
+        With supports that differ by direction they are those in the fixed frame.
+        """
         return self.column("frequency")
 
     @property
@@ -191,9 +194,11 @@ class CampbellResult(Result):
         }
 
     def drawings(self) -> dict[str, Callable[[], Figure]]:
-        """Return campbell.png and, of a rotor, campbell_fixed.png."""
+        """Return campbell.png and, of a rotor in the rotating frame, campbell_fixed.png."""
         from rotfem.results import plots
 
+        if self.summary.get("frame") == "fixed":
+            return {"campbell.png": partial(plots.fixed_frame_figure, self)}
         fixed = {"campbell_fixed.png": partial(plots.fixed_frame_figure, self)}
         return {"campbell.png": partial(plots.campbell_figure, self), **(fixed if "whirl" in self.rows[0] else {})}
 

@@ -160,7 +160,8 @@ def fixed_frame_figure(result: CampbellResult) -> Figure:
     axis.annotate("Ω", (end, rise * end), (-2, 3), textcoords="offset points", fontsize=7, color="0.4", ha="right")
     for c in result.critical_speeds:
         if c.kind != "per_rev":
-            fixed = 0.0 if c.per_rev == c.order else c.speed  # a wave of a disk stands still
+            stands = c.per_rev == c.order and result.summary.get("frame") != "fixed"  # a wave of a disk
+            fixed = 0.0 if stands else c.speed
             axis.plot(units.speeds(c.speed), units.frequencies(fixed), "ko", ms=4, mfc="none", clip_on=False)
     axis.set_xlim(min(0.0, *(float(b["speed"][0]) for b in branches.values())), last)
     axis.set_ylim(0, top)

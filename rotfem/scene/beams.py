@@ -332,7 +332,8 @@ class SpatialBeamStructure(BeamStructure):
         if self.supports and not straight:
             why = "hold straight shafts: without precone, sweep, line, and hub_offset across the axis"
             raise problem("supports", None, why)
-        if self.root.driven and len({support.x for support in self.supports if support.stiffness[0][0] > 0.0}) < 2:
+        springs = {s.x for s in self.supports if min(s.stiffness[0][0], s.stiffness[1][1]) > 0.0}
+        if self.root.driven and len(springs) < 2:
             raise problem("root.driven", True, "needs structure.supports with a stiffness at two places at least")
 
 

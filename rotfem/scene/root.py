@@ -169,18 +169,14 @@ class SpatialRoot(Root):
                 raise problem(f"root.{missing}_stiffness", None, why)
 
 
-def _as_isotropic(value: Any) -> Matrix:
-    """Return a matrix [[a, b], [−b, a]], a ≥ 0, of a number a or of these rows: the same in all directions."""
-    rows = as_rows(value, (2,), "a number or [[a, b], [-b, a]]") if isinstance(value, list | tuple) else None
-    if rows is None:
+def _as_two_by_two(value: Any) -> Matrix:
+    """Return a matrix of two rows with a diagonal ≥ 0; a number stands for that times the identity."""
+    if not isinstance(value, list | tuple):
         number = Bounds(ge=0.0).number(value)
         return (number, 0.0), (0.0, number)
-    if len(rows) != 2 or rows[0][0] != rows[1][1] or rows[0][1] != -rows[1][0] or rows[0][0] < 0.0:
-        why = (
-            "must be a number ≥ 0 or [[a, b], [-b, a]], a ≥ 0: a support that is not the same in all directions makes "
-            "coefficients of the rotating frame that change with time"
-        )
-        raise problem("", value, why)
+    rows = as_rows(value, (2,), "a number or two rows [[yy, yz], [zy, zz]]")
+    if len(rows) != 2 or rows[0][0] < 0.0 or rows[1][1] < 0.0:
+        raise problem("", value, "must be a number ≥ 0 or [[yy, yz], [zy, zz]] with yy ≥ 0 and zz ≥ 0")
     return rows
 
 
@@ -191,19 +187,32 @@ class Support(SceneModel):
 
     Attributes:
         x: place along the beam (m).
-        stiffness: N/m, a number or [[k, c], [−c, k]] with the cross-coupling c of a fluid film.
+        stiffness: N/m, a number or [[yy, yz], [zy, zz]].
         damping: N·s/m, likewise.
     """
 
     x: Number = Field(description="a place along the beam (m)")
-    stiffness: Annotated[Matrix, PlainValidator(_as_isotropic)] = ((0.0, 0.0), (0.0, 0.0))
-    damping: Annotated[Matrix, PlainValidator(_as_isotropic)] = ((0.0, 0.0), (0.0, 0.0))
+    stiffness: Annotated[Matrix, PlainValidator(_as_two_by_two)] = ((0.0, 0.0), (0.0, 0.0))
+    damping: Annotated[Matrix, PlainValidator(_as_two_by_two)] = ((0.0, 0.0), (0.0, 0.0))
 
     @model_validator(mode="after")
     def _check_any(self) -> Self:
         if not np.any(self.stiffness) and not np.any(self.damping):
             raise problem("stiffness", None, "give stiffness, damping, or both")
         return self
+
+    @property
+    def isotropic(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """(a, b) of the part [[a, b], [−b, a]] of stiffness and damping, which every rotating frame sees alike."""
+        (k, c), (d, e) = ((A[0][0] + A[1][1], A[0][1] - A[1][0]) for A in (self.stiffness, self.damping))
+        return (k / 2, c / 2), (d / 2, e / 2)
+
+    @property
+    def anisotropic(self) -> tuple[Matrix, Matrix]:
+        """The rest of both, [[a, b], [b, −a]]: how they differ by direction."""
+        rest = [((A[0][0] - A[1][1]) / 2, (A[0][1] + A[1][0]) / 2) for A in (self.stiffness, self.damping)]
+        stiffness, damping = (((a, b), (b, -a)) for a, b in rest)
+        return stiffness, damping
 
 
 class RootedStructure(StructureTable):

@@ -63,26 +63,33 @@ STANDING = 0.02
 
 @dataclass(frozen=True)
 class Wave:
-    """How a mode of a rotor precesses, seen from the rotor.
+    """How a mode of a rotor precesses, seen from the rotor or the fixed frame.
 
     Attributes:
         number: m, nodal diameters of a disk, 1 of a shaft.
         share: (|a|² − |b|²)/(|a|² + |b|²): 1 for a wave that runs with the spin, −1 against it, 0 for a standing one.
         shaft: whether it is that of a shaft, which whirls, or of a disk.
+        fixed: whether frequency and shape are those in the fixed frame.
     """
 
     number: int
     share: float
     shaft: bool
+    fixed: bool = False
+
+    @property
+    def at_rest(self) -> int:
+        """Per-rev order, in the frame of the mode, at which a wave against the spin is critical."""
+        return 1 if self.fixed else 2 if self.shaft else self.number
 
     def seen_fixed(self, omega: float, speed: float) -> float:
         """Return the frequency ω in the fixed frame, rad/s: positive with the spin, negative against it.
 
         Args:
-            omega: frequency in the rotating frame, rad/s.
+            omega: frequency in the frame of the mode, rad/s.
             speed: Ω ≥ 0, rad/s.
         """
-        return (omega if self.share > 0.0 else -omega) + self.number * speed
+        return (omega if self.share > 0.0 else -omega) + (0.0 if self.fixed else self.number * speed)
 
     def direction(self, omega: float, speed: float) -> str:
         """Return "forward", "backward", or "" of a standing wave.

@@ -238,7 +238,7 @@ class SpatialBeam(Beam):
         """
         if np.any(np.atleast_2d(data.pretwist)[:, -1]) or data.pitches or data.root.pitch.constant != 0.0:
             return False
-        if any(support.stiffness[0][1] != 0.0 or support.damping[0][1] != 0.0 for support in data.supports):
+        if any(b != 0.0 for support in data.supports for _, b in support.isotropic):
             return False
         leaves = {1: data.sweep, 2: data.precone}[normal]  # the plane (1, 3) by sweep, the plane (1, 2) by precone
         if np.any(np.atleast_2d(leaves)[:, -1]) or np.any(np.array(data.line or [(0.0, 0.0, 0.0)])[:, normal]):
@@ -341,17 +341,17 @@ class SpatialBeam(Beam):
         return {1, 2, 4, 5} if self.data.root.driven else super().released
 
     def supports(self) -> list[Support]:
-        """Return the bearings of a shaft, which is along direction 1."""
+        """Return the bearings of a shaft, which is along direction 1, by their isotropic parts."""
         across, e = ufl.as_vector((0, self.k.q[1], self.k.q[2])), ufl.as_vector((1, 0, 0))
 
-        def constants(name: str, matrix: Any) -> tuple[Any, Any]:
-            return tuple(self.scalar(f"{name}_{i}", c) if c != 0.0 else 0 for i, c in enumerate(matrix[0]))  # type: ignore[return-value]
+        def constants(name: str, pair: tuple[float, float]) -> tuple[Any, Any]:
+            return tuple(self.scalar(f"{name}_{i}", c) if c != 0.0 else 0 for i, c in enumerate(pair))  # type: ignore[return-value]
 
         return [
             Support(
                 across,
-                constants(f"supports_{i}_stiffness", support.stiffness),
-                constants(f"supports_{i}_damping", support.damping),
+                constants(f"supports_{i}_stiffness", support.isotropic[0]),
+                constants(f"supports_{i}_damping", support.isotropic[1]),
                 e,
                 self.points.measure((support.x,)),
             )

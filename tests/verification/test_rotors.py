@@ -191,6 +191,86 @@ def test_cross_coupling_leaves_no_plane() -> None:
         assert set(inactive_unknowns(Problem.of(rotfem.Scene.from_dict(tables)))) == inactive
 
 
+def planes_on_bearing(stiffness: np.ndarray, damping: np.ndarray, speed: float) -> np.ndarray:
+    """Return λ of a disk on a cantilevered massless shaft with a bearing at the disk, 1/s, those with Im λ > 0.
+
+    M q̈ + (C + ΩG) q̇ + K q = 0 of q = (y, −θ_z, z, θ_y) in the fixed frame (Genta 2005, section 4.3): a turning disk
+    couples the two planes by its polar moment of inertia, the bearing adds to the displacements y and z.
+    """
+    plane = EI / LENGTH**3 * np.array([[12.0, -6.0 * LENGTH], [-6.0 * LENGTH, 4.0 * LENGTH**2]])
+    zero, G = np.zeros((2, 2)), np.diag([0.0, POLAR])
+    M = np.diag([MASS, DIAMETRAL, MASS, DIAMETRAL])
+    K, C = np.block([[plane, zero], [zero, plane]]), speed * np.block([[zero, G], [-G, zero]])
+    displaced = np.ix_([0, 2], [0, 2])
+    K[displaced] += stiffness
+    C[displaced] += damping
+    values = eig(
+        np.block([[np.zeros((4, 4)), np.eye(4)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]]), right=False
+    )
+    return np.array(sorted(values[values.imag > 0.0], key=abs))
+
+
+BEARING = np.array([[3e4, 4e3], [4e3, 9e4]]), np.array([[20.0, 0.0], [0.0, 60.0]])
+CROSS_COUPLED = np.array([[3e4, 7e3], [-2e3, 9e4]]), np.array([[20.0, 3.0], [5.0, 60.0]])
+
+
+@pytest.mark.parametrize("axis", [1, -1])
+@pytest.mark.parametrize("theory", ["reissner", "consistent_linear"])
+@pytest.mark.parametrize("bearing", [BEARING, CROSS_COUPLED])
+def test_bearings_that_differ_by_direction(bearing: tuple[np.ndarray, np.ndarray], theory: str, axis: int) -> None:
+    """Eigenvalues in the fixed frame, below and above critical speeds: 2e-5, the shaft's own mass and shear."""
+    for speed in (40.0, 200.0):
+        scene = overhung(motion={"type": "constant", "speed": speed, "axis": [axis, 0, 0]}, model={"theory": theory})
+        stiffness, damping = (A.tolist() for A in bearing)
+        scene["structure"]["supports"] = [{"x": LENGTH, "stiffness": stiffness, "damping": damping}]
+        found = rotfem.modes(scene)
+        rows = [row for row in found.rows if row["label"].startswith("bending")][:4]
+        expected = planes_on_bearing(*bearing, axis * speed)
+        np.testing.assert_allclose([row["frequency"] for row in rows], expected.imag, rtol=2e-5)
+        size = np.max(np.abs(expected.real))
+        np.testing.assert_allclose([row["growth"] for row in rows], expected.real, rtol=2e-5, atol=2e-5 * size)
+        assert found.summary["frame"] == "fixed"
+
+
+def test_critical_speeds_on_bearings_that_differ_by_direction() -> None:
+    """Both whirls of a mode are critical where their frequency is Ω, one backward, one forward: 2e-5."""
+    scene = overhung(modes={"count": 4})
+    scene["structure"]["supports"] = [{"x": LENGTH, "stiffness": BEARING[0].tolist()}]
+    diagram = rotfem.campbell(scene, "0:300:7")
+    found = [c for c in diagram.critical_speeds if c.kind != "per_rev"]
+    assert [c.kind for c in found[:2]] == ["backward", "forward"]
+    assert [c.label for c in found[:2]] == ["bending 1 backward", "bending 1 forward"]
+    for c in found:
+        whirl = planes_on_bearing(BEARING[0], np.zeros((2, 2)), c.speed).imag
+        assert np.min(np.abs(whirl - c.speed)) < 2e-5 * c.speed
+    assert set(diagram.drawings()) == {"campbell.png"}
+
+
+def test_nearly_isotropic_bearings_have_the_modes_of_isotropic_ones() -> None:
+    """In the fixed frame and in the rotor: 1e-9, the difference of the bearings."""
+    one, other = (
+        rotfem.modes(shaft_on_bearings(stiffness, 30.0)).rows
+        for stiffness in (2e4, [[2e4, 0.0], [0.0, 2e4 * (1 + 1e-9)]])
+    )
+    fixed = [sorted((row["frequency_fixed"], row["growth"]) for row in rows) for rows in (one, other)]
+    np.testing.assert_allclose(*fixed, rtol=1e-7)
+
+
+def test_bearings_that_differ_by_direction_are_refused_in_the_rotating_frame() -> None:
+    """Coefficients would change with time there; a shaft that differs by direction, too, has no frame without."""
+    supports = [[2e4, 0.0], [0.0, 1e4]]
+    scene = shaft_on_bearings(supports)
+    harmonic = {"tip_force": {"harmonic": {"amplitude": [0.0, 1.0, 0.0], "frequency": 3.0}}}
+    for compute in (rotfem.run, rotfem.explain, rotfem.response):
+        with pytest.raises(rotfem.SceneError, match=r"structure\.supports.*change with time"):
+            compute(scene | {"loads": harmonic})
+    with pytest.raises(rotfem.SceneError, match=r"structure\.supports.*change with time"):
+        rotfem.modes(scene, sensitivities=True)
+    scene["structure"]["section"] = scene["structure"]["section"] | {"EI2": 2 * EI}
+    with pytest.raises(rotfem.SceneError, match=r"structure\.supports.*need a shaft that does not"):
+        rotfem.modes(scene)
+
+
 @pytest.mark.parametrize(
     ("change", "key"),
     [
@@ -198,7 +278,7 @@ def test_cross_coupling_leaves_no_plane() -> None:
         ({"supports": [{"x": 0.0, "stiffness": 1.0}]}, "structure.root.driven"),
         ({"supports": [{"x": 2.0, "stiffness": 1.0}]}, "structure.supports.0.x"),
         ({"supports": [{"x": 0.5}]}, "structure.supports.0.stiffness"),
-        ({"supports": [{"x": 0.5, "stiffness": [[1.0, 0.0], [0.0, 2.0]]}]}, "structure.supports.0.stiffness"),
+        ({"supports": [{"x": 0.5, "stiffness": [[1.0, 0.0], [0.0, -2.0]]}]}, "structure.supports.0.stiffness"),
         ({"precone": 0.1}, "structure.supports"),
         ({"root": {"driven": True, "lag_stiffness": 1.0}}, "structure.root.driven"),
     ],
