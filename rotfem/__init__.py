@@ -1,8 +1,8 @@
 """rotfem: rotating beams and plates with FEniCSx.
 
 One noun, the scene (`Scene`, `load_scene`), and verbs on it (`check`, `run`, `modes`, `campbell`, `response`,
-`explain`, `cost`), and on results `compare`. Between scene and equations stands the `Problem`, which a script can
-build too. `register` adds a `Theory`, `Effect`, `Scheme`, `MotionLaw`, `DampingModel`, `StructureKind`, `Shape`,
+`explain`, `cost`, `sweep`), and on results `compare`. Between scene and equations stands the `Problem`, which a script
+can build too. `register` adds a `Theory`, `Effect`, `Scheme`, `MotionLaw`, `DampingModel`, `StructureKind`, `Shape`,
 `Output` or `BladeFormat` of a user's own. What computes loads FEniCSx when first used.
 """
 
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from rotfem.commands.problem import Problem
     from rotfem.commands.response import response
     from rotfem.commands.run import run
+    from rotfem.commands.sweep import sweep
     from rotfem.mechanics.effects import DampingModel, Effect
     from rotfem.mechanics.free_hub import FreeHub, Torque
     from rotfem.mechanics.loads import ConstantLoad, Loads
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from rotfem.mechanics.theories import Theory
     from rotfem.results import CampbellResult, CheckResult, ExplainResult, ModesResult, ResponseResult, RunResult
     from rotfem.results.compare import CompareResult, compare
+    from rotfem.results.sweep import SweepResult
     from rotfem.scene import BeamMesh, PlateMesh
     from rotfem.scene.beams import PlanarBeamStructure as PlanarBeam
     from rotfem.scene.beams import SpatialBeamStructure as SpatialBeam
@@ -60,6 +62,7 @@ _HOMES = {
     "commands.problem": ("Problem",),
     "commands.response": ("response",),
     "commands.run": ("run",),
+    "commands.sweep": ("sweep",),
     "mechanics.effects": ("DampingModel", "Effect"),
     "mechanics.free_hub": ("FreeHub", "Torque"),
     "mechanics.loads": ("ConstantLoad", "Loads"),
@@ -69,6 +72,7 @@ _HOMES = {
     "commands.cost.result": ("CostResult",),
     "results": ("CampbellResult", "CheckResult", "ExplainResult", "ModesResult", "ResponseResult", "RunResult"),
     "results.compare": ("CompareResult", "compare"),
+    "results.sweep": ("SweepResult",),
     "scene": ("BeamMesh", "PlateMesh"),
     "scene.blades.deck": ("Asked", "BladeFormat", "Deck"),
     "scene.structure": ("StructureKind",),
@@ -121,6 +125,7 @@ __all__ = [
     "Stage",
     "State",
     "StructureKind",
+    "SweepResult",
     "Theory",
     "Torque",
     "__version__",
@@ -135,6 +140,7 @@ __all__ = [
     "register",
     "response",
     "run",
+    "sweep",
 ]
 
 

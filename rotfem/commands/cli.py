@@ -21,6 +21,7 @@ from rotfem.commands.printed import (
     modes_report,
     response_report,
     run_report,
+    sweep_report,
 )
 from rotfem.commands.result_folder import Writer
 from rotfem.errors import input_of
@@ -80,6 +81,7 @@ def modes(
         sensitivities=sensitivities,
         blade_tables=blade_tables,
         participation=participation,
+        comm=todo.session.comm,
         hint=todo.hint,
     )
     further: list[Writer] = []
@@ -113,7 +115,7 @@ def campbell(
     from rotfem.commands.campbell import campbell as sweep
 
     with todo.progress() as progress:
-        result = sweep(todo.scene, speeds, orders=per_rev, progress=progress, hint=todo.hint)
+        result = sweep(todo.scene, speeds, comm=todo.session.comm, orders=per_rev, progress=progress, hint=todo.hint)
     todo.finish(result, campbell_report)
 
 
@@ -132,7 +134,8 @@ def response(
     """Compute amplitude and phase of the tip of SCENE under its harmonic loads, over their frequency."""
     from rotfem.commands.response import response as answers
 
-    result = answers(todo.scene, low, high, number=number, per_rev=listed("--per-rev", per_rev, float) or ())
+    orders = listed("--per-rev", per_rev, float) or ()
+    result = answers(todo.scene, low, high, number=number, per_rev=orders, comm=todo.session.comm)
     todo.finish(result, response_report)
 
 
@@ -159,7 +162,7 @@ def check(todo: Job) -> None:
     """
     from rotfem.commands.check import check as weigh
 
-    todo.finish(weigh(todo.scene), check_report)
+    todo.finish(weigh(todo.scene, comm=todo.session.comm), check_report)
 
 
 @command(computes=False)
@@ -223,6 +226,46 @@ def cost(
     if write is not None and todo.session.first:
         result.write_tuned(write)
         todo.session.say([f"tuned scene in {write}"])
+
+
+@app.command()
+def sweep(
+    scene: Annotated[
+        Path, typer.Argument(metavar="SCENE", parser=as_path, help="scene file (TOML)", show_default=False)
+    ],
+    verb: Annotated[
+        list[str], typer.Argument(metavar="-- VERB…", help="run, modes, campbell, response or check, with its options")
+    ],
+    overrides: Annotated[
+        list[str], typer.Option("--set", metavar="KEY=A:B:N", help="values of a scene key, or KEY=A,B,…; repeatable")
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="DIR", parser=as_path, help="result folder [results/sweep-<scene name>]"
+        ),
+    ] = None,
+    jobs: Annotated[int, typer.Option("-j", "--jobs", metavar="N", help="processes that compute")] = 1,
+    as_json: Annotated[bool, typer.Option("--json", help="print the summary as JSON on stdout")] = False,
+    no_plots: Annotated[bool, typer.Option("--no-plots", help="write no figure")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False,
+) -> None:
+    """Run a verb for all combinations of values of scene keys; one that was stopped goes on."""
+    from rotfem.commands.sweep import sweep as compute
+    from rotfem.commands.sweep import values_of
+
+    with Session(as_json, quiet, debug) as session:
+        folder = session.folder(output or Path("results") / f"sweep-{scene.stem}", "sweep", [scene])
+        keys = {}
+        for text in overrides:
+            key, _, values = text.partition("=")
+            keys[key.strip()] = values_of(values.strip())
+        bar = session.progress(f"{scene.stem}: sweep")
+        with bar as progress:
+            result = compute(scene, keys, verb, folder.path, jobs=jobs, comm=session.comm, progress=progress)
+        session.write(result, not no_plots)
+        session.say(sweep_report(result.summary, folder.path))
 
 
 @app.command("import")

@@ -11,6 +11,7 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from contextvars import ContextVar
 from importlib.util import find_spec
 from pathlib import Path
 from time import monotonic, sleep
@@ -27,6 +28,9 @@ PASSED_ON = 0.2
 #: Seconds after which a computation says how far it is where there is no bar; again after twice the time, and so on.
 LONG = 10.0
 
+
+#: Whether commands run on this process alone, whatever others mpirun has started.
+ALONE: ContextVar[bool] = ContextVar("ALONE", default=False)
 
 #: Where to find out what is to be done without FEniCSx.
 MISSING = "FEniCSx is not here (there is no module {}); see docs/installation.md"
@@ -62,7 +66,7 @@ class Session:
         with suppress(ImportError):  # some commands do without FEniCSx
             from mpi4py import MPI
 
-            self.comm = MPI.COMM_WORLD
+            self.comm = MPI.COMM_SELF if ALONE.get() else MPI.COMM_WORLD
         self.as_json, self.quiet, self.debug = as_json, quiet, debug
         self.first = self.comm.rank == 0
         self._folder: ResultFolder | None = None

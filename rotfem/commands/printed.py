@@ -202,3 +202,14 @@ def explain_report(summary: dict[str, Any], folder: Path) -> list[str]:
     lines += choice_report(summary)
     lines += [f"no {name}: {text}" for name, text in summary["absent_effects"].items()]
     return [*lines, f"results in {folder}"]
+
+
+def sweep_report(summary: dict[str, Any], folder: Path) -> list[str]:
+    """Return the lines `sweep` prints."""
+    keys = " × ".join(f"{key} ({len(values)})" for key, values in summary["keys"].items())
+    done = summary["points"] - summary["failed"]
+    return [
+        f"{summary['name']}: {' '.join(summary['verb'])} over {keys}",
+        f"{done} of {summary['points']} points done, {summary['seconds']:.3g} s of computing",
+        f"results in {folder}",
+    ]

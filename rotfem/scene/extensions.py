@@ -76,6 +76,11 @@ def load(name: str, path: Path, file: str, key: str) -> None:
     _LOADED.add(path)
 
 
+def loaded() -> tuple[Path, ...]:
+    """Return the files that have been run."""
+    return tuple(_LOADED)
+
+
 def _described(error: BaseException, path: Path) -> str:
     """Return the type and the words of an error, and the line of the file that it comes from."""
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]

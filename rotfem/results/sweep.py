@@ -1,0 +1,158 @@
+"""What a sweep returns: a table with one row for each point, and a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.errors import OutputError
+from rotfem.results.columns import described
+from rotfem.results.files import json_text, rows_text
+from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows
+from rotfem.results.result import Result
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.figure import Figure
+
+#: Panels of the figure, and lines named in its legend, at most.
+PANELS, NAMED = 6, 12
+
+#: Part of the largest value, of damping ratios of 1, below which a change is round-off.
+ROUND_OFF = 1e-9
+
+
+def quantities(summary: Mapping[str, Any]) -> dict[str, float]:
+    """Return the numbers that stand for the result of a summary in a table of many."""
+    command = summary.get("command")
+    if command == "run":
+        return dict(summary["figures"])
+    if command == "modes":
+        return {f"{name}_{row['mode']}": row[name] for name in ("frequency", "damping") for row in summary["modes"]}
+    if command == "campbell":
+        found = {f"frequency_last_{i}": b["frequency_last"] for i, b in enumerate(summary["branches"], start=1)}
+        for c in summary["critical_speeds"]:
+            found.setdefault(f"speed_{c['kind']}_{c['order']}_{c['branch']}", c["speed"])
+        return found
+    if command == "response":
+        peaks = summary["peaks"].items()
+        return {f"{name}_peak": p["amplitude"] for name, p in peaks} | {
+            f"frequency_{n}": p["frequency"] for n, p in peaks
+        }
+    return {name: value for name, value in summary.items() if isinstance(value, float)}
+
+
+@dataclass
+class SweepResult(Result):
+    """Outcome of `rotfem sweep`.
+
+    Attributes:
+        summary: scene, verb, swept keys with their values, numbers of points; JSON-able.
+        rows: one dictionary a point: the value of every swept key, what was computed there (see `quantities`),
+            `status`, `reason` where it failed, `seconds` it took, `folder` with its results.
+    """
+
+    rows: list[dict[str, Any]]
+
+    @property
+    def keys(self) -> dict[str, list[Any]]:
+        """Swept keys ↦ their values."""
+        return dict(self.summary["keys"])
+
+    @property
+    def names(self) -> list[str]:
+        """Names of what was computed."""
+        no = {*self.keys, "status", "reason", "folder"}
+        return [name for name in dict.fromkeys(k for row in self.rows for k in row) if name not in no]
+
+    def array(self, name: str) -> npt.NDArray[Any]:
+        """Return a quantity over the swept keys, one axis a key; NaN where there is none."""
+        shape = [len(values) for values in self.keys.values()]
+        return column_of_rows(self.rows, name).astype(np.float64).reshape(shape)
+
+    def files(self) -> dict[str, str]:
+        """Return sweep.csv and summary.json."""
+        return {"sweep.csv": rows_text(self.rows), "summary.json": json_text(self.summary)}
+
+    def large(self) -> list[Callable[[Path], object]]:
+        """Return what writes sweep.nc, where xarray is installed."""
+        return [self._netcdf] if find_spec("xarray") else []
+
+    def _netcdf(self, folder: Path) -> None:
+        try:
+            self.to_xarray().to_netcdf(folder / "sweep.nc", engine="scipy")
+        except OSError as error:
+            raise OutputError(folder / "sweep.nc", error.strerror or str(error)) from None
+
+    def drawings(self) -> dict[str, Callable[[], Figure]]:
+        """Return sweep.png; nothing where no quantity varies."""
+        return {"sweep.png": partial(sweep_figure, self)} if self.varying() else {}
+
+    def varying(self) -> list[str]:
+        """Return the names of what changes from point to point by more than round-off, without times."""
+        out = []
+        for name in (n for n in self.names if n != "seconds" and not n.endswith("_time")):
+            y = self.array(name)
+            y = y[np.isfinite(y)]
+            size = max(np.max(np.abs(y), initial=0.0), 1.0 if name.startswith("damping") else 0.0)
+            if len(y) and np.ptp(y) > ROUND_OFF * size:
+                out.append(name)
+        return out
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return one row a point, indexed by the swept keys.
+
+        Raises:
+            ImportError: pandas is not installed.
+        """
+        return frame_of_rows(self.rows, list(self.keys))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return what was computed over the swept keys, each a dimension.
+
+        Raises:
+            ImportError: xarray is not installed.
+        """
+        over: dict[str, Variable] = {name: (tuple(self.keys), self.array(name)) for name in self.names}
+        shape = [len(values) for values in self.keys.values()]
+        over["status"] = tuple(self.keys), column_of_rows(self.rows, "status").reshape(shape)
+        return dataset(over, {k: ((k,), np.array(v)) for k, v in self.keys.items()}, self._attributes())
+
+
+def labelled(name: str) -> str:
+    """Return a name of `quantities` in words with its unit: that of the column that it begins with."""
+    words = name.split("_")
+    units = (described("_".join(words[:n]))[1] for n in range(len(words), 0, -1))
+    unit = next((unit for unit in units if unit), "")
+    return f"{' '.join(words)} ({'–' if unit == '1' else unit})" if unit else " ".join(words)
+
+
+def sweep_figure(result: SweepResult) -> Figure:
+    """Return the first quantities that vary over the first swept key, a line for each value of the others."""
+    from matplotlib.figure import Figure
+
+    names, (first, *others) = result.varying()[:PANELS], list(result.keys)
+    figure = Figure(figsize=(9, 1.9 * len(names) + 0.8), layout="constrained")
+    axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    lines = list(result.keys.values())[1:]
+    for axis, name in zip(axes, names, strict=True):
+        y = result.array(name).reshape(len(result.keys[first]), -1)
+        for j, place in enumerate(np.ndindex(*map(len, lines))):
+            said = ", ".join(f"{k} = {v[i]}" for k, v, i in zip(others, lines, place, strict=True))
+            colour = f"C{j}" if y.shape[1] <= 10 else None
+            axis.plot(result.keys[first], y[:, j], ".-", lw=1.2, color=colour, label=said)
+        axis.set_ylabel(labelled(name))
+        axis.grid(True, lw=0.4, alpha=0.6)
+    axes[-1].set_xlabel(first)
+    if others:
+        handles, said = axes[0].get_legend_handles_labels()
+        figure.legend(handles[:NAMED], said[:NAMED], loc="outside upper center", ncols=3, frameon=False, fontsize=8)
+    return figure
