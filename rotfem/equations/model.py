@@ -98,6 +98,7 @@ class Model:
         fixed, pitching = problem.frame == "inertial", problem.motion.pitch is not None
         self.frame = Frame(self.structure.mesh, self.structure.planar, fixed, problem.loads.gravity, pitching)
         self.switches: dict[str, fem.Constant] = {}
+        self._switched_off: frozenset[str] = frozenset()
         chosen = [Effect.registry[name] for name in self.effects]
         if pitching:  # springs of axes that the frame turns about
             chosen = [replace(effect, constants=None) if effect.at_root else effect for effect in chosen]
@@ -184,6 +185,13 @@ class Model:
         if name not in self.switches:
             self.switches[name] = self.structure.constant(1.0)
         return self.switches[name] * factor
+
+    def switch_off(self, effects: frozenset[str]) -> None:
+        """Switch effects off, all others on."""
+        if self._switched_off is not effects:
+            self._switched_off = effects
+            for name, switch in self.switches.items():
+                switch.value = 0.0 if name in effects else 1.0
 
     def work(self, variation: Any) -> dict[str, Any]:
         """Return name ↦ virtual work of every effect for a variation, each times its switch; UFL forms."""

@@ -329,10 +329,9 @@ class System(Readings, Solutions, ABC):
         return False
 
     def leave_out(self, effects: Collection[str]) -> None:
-        """Switch effects off, all others on."""
+        """Switch effects off, all others on; of twins each has its own switched off."""
         self.left_out = frozenset(effects)
-        for name, switch in self.model.switches.items():
-            switch.value = 0.0 if name in effects else 1.0
+        self.model.switch_off(self.left_out)
         self._damped = EFFECT not in effects
 
     @property
@@ -379,6 +378,7 @@ class System(Readings, Solutions, ABC):
         """
         motion = motion or self.motion
         self.model.time = t
+        self.model.switch_off(self.left_out)
         values = self.model.frame.values(motion, t)
         if load_factor != 1.0:
             values = {n: v * load_factor if n in ("a_o", "gravity") else v for n, v in values.items()}

@@ -266,24 +266,25 @@ class Explanation:
             system.leave_out(without)
         return system
 
-    def _variants(self, mesh: Any, changes: Sequence[Change]) -> list[Any]:
-        """Return the systems of changes on a mesh; None of a theory that cannot have all terms."""
-        off = set(self.effects) - set(self.own)
+    def _variants(self, own: Any, changes: Sequence[Change]) -> list[Any]:
+        """Return the systems of changes on the mesh of one of the own model; None of a theory without all terms."""
+        off, mesh = set(self.effects) - set(self.own), own.model.problem.mesh
+        out = []
         for change in changes:
-            if (change.name, repr(mesh)) in self._others:
-                continue
-            problem, without = self.problem.replace(mesh=mesh), off
             if change.kind == "effect":
-                without = off ^ {change.name}
-            else:
-                problem = problem.replace(theory=change.name)
-            try:
-                self._others[change.name, repr(mesh)] = self._compiled(problem, self.system.comm, without)
-            except InputError as error:
-                self._others[change.name, repr(mesh)] = None
-                change.notes |= dict.fromkeys(self.wanted, str(error))
-                change.estimate |= dict.fromkeys(self.wanted, np.inf)
-        return [self._others[change.name, repr(mesh)] for change in changes]
+                out.append(own.twin())
+                out[-1].leave_out(off ^ {change.name})
+                continue
+            if (change.name, repr(mesh)) not in self._others:
+                problem = self.problem.replace(mesh=mesh, theory=change.name)
+                try:
+                    self._others[change.name, repr(mesh)] = self._compiled(problem, self.system.comm, off)
+                except InputError as error:
+                    self._others[change.name, repr(mesh)] = None
+                    change.notes |= dict.fromkeys(self.wanted, str(error))
+                    change.estimate |= dict.fromkeys(self.wanted, np.inf)
+            out.append(self._others[change.name, repr(mesh)])
+        return out
 
     def _reached(self) -> float:
         """Return the speed of the modes: the final one, of a free hub the largest with a rigid structure; rad/s."""
@@ -366,7 +367,7 @@ class Explanation:
     def _following(self, own: Companion, changes: Sequence[Change]) -> list[Companion | None]:
         """Return companions of changes that follow that of the own model, which passes its steps on to them."""
         out: list[Companion | None] = []
-        for system in self._variants(own.system.model.problem.mesh, changes):
+        for system in self._variants(own.system, changes):
             if system is None:
                 out.append(None)
                 continue
@@ -429,7 +430,7 @@ class Explanation:
         self.mesh.estimate[name] = None if other is None else other.error(apart)
         off, known = set(self.effects) - set(self.own), (self.size, self.scale)
         others = [change for change in self.changes if change.kind == "theory"]
-        systems = dict(zip((t.name for t in others), self._variants(at.model.problem.mesh, others), strict=True))
+        systems = dict(zip((t.name for t in others), self._variants(at, others), strict=True))
         for change in self.changes:
             system = systems.get(change.name) if change in others else at
             if system is None:
