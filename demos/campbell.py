@@ -20,7 +20,6 @@ from pathlib import Path
 from _demo import FIRST_RANK, command_line, report, save, say
 
 import rotfem
-from rotfem.results.plots import campbell_figure
 
 SCENE = Path(__file__).with_name("campbell.toml")
 REFERENCE = 8.8572904  # rad/s; Legendre–Galerkin with 18 functions a field, all digits converged
@@ -40,7 +39,7 @@ def main(figure: Path | None = None) -> float:
     (meeting,) = [c for c in summary["critical_speeds"] if c["label"] == "lag 1" and c["per_rev"] == 1]
     report("lag 1 meets 1Ω at", meeting["speed"], REFERENCE, "rad/s")
     if figure is not None and FIRST_RANK:
-        save(campbell_figure(result), figure)
+        save(result.plot(), figure)
     return float(meeting["speed"])
 
 

@@ -14,7 +14,6 @@ from pathlib import Path
 from _demo import FIRST_RANK, command_line, report, save, say
 
 import rotfem
-from rotfem.results.plots import explain_figure
 
 SCENE = Path(__file__).with_name("explain.toml")
 
@@ -33,7 +32,7 @@ def main(figure: Path | None = None) -> float:
         choice = rotfem.modes(rotfem.load_scene(SCENE, [f"model.tolerance={tolerance}"])).summary["choice"]
         say(f"within {tolerance:g}: {choice['theory']}, estimated error {choice['estimated_error']:.1e}")
     if figure is not None and FIRST_RANK:
-        save(explain_figure(result), figure)
+        save(result.plot(), figure)
     return change
 
 

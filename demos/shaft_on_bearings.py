@@ -15,7 +15,6 @@ from pathlib import Path
 from _demo import FIRST_RANK, command_line, report, save, say
 
 import rotfem
-from rotfem.results.plots import campbell_figure
 
 SCENE = Path(__file__).with_name("shaft_on_bearings.toml")
 REFERENCE = 96.49728647  # rad/s
@@ -30,7 +29,7 @@ def main(figure: Path | None = None) -> float:
     first = next(c.speed for c in synchronous if c.kind == "forward")
     report("forward critical speed", first, REFERENCE, "rad/s")
     if figure is not None and FIRST_RANK:
-        save(campbell_figure(result), figure)
+        save(result.plot(), figure)
     return first
 
 

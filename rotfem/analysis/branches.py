@@ -7,7 +7,7 @@ a veering then shows itself as two branches that keep their order, a true crossi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -254,14 +254,14 @@ class Sweep:
         wave = self.wave(node, branch)
         return "" if wave is None else wave.direction(node.value(branch).imag, abs(node.speed))
 
-    def critical_speeds(self, orders: int) -> list[dict[str, Any]]:
+    def critical_speeds(self, orders: Collection[int]) -> list[dict[str, Any]]:
         """Return the critical speeds of the branches: the synchronous ones of a rotor first, each kind by speed.
 
         - "forward": the frequency in the rotor is zero, so that an unbalance, which rests in it, has no stiffness
           against it. Order 1.
         - "backward", order 1: a shaft whirls against the spin at the frequency Ω in the fixed frame, 2Ω in the rotor.
           Order m: a disk's wave of m diameters against the spin stands still in the fixed frame, mΩ in the disk.
-        - "per_rev": the frequency in the rotor is kΩ, order k = 1 … orders.
+        - "per_rev": the frequency in the rotor is kΩ, order k of those given.
 
         Modes in the fixed frame are synchronous where their frequency is Ω, and per_rev where it is kΩ.
         """
@@ -274,14 +274,14 @@ class Sweep:
                     out.append(self._critical(b, "forward", 1, 0, at_zero))
                 wave = self.wave(right, b)
                 against = 0 if wave is None else wave.at_rest
-                for k in sorted({*range(1, orders + 1), against} - {0}):
+                for k in sorted({*orders, against} - {0}):
                     speed = self._meeting(left, right, b, k)
                     if speed is None:
                         continue
                     way = self.direction(right, b)
                     if wave is not None and k == against and (way == "backward" or (wave.fixed and way)):
                         out.append(self._critical(b, way, wave.number, k, speed))
-                    elif k <= orders:
+                    elif k in orders:
                         out.append(self._critical(b, "per_rev", k, k, speed))
         return sorted(out, key=lambda c: (c["kind"] == "per_rev", c["speed"]))
 

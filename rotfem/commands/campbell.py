@@ -85,7 +85,9 @@ def campbell(
     speeds: Sequence[float] | str,
     *,
     comm: MPI.Comm = MPI.COMM_WORLD,
-    orders: int | None = None,
+    orders: int | Sequence[int] | None = None,
+    rated: float | str | None = None,
+    operating: Sequence[float | str] | None = None,
     progress: Progress | None = None,
     hint: Hint | None = silent,
     terms: Mapping[str, Work] | None = None,
@@ -96,7 +98,10 @@ def campbell(
         scene: scene, path of a scene file, or nested tables; its own speed is not used.
         speeds: increasing speeds in rad/s, or text such as "0:12:25".
         comm: MPI communicator.
-        orders: per-rev lines 1Ω … orders·Ω to cross; by default as many as meet a branch in the range, at most 4.
+        orders: k of the lines kΩ to cross, or their number, 1Ω … orders·Ω; by default those of the scene, or as many
+            as meet a branch in the range, at most 4.
+        rated: rated speed, rad/s or with a unit such as "12.1 rpm"; that of the scene if None.
+        operating: lowest and highest speed of operation, likewise.
         progress: called with the share of the speeds done, between 0 and 1.
         hint: called with every line of advice before the computation starts; None asks for none.
         terms: further terms of the residual by name, (mechanics, variation) ↦ UFL form (see `rotfem.Effect`).
@@ -105,14 +110,14 @@ def campbell(
         SceneError: the scene or the speeds are not valid.
         ComputationError: no equilibrium at a speed, or eigenpairs that fail their check.
     """
-    scene = as_scene(scene)
+    scene = with_marks(as_scene(scene), orders, rated, operating)
     text = speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds)
     values = parse_speeds(text, scene.limits)
 
     def attempt(setting: Setting | None = None) -> CampbellResult:
         started, variant = perf_counter(), scene if setting is None else scene.replace(changes_of(scene, setting))
         sweep = Diagram(variant, Problem.of(variant, terms=terms), values, comm, hint)
-        return sweep.result(orders, progress or (lambda share: None), started)
+        return sweep.result(progress or (lambda share: None), started)
 
     scene.check_tables("what modes are about" if scene.time is None else "")
     with input_of(scene.file):
@@ -122,6 +127,24 @@ def campbell(
             return attempt()
         refuse(scene, ("frequencies",), "campbell")
         return to_accuracy(scene, first_setting(scene, scene.modes.count), attempt, Clock(scene.accuracy_budget, comm))
+
+
+def with_marks(
+    scene: Scene, orders: int | Sequence[int] | None, rated: float | str | None, operating: Sequence[float | str] | None
+) -> Scene:
+    """Return the scene with what its diagram is to mark, as far as that is given here.
+
+    Raises:
+        SceneError: it is not valid.
+    """
+    given = {
+        "modes.orders": range(1, orders + 1) if isinstance(orders, int) else orders,
+        "modes.rated": rated,
+        "modes.operating": operating,
+    }
+    changes = {key: list(v) if isinstance(v, Sequence) and not isinstance(v, str) else v for key, v in given.items()}
+    changes = {key: value for key, value in changes.items() if value is not None}
+    return scene.replace(changes) if changes else scene
 
 
 class Diagram:
@@ -143,7 +166,7 @@ class Diagram:
             self.analysis = ReducedAnalysis(self.analysis)
             self.analysis.prepare(values[0], values[-1], scene.modes.count + SPARE)
 
-    def result(self, orders: int | None, progress: Progress, started: float) -> CampbellResult:
+    def result(self, progress: Progress, started: float) -> CampbellResult:
         """Return the branches over speed, with what the diagram says."""
         analysis, count, values = self.analysis, self.scene.modes.count, self.values
         sweep = Sweep(analysis, count, self.scene.limits.speeds)
@@ -152,8 +175,11 @@ class Diagram:
         found = [node.value(b).imag for node in sweep.nodes for b in range(count)]
         lowest = min((w for w in found if w > 0), default=0.0)
         fastest = max(abs(values[0]), abs(values[-1]))
+        marks = self.scene.modes
+        orders = marks.orders
         if orders is None:
-            orders = int(np.clip(np.ceil(max(found, default=lowest) / max(fastest, 1e-300)), 1, 4))
+            most = int(np.clip(np.ceil(max(found, default=lowest) / max(fastest, 1e-300)), 1, 4))
+            orders = tuple(range(1, most + 1))
         labels = branch_labels(analysis, sweep, count)
         mesh = branch_errors(analysis, sweep, count) if analysis.estimates else None
         rows = [row for node in sweep.nodes for row in node_rows(analysis, node, labels, mesh)]
@@ -179,7 +205,10 @@ class Diagram:
                 {"branch": b + 1, "label": labels[b], "name": engineers_name(labels[b]), **branch_summary(sweep, b)}
                 for b in range(count)
             ],
-            "per_rev": orders,
+            "per_rev": max(orders, default=0),
+            "orders": list(orders),
+            **({} if marks.rated is None else {"rated": marks.rated}),
+            **({} if marks.operating is None else {"operating": list(marks.operating)}),
             "critical_speeds": crossings,
             "instabilities": onsets,
             "ambiguous": sweep.ambiguous,

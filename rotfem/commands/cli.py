@@ -6,14 +6,14 @@ import sys
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 import rotfem.commands.compare  # noqa: F401  a verb
 from rotfem.commands.console import Session, missing
 from rotfem.commands.job import Job, app, command
-from rotfem.commands.options import as_path, listed
+from rotfem.commands.options import as_path, listed, speeds_of
 from rotfem.commands.printed import (
     campbell_report,
     check_report,
@@ -109,13 +109,23 @@ def campbell(
     speeds: Annotated[
         str, typer.Option("--speeds", metavar="RANGE", help="first:last:number or s1,s2,… in rad/s, or as 0:15:31rpm")
     ],
-    per_rev: Annotated[int | None, typer.Option("--per-rev", min=0, help="per-rev lines 1Ω … NΩ to cross")] = None,
+    per_rev: Annotated[int | None, typer.Option("--per-rev", min=0, help="lines 1Ω … NΩ to cross")] = None,
+    orders: Annotated[str | None, typer.Option("--orders", metavar="K,…", help="lines kΩ to cross: 1,3,6,9")] = None,
+    rated: Annotated[str | None, typer.Option("--rated", metavar="SPEED", help="rated speed to mark: 12.1rpm")] = None,
+    operating: Annotated[
+        str | None, typer.Option("--operating", metavar="LOW:HIGH", help="operating range to mark: 6.9:12.1rpm")
+    ] = None,
 ) -> None:
     """Follow the modes of SCENE over a range of speeds."""
     from rotfem.commands.campbell import campbell as sweep
 
+    marks: dict[str, Any] = {
+        "orders": per_rev if orders is None else listed("--orders", orders, int),
+        "rated": None if rated is None else speeds_of("--rated", rated, 1)[0],
+        "operating": None if operating is None else speeds_of("--operating", operating, 2),
+    }
     with todo.progress() as progress:
-        result = sweep(todo.scene, speeds, comm=todo.session.comm, orders=per_rev, progress=progress, hint=todo.hint)
+        result = sweep(todo.scene, speeds, comm=todo.session.comm, **marks, progress=progress, hint=todo.hint)
     todo.finish(result, campbell_report)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import typer
 
 from rotfem.errors import SceneError
+from rotfem.units import split_unit
 
 #: Units of a time ↦ s.
 UNITS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0}
@@ -71,3 +72,20 @@ def listed(option: str, text: str | None, kind: Callable[[str], Any]) -> list[An
     except ValueError:
         what = "integers" if kind is int else "numbers"
         raise SceneError("command line", option, text, f"must be {what} separated by commas") from None
+
+
+def speeds_of(option: str, text: str, number: int) -> list[float]:
+    """Return so many speeds (rad/s) of an option such as "6.9:12.1rpm".
+
+    Raises:
+        SceneError: it is not that many, or their unit is none of speeds.
+    """
+    try:
+        numbers, unit = split_unit(text)
+        speeds = [float(part) * unit for part in numbers.split(":")]
+        if len(speeds) == number:
+            return speeds
+    except ValueError:
+        pass
+    allowed = {1: "a speed, rad/s or as 12.1rpm", 2: "two speeds low:high, rad/s or as 6.9:12.1rpm"}[number]
+    raise SceneError("command line", option, text, f"must be {allowed}")

@@ -186,21 +186,20 @@ class CampbellResult(Result):
 
     def files(self) -> dict[str, str]:
         """Return campbell.csv, campbell.json and summary.json."""
-        keys = ("branches", "critical_speeds", "instabilities", "ambiguous", "per_rev")
+        keys = ("branches", "critical_speeds", "instabilities", "ambiguous", "per_rev", "orders", "rated", "operating")
         return {
             "campbell.csv": rows_text(ShownUnits.of(self.summary).rows(self.rows)),
-            "campbell.json": json_text({**{k: self.summary[k] for k in keys}, "rows": self.rows}),
+            "campbell.json": json_text({**{k: self.summary[k] for k in keys if k in self.summary}, "rows": self.rows}),
             "summary.json": json_text(self.summary),
         }
 
     def drawings(self) -> dict[str, Callable[[], Figure]]:
         """Return campbell.png and, of a rotor in the rotating frame, campbell_fixed.png."""
-        from rotfem.results import plots
+        from rotfem.results.plots_campbell import campbell_figure
 
-        if self.summary.get("frame") == "fixed":
-            return {"campbell.png": partial(plots.fixed_frame_figure, self)}
-        fixed = {"campbell_fixed.png": partial(plots.fixed_frame_figure, self)}
-        return {"campbell.png": partial(plots.campbell_figure, self), **(fixed if "whirl" in self.rows[0] else {})}
+        both = self.summary.get("frame") != "fixed" and "whirl" in self.rows[0]
+        fixed = {"campbell_fixed.png": partial(campbell_figure, self, fixed=True)}
+        return {"campbell.png": partial(campbell_figure, self), **(fixed if both else {})}
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return one row a speed and branch, indexed by `speed` (rad/s) and `label`, as in campbell.csv.

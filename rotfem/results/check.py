@@ -62,7 +62,7 @@ class CheckResult(Result):
 
     def drawings(self) -> dict[str, Callable[[], Figure]]:
         """Return check.png."""
-        from rotfem.results.plots import check_figure
+        from rotfem.results.plots_scene import check_figure
 
         return {"check.png": partial(check_figure, self)}
 

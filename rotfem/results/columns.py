@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import numpy.typing as npt
 
@@ -40,6 +42,20 @@ def extreme(t: Array, y: Array, sign: int) -> tuple[float, float]:
         return float(t[i]), float(y[i])
     s = -c[1] / (2 * c[0])
     return float(t[i] + s), float(np.polyval(c, s))
+
+
+#: Part of the largest number of its unit below which one is shown as 0.
+ZERO = 1e-9
+
+
+def zeros(columns: Mapping[str, Array]) -> list[str]:
+    """Return the columns of which every number is shown as 0, `ZERO` of the largest of its unit and below."""
+    largest: dict[str, float] = {}
+    sizes = {name: float(np.max(np.abs(values), initial=0.0)) for name, values in columns.items()}
+    units = {name: described(name)[1] or name for name in columns}
+    for name, size in sizes.items():
+        largest[units[name]] = max(largest.get(units[name], 0.0), size)
+    return [name for name, size in sizes.items() if size <= ZERO * largest[units[name]]]
 
 
 _SUB = {"1": "₁", "2": "₂", "3": "₃"}
@@ -138,6 +154,10 @@ def described(column: str) -> tuple[str, str]:
 
 def label(column: str, shown: str = "") -> str:
     """Return the axis label of a column, with its unit, or with the one that it is shown in."""
-    what, unit = described(column)
-    unit = shown or unit
-    return f"{what} ({'–' if unit == '1' else unit})" if unit else what
+    return f"{described(column)[0]} {shown_unit(column, shown)}".rstrip()
+
+
+def shown_unit(column: str, shown: str = "") -> str:
+    """Return the unit of a column, or the one that it is shown in, as "(m)"; "" of one without."""
+    unit = shown or described(column)[1]
+    return f"({'–' if unit == '1' else unit})" if unit else ""

@@ -63,7 +63,7 @@ class ExplainResult(Result):
 
     def drawings(self) -> dict[str, Callable[[], Figure]]:
         """Return explain.png."""
-        from rotfem.results.plots import explain_figure
+        from rotfem.results.plots_scene import explain_figure
 
         return {"explain.png": partial(explain_figure, self)}
 

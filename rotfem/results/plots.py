@@ -1,28 +1,50 @@
-"""Figures of results: every function that draws takes a result and returns a figure, one function writes them."""
+"""Figures of results: every function that draws takes a result and returns a figure, one function writes them.
+
+A number below `ZERO` of the largest of its unit is shown as 0, in all figures. What is 0 everywhere has no panel; a
+line below the title names it.
+"""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from scipy.signal import find_peaks
 
-from rotfem.results.columns import described, is_at_station, label
+from rotfem.results.columns import ZERO, described, is_at_station, label, shown_unit, zeros
 from rotfem.results.files import write_whole
 from rotfem.results.units import ShownUnits
 
 if TYPE_CHECKING:
-    from rotfem.results.campbell import CampbellResult
-    from rotfem.results.check import CheckResult
-    from rotfem.results.explain import ExplainResult
+    from matplotlib.axes import Axes
+
     from rotfem.results.modes import ModesResult
     from rotfem.results.response import ResponseResult
     from rotfem.results.result import Result
-    from rotfem.results.run import RunResult
+    from rotfem.results.run import RunResult, StationHistory
+
+Array = npt.NDArray[np.float64]
+
+#: How all grids are drawn.
+GRID: dict[str, Any] = {"visible": True, "lw": 0.4, "alpha": 0.6}
+
+#: Periods above which a history is drawn as the range and the mean of stretches of it, and the number of these.
+PERIODS, STRETCHES = 500, 250
+
+#: Height of a peak that counts as a period, part of the range of a history.
+PEAK = 1e-2
+
+#: Part of the largest displacement below which a line cannot be told from 0.
+VISIBLE = 1e-3
+
+#: Part of the frequencies, those of deep antiresonances, at which an amplitude may lie below what is drawn.
+RARE = 0.05
 
 
 def plot(result: Result, folder: Path) -> list[Path]:
@@ -32,177 +54,6 @@ def plot(result: Result, folder: Path) -> list[Path]:
         OutputError: one cannot be written.
     """
     return [save(draw(), folder / name) for name, draw in result.drawings().items()]
-
-
-def history_figure(result: RunResult) -> Figure:
-    """Return the tip's components, and the speed over time."""
-    h = result.history
-    columns = [*(c for c in h if c.startswith("tip_")), "psi_dot"]
-    units = ShownUnits.of(result.summary)
-    return stacked(h | {"psi_dot": units.speeds(h["psi_dot"])}, "t", columns, result.title, {"psi_dot": units.speed})
-
-
-def shape_figure(result: RunResult) -> Figure:
-    """Return the components of a steady state along the structure."""
-    s = result.shape
-    return stacked(s, "x", [c for c in s if c != "x"], result.title + ", steady state")
-
-
-def shapes_figure(result: ModesResult) -> Figure:
-    """Return the shapes of all modes along the structure, scaled as in `ModesResult`; imaginary parts dashed."""
-    shapes = result.shapes
-    rows = result.rows[len(result.rows) - len(shapes) :]  # a rigid-body mode comes first and has no shape
-    units = ShownUnits.of(result.summary)
-    figure = Figure(figsize=(9, 1.7 * len(shapes) + 0.8))
-    for i, ((title, columns), row) in enumerate(zip(shapes.items(), rows, strict=True), start=1):
-        axis = figure.add_subplot(len(shapes), 1, i)
-        names = [name for name in columns if name != "x" and not name.endswith("_imag")]
-        for c, name in enumerate(names):
-            axis.plot(columns["x"], columns[name], lw=1.3, color=f"C{c}", label=described(f"shape_{name}")[0][7:])
-            if np.max(np.abs(columns[f"{name}_imag"])) > 1e-3:
-                axis.plot(columns["x"], columns[f"{name}_imag"], lw=1.0, ls="--", color=f"C{c}")
-        axis.set_title(f"{title}, {units.frequencies(row['frequency']):.4g} {units.frequency}", fontsize=9, pad=3)
-        axis.set_ylabel("shape (–)", fontsize=8)
-        axis.grid(True, lw=0.4, alpha=0.6)
-        if i < len(shapes):
-            axis.set_xticklabels([])
-        if i == 1:
-            axis.legend(fontsize=8, ncols=len(names), loc="upper left")
-    axis.set_xlabel(label("x") + "; imaginary parts dashed")
-    height = figure.get_figheight()
-    figure.subplots_adjust(left=0.1, right=0.97, top=1 - 0.35 / height, bottom=0.55 / height, hspace=0.35)
-    return figure
-
-
-def campbell_figure(result: CampbellResult) -> Figure:
-    """Return frequency over speed with labelled branches, per-rev lines, their crossings and instabilities."""
-    figure = Figure(figsize=(9, 6.5))
-    axis = figure.add_subplot()
-    units, branches = ShownUnits.of(result.summary), shown_branches(result)
-    top = 1.05 * max(float(np.max(b["frequency"])) for b in branches.values())
-    last = max(float(b["speed"][-1]) for b in branches.values())
-    named_at_ends(axis, branches, "frequency", top)
-    for i, b in enumerate(branches.values()):
-        unstable = b["unstable"]
-        axis.plot(b["speed"][unstable], b["frequency"][unstable], "x", ms=5, color=f"C{i % 10}")
-    rise = float(units.frequencies(1.0) / units.speeds(1.0))  # of the line 1Ω
-    for k in range(1, result.summary["per_rev"] + 1):
-        end = min(last, top / (k * rise))
-        axis.plot([0, end], [0, k * rise * end], lw=0.7, ls=":", color="0.4")
-        axis.annotate(
-            f"{k}Ω", (end, k * rise * end), (-2, 3), textcoords="offset points", fontsize=7, color="0.4", ha="right"
-        )
-    crossings = result.summary["critical_speeds"]
-    met = [units.speeds([c["speed"] for c in crossings]), units.frequencies([c["frequency"] for c in crossings])]
-    axis.plot(*met, "ko", ms=3.5, mfc="none")
-    for onset in result.summary["instabilities"]:
-        begin = float(units.speeds(onset["speed"]))
-        axis.axvline(begin, color="C3", lw=0.8, ls="-.")
-        axis.annotate(onset["kind"], (begin, top), (3, -10), textcoords="offset points", fontsize=7, color="C3")
-    axis.set_xlim(min(0.0, *(float(b["speed"][0]) for b in branches.values())), last)
-    axis.set_ylim(0, top)
-    axis.set_xlabel(label("psi_dot", units.speed))
-    axis.set_ylabel(label("frequency", units.frequency))
-    axis.set_title(result.title)
-    axis.grid(True, lw=0.4, alpha=0.6)
-    figure.subplots_adjust(left=0.09, right=0.84, top=0.94, bottom=0.08)  # the labels stand outside on the right
-    return figure
-
-
-def shown_branches(result: CampbellResult) -> dict[str, dict[str, Any]]:
-    """Return label ↦ `speed`, frequencies in the units that are shown, and `unstable`, whether the mode grows there."""
-    units = ShownUnits.of(result.summary)
-    return {
-        name: {
-            "speed": units.speeds(b["speed"]),
-            **{k: units.frequencies(b[k]) for k in ("frequency", "frequency_fixed") if k in b},
-            "unstable": b["growth"] > 1e-6 * (np.abs(b["frequency"]) + np.abs(b["growth"])),
-        }
-        for name, b in result.branches().items()
-    }
-
-
-def spread(values: list[float], gap: float) -> list[float]:
-    """Return the values with the upper ones raised until all are at least `gap` apart, so that labels can be read."""
-    out, last = list(values), -np.inf
-    for i in np.argsort(values, kind="stable"):
-        last = out[i] = max(values[i], last + gap)
-    return out
-
-
-def named_at_ends(axis: Any, branches: Mapping[str, Mapping[str, Any]], column: str, top: float) -> None:
-    """Draw branches over speed, their names at their ends on the right: dashed where they run against the spin."""
-    heights = spread([float(b[column][-1]) for b in branches.values()], 0.022 * top)
-    for i, (name, b) in enumerate(branches.items()):
-        style, color = ("--" if name.endswith("backward") else "-"), f"C{i % 10}"
-        axis.plot(b["speed"], b[column], lw=1.6, ls=style, color=color)
-        axis.annotate(
-            name,
-            (float(b["speed"][-1]), heights[i]),
-            (5, -3),
-            textcoords="offset points",
-            annotation_clip=False,
-            fontsize=8,
-            color=color,
-        )
-
-
-def fixed_frame_figure(result: CampbellResult) -> Figure:
-    """Return the frequencies of a rotor in the fixed frame over speed, and its synchronous critical speeds."""
-    figure = Figure(figsize=(9, 6.5))
-    axis, units, branches = figure.add_subplot(), ShownUnits.of(result.summary), shown_branches(result)
-    top = 1.05 * max(float(np.max(b["frequency_fixed"])) for b in branches.values())
-    last = max(float(b["speed"][-1]) for b in branches.values())
-    named_at_ends(axis, branches, "frequency_fixed", top)
-    rise = float(units.frequencies(1.0) / units.speeds(1.0))
-    end = min(last, top / rise)
-    axis.plot([0, end], [0, rise * end], lw=0.7, ls=":", color="0.4")
-    axis.annotate("Ω", (end, rise * end), (-2, 3), textcoords="offset points", fontsize=7, color="0.4", ha="right")
-    for c in result.critical_speeds:
-        if c.kind != "per_rev":
-            stands = c.per_rev == c.order and result.summary.get("frame") != "fixed"  # a wave of a disk
-            fixed = 0.0 if stands else c.speed
-            axis.plot(units.speeds(c.speed), units.frequencies(fixed), "ko", ms=4, mfc="none", clip_on=False)
-    axis.set_xlim(min(0.0, *(float(b["speed"][0]) for b in branches.values())), last)
-    axis.set_ylim(0, top)
-    axis.set_xlabel(label("psi_dot", units.speed))
-    axis.set_ylabel(label("frequency_fixed", units.frequency))
-    axis.set_title(f"{result.title}; backward dashed, synchronous critical speeds circled", size=10)
-    axis.grid(True, lw=0.4, alpha=0.6)
-    figure.subplots_adjust(left=0.09, right=0.84, top=0.94, bottom=0.08)
-    return figure
-
-
-def stacked(
-    data: dict[str, Any], x: str, columns: list[str], title: str, units: Mapping[str, str] | None = None
-) -> Figure:
-    """Return one panel a column over the common abscissa x, with marks where it is a position.
-
-    Args:
-        data: column ↦ values.
-        x: column of the abscissa.
-        columns: those that are drawn.
-        title: of the figure.
-        units: column ↦ unit of its values, where it is not the usual one.
-    """
-    units = units or {}
-    marker = "." if x == "x" else ""
-    figure = Figure(figsize=(8, 1.8 * len(columns) + 0.6))
-    for i, column in enumerate(columns, start=1):
-        axis = figure.add_subplot(len(columns), 1, i)
-        axis.plot(data[x], data[column], lw=1.2, marker=marker, ms=4)
-        axis.set_ylabel(label(column, units.get(column, "")))
-        axis.grid(True, lw=0.4, alpha=0.6)
-        if i == 1:
-            axis.set_title(title)
-        if i < len(columns):
-            axis.set_xticklabels([])
-    axis.set_xlabel(label(x))
-    figure.align_ylabels()
-    figure.subplots_adjust(
-        left=0.14, right=0.97, top=1 - 0.4 / figure.get_figheight(), bottom=0.55 / figure.get_figheight()
-    )
-    return figure
 
 
 def save(figure: Figure, path: Path) -> Path:
@@ -218,168 +69,219 @@ def save(figure: Figure, path: Path) -> Path:
     return write_whole(path, content.getvalue())
 
 
-#: Panels of properties: names in one panel, its label, whether on a logarithmic axis.
-PANELS = (
-    (("mass_per_length",), "mass (kg/m)", False),
-    (("EA", "GA", "GA2", "GA3"), "EA, GA (N)", True),
-    (("EI", "EI2", "EI3", "GJ"), "EI, GJ (N·m²)", True),
-    (("rotary_inertia", "rotary_inertia2", "rotary_inertia3"), "inertia (kg·m)", False),
-    (("pretwist",), "pretwist (°)", False),
-    (("mass_center_y", "tension_center_y", "shear_center_y"), "centres, y (m)", False),
-    (("mass_center_z", "tension_center_z", "shear_center_z"), "centres, z (m)", False),
-)
-
-#: What is drawn of a section is as wide as the rectangle of its radius of gyration.
-HALF_WIDTH = np.sqrt(3.0)
+# --- panels -----------------------------------------------------------------------------------------------------------
 
 
-def check_figure(result: CheckResult) -> Figure:
-    """Return the structure as seen along axes 3, 2 and 1 with its centre of mass, and properties along a beam."""
-    columns = result.columns
-    there = [(tuple(n for n in names if n in columns), title, log) for names, title, log in PANELS]
-    panels = [panel for panel in there if any(np.any(columns[n]) for n in panel[0])]
-    figure = Figure(figsize=(10, 4.2 + 1.25 * len(panels)))
-    grid = figure.add_gridspec(2 + len(panels), 4, height_ratios=[1.7, 1.7, *[1.0] * len(panels)])
-    views = ((grid[0, :3], 0, 1), (grid[1, :3], 0, 2), (grid[:2, 3], 1, 2))
-    for spot, i, j in views:
-        axis = figure.add_subplot(spot)
-        _view(axis, result, i, j)
-    first = None
-    for row, (names, title, logarithmic) in enumerate(panels, start=2):
-        axis = figure.add_subplot(grid[row, :], sharex=first)
-        first = first or axis
-        for name in names:
-            values = np.degrees(columns[name]) if name == "pretwist" else columns[name]
-            axis.plot(columns["x"], values, lw=1.3, label=name)
-        if logarithmic and all(np.all(columns[name] > 0.0) for name in names):
-            axis.set_yscale("log")
-        axis.set_ylabel(title, fontsize=8)
-        axis.grid(True, lw=0.4, alpha=0.6)
-        if len(names) > 1:
-            axis.legend(fontsize=7, ncols=4)
-        axis.tick_params(labelsize=7)
-    if first is not None:
-        axis.set_xlabel("position X along the axis (m)")
-    s = result.summary
-    figure.suptitle(f"{s['name']}: {s['mass']:.6g} kg, {s['length']:.6g} m", fontsize=10)
-    figure.subplots_adjust(left=0.09, right=0.97, top=0.95, bottom=0.06, hspace=0.45, wspace=0.35)
-    return figure
+def grid_of(number: int, size: tuple[float, float], title: str, note: str = "") -> tuple[Figure, list[Axes]]:
+    """Return a figure and its panels in one column or more, the first column filled first, with a common abscissa.
+
+    Args:
+        number: of panels.
+        size: width and height of a panel, inch.
+        title: of the figure.
+        note: line below the title.
+    """
+    columns = 1 if number <= 3 else 2 if number <= 12 else 3
+    rows = -(-max(number, 1) // columns)
+    width = max(size[0] * columns, 7.0)
+    figure = Figure(figsize=(width, size[1] * rows + 1.0), layout="constrained")
+    figure.suptitle(title + (f"\n{note}" if note else ""), fontsize=10)
+    panels = [figure.add_subplot(rows, columns, (i % rows) * columns + i // rows + 1) for i in range(number)]
+    for i, panel in enumerate(panels):
+        panel.grid(**GRID)
+        panel.tick_params(labelsize=8, labelbottom=i % rows == rows - 1 or i == number - 1)
+        panel.ticklabel_format(axis="y", scilimits=(-3, 4), useMathText=True)
+        panel.yaxis.get_offset_text().set_fontsize(7)
+    return figure, panels
 
 
-def _view(axis: Any, result: CheckResult, i: int, j: int) -> None:
-    """Draw the structure over axes i and j (from 0) of the frame."""
-    c = result.columns
-    if "axis_1" in c:
-        r = np.stack([c[f"axis_{n}"] for n in (1, 2, 3)], axis=-1)
-        for across, EI, colour in ((2, "EI3", "C0"), (3, "EI2", "C1")):
-            half = HALF_WIDTH * np.sqrt(np.abs(c[EI] / c["EA"]))
-            ends = half[:, None] * np.stack([c[f"t{across}_{n}"] for n in (1, 2, 3)], axis=-1)
-            for end in (r + ends, r - ends):
-                axis.plot(end[:, i], end[:, j], lw=0.8, color=colour)
-            for place in np.linspace(0, len(r) - 1, 12).astype(int):
-                line = np.stack([r[place] - ends[place], r[place] + ends[place]])
-                axis.plot(line[:, i], line[:, j], lw=0.6, color=colour)
-        axis.plot(r[:, i], r[:, j], "k", lw=1.2)
-    elif result.triangles is not None:
-        x, y = list(result.nodes.values())[:2]
-        root = result.summary["root"]
-        places = np.stack([x + root[0], y + root[1], np.zeros(len(x)) + root[2]], axis=-1)
-        if (i, j) == (0, 1):
-            axis.triplot(places[:, 0], places[:, 1], result.triangles, lw=0.3, color="0.5")
+def lowest(panels: Sequence[Axes]) -> list[Axes]:
+    """Return the panels that have the labels of the abscissa."""
+    return [panel for panel in panels if panel.xaxis.get_tick_params()["labelbottom"]]
+
+
+def stacked(
+    data: Mapping[str, Array],
+    x: str,
+    columns: Sequence[str],
+    title: str,
+    units: Mapping[str, str] | None = None,
+    sizes: Mapping[str, Array] | None = None,
+) -> Figure:
+    """Return one panel a column over the common abscissa x, with marks where it is a position.
+
+    Args:
+        data: column ↦ values.
+        x: column of the abscissa.
+        columns: those that are drawn, but for those that are 0.
+        title: of the figure.
+        units: column ↦ unit of its values, where it is not the usual one.
+        sizes: column ↦ values by which it is 0 or not, where these are others; also drawn, as a range (low, high).
+    """
+    sizes = sizes or {}
+    zero = zeros({name: sizes.get(name, data[name]) for name in columns})
+    shown = [name for name in columns if name not in zero]
+    figure, panels = grid_of(len(shown), (5.0, 1.75), title, said_zero(zero))
+    for panel, name in zip(panels, shown, strict=True):
+        caption = described(name)[0]
+        if x == "t":
+            caption += history_line(panel, data[x], data[name])
         else:
-            axis.plot(places[:, i], places[:, j], "k", lw=1.2)
-    else:
-        x = result.nodes["x"] + result.summary["root"][0]
-        axis.plot(*(x if n == 0 else np.zeros(len(x)) for n in (i, j)), "k", lw=1.2)
-    center = result.summary["center_of_mass"]
-    axis.plot(center[i], center[j], "o", ms=6, mfc="none", color="C3")
-    axis.set_xlabel(f"{i + 1} (m)", fontsize=8)
-    axis.set_ylabel(f"{j + 1} (m)", fontsize=8)
-    axis.tick_params(labelsize=7)
-    axis.grid(True, lw=0.4, alpha=0.6)
-
-
-#: Relative changes below it are not drawn.
-ROUND_OFF = 1e-9
-
-
-def explain_figure(result: ExplainResult) -> Figure:
-    """Return a bar for every effect and theory: relative change of each output; a mark is the true change."""
-    rows, outputs = result.rows, result.summary["outputs"]
-    figure = Figure(figsize=(8, 0.45 * len(rows) + 1.4))
-    axis = figure.add_subplot()
-    shown = [v for row in rows for v in row["estimate"].values() if v and ROUND_OFF < v < np.inf]
-    left, right = 10 ** np.floor(np.log10(min([*shown, 1e-2]))) / 3, 3 * max([*shown, 1.0])
-    height = 0.8 / max(len(outputs), 1)
-    for j, output in enumerate(outputs):
-        for i, row in enumerate(rows):
-            known, at = row["estimate"].get(output, 0.0), i + (j - (len(outputs) - 1) / 2) * height
-            value = left if known is None else known
-            axis.barh(
-                at,
-                float(np.clip(value, left, right)) - left,
-                height,
-                left=left,
-                color=f"C{j}",
-                label=output if i == 0 else None,
-            )
-            if known is None:
-                axis.annotate("unknown", (left, at), (3, -3), textcoords="offset points", fontsize=8)
-            if not np.isfinite(value):
-                axis.annotate("fails", (right, at), (-3, -3), textcoords="offset points", fontsize=8, ha="right")
-            if output in row.get("truth", {}) and np.isfinite(row["truth"][output]):
-                truth = max(row["truth"][output], left)
-                axis.plot(truth, at, "k|", ms=9, mew=2, label="both models run" if i == j == 0 else None)
-    axis.axvline(1e-2, color="0.4", lw=0.8, ls="--")
-    axis.set_xscale("log")
-    axis.set_xlim(left, right)
-    names = [f"{'without' if row['included'] else 'with'} {row['name']}" for row in rows]
-    names = [n if row["kind"] == "effect" else row["name"] for n, row in zip(names, rows, strict=True)]
-    axis.set_yticks(range(len(rows)), names)
-    axis.invert_yaxis()
-    axis.set_xlabel("relative change of the output (–)")
-    figure.suptitle(f"{result.summary['name']}: what each effect and other theories change", fontsize=10)
-    axis.grid(True, axis="x", lw=0.4, alpha=0.6)
-    tall = figure.get_figheight()
-    figure.subplots_adjust(left=0.27, right=0.97, top=1 - 0.65 / tall, bottom=0.55 / tall)
-    figure.legend(fontsize=8, loc="upper right", ncols=4, bbox_to_anchor=(0.98, 1 - 0.28 / tall), frameon=False)
+            panel.plot(data[x], data[name], lw=1.2, marker=".", ms=4)
+        if name in sizes:
+            panel.fill_between(data[x], *sizes[name], alpha=0.2, lw=0.0)
+        panel.set_title(caption, fontsize=8, loc="left", pad=3)
+        panel.set_ylabel(shown_unit(name, (units or {}).get(name, "")), fontsize=8)
+        panel.set_xlim(data[x][0], data[x][-1])
+    for panel in lowest(panels):
+        panel.set_xlabel(label(x), fontsize=8)
+    figure.align_ylabels()
     return figure
 
 
-#: Part of the largest output of its unit below which one is round-off.
-SHOWN = 1e-9
+def said_zero(names: Sequence[str]) -> str:
+    """Return the line that says what has no panel."""
+    if not names:
+        return ""
+    listed = ", ".join(described(name)[0] for name in names[:6]) + (" …" if len(names) > 6 else "")
+    return f"0 (below {ZERO:.0e} of the largest of the unit): {listed}".replace("e-0", "e-")
+
+
+def history_line(axis: Axes, t: Array, y: Array) -> str:
+    """Draw a history, one of more than `PERIODS` periods as range and mean of stretches; return what to say of it."""
+    periods = len(find_peaks(y, prominence=PEAK * float(np.ptp(y)))[0]) if np.ptp(y) > 0.0 else 0
+    if periods <= PERIODS:
+        axis.plot(t, y, lw=1.0)
+        return ""
+    parts = np.array_split(np.arange(len(t)), STRETCHES)
+    middle = np.array([t[part].mean() for part in parts])
+    low, high, mean = (np.array([f(y[part]) for part in parts]) for f in (np.min, np.max, np.mean))
+    axis.fill_between(middle, low, high, alpha=0.35, lw=0.0)
+    axis.plot(middle, mean, lw=1.2)
+    return f", range and mean of {periods} periods"
+
+
+# --- runs -------------------------------------------------------------------------------------------------------------
+
+
+def history_figure(result: RunResult) -> Figure:
+    """Return the motion of the tip, and of the hub unless it turns at one speed: speed, angle and torque."""
+    units, history = ShownUnits.of(result.summary), result.history
+    tip = [name for name in history if name.startswith("tip_")]
+    hub = [name for name in ("psi_dot", "psi", "pitch", "torque") if name in history]
+    speed = history["psi_dot"]
+    title = result.title
+    if np.ptp(speed) <= ZERO * np.max(np.abs(speed)):
+        hub = [name for name in hub if not name.startswith("psi")]
+        title += f", {units.speeds(speed[0]):.6g} {units.speed}"
+    return stacked(history | {"psi_dot": units.speeds(speed)}, "t", [*tip, *hub], title, {"psi_dot": units.speed})
+
+
+def loads_figure(result: RunResult) -> Figure:
+    """Return forces and moments of the hub on the root over time."""
+    names = [name for name in result.history if name.startswith("root_")]
+    return stacked(result.history, "t", names, f"{result.title}, loads of the hub on the root")
+
+
+def shape_figure(result: RunResult) -> Figure:
+    """Return the components of a steady state along the structure."""
+    s = result.shape
+    return stacked(s, "x", [c for c in s if c != "x"], result.title + ", steady state")
+
+
+def stations_figure(stations: StationHistory, title: str) -> Figure:
+    """Return every quantity along a beam at the last time, and of a motion the range it has had."""
+    last = {"x": stations.x, **{name: values[-1] for name, values in stations.values.items()}}
+    if len(stations.t) < 2:
+        return stacked(last, "x", list(stations.values), title)
+    ranges = {name: np.stack([v.min(axis=0), v.max(axis=0)]) for name, v in stations.values.items()}
+    title += f", t = {stations.t[-1]:.6g} s, and the range over time"
+    return stacked(last, "x", list(stations.values), title, sizes=ranges)
+
+
+# --- small motions ----------------------------------------------------------------------------------------------------
+
+
+def shapes_figure(result: ModesResult) -> Figure:
+    """Return displacements and twist of all modes of a beam, scaled as in `ModesResult`; imaginary parts dashed.
+
+    Rotations of bending are the slopes of what is drawn, and left out.
+    """
+    shapes = result.shapes
+    rows = result.rows[len(result.rows) - len(shapes) :]  # a rigid-body mode comes first and has no shape
+    units = ShownUnits.of(result.summary)
+    names = [n for n in next(iter(shapes.values())) if (n.startswith("u") or n == "theta1") and not n.endswith("_imag")]
+    note = "largest displacement 1, imaginary parts dashed"
+    figure, panels = grid_of(len(shapes), (5.0, 1.75), f"{result.title}, {note}")
+    drawn = {}
+    for panel, columns, row in zip(panels, shapes.values(), rows, strict=True):
+        for c, name in enumerate(names):
+            size = np.max(np.hypot(columns[name], columns[f"{name}_imag"]))
+            if size > VISIBLE:
+                what = described(f"shape_{name}")[0].removeprefix("shape, ").replace("rotation", "twist")
+                drawn[name] = panel.plot(columns["x"], columns[name], lw=1.4, color=f"C{c}", label=what)[0]
+            if np.max(np.abs(columns[f"{name}_imag"])) > VISIBLE:
+                panel.plot(columns["x"], columns[f"{name}_imag"], lw=1.0, ls="--", color=f"C{c}")
+        panel.set_title(
+            f"{row['mode']}  {row['name']}, {units.frequencies(row['frequency']):.4g} {units.frequency}",
+            fontsize=8,
+            loc="left",
+            pad=3,
+        )
+        panel.set_xlim(columns["x"][0], columns["x"][-1])
+        panel.set_ylabel("shape (–)", fontsize=8)
+    for panel in lowest(panels):
+        panel.set_xlabel(label("x"), fontsize=8)
+    handles = [drawn[name] for name in names if name in drawn]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(names), fontsize=8, frameon=False)
+    return figure
 
 
 def response_figure(result: ResponseResult) -> Figure:
-    """Return amplitudes, direct and by modes (dashed), and phases over frequency, of tip and root.
+    """Return amplitudes, direct and by modes (dashed), and phases over frequency, of tip, root and hub.
 
-    What does not answer is left out.
+    A row has what is of one kind. Deep antiresonances are cut off.
     """
-    units, size = ShownUnits.of(result.summary), np.max(np.abs(result.direct), axis=0)
-    kinds = [described(name)[1] for name in result.outputs]
-    largest: dict[str, float] = {}
-    for kind, value in zip(kinds, size, strict=True):
-        largest[kind] = max(largest.get(kind, 0.0), float(value))
-    own = [not is_at_station(name) for name in result.outputs]
-    drawn = [i for i, kind in enumerate(kinds) if own[i] and size[i] > SHOWN * largest[kind]]
-    figure = Figure(figsize=(9, 2.2 * max(len(drawn), 1) + 2.4))
-    panels = figure.subplots(len(drawn) + 1, 1, sharex=True, squeeze=False)[:, 0]
+    units = ShownUnits.of(result.summary)
+    own = {name: i for i, name in enumerate(result.outputs) if not is_at_station(name)}
+    zero = zeros({name: np.abs(result.direct[:, i]) for name, i in own.items()})
+    shown = [name for name in own if name not in zero]
+    kinds = {name: (name.partition("_")[0], described(name)[1]) for name in shown}
+    rows = list(dict.fromkeys(kinds.values()))
+    figure = Figure(figsize=(10.0, 2.1 * max(len(rows), 1) + 1.2), layout="constrained")
+    at = f"{units.speeds(result.summary['speed']):.6g} {units.speed}"
+    notes = ["amplitudes by modes dashed", *filter(None, [said_zero(zero)])]
+    figure.suptitle(f"{result.title}, at {at}\n" + "; ".join(notes), fontsize=10)
+    panels = figure.subplots(max(len(rows), 1), 2, sharex=True, squeeze=False)
     x = units.frequencies(result.frequencies)
-    for axis, i in zip(panels, drawn, strict=False):
-        name = result.outputs[i]
-        axis.semilogy(x, np.abs(result.direct[:, i]), lw=1.4, color=f"C{i}")
-        axis.semilogy(x, np.abs(result.modal[:, i]), lw=1.0, ls="--", color="0.3")
-        axis.set_ylabel(label(name))
-        panels[-1].plot(x, np.degrees(np.angle(result.direct[:, i])), lw=1.2, color=f"C{i}", label=name)
-    panels[-1].set_ylabel("phase (°)")
-    panels[-1].set_yticks(np.arange(-180, 181, 90))
-    panels[-1].set_xlabel(f"frequency of the load ({units.frequency}); amplitudes by modes dashed")
-    if drawn:
-        panels[-1].legend(fontsize=8, ncols=len(drawn))
-    for axis in panels:
-        axis.grid(True, lw=0.4, alpha=0.6)
-    panels[0].set_title(f"{result.title}, at {units.speeds(result.summary['speed']):g} {units.speed}")
-    figure.align_ylabels()
-    height = figure.get_figheight()
-    figure.subplots_adjust(left=0.12, right=0.97, top=1 - 0.4 / height, bottom=0.55 / height, hspace=0.12)
+    for (left, right), kind in zip(panels, rows, strict=False):
+        names = [name for name in shown if kinds[name] == kind]
+        sizes = np.abs(result.direct[:, [own[name] for name in names]])
+        for c, name in enumerate(names):
+            direct, modal = result.direct[:, own[name]], np.abs(result.modal[:, own[name]])
+            left.semilogy(x, np.abs(direct), lw=1.3, color=f"C{c}")
+            left.semilogy(x, modal, lw=0.9, ls="--", color="0.3")
+            phase = np.degrees(np.angle(direct))
+            jumps = 1 + np.flatnonzero(np.abs(np.diff(phase)) > 180.0)
+            broken = np.insert(x, jumps, np.nan), np.insert(phase, jumps, np.nan)
+            right.plot(*broken, lw=1.2, color=f"C{c}", label=name_in_legend(name))
+        seen = max(0.3 * float(np.min(np.quantile(sizes, RARE, axis=0))), ZERO * float(np.max(sizes)))
+        left.set_ylim(seen, 3.0 * float(np.max(sizes)))
+        left.set_ylabel(f"amplitude {shown_unit(names[0])}", fontsize=8)
+        right.set_ylabel("phase (°)", fontsize=8)
+        right.set_yticks(np.arange(-180, 181, 90))
+        right.set_ylim(-190, 190)
+        right.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), fontsize=8, frameon=False)
+    for panel in panels.ravel():
+        panel.grid(**GRID)
+        panel.tick_params(labelsize=8)
+        panel.set_xlim(x[0], x[-1])
+    for panel in panels[-1]:
+        panel.set_xlabel(f"frequency of the load ({units.frequency})", fontsize=8)
     return figure
+
+
+def name_in_legend(name: str) -> str:
+    """Return what an output is in few words: "tip u₁", "root f₁", "angle ψ"."""
+    place, _, _ = name.partition("_")
+    return f"{place} {described(name)[0].split()[-1]}" if "_" in name else described(name)[0]

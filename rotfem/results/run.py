@@ -79,15 +79,9 @@ class StationHistory:
 
     def figure(self, title: str) -> Figure:
         """Return every quantity along the beam at the last time, and of a motion the range it has had."""
-        from rotfem.results.plots import stacked
+        from rotfem.results.plots import stations_figure
 
-        last = {"x": self.x, **{name: values[-1] for name, values in self.values.items()}}
-        figure = stacked(last, "x", list(self.values), title)
-        if len(self.t) > 1:
-            for axis, values in zip(figure.axes, self.values.values(), strict=True):
-                axis.fill_between(self.x, values.min(axis=0), values.max(axis=0), alpha=0.2, lw=0.0)
-            figure.axes[0].set_title(f"{title}, t = {self.t[-1]:.6g} s, and the range over time", fontsize=9)
-        return figure
+        return stations_figure(self, title)
 
 
 Array = npt.NDArray[np.float64]
@@ -191,13 +185,15 @@ class RunResult(Result):
         return [lambda folder: stations.write_hdf5(folder / "stations.h5"), *self.further]
 
     def drawings(self) -> dict[str, Callable[[], Figure]]:
-        """Return history.png of a time history, shape.png of a steady state and of plates."""
+        """Return history.png and loads.png of a time history, shape.png of a steady state and of plates."""
         from rotfem.results import plots, plots_plate
 
         over_time = len(self.history.get("t", ())) > 1
         out: dict[str, Callable[[], Figure]] = {}
         if over_time:
             out["history.png"] = partial(plots.history_figure, self)
+            if any(name.startswith("root_") for name in self.history):
+                out["loads.png"] = partial(plots.loads_figure, self)
         if self.shape and self.triangles is not None:
             out["shape.png"] = partial(plots_plate.shape_figure, self)
         elif self.shape and not over_time:

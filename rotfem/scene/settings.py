@@ -328,16 +328,42 @@ class Time(SceneModel):
         return self
 
 
+def _as_orders(value: Any) -> tuple[int, ...]:
+    integer = Bounds(ge=1).integer
+    if not isinstance(value, list | tuple) or len(value) > ORDERS:
+        raise problem("", value, f"must be a list of at most {ORDERS} multiples of the speed, such as [1, 3, 6, 9]")
+    return tuple(sorted({integer(k) for k in value}))
+
+
+def _as_speed_range(value: Any) -> tuple[float, float]:
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise problem("", value, "must be two speeds, [lowest, highest] (rad/s)")
+    low, high = (Bounds(ge=0.0).number(speed) for speed in value)
+    if not low < high:
+        raise problem("", value, "must be two speeds that increase")
+    return low, high
+
+
+#: Most lines kΩ of a diagram.
+ORDERS = 100
+
+
 class Modes(SceneModel):
     """The [modes] table.
 
     Attributes:
         count: number of modes.
         about: state about which the motion is small: "steady" (deformed equilibrium) or "undeformed".
+        orders: k of the lines kΩ of a Campbell diagram, whose crossings are critical speeds; chosen if None.
+        rated: rated speed of the rotor, which the diagram marks, rad/s.
+        operating: lowest and highest speed of operation, which the diagram marks, rad/s.
     """
 
     count: Count = 6
     about: Literal["steady", "undeformed"] = "steady"
+    orders: Annotated[tuple[int, ...] | None, PlainValidator(_as_orders)] = None
+    rated: Positive | None = None
+    operating: Annotated[tuple[float, float] | None, PlainValidator(_as_speed_range)] = None
 
 
 class Solver(SceneModel):

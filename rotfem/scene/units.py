@@ -61,6 +61,7 @@ _KEYS: dict[str, dict[Unit, str]] = {
         "Pa": "pressure",
         "m": "at.x",
     },
+    "modes": {"rad/s": "rated operating"},
     "output": {"m": "stations"},
     "time": {"s": "end step max_step min_step output_step"},
 }

@@ -15,7 +15,7 @@ from rotfem.commands.cost.result import CostResult
 from rotfem.errors import OutputError
 from rotfem.results import CampbellResult, CriticalSpeed, ExplainResult, Instability, ModesResult, Result, RunResult
 from rotfem.results.columns import described, label
-from rotfem.results.plots import plot, spread
+from rotfem.results.plots import plot
 from rotfem.scene import Scene
 
 T = np.array([0.0, 0.5, 1.0])
@@ -43,9 +43,33 @@ def shape(scale: complex) -> dict[str, Any]:
 def modes(stability: str = "stable") -> ModesResult:
     """Return a rigid-body mode and two others, at 6 rad/s."""
     rows = [
-        {"mode": 1, "label": "rigid body", "frequency": 0.0, "growth": 0.0, "stability": "neutral", "share_hub": 1.0},
-        {"mode": 2, "label": "lag 1", "frequency": 4.0, "growth": -3.0, "stability": "stable", "share_hub": 0.1},
-        {"mode": 3, "label": "lag 2", "frequency": 12.0, "growth": 0.5, "stability": stability, "share_hub": 0.2},
+        {
+            "mode": 1,
+            "label": "rigid body",
+            "name": "rigid body",
+            "frequency": 0.0,
+            "growth": 0.0,
+            "stability": "neutral",
+            "share_hub": 1.0,
+        },
+        {
+            "mode": 2,
+            "label": "lag 1",
+            "name": "1st edgewise",
+            "frequency": 4.0,
+            "growth": -3.0,
+            "stability": "stable",
+            "share_hub": 0.1,
+        },
+        {
+            "mode": 3,
+            "label": "lag 2",
+            "name": "2nd edgewise",
+            "frequency": 12.0,
+            "growth": 0.5,
+            "stability": stability,
+            "share_hub": 0.2,
+        },
     ]
     for row in rows:
         size = abs(complex(row["growth"], row["frequency"]))
@@ -59,7 +83,15 @@ def plate_modes() -> ModesResult:
     columns = {"x": np.array([0.0, 1.0, 0.0]), "y": np.array([0.0, 0.0, 1.0])}
     for name in ("u1", "u2", "u3"):
         columns |= {name: np.array([0.0, 0.0, float(name == "u3")]), f"{name}_imag": np.zeros(3)}
-    row = {"mode": 1, "label": "flap 1", "frequency": 2.0, "growth": 0.0, "stability": "stable", "turning": 0.0}
+    row = {
+        "mode": 1,
+        "label": "flap 1",
+        "name": "1st flapwise",
+        "frequency": 2.0,
+        "growth": 0.0,
+        "stability": "stable",
+        "turning": 0.0,
+    }
     result = ModesResult(summary(command="modes", speed=0.0), [row], {"mode 1: flap 1": columns})
     result.triangles = np.array([[0, 1, 2]])
     return result
@@ -81,6 +113,7 @@ def campbell() -> CampbellResult:
             {"branch": 2, "label": "axial 1", "name": "1st axial"},
         ],
         per_rev=2,
+        orders=[1, 2],
         critical_speeds=[
             {"speed": 3.0, "kind": "per_rev", "order": 2, "branch": 1, "per_rev": 2, "frequency": 6.0, "label": "lag 1"}
             | {"name": "1st edgewise"}
@@ -350,8 +383,3 @@ def test_plot_of_a_drawing_by_its_name() -> None:
     assert empty.title == "beam: reissner (failed)"
     with pytest.raises(ValueError, match="none, as too little was computed"):
         empty.plot()
-
-
-def test_labels_that_would_hide_one_another_are_spread() -> None:
-    assert spread([5.0, 1.0, 1.0, 1.5], 1.0) == [5.0, 1.0, 2.0, 3.0]
-    assert spread([3.0, 2.0], 0.5) == [3.0, 2.0]

@@ -207,7 +207,7 @@ class Bench:
         diagram = Diagram(variant, problem, speeds, self.comm, None)
 
         def go() -> tuple[Array, tuple[int, int, int]]:
-            result = diagram.result(None, lambda share: None, started)
+            result = diagram.result(lambda share: None, started)
             rows = sorted((r["speed"], r["frequency"]) for r in result.rows if not r["refined"])
             values = np.array([[frequency] for _, frequency in rows])
             return values, (result.summary["dofs"], result.summary["speeds_solved"], 0)

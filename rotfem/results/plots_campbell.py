@@ -1,0 +1,291 @@
+"""The Campbell diagram: frequencies over speed with lines kΩ and critical speeds, and damping ratios below them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from scipy.optimize import isotonic_regression
+
+from rotfem.results.columns import ZERO, label
+from rotfem.results.plots import GRID
+from rotfem.results.units import ShownUnits
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from rotfem.results.campbell import CampbellResult
+
+Array = npt.NDArray[np.float64]
+
+#: Room above the highest mode that is drawn, part of its frequency.
+ROOM = 0.06
+
+#: Height of a name at the end of a line, and width of one of a line kΩ, inch.
+NAME_HEIGHT, ORDER_WIDTH = 0.16, 0.42
+
+#: Width of the diagram, and height of the frequencies over the damping ratios, inch.
+WIDTH, HEIGHT, DAMPING_HEIGHT = 9.0, 4.8, 1.6
+
+#: Columns of the legend below.
+LEGEND_COLUMNS = 3
+
+#: Most modes above the diagram that are named there.
+NAMED = 4
+
+
+@dataclass(frozen=True)
+class Branch:
+    """A branch as it is drawn, in the units that are shown.
+
+    Attributes:
+        name: of its mode, as engineers say.
+        number: from 1 on, decides the colour.
+        speed, frequency, damping: over the speeds solved; damping ratios in per cent.
+        doubtful: whether the step to a speed from the one before is ambiguous.
+        unstable: whether the mode grows there.
+    """
+
+    name: str
+    number: int
+    speed: Array
+    frequency: Array
+    damping: Array
+    doubtful: npt.NDArray[np.bool_]
+    unstable: npt.NDArray[np.bool_]
+
+    @property
+    def style(self) -> dict[str, Any]:
+        """Colour and dashes: waves against the spin are dashed."""
+        return {"color": f"C{(self.number - 1) % 10}", "ls": "--" if "backward" in self.name else "-"}
+
+
+def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
+    """Return frequencies over speed, lines kΩ with their crossings, what is unstable, and damping where there is any.
+
+    The diagram reaches up to the lowest mode that no line meets; higher ones are named above it.
+
+    Args:
+        result: the branches.
+        fixed: whether modes of a rotor in the rotating frame are drawn as the fixed one sees them, with the line Ω and
+            the synchronous critical speeds.
+    """
+    units, branches = ShownUnits.of(result.summary), drawn_branches(result, fixed)
+    rise = float(units.frequencies(1.0) / units.speeds(1.0))  # of the line 1Ω
+    orders = [1] if fixed else result.summary["orders"]
+    last = max(float(b.speed[-1]) for b in branches)
+    shown = branches if fixed or not orders else of_interest(branches, max(orders) * rise)
+    top = (1.0 + ROOM) * max(float(np.max(b.frequency)) for b in shown)
+    damped = any(np.nanmax(np.abs(b.damping)) > 0.0 for b in shown)
+    heights = [max(HEIGHT, (len(shown) + len(orders) + 1) * NAME_HEIGHT), DAMPING_HEIGHT][: 1 + damped]
+    figure = Figure(figsize=(WIDTH, sum(heights)), layout=ConstrainedLayoutEngine(w_pad=0.1))
+    panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+    axis = panels[0]
+    for panel in panels:
+        panel.grid(**GRID)
+        entries = marks(panel, result, units, last)
+    for b in shown:
+        axis.plot(b.speed, b.frequency, lw=1.6, **b.style)
+        axis.plot(b.speed[b.unstable], b.frequency[b.unstable], "x", ms=5, color="C3", zorder=3)
+        for i in np.flatnonzero(b.doubtful):
+            axis.plot(b.speed[i - 1 : i + 1], b.frequency[i - 1 : i + 1], lw=7, color="0.6", alpha=0.5, zorder=1)
+        if damped:
+            panels[1].plot(b.speed, b.damping, lw=1.4, **b.style)
+    rays = [(f"{k}Ω" if k > 1 else "Ω", k * rise) for k in orders]
+    for _, slope in rays:
+        axis.plot([0.0, min(last, top / slope)], [0.0, min(last * slope, top)], lw=0.8, ls=":", color="0.4", zorder=1)
+    entries += crossings(axis, result, units, fixed)
+    axis.set_xlim(min(0.0, *(float(b.speed[0]) for b in branches)), last)
+    axis.set_ylim(0.0, top)
+    name_lines(axis, shown, rays, (heights[0], last, top))
+    above = [b for b in branches if b not in shown]
+    names = [f"↑ {b.name}, {b.frequency[-1]:.3g} {units.frequency}" for b in above[:NAMED]]
+    names += [f"↑ {len(above) - NAMED} more"] if len(above) > NAMED else []
+    axis.annotate(
+        "\n".join(reversed(names)),
+        (1.0, 1.0),
+        xytext=(14, 4),
+        xycoords="axes fraction",
+        textcoords="offset points",
+        fontsize=7,
+        color="0.4",
+        va="bottom",
+    )
+    seen = "frequency_fixed" if fixed or result.summary.get("frame") == "fixed" else "frequency"
+    axis.set_ylabel(label(seen, units.frequency))
+    if damped:
+        panels[1].set_ylabel("damping ratio (%)")
+        panels[1].axhline(0.0, lw=0.8, color="0.4", zorder=1)
+    panels[-1].set_xlabel(label("psi_dot", units.speed))
+    figure.suptitle(result.title, fontsize=11)
+    entries += line_entries(shown)
+    around = 1.1 + 0.2 * -(-len(entries) // LEGEND_COLUMNS) + 0.12 * len(names) + 0.2 * damped
+    figure.set_figheight(sum(heights) + around)
+    if entries:
+        figure.legend(handles=entries, loc="outside lower center", ncols=LEGEND_COLUMNS, fontsize=8, frameon=False)
+    return figure
+
+
+def drawn_branches(result: CampbellResult, fixed: bool) -> list[Branch]:
+    """Return the branches in the units that are shown; each passes through its critical speeds, where it may touch 0.
+
+    Args:
+        result: the diagram.
+        fixed: whether frequencies are those in the fixed frame.
+    """
+    units, out = ShownUnits.of(result.summary), []
+    ambiguous = {(int(a["branch"]), float(a["speed"])) for a in result.summary["ambiguous"]}
+    for named, columns in zip(result.summary["branches"], result.branches().values(), strict=True):
+        number, speed = named["branch"], columns["speed"]
+        frequency = columns["frequency_fixed" if fixed else "frequency"]
+        small = np.abs(columns["damping"]) <= np.maximum(ZERO, columns.get("error_bound", 0.0))
+        unstable = columns["growth"] > 1e-6 * (np.abs(columns["frequency"]) + np.abs(columns["growth"]))
+        further = [
+            (c.speed, seen_fixed(c) if fixed else c.frequency)
+            for c in result.critical_speeds
+            if c.branch == number and c.kind != "per_rev" and c.speed not in speed
+        ]
+        at = np.searchsorted(speed, [s for s, _ in further])
+        out.append(
+            Branch(
+                named["name"],
+                number,
+                units.speeds(np.insert(speed, at, [s for s, _ in further])),
+                units.frequencies(np.insert(frequency, at, [f for _, f in further])),
+                100.0 * np.insert(np.where(small, 0.0, columns["damping"]), at, np.nan),
+                np.insert(np.array([(number, float(s)) in ambiguous for s in speed]), at, False),
+                np.insert(unstable, at, False),
+            )
+        )
+    return out
+
+
+def seen_fixed(critical: Any) -> float:
+    """Return the frequency in the fixed frame at a synchronous critical speed, rad/s: a wave of a disk stands still."""
+    return 0.0 if critical.per_rev == critical.order else float(critical.speed)
+
+
+def of_interest(branches: list[Branch], steepest: float) -> list[Branch]:
+    """Return the branches that the steepest line kΩ meets or passes, the next above, and what lies among them."""
+    met = [np.any((b.frequency <= steepest * np.abs(b.speed)) | b.unstable) for b in branches]
+    others = [float(np.min(b.frequency)) for b, there in zip(branches, met, strict=True) if not there]
+    bottom = min(others, default=np.inf)
+    top = max((float(np.max(b.frequency)) for b, there in zip(branches, met, strict=True) if there), default=0.0)
+    shown: list[Branch] = []
+    while True:  # a branch that begins in the diagram is drawn as far as it goes
+        found = [b for b in branches if np.min(b.frequency) <= max(top, bottom)]
+        if len(found) == len(shown):
+            return found
+        shown, top = found, max(float(np.max(b.frequency)) for b in found)
+
+
+def marks(axis: Axes, result: CampbellResult, units: ShownUnits, last: float) -> list[Any]:
+    """Draw rated speed, operating range and ranges of instability as far as they are given; return legend entries."""
+    summary, entries = result.summary, list[Any]()
+    if "operating" in summary:
+        low, high = units.speeds(summary["operating"])
+        axis.axvspan(low, high, color="0.9", lw=0.0, zorder=0)
+        entries.append(Patch(color="0.9", label=f"operating range, {low:.5g} to {high:.5g} {units.speed}"))
+    if "rated" in summary:
+        rated = float(units.speeds(summary["rated"]))
+        style: dict[str, Any] = {"color": "k", "lw": 1.0, "ls": (0, (6, 2, 1, 2))}
+        axis.axvline(rated, zorder=1, **style)
+        entries.append(Line2D([], [], label=f"rated speed, {rated:.5g} {units.speed}", **style))
+    for kind, color in (("dynamic instability", "C3"), ("static instability", "C1")):
+        ranges = [onset for onset in summary["instabilities"] if onset["kind"] == kind]
+        for onset in ranges:
+            end = last if onset["until"] is None else float(units.speeds(onset["until"]))
+            axis.axvspan(float(units.speeds(onset["speed"])), end, color=color, alpha=0.12, lw=0.0, zorder=0)
+        if ranges:
+            first = float(units.speeds(ranges[0]["speed"]))
+            entries.append(Patch(color=color, alpha=0.2, label=f"{kind} from {first:.5g} {units.speed}"))
+    return entries
+
+
+def crossings(axis: Axes, result: CampbellResult, units: ShownUnits, fixed: bool) -> list[Line2D]:
+    """Draw critical speeds, synchronous ones filled; return their legend entries."""
+    entries = []
+    for synchronous, name in ((True, "synchronous critical speed"), (False, "crossing with kΩ")):
+        there = [c for c in result.critical_speeds if (c.kind != "per_rev") == synchronous]
+        if not there or (fixed and not synchronous):
+            continue
+        style: dict[str, Any] = {"marker": "o", "ls": "", "color": "k", "ms": 5 if synchronous else 4}
+        style |= {} if synchronous else {"mfc": "white"}
+        height = [seen_fixed(c) if fixed else c.frequency for c in there]
+        speeds, heights = units.speeds([c.speed for c in there]), units.frequencies(height)
+        axis.plot(speeds, heights, **style, clip_on=False, zorder=4)
+        entries.append(Line2D([], [], label=name, **style))
+    return entries
+
+
+def line_entries(branches: list[Branch]) -> list[Line2D]:
+    """Return the legend entries of dashes, crosses and broad lines, as far as there are some."""
+    kinds = (
+        (any(b.style["ls"] == "--" for b in branches), "backward", {"color": "0.3", "ls": "--"}),
+        (any(np.any(b.unstable) for b in branches), "grows", {"color": "C3", "ls": "", "marker": "x"}),
+        (any(np.any(b.doubtful) for b in branches), "ambiguous", {"color": "0.6", "lw": 7, "alpha": 0.5}),
+    )
+    return [Line2D([], [], label=name, **style) for there, name, style in kinds if there]
+
+
+def name_lines(
+    axis: Axes, branches: list[Branch], rays: list[tuple[str, float]], extent: tuple[float, float, float]
+) -> None:
+    """Write the names of the branches at their ends, and of the lines kΩ where they leave the diagram.
+
+    Args:
+        axis: of the frequencies.
+        branches: those drawn.
+        rays: (name, slope) of the lines kΩ.
+        extent: height of the axis, inch; last speed and highest frequency.
+    """
+    height, last, top = extent
+    ends = [(b.name, float(b.speed[-1]), float(b.frequency[-1]), str(b.style["color"])) for b in branches]
+    ends += [(name, last, slope * last, "0.4") for name, slope in rays if slope * last <= top]
+    places = spread([y for _, _, y, _ in ends], NAME_HEIGHT / height * top, (0.0, top))
+    for (name, x, y, color), place in zip(ends, places, strict=True):
+        axis.annotate(
+            name,
+            (x, y),
+            xytext=(1.02, place),
+            textcoords=axis.get_yaxis_transform(),
+            annotation_clip=False,
+            fontsize=8,
+            color=color,
+            va="center",
+            arrowprops={"arrowstyle": "-", "lw": 0.6, "color": color, "shrinkA": 1, "shrinkB": 0},
+        )
+    leaving = [(name, top / slope) for name, slope in rays if slope * last > top]
+    at = spread([x for _, x in leaving], ORDER_WIDTH / (WIDTH - 3.0) * last, (0.0, last))
+    for (name, _), place in zip(leaving, at, strict=True):
+        axis.annotate(
+            name,
+            (place, top),
+            xytext=(0, 3),
+            textcoords="offset points",
+            annotation_clip=False,
+            fontsize=8,
+            color="0.4",
+            ha="center",
+        )
+
+
+def spread(values: list[float], gap: float, limits: tuple[float, float]) -> list[float]:
+    """Return the values closest to those given that are `gap` apart and within limits, so that labels can be read.
+
+    By least squares: with y_i = z_i + i gap in the order of the values, z is their isotonic regression.
+    """
+    if not values:
+        return []
+    order = np.argsort(values, kind="stable")
+    steps = min(gap, (limits[1] - limits[0]) / max(len(values) - 1, 1)) * np.arange(len(values))
+    z = isotonic_regression(np.asarray(values)[order] - steps).x
+    out = np.empty(len(values))
+    out[order] = np.clip(z, limits[0], limits[1] - steps[-1]) + steps
+    return [float(y) for y in out]

@@ -1,0 +1,139 @@
+"""Figures of what a scene is and what it calls for: the structure with its properties, the size of each effect."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from rotfem.results.check import CheckResult
+    from rotfem.results.explain import ExplainResult
+
+#: Panels of properties: names in one panel, its label, whether on a logarithmic axis.
+PANELS = (
+    (("mass_per_length",), "mass (kg/m)", False),
+    (("EA", "GA", "GA2", "GA3"), "EA, GA (N)", True),
+    (("EI", "EI2", "EI3", "GJ"), "EI, GJ (N·m²)", True),
+    (("rotary_inertia", "rotary_inertia2", "rotary_inertia3"), "inertia (kg·m)", False),
+    (("pretwist",), "pretwist (°)", False),
+    (("mass_center_y", "tension_center_y", "shear_center_y"), "centres, y (m)", False),
+    (("mass_center_z", "tension_center_z", "shear_center_z"), "centres, z (m)", False),
+)
+
+#: What is drawn of a section is as wide as the rectangle of its radius of gyration.
+HALF_WIDTH = np.sqrt(3.0)
+
+
+def check_figure(result: CheckResult) -> Figure:
+    """Return the structure as seen along axes 3, 2 and 1 with its centre of mass, and properties along a beam."""
+    columns = result.columns
+    there = [(tuple(n for n in names if n in columns), title, log) for names, title, log in PANELS]
+    panels = [panel for panel in there if any(np.any(columns[n]) for n in panel[0])]
+    figure = Figure(figsize=(10, 4.2 + 1.25 * len(panels)))
+    grid = figure.add_gridspec(2 + len(panels), 4, height_ratios=[1.7, 1.7, *[1.0] * len(panels)])
+    views = ((grid[0, :3], 0, 1), (grid[1, :3], 0, 2), (grid[:2, 3], 1, 2))
+    for spot, i, j in views:
+        axis = figure.add_subplot(spot)
+        _view(axis, result, i, j)
+    first = None
+    for row, (names, title, logarithmic) in enumerate(panels, start=2):
+        axis = figure.add_subplot(grid[row, :], sharex=first)
+        first = first or axis
+        for name in names:
+            values = np.degrees(columns[name]) if name == "pretwist" else columns[name]
+            axis.plot(columns["x"], values, lw=1.3, label=name)
+        if logarithmic and all(np.all(columns[name] > 0.0) for name in names):
+            axis.set_yscale("log")
+        axis.set_ylabel(title, fontsize=8)
+        axis.grid(True, lw=0.4, alpha=0.6)
+        if len(names) > 1:
+            axis.legend(fontsize=7, ncols=4)
+        axis.tick_params(labelsize=7)
+    if first is not None:
+        axis.set_xlabel("position X along the axis (m)")
+    s = result.summary
+    figure.suptitle(f"{s['name']}: {s['mass']:.6g} kg, {s['length']:.6g} m", fontsize=10)
+    figure.subplots_adjust(left=0.09, right=0.97, top=0.95, bottom=0.06, hspace=0.45, wspace=0.35)
+    return figure
+
+
+def _view(axis: Any, result: CheckResult, i: int, j: int) -> None:
+    """Draw the structure over axes i and j (from 0) of the frame."""
+    c = result.columns
+    if "axis_1" in c:
+        r = np.stack([c[f"axis_{n}"] for n in (1, 2, 3)], axis=-1)
+        for across, EI, colour in ((2, "EI3", "C0"), (3, "EI2", "C1")):
+            half = HALF_WIDTH * np.sqrt(np.abs(c[EI] / c["EA"]))
+            ends = half[:, None] * np.stack([c[f"t{across}_{n}"] for n in (1, 2, 3)], axis=-1)
+            for end in (r + ends, r - ends):
+                axis.plot(end[:, i], end[:, j], lw=0.8, color=colour)
+            for place in np.linspace(0, len(r) - 1, 12).astype(int):
+                line = np.stack([r[place] - ends[place], r[place] + ends[place]])
+                axis.plot(line[:, i], line[:, j], lw=0.6, color=colour)
+        axis.plot(r[:, i], r[:, j], "k", lw=1.2)
+    elif result.triangles is not None:
+        x, y = list(result.nodes.values())[:2]
+        root = result.summary["root"]
+        places = np.stack([x + root[0], y + root[1], np.zeros(len(x)) + root[2]], axis=-1)
+        if (i, j) == (0, 1):
+            axis.triplot(places[:, 0], places[:, 1], result.triangles, lw=0.3, color="0.5")
+        else:
+            axis.plot(places[:, i], places[:, j], "k", lw=1.2)
+    else:
+        x = result.nodes["x"] + result.summary["root"][0]
+        axis.plot(*(x if n == 0 else np.zeros(len(x)) for n in (i, j)), "k", lw=1.2)
+    center = result.summary["center_of_mass"]
+    axis.plot(center[i], center[j], "o", ms=6, mfc="none", color="C3")
+    axis.set_xlabel(f"{i + 1} (m)", fontsize=8)
+    axis.set_ylabel(f"{j + 1} (m)", fontsize=8)
+    axis.tick_params(labelsize=7)
+    axis.grid(True, lw=0.4, alpha=0.6)
+
+
+#: Relative changes below it are not drawn.
+ROUND_OFF = 1e-9
+
+
+def explain_figure(result: ExplainResult) -> Figure:
+    """Return a bar for every effect and theory: relative change of each output; a mark is the true change."""
+    rows, outputs = result.rows, result.summary["outputs"]
+    figure = Figure(figsize=(8, 0.45 * len(rows) + 1.4))
+    axis = figure.add_subplot()
+    shown = [v for row in rows for v in row["estimate"].values() if v and ROUND_OFF < v < np.inf]
+    left, right = 10 ** np.floor(np.log10(min([*shown, 1e-2]))) / 3, 3 * max([*shown, 1.0])
+    height = 0.8 / max(len(outputs), 1)
+    for j, output in enumerate(outputs):
+        for i, row in enumerate(rows):
+            known, at = row["estimate"].get(output, 0.0), i + (j - (len(outputs) - 1) / 2) * height
+            value = left if known is None else known
+            axis.barh(
+                at,
+                float(np.clip(value, left, right)) - left,
+                height,
+                left=left,
+                color=f"C{j}",
+                label=output if i == 0 else None,
+            )
+            if known is None:
+                axis.annotate("unknown", (left, at), (3, -3), textcoords="offset points", fontsize=8)
+            if not np.isfinite(value):
+                axis.annotate("fails", (right, at), (-3, -3), textcoords="offset points", fontsize=8, ha="right")
+            if output in row.get("truth", {}) and np.isfinite(row["truth"][output]):
+                truth = max(row["truth"][output], left)
+                axis.plot(truth, at, "k|", ms=9, mew=2, label="both models run" if i == j == 0 else None)
+    axis.axvline(1e-2, color="0.4", lw=0.8, ls="--")
+    axis.set_xscale("log")
+    axis.set_xlim(left, right)
+    names = [f"{'without' if row['included'] else 'with'} {row['name']}" for row in rows]
+    names = [n if row["kind"] == "effect" else row["name"] for n, row in zip(names, rows, strict=True)]
+    axis.set_yticks(range(len(rows)), names)
+    axis.invert_yaxis()
+    axis.set_xlabel("relative change of the output (–)")
+    figure.suptitle(f"{result.summary['name']}: what each effect and other theories change", fontsize=10)
+    axis.grid(True, axis="x", lw=0.4, alpha=0.6)
+    tall = figure.get_figheight()
+    figure.subplots_adjust(left=0.27, right=0.97, top=1 - 0.65 / tall, bottom=0.55 / tall)
+    figure.legend(fontsize=8, loc="upper right", ncols=4, bbox_to_anchor=(0.98, 1 - 0.28 / tall), frameon=False)
+    return figure

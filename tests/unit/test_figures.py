@@ -1,0 +1,251 @@
+"""What a reader of a figure needs: no text over another or cut off, units on axes, data inside, legends beside them.
+
+Judged on the figure as Matplotlib lays it out, of results made by hand.
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from rotfem.results import CampbellResult, ModesResult, RunResult
+from rotfem.results.plots_campbell import campbell_figure, spread
+from rotfem.results.response import ResponseResult
+
+#: Pixels by which boxes of texts may touch: they are those of the font, not of its letters.
+TOUCH = 1.0
+
+
+def drawn_texts(figure: Figure) -> list[tuple[str, Any]]:
+    """Return (text, box in pixels) of everything written in a figure; of ticks those within the limits."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    ticks = [tick for axes in figure.axes for axis in (axes.xaxis, axes.yaxis) for tick in axis.get_major_ticks()]
+    every = [tick for axes in figure.axes for axis in (axes.xaxis, axes.yaxis) for tick in axis.get_minor_ticks()]
+    of_ticks = {id(text) for tick in (*ticks, *every) for text in (tick.label1, tick.label2)}
+    found = [text for text in figure.findobj(Text) if id(text) not in of_ticks and text.get_visible()]
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            shown = [tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
+            found += [tick.label1 for tick in shown if tick.label1.get_visible()]
+    renderer = canvas.get_renderer()
+    # that of an annotation would have its arrow too
+    return [(text.get_text(), Text.get_window_extent(text, renderer)) for text in found if text.get_text().strip()]
+
+
+def check(figure: Figure) -> None:
+    """Assert what holds of every figure."""
+    boxes = drawn_texts(figure)
+    for text, box in boxes:
+        inside = box.x0 >= -TOUCH and box.y0 >= -TOUCH
+        inside &= box.x1 <= figure.bbox.x1 + TOUCH and box.y1 <= figure.bbox.y1 + TOUCH
+        assert inside, f"{text!r} is cut off"
+    for (one, a), (other, b) in combinations(boxes, 2):
+        width, height = min(a.x1, b.x1) - max(a.x0, b.x0), min(a.y1, b.y1) - max(a.y0, b.y0)
+        assert min(width, height) <= TOUCH, f"{one!r} lies over {other!r}"
+    legends = [*figure.legends, *(axes.get_legend() for axes in figure.axes if axes.get_legend())]
+    for legend in legends:
+        box = legend.get_window_extent()
+        assert not any(box.overlaps(axes.bbox) for axes in figure.axes), "a legend lies over data"
+    for axes in figure.axes:
+        for name in (axes.get_xlabel(), axes.get_ylabel()):
+            assert not name or re.search(r"\([^()]+\)$", name), f"no unit in {name!r}"
+        assert axes.get_ylabel() or axes.get_xlabel()
+        within(axes)
+
+
+def within(axes: Axes) -> None:
+    """Assert that the limits of an axis with a linear scale hold all points of its lines."""
+    (left, right), (low, high) = sorted(axes.get_xlim()), sorted(axes.get_ylim())
+    for line in axes.get_lines():
+        if line.get_transform() != axes.transData or axes.get_yscale() != "linear":
+            continue  # those of a whole axis
+        x, y = (np.asarray(values, dtype=float) for values in line.get_data())
+        there = np.isfinite(x) & np.isfinite(y)
+        slack = 1e-9 * (high - low)
+        assert np.all((x[there] >= left) & (x[there] <= right))
+        assert np.all((y[there] >= low - slack) & (y[there] <= high + slack))
+
+
+def said(**more: Any) -> dict[str, Any]:
+    return {"name": "blade", "theory": "reissner", "status": "done", "warnings": [], **more}
+
+
+# --- Campbell diagrams ------------------------------------------------------------------------------------------------
+
+SPEEDS = np.linspace(0.0, 2.0, 9)
+BLADE = {"1st flapwise": 4.2, "1st edgewise": 6.7, "2nd flapwise": 12.0, "2nd edgewise": 12.1, "3rd flapwise": 27.0}
+FURTHER = {"1st torsion": 35.0, "4th flapwise": 44.0, "3rd edgewise": 50.0, "2nd torsion": 60.0, "5th flapwise": 70.0}
+
+
+def diagram(frequencies: dict[str, float], damping: float = 0.0, **more: Any) -> CampbellResult:
+    """Return branches of squared frequencies ω₀² + 1.3 Ω², and where they meet kΩ."""
+    rows, crossings = [], []
+    for branch, (name, at_rest) in enumerate(frequencies.items(), start=1):
+        for speed in SPEEDS:
+            values = {"frequency": float(np.hypot(at_rest, np.sqrt(1.3) * speed)), "damping": damping, "growth": 0.0}
+            rows.append({"speed": float(speed), "branch": branch, "label": name, "mode": name, **values, "refined": 0})
+        for k in more.get("orders", [1, 2, 3, 4]):
+            if k**2 > 1.3 and (speed := at_rest / np.sqrt(k**2 - 1.3)) < SPEEDS[-1]:
+                place = {"speed": speed, "kind": "per_rev", "order": k, "per_rev": k, "frequency": k * speed}
+                crossings.append({**place, "branch": branch, "label": name, "name": name})
+    branches = [{"branch": i, "label": name, "name": name} for i, name in enumerate(frequencies, start=1)]
+    found = {"critical_speeds": crossings, "instabilities": [], "ambiguous": [], "orders": [1, 2, 3, 4]}
+    units = {"scene": {"output": {"speed": "rpm", "frequency": "Hz"}}}
+    rows.sort(key=lambda row: row["speed"])
+    return CampbellResult(said(branches=branches, **(found | units | more)), rows)
+
+
+@pytest.mark.parametrize("orders", [[1, 2, 3, 4], [1, 3, 6, 9], list(range(1, 16)), []])
+@pytest.mark.parametrize("frequencies", [BLADE, BLADE | FURTHER])
+def test_a_campbell_diagram_can_be_read(frequencies: dict[str, float], orders: list[int]) -> None:
+    onsets = [{"speed": 1.5, "kind": "dynamic instability", "until": None}]
+    doubts = [{"branch": 1, "speed": 1.0, "confidence": 0.3}]
+    marks = {"rated": 1.27, "operating": [0.7, 1.27], "instabilities": onsets, "ambiguous": doubts}
+    check(campbell_figure(diagram(frequencies, 0.01, orders=orders, **marks)))
+
+
+def test_the_limit_follows_the_modes_that_lines_meet() -> None:
+    """At 2 rad/s the line 3Ω reaches 6 rad/s: the first mode is met, the second is the next; others are named above."""
+    axis = campbell_figure(diagram(BLADE | FURTHER, orders=[1, 3])).axes[0]
+    highest = np.hypot(6.7, np.sqrt(1.3) * 2.0) / (2 * np.pi)
+    assert highest < axis.get_ylim()[1] < 1.1 * highest
+    names = [text.get_text() for text in axis.texts]
+    assert {"1st flapwise", "1st edgewise"} <= set(names)
+    assert "↑ 4 more" in names[-1] or any("↑ 4 more" in name for name in names)
+    assert any("↑ 2nd flapwise" in name for name in names)
+    everything = campbell_figure(diagram(BLADE | FURTHER, orders=[])).axes[0]
+    assert everything.get_ylim()[1] > 70.0 / (2 * np.pi)
+
+
+def test_damping_has_a_panel_where_there_is_some() -> None:
+    assert len(campbell_figure(diagram(BLADE)).axes) == 1
+    assert len(campbell_figure(diagram(BLADE, 1e-10)).axes) == 1, "round-off is no damping"
+    damped = campbell_figure(diagram(BLADE, 0.02))
+    assert damped.axes[1].get_ylabel() == "damping ratio (%)"
+    np.testing.assert_allclose(damped.axes[1].get_lines()[-2].get_ydata(), 2.0)
+
+
+def test_what_is_marked_is_in_the_legend() -> None:
+    marks = {"rated": 12.1 * np.pi / 30, "operating": [6.9 * np.pi / 30, 12.1 * np.pi / 30]}
+    doubts = [{"branch": 1, "speed": 1.0, "confidence": 0.3}]
+    (legend,) = campbell_figure(diagram(BLADE, ambiguous=doubts, **marks)).legends
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert texts == ["operating range, 6.9 to 12.1 rpm", "rated speed, 12.1 rpm", "crossing with kΩ", "ambiguous"]
+
+
+def test_a_branch_touches_zero_at_its_forward_critical_speed() -> None:
+    result = diagram({"1st forward whirl": 1.0})
+    place = {"speed": 0.9, "kind": "forward", "order": 1, "per_rev": 0, "frequency": 0.0, "branch": 1}
+    result.summary["critical_speeds"] = [{**place, "label": "1st forward whirl", "name": "1st forward whirl"}]
+    lines = [line for line in campbell_figure(result).axes[0].get_lines() if len(line.get_xdata()) == len(SPEEDS) + 1]
+    assert np.min(lines[0].get_ydata()) == 0.0
+
+
+def test_labels_are_spread_least() -> None:
+    assert spread([5.0, 1.0, 1.0], 1.0, (0.0, 9.0)) == [5.0, 0.5, 1.5]
+    assert spread([3.0, 2.0], 0.5, (0.0, 9.0)) == [3.0, 2.0]
+    assert spread([8.9, 9.0], 1.0, (0.0, 9.0)) == [8.0, 9.0], "labels stay within the limits"
+    assert spread([1.0, 1.0, 1.0], 5.0, (0.0, 4.0)) == [0.0, 2.0, 4.0], "as far apart as there is room"
+
+
+# --- histories and shapes ---------------------------------------------------------------------------------------------
+
+
+def run_of(t: Any, **columns: Any) -> RunResult:
+    still = {"psi": 6.0 * t, "psi_dot": 6.0 + 0.0 * t}
+    return RunResult(said(kind="history"), {"t": t, **still, **columns}, {})
+
+
+T = np.linspace(0.0, 100.0, 20001)
+
+
+def test_a_long_history_is_an_envelope() -> None:
+    """800 periods of 8 Hz between ±1 and 0.1 t: their range in 250 stretches, none of the 20 001 points."""
+    result = run_of(T, tip_u2=np.sin(16 * np.pi * T), tip_u3=0.01 * np.sin(np.pi * T))
+    figure = result.plot()
+    check(figure)
+    assert [len(line.get_xdata()) for axes in figure.axes for line in axes.get_lines()] == [250, 20001]
+    assert figure.axes[0].get_title(loc="left") == "tip u₂, range and mean of 800 periods"
+    (band,) = figure.axes[0].collections
+    extent = band.get_paths()[0].get_extents()
+    np.testing.assert_allclose([extent.y0, extent.y1], [-1.0, 1.0], atol=8e-3)  # 1 − cos(π/25), 25 points a period
+
+
+def test_what_is_zero_has_no_panel() -> None:
+    """Round-off is 0, as is said; so is a speed that does not change."""
+    result = run_of(T, tip_u1=1e-16 * T, tip_u2=np.sin(T), tip_u3=2e-9 * np.sin(T), tip_theta1=0.0 * T)
+    figure = result.plot()
+    check(figure)
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    assert titles == ["tip u₂", "tip u₃"]
+    suptitle = figure.get_suptitle()
+    assert suptitle.startswith("blade: reissner, 6 rad/s\n")
+    assert suptitle.endswith("0 (below 1e-9 of the largest of the unit): tip u₁, tip rotation θ₁")
+
+
+def test_hub_and_root_are_drawn() -> None:
+    names = [f"root_{kind}{i}" for kind in "fm" for i in (1, 2, 3)]
+    roots = {name: 1e6 * np.cos(T + i) for i, name in enumerate(names)}
+    tip = {f"tip_{name}": np.sin(T) for name in ("u1", "u2", "u3", "theta1", "theta2", "theta3")}
+    result = run_of(T, **tip, torque=np.cos(T), **roots)
+    result.history["psi_dot"] = T
+    assert list(result.drawings()) == ["history.png", "loads.png"]
+    titles = [axes.get_title(loc="left") for axes in result.plot().axes]
+    assert titles[6:] == ["speed Ω", "angle ψ", "torque on the hub"]
+    for drawing in result.drawings():
+        check(result.plot(drawing=drawing))
+    assert len(result.plot(drawing="loads").axes) == 6
+
+
+def test_a_steady_state() -> None:
+    x = np.linspace(0.0, 2.0, 21)
+    shape = {"x": x, "u1": 1e-5 * x, "u2": 0 * x, "u3": -(x**2), "theta2": 2 * x}
+    result = RunResult(said(kind="steady"), {"t": np.zeros(1), "psi_dot": np.ones(1)}, shape)
+    figure = result.plot()
+    check(figure)
+    assert [axes.get_title(loc="left") for axes in figure.axes] == ["u₁", "u₃", "rotation θ₂"]
+
+
+# --- small motions ----------------------------------------------------------------------------------------------------
+
+
+def test_modes_of_a_beam() -> None:
+    x = np.linspace(0.0, 2.0, 41)
+    shapes, rows = {}, []
+    for i in range(1, 7):
+        columns = {"x": x, "u1": 0 * x, "u2": np.sin(i * x), "u3": 0.3 * x, "theta1": 0.1 * x, "theta2": 5 * x}
+        shapes[f"mode {i}: flap {i}"] = columns | {f"{n}_imag": 0.01 * v for n, v in columns.items() if n != "x"}
+        rows.append({"mode": i, "label": f"flap {i}", "name": f"{i}th flapwise", "frequency": 3.0 * i})
+    figure = ModesResult(said(speed=1.0), rows, shapes).plot()
+    check(figure)
+    assert figure.axes[1].get_title(loc="left") == "2  2th flapwise, 6 rad/s"
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["u₂", "u₃", "twist θ₁ × length"]
+
+
+def test_a_response() -> None:
+    """Two resonances; the outputs of a kind share a row, what does not answer is named, a legend stands beside."""
+    omega = np.linspace(0.1, 30.0, 400)
+    one = 1 / (25 - omega**2 + 0.1j * omega) + 0.2 / (400 - omega**2 + 0.4j * omega)
+    outputs = ["tip_u1", "tip_u2", "tip_u3", "tip_theta1", "root_f1", "root_f2", "root_m3", "M3@1.5"]
+    direct = np.column_stack([1e-14 * one, one, 0.3 * one, one, 1e6 * one, one, one, one])
+    result = ResponseResult(said(outputs=outputs, speed=6.0), [{"frequency": w} for w in omega], direct, direct)
+    figure = result.plot()
+    check(figure)
+    amplitudes = figure.axes[::2]
+    assert [len(axes.get_lines()) for axes in amplitudes] == [4, 2, 4, 2], "two lines an output: direct and by modes"
+    assert figure.get_suptitle().endswith("0 (below 1e-9 of the largest of the unit): tip u₁")
+    low, high = amplitudes[0].get_ylim()
+    sizes = np.abs(direct[:, [1, 2]])
+    assert high > sizes.max()
+    assert np.all(np.mean(sizes < low, axis=0) < 0.05)
