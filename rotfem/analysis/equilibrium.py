@@ -126,6 +126,8 @@ def _judged(system: Any, growth: Growth, newton: Newton, found: Raised, notes: l
         return found.q
     system.count_rotations_from(found.reference)
     total = system.structure.total(found.q)
+    if found.sure and system.size(total) <= newton.tolerance:
+        return found.q  # nothing bends it, as a shaft that spins about its axis: the path is one state at all speeds
     path = _path(system, growth, newton, False, notes)
     if path is not None and path.limits:
         raise _at_limit(system, growth, path)

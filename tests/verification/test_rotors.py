@@ -99,6 +99,15 @@ def test_diagram_in_the_fixed_frame(tmp_path: Path) -> None:
     assert len(circles) == 2
 
 
+def test_a_shaft_above_its_critical_speed_is_where_it_was() -> None:
+    """Nothing bends it there, so that no other equilibrium is met on the way to the speed; its spin alone holds it."""
+    warnings = rotfem.modes(overhung(motion={"type": "constant", "speed": 150.0, "axis": [1, 0, 0]})).summary[
+        "warnings"
+    ]
+    assert not any("bifurcation" in text for text in warnings)
+    assert any("gyroscopic forces alone hold it" in text for text in warnings)
+
+
 def test_critical_speed_is_said_by_modes() -> None:
     """At its critical speed a shaft has a mode of zero frequency, which is no mistake of the solver."""
     speed = next(
