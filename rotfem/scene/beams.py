@@ -56,7 +56,7 @@ class PointMass(SceneModel):
 
     Attributes:
         x: place along the beam (m).
-        mass: kg.
+        mass: of the body (kg).
         offset: position of its center relative to the axis, section axes (m).
         inertia: about its center (kg·m²): of a planar beam about axis 3; of a spatial one a tensor in section axes, or
             a number, isotropic.

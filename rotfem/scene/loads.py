@@ -187,8 +187,8 @@ class PointLoad(SceneModel):
 
     Attributes:
         x: along a beam (m), or [x, y] on a plate.
-        force: N, or None.
-        moment: N·m, or None.
+        force: force there (N), or None.
+        moment: moment there (N·m), of beams only, or None.
         kind: "dead" or "follower", of both where they do not say it themselves.
     """
 

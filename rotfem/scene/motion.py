@@ -112,7 +112,11 @@ class Swept:
 
 
 class ConstantMotion(Motion):
-    """Steady rotation at the given speed (rad/s)."""
+    """Steady rotation.
+
+    Attributes:
+        speed: Ω (rad/s).
+    """
 
     name: ClassVar[str] = "constant"
     is_steady: ClassVar[bool] = True
@@ -149,8 +153,8 @@ class TableMotion(Motion):
     """Speed interpolated in a table.
 
     Attributes:
-        table: rows (t, Ω) in s and rad/s.
-        interpolation: "pchip", "cubic" or "linear".
+        table: rows (t, Ω) in s and rad/s, constant outside; or the path of a CSV file.
+        interpolation: between the rows; "pchip" does not overshoot.
     """
 
     name: ClassVar[str] = "table"

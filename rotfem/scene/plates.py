@@ -68,12 +68,14 @@ class PlateStructure(StructureTable):
         type: "plate".
         length: side along x (m); None with a mesh.
         width: side along y (m); None with a mesh.
-        mesh: absolute path of a gmsh file with the physical groups "clamped" and "plate", or None.
+        mesh: path of a gmsh file with the physical groups "clamped" and "plate", or None.
         thickness: number (m), taper ((x, thickness), …), or with a mesh a dictionary region → thickness.
         E: Young's modulus (Pa), isotropic.
         nu: Poisson's ratio, isotropic.
-        E1: Young's modulus in direction 1 (Pa), orthotropic; so are E2, nu12, G12.
-        G13: transverse shear modulus (Pa), orthotropic; G12 if not given. So is G23.
+        E1, E2: Young's moduli in directions 1 and 2 (Pa), orthotropic.
+        nu12: Poisson's ratio, orthotropic.
+        G12: shear modulus in the plane (Pa), orthotropic.
+        G13, G23: transverse shear moduli (Pa), orthotropic; G12 if not given.
         rho: density (kg/m³).
         shear_correction: shear correction factor.
         hub_radius: distance of the clamped edge from the origin of the frame along direction 1 (m).

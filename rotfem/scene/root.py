@@ -187,8 +187,8 @@ class Support(SceneModel):
 
     Attributes:
         x: place along the beam (m).
-        stiffness: N/m, a number or [[yy, yz], [zy, zz]].
-        damping: N·s/m, likewise.
+        stiffness: of the spring (N/m), a number or [[yy, yz], [zy, zz]].
+        damping: of the damper (N·s/m), likewise.
     """
 
     x: Number = Field(description="a place along the beam (m)")

@@ -257,8 +257,8 @@ class Time(SceneModel):
         end: final time (s).
         step: time step (s), or None for adaptive steps.
         tolerance: error of all adaptive steps together, relative to the largest displacement, or None.
-        max_step: longest adaptive step (s), or None.
-        min_step: shortest adaptive step (s), or None.
+        max_step: longest adaptive step (s); `end`/20 if not given.
+        min_step: shortest adaptive step (s); 1e-9 `end` if not given.
         scheme: name of a registered scheme; if not given, the usual one of fixed or adaptive steps.
         output_every: number of steps from one output to the next.
         output_step: time (s) from one output to the next, wherever steps end; None where steps are counted.
@@ -354,9 +354,10 @@ class Modes(SceneModel):
     Attributes:
         count: number of modes.
         about: state about which the motion is small: "steady" (deformed equilibrium) or "undeformed".
-        orders: k of the lines kΩ of a Campbell diagram, whose crossings are critical speeds; chosen if None.
-        rated: rated speed of the rotor, which the diagram marks, rad/s.
-        operating: lowest and highest speed of operation, which the diagram marks, rad/s.
+        orders: k of the lines kΩ of a Campbell diagram, whose crossings are critical speeds; as many as meet a mode, up to
+            [1, 2, 3, 4], if not given, none if empty.
+        rated: rated speed of the rotor, which the diagram marks (rad/s).
+        operating: lowest and highest speed of operation, which the diagram marks (rad/s).
     """
 
     count: Count = 6

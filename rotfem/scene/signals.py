@@ -47,9 +47,9 @@ class Harmonic(SceneModel):
 
     Attributes:
         amplitude: components, as those of the load's value; of a load over the span also rows (x, components).
-        frequency: rad/s; or
+        frequency: angular frequency (rad/s), or `per_rev`.
         per_rev: periods in a revolution of the hub.
-        phase: rad.
+        phase: by which it is ahead at t = 0 or ψ = 0 (rad).
     """
 
     amplitude: Any = Field(description="given")

@@ -390,13 +390,6 @@ def test_bad_names_of_dimensions(dimensions: Any) -> None:
         Shape("bad", dimensions, square)
 
 
-def test_the_reference_names_every_dimension() -> None:
-    text = (ROOT / "docs" / "scene.md").read_text(encoding="utf-8")
-    for shape in registry.shapes:
-        for key in (f'"{shape.name}"', *(key for keys in shape.choices for key in keys)):
-            assert f"`{key}`" in text
-
-
 # --- outputs --------------------------------------------------------------------------------------------------------
 
 

@@ -1,0 +1,42 @@
+# %% [markdown]
+# # A shaft on bearings
+#
+# A steel shaft with two disks runs on two bearings. At which speeds will an unbalance break it? The scene is
+# `demos/shaft_on_bearings.toml`, the example rotor of the program ROSS:
+#
+# ```{literalinclude} ../../demos/shaft_on_bearings.toml
+# :language: toml
+# ```
+#
+# Three keys make a shaft of a beam. `axis = [1, 0, 0]` spins it about its own axis. `root = { driven = true }` lets the
+# drive hold it along and about that axis alone. `supports` are the bearings, springs (and dampers) to the fixed frame.
+#
+# On the command line the whole computation is `rotfem campbell demos/shaft_on_bearings.toml --speeds 0:400:9`.
+
+# %%
+import rotfem
+
+diagram = rotfem.campbell("../../demos/shaft_on_bearings.toml", "0:400:9")
+for critical in diagram.critical_speeds:
+    if critical.kind != "per_rev":
+        print(f"{critical.kind:8s} whirl, {critical.label:20s} {critical.speed:8.3f} rad/s")
+
+# %% [markdown]
+# A shaft whirls forward, with its spin, or backward. Gyroscopic moments of the disks raise the frequency of the one and
+# lower that of the other. An unbalance turns with the shaft and drives forward whirl: the forward critical speed is the
+# one to stay away from. A force that rests in space drives the backward one.
+#
+# Frequencies below are those in the rotor, where forward whirl at the speed of the shaft has the frequency zero.
+
+# %%
+diagram.plot()
+
+# %% [markdown]
+# ## Is it right?
+#
+# ROSS 2.3.0 with 48 Timoshenko elements has its first forward critical speed at 96.49728647 rad/s.
+
+# %%
+first = next(c.speed for c in diagram.critical_speeds if c.kind == "forward")
+print(f"{first:.6f} rad/s, ROSS 96.497286 rad/s")
+assert abs(first - 96.49728647) < 1e-4
