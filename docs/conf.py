@@ -1,4 +1,4 @@
-"""The documentation site: `./with-fenicsx python3 -m sphinx -W --keep-going docs site` makes it, in the folder site."""
+"""The documentation site: `./with-fenicsx python3 -m sphinx -W --keep-going docs site/html` makes it."""
 
 from __future__ import annotations
 

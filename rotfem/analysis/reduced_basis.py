@@ -66,7 +66,7 @@ class ReducedAnalysis(ModalAnalysis):
         self.problem, self.about, self.comm, self.newton = full.problem, full.about, full.comm, full.newton
         self.system, self.model, self.structure, self.free = full.system, full.model, full.structure, full.free
         self.seconds, self._unit, self.mesh_by_shape = full.seconds, full._unit, False
-        self.estimates, self.past_limits = full.estimates, full.past_limits
+        self.estimates, self.past_limits, self.fixed = full.estimates, full.past_limits, full.fixed
         self.checks: list[dict[str, float]] = []
         self._columns: list[Array] = []
 
