@@ -354,8 +354,8 @@ class Modes(SceneModel):
     Attributes:
         count: number of modes.
         about: state about which the motion is small: "steady" (deformed equilibrium) or "undeformed".
-        orders: k of the lines kΩ of a Campbell diagram, whose crossings are critical speeds; as many as meet a mode, up to
-            [1, 2, 3, 4], if not given, none if empty.
+        orders: k of the lines kΩ of a Campbell diagram, whose crossings are critical speeds. If not given up to 4Ω,
+            as many as meet a mode.
         rated: rated speed of the rotor, which the diagram marks (rad/s).
         operating: lowest and highest speed of operation, which the diagram marks (rad/s).
     """
