@@ -3,7 +3,7 @@
 One noun, the scene (`Scene`, `load_scene`), and verbs on it (`check`, `run`, `modes`, `campbell`, `response`,
 `explain`, `cost`, `sweep`), and on results `compare`. Between scene and equations stands the `Problem`, which a script
 can build too. `register` adds a `Theory`, `Effect`, `Scheme`, `MotionLaw`, `DampingModel`, `StructureKind`, `Shape`,
-`Output` or `BladeFormat` of a user's own. What computes loads FEniCSx when first used.
+`Output` or `BladeFormat` of a user's own. Everything is imported when it is first used, FEniCSx by what computes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 from rotfem.errors import ComputationError, InputError, OutputError, SceneError
 from rotfem.registry import register
-from rotfem.scene import Scene, load_scene
 from rotfem.version import __version__
 
 if TYPE_CHECKING:
@@ -40,7 +39,7 @@ if TYPE_CHECKING:
     from rotfem.results import CampbellResult, CheckResult, ExplainResult, ModesResult, ResponseResult, RunResult
     from rotfem.results.compare import CompareResult, compare
     from rotfem.results.sweep import SweepResult
-    from rotfem.scene import BeamMesh, PlateMesh
+    from rotfem.scene import BeamMesh, PlateMesh, Scene, load_scene
     from rotfem.scene.beams import PlanarBeamStructure as PlanarBeam
     from rotfem.scene.beams import SpatialBeamStructure as SpatialBeam
     from rotfem.scene.blades.deck import Asked, BladeFormat, Deck
@@ -48,7 +47,7 @@ if TYPE_CHECKING:
     from rotfem.scene.section_shapes import Geometry, Shape
     from rotfem.scene.structure import StructureKind
 
-#: Module ↦ public names it has: imported when one is first asked for, as most of them load FEniCSx.
+#: Module ↦ public names it has: imported when one is first asked for.
 _HOMES = {
     "analysis.alpha_family": ("GeneralisedAlpha", "Newmark"),
     "analysis.esdirk": ("ESDIRK4",),
@@ -73,7 +72,7 @@ _HOMES = {
     "results": ("CampbellResult", "CheckResult", "ExplainResult", "ModesResult", "ResponseResult", "RunResult"),
     "results.compare": ("CompareResult", "compare"),
     "results.sweep": ("SweepResult",),
-    "scene": ("BeamMesh", "PlateMesh"),
+    "scene": ("BeamMesh", "PlateMesh", "Scene", "load_scene"),
     "scene.blades.deck": ("Asked", "BladeFormat", "Deck"),
     "scene.structure": ("StructureKind",),
     "scene.section_shapes": ("Geometry", "Shape"),

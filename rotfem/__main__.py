@@ -6,9 +6,16 @@ from rotfem.commands.interrupts import held_back
 
 
 def main() -> None:
-    """Run the command line; Ctrl-C waits until all that it is made of is there."""
+    """Run the command line; Ctrl-C waits until all that it is made of is there.
+
+    Typer is imported without rich, which takes longer than all the rest and puts backslashes into the helps.
+    """
     try:
         with held_back():
+            sys.modules["rich"] = None  # type: ignore[assignment]
+            import typer  # noqa: F401
+
+            del sys.modules["rich"]
             from rotfem.commands.cli import main as command
     except KeyboardInterrupt:
         print("rotfem: interrupted", file=sys.stderr)

@@ -34,6 +34,12 @@ def quantity(text: str, unit: str) -> float:
     return float(found[1]) * _factor(found[2].strip(), unit)
 
 
+def unit_of(text: str) -> str:
+    """Return the unit at the end of a text such as "12.1 rpm" or "0:15:31rpm"; empty where there is none."""
+    found = re.fullmatch(r"[-+0-9.eE:,\s]*\d\.?\s*((?![eE][-+]?\d)[^\W\d].*?)\s*", text)
+    return found[1] if found else ""
+
+
 def split_unit(text: str, unit: str = "rad/s") -> tuple[str, float]:
     """Return the numbers of a text without the unit that ends it, and how many of the wanted unit that is; 1 of none.
 

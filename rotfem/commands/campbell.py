@@ -110,7 +110,7 @@ def campbell(
         SceneError: the scene or the speeds are not valid.
         ComputationError: no equilibrium at a speed, or eigenpairs that fail their check.
     """
-    scene = with_marks(as_scene(scene), orders, rated, operating)
+    scene = with_marks(as_scene(scene).showing("speed", speeds), orders, rated, operating)
     text = speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds)
     values = parse_speeds(text, scene.limits)
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,20 +13,10 @@ import rotfem.commands.compare  # noqa: F401  a verb
 from rotfem.commands.console import Session, missing
 from rotfem.commands.job import Job, app, command
 from rotfem.commands.options import as_path, listed, speeds_of
-from rotfem.commands.printed import (
-    campbell_report,
-    check_report,
-    explain_report,
-    modes_report,
-    response_report,
-    run_report,
-    sweep_report,
-)
-from rotfem.commands.result_folder import Writer
 from rotfem.errors import input_of
-from rotfem.results.result_set import read_summary, said_of
-from rotfem.scene import load_scene
-from rotfem.scene.files import noted_files
+
+if TYPE_CHECKING:
+    from rotfem.commands.result_folder import Writer
 
 
 @command()
@@ -50,10 +39,8 @@ def run(
             [f"{todo.results.path} holds the finished run already; a later time.end is what --resume can go on to"]
         )
         return
-    bar = todo.progress()
-    with bar as progress:
-        result = simulate(todo.scene, store, progress, todo.hint if todo.scene.accuracy is None else bar.says)
-    todo.finish(result, run_report)
+    hint = todo.hint if todo.scene.accuracy is None else todo.session.bar.says
+    todo.finish(simulate(todo.scene, store, todo.progress, hint))
 
 
 @command()
@@ -95,12 +82,12 @@ def modes(
                 further.append(lambda folder: model.write(folder / "state_space.npz"))
             if matrices:
                 serial(result.analysis, "the export of matrices")
-                further.append(partial(write_matrices, result.analysis, result.spinning))
+                further.append(lambda folder: write_matrices(result.analysis, result.spinning, folder))
     if animate is not None:
         from rotfem.results.plots_plate import animate as draw
 
-        further.append(partial(draw, result, animate))
-    todo.finish(result, modes_report, further)
+        further.append(lambda folder: draw(result, animate, folder))
+    todo.finish(result, further)
 
 
 @command()
@@ -124,9 +111,8 @@ def campbell(
         "rated": None if rated is None else speeds_of("--rated", rated, 1)[0],
         "operating": None if operating is None else speeds_of("--operating", operating, 2),
     }
-    with todo.progress() as progress:
-        result = sweep(todo.scene, speeds, comm=todo.session.comm, **marks, progress=progress, hint=todo.hint)
-    todo.finish(result, campbell_report)
+    result = sweep(todo.scene, speeds, comm=todo.session.comm, **marks, progress=todo.progress, hint=todo.hint)
+    todo.finish(result)
 
 
 @command(computes=False)
@@ -146,15 +132,19 @@ def response(
 
     orders = listed("--per-rev", per_rev, float) or ()
     result = answers(todo.scene, low, high, number=number, per_rev=orders, comm=todo.session.comm)
-    todo.finish(result, response_report)
+    todo.finish(result)
 
 
 def look(session: Session, path: Path, overrides: Sequence[str]) -> bool:
     """Say how the results of a folder ended, or, without FEniCSx, that a scene is valid; return whether either was."""
     if path.is_dir():
+        from rotfem.results.result_set import read_summary, said_of
+
         said = said_of(path)
         session.print_json({**read_summary(path), "found": said})
     elif lacking := missing():
+        from rotfem.scene import load_scene
+
         scene = load_scene(path, overrides)
         said = f"{path} is a valid scene; for more, {lacking}"
         session.print_json({"command": "check", "name": scene.name, "found": said})
@@ -172,7 +162,7 @@ def check(todo: Job) -> None:
     """
     from rotfem.commands.check import check as weigh
 
-    todo.finish(weigh(todo.scene, comm=todo.session.comm), check_report)
+    todo.finish(weigh(todo.scene, comm=todo.session.comm))
 
 
 @command(computes=False)
@@ -185,9 +175,7 @@ def explain(
     """Say which effects and which theory SCENE calls for, and what each of them changes."""
     from rotfem.commands.explain import explain as estimate
 
-    with todo.progress() as progress:
-        result = estimate(todo.scene, check=check, progress=progress)
-    todo.finish(result, explain_report)
+    todo.finish(estimate(todo.scene, check=check, progress=todo.progress))
 
 
 @command(computes=False)
@@ -213,24 +201,23 @@ def cost(
 
     if write is not None:
         todo.session.check_writable("--write", write, todo.scene.inputs)
-    with todo.progress("cost") as progress:
-        result = study(
-            todo.scene,
-            quick=quick,
-            accuracy=accuracy,
-            output=of,
-            repeat=repeat,
-            budget=budget,
-            folder=todo.results.path,
-            resume=resume,
-            theories=listed("--theories", theories, str),
-            elements=listed("--elements", elements, int),
-            degrees=listed("--degrees", degrees, int),
-            steps=listed("--steps", steps, float),
-            schemes=listed("--schemes", schemes, str),
-            progress=progress,
-        )
-    todo.finish(result, lambda summary, folder: result.report(folder))
+    result = study(
+        todo.scene,
+        quick=quick,
+        accuracy=accuracy,
+        output=of,
+        repeat=repeat,
+        budget=budget,
+        folder=todo.results.path,
+        resume=resume,
+        theories=listed("--theories", theories, str),
+        elements=listed("--elements", elements, int),
+        degrees=listed("--degrees", degrees, int),
+        steps=listed("--steps", steps, float),
+        schemes=listed("--schemes", schemes, str),
+        progress=todo.progress,
+    )
+    todo.finish(result)
     if result.recommended is None:
         raise result.missed()
     if write is not None and todo.session.first:
@@ -271,11 +258,9 @@ def sweep(
         for text in overrides:
             key, _, values = text.partition("=")
             keys[key.strip()] = values_of(values.strip())
-        bar = session.progress(f"{scene.stem}: sweep")
-        with bar as progress:
-            result = compute(scene, keys, verb, folder.path, jobs=jobs, comm=session.comm, progress=progress)
-        session.write(result, not no_plots)
-        session.say(sweep_report(result.summary, folder.path))
+        session.start(f"{scene.stem}: sweep")
+        result = compute(scene, keys, verb, folder.path, jobs=jobs, comm=session.comm, progress=session.bar)
+        session.finish(result, not no_plots)
 
 
 @app.command("import")
@@ -294,6 +279,7 @@ def import_(
 ) -> None:
     """Write the scene of a blade FILE of BeamDyn, ElastoDyn, BModes, HAWC2 or windIO."""
     from rotfem.commands.import_blade import import_blade, write_imported
+    from rotfem.scene.files import noted_files
 
     with Session(False, quiet, debug) as session:
         with noted_files() as inputs:

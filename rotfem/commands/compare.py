@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -36,27 +36,8 @@ def compare(
     with Session(as_json, quiet, debug) as session:
         result = distances(*folders)
         inputs = [Path(folder) / "summary.json" for folder in folders]
-        folder = session.folder(output or Path("results/compare"), "compare", inputs)
-        session.write(result, not no_plots)
-        session.say(compare_report(result.summary, folder.path))
+        session.folder(output or Path("results/compare"), "compare", inputs)
+        session.finish(result, not no_plots)
         if tolerance is not None and not result.summary["worst"] <= tolerance:
             session.say([f"farther apart than {tolerance:g}"])
             raise SystemExit(DIFFERENT)
-
-
-def compare_report(summary: dict[str, Any], folder: Path) -> list[str]:
-    """Return the lines that `compare` prints: a table for each result but the reference."""
-    lines = []
-    for title in summary["results"][1:]:
-        rows = [row for row in summary["rows"] if row["result"] == title]
-        width = max([16, *(len(row["quantity"]) for row in rows)])
-        second = "mac" if summary["compared"] == "modes" else "rms"
-        lines += [
-            f"{title} beside {summary['name']}, relative to the largest of the latter",
-            f"{'':<{width}}{'reference':>14}{'value':>14} {'unit':<6}{'difference':>11}{second:>10}",
-        ]
-        for row in rows:
-            last = f"{row[second]:>10.2g}" if second in row else ""
-            values = f"{row['reference']:>14.6g}{row['value']:>14.6g} {row['unit']:<6}"
-            lines.append(f"{row['quantity']:<{width}}{values}{row['difference']:>11.2g}{last}")
-    return [*lines, f"largest difference {summary['worst']:.2g}", f"results in {folder}"]

@@ -6,7 +6,10 @@ Exit status 0 done, 2 bad input, 3 the computation failed, 130 interrupted.
 from __future__ import annotations
 
 import io
+import logging
 import os
+import re
+import shutil
 import signal
 import sys
 from collections.abc import Callable, Sequence
@@ -14,13 +17,15 @@ from contextlib import suppress
 from contextvars import ContextVar
 from importlib.util import find_spec
 from pathlib import Path
+from textwrap import wrap
 from time import monotonic, sleep
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 from rotfem.commands.interrupts import together
-from rotfem.commands.result_folder import ResultFolder, Writer
 from rotfem.errors import ComputationError, InputError, OutputError, SceneError, printable
-from rotfem.results.files import json_text
+
+if TYPE_CHECKING:
+    from rotfem.commands.result_folder import ResultFolder, Writer
 
 #: Seconds that mpirun is given to pass on what was printed.
 PASSED_ON = 0.2
@@ -28,6 +33,11 @@ PASSED_ON = 0.2
 #: Seconds after which a computation says how far it is where there is no bar; again after twice the time, and so on.
 LONG = 10.0
 
+#: A number with the unit of angular speeds.
+ANGULAR = re.compile(r"(\d[\d.]*(?:e[-+]?\d+)?) rad/s(?!²)")
+
+#: File of a result folder with what a study has measured so far.
+STUDY = "cost.jsonl"
 
 #: Whether commands run on this process alone, whatever others mpirun has started.
 ALONE: ContextVar[bool] = ContextVar("ALONE", default=False)
@@ -40,6 +50,15 @@ def missing() -> str:
     """Return the message where a module of FEniCSx is missing; empty where none is."""
     names = ("mpi4py", "petsc4py", "slepc4py", "dolfinx")
     return next((MISSING.format(name) for name in names if find_spec(name) is None), "")
+
+
+def fitted(text: str, stream: TextIO) -> str:
+    """Return a text with its lines folded to the width of the terminal; as it is where there is none."""
+    if not stream.isatty():
+        return text
+    width = shutil.get_terminal_size().columns
+    folds: dict[str, Any] = {"subsequent_indent": "  ", "break_long_words": False, "break_on_hyphens": False}
+    return "\n".join("\n".join(wrap(x, width, **folds)) if len(x) > width else x for x in text.split("\n"))
 
 
 class _Alone:
@@ -59,6 +78,10 @@ class Session:
         as_json: print the summary on stdout as JSON and nothing else there.
         quiet: print errors only.
         debug: let tracebacks through.
+
+    Attributes:
+        speed_unit: unit in which the user gives speeds.
+        bar: progress of the computation.
     """
 
     def __init__(self, as_json: bool, quiet: bool, debug: bool):
@@ -69,6 +92,7 @@ class Session:
             self.comm = MPI.COMM_SELF if ALONE.get() else MPI.COMM_WORLD
         self.as_json, self.quiet, self.debug = as_json, quiet, debug
         self.first = self.comm.rank == 0
+        self.bar, self.speed_unit = ProgressBar(), "rad/s"
         self._folder: ResultFolder | None = None
         self._made: list[Path] = []
 
@@ -80,6 +104,7 @@ class Session:
         return self
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
+        self.bar.stop()
         if self._folder is not None:
             self._folder.close(error)
         if error is not None:
@@ -90,13 +115,14 @@ class Session:
         if isinstance(error, InputError | OutputError):
             self._end(str(error), 2)
         if isinstance(error, ComputationError):
-            self._end(f"the computation failed: {error}", 3)
+            self._end(f"the computation failed: {error}{self._kept()}", 3)
         if isinstance(error, MemoryError):
             self._end("the computation failed: there is not enough memory; use fewer elements, or fewer modes", 3)
         if isinstance(error, KeyboardInterrupt):
+            message = f"interrupted{self._kept() or '; there are no results yet'}"
             if not together(self.comm, error):
-                self._leave("interrupted", 130)
-            self._end("interrupted", 130)
+                self._leave(message, 130)
+            self._end(message, 130)
         if self.comm.size > 1 and not isinstance(error, SystemExit):
             # A rank that fails alone would leave the others waiting for it.
             import traceback
@@ -110,16 +136,40 @@ class Session:
             sys.stdout.flush()
             sleep(PASSED_ON)
 
+    def _kept(self) -> str:
+        """Return where results are of a command that did not end well, and how it goes on; empty where none are."""
+        from rotfem.results.result_set import kept_in
+
+        if self._folder is None or self._folder.set is None:
+            return ""
+        path = self._folder.path
+        if (path / STUDY).exists():
+            return f"; what was measured is in {path}, and the same command goes on from there"
+        found = kept_in(path) if self._folder.set.begun else []
+        return "; ".join(["", f"results until then are in {path}", *found]) if found else ""
+
     def _end(self, message: str, status: int) -> NoReturn:
-        if self.first:
-            print(f"rotfem: {message}", file=sys.stderr)
+        self._error(f"rotfem: {message}")
         raise SystemExit(status) from None
 
     def _leave(self, message: str, status: int) -> NoReturn:
         """End this process at once: the others may be waiting for it, or gone, so that it must not wait for them."""
-        if self.first:
-            print(f"rotfem: {message}", file=sys.stderr, flush=True)
+        self._error(f"rotfem: {message}")
         os._exit(status)
+
+    def _error(self, line: str) -> None:
+        if self.first:
+            self.bar.stop()
+            print(fitted(self._in_unit(line), sys.stderr), file=sys.stderr, flush=True)
+
+    def _in_unit(self, line: str) -> str:
+        """Return a line with its angular speeds in the unit of the scene, too."""
+        unit = self.speed_unit
+        if unit == "rad/s":
+            return line
+        from rotfem.results.units import in_unit
+
+        return ANGULAR.sub(lambda found: f"{found[0]} ({in_unit(float(found[1]), unit):.6g} {unit})", line)
 
     def _tidy(self) -> None:
         """Remove the folders that this command made, the innermost first, as far as they are empty."""
@@ -135,11 +185,13 @@ class Session:
         Raises:
             OutputError: it is not to be written (see `rotfem.results.result_set.ResultSet`).
         """
+        from rotfem.commands.result_folder import ResultFolder
+
         if self.first:
             self._made = [p for p in (path, *path.parents) if not os.path.exists(p)]  # Path.exists may raise
         self._folder = ResultFolder(self.comm, path, command, inputs)
         if self._folder.set is not None and self._folder.set.before and not self.quiet:
-            print(f"warning: {self._folder.set.before}", file=sys.stderr)
+            self.remark(f"warning: {self._folder.set.before}")
         return self._folder
 
     def check_writable(self, option: str, path: Path, inputs: Sequence[Path]) -> None:
@@ -154,16 +206,22 @@ class Session:
         if reason:
             raise SceneError("command line", option, str(path), reason)
 
-    def progress(self, title: str) -> ProgressBar:
-        """Return the progress bar: on a terminal only, and only where the command may speak."""
+    def start(self, title: str) -> None:
+        """Begin to show progress: by a bar on a terminal, elsewhere by lines of a long computation."""
         speaks = self.first and not self.quiet and not self.as_json
-        return ProgressBar(title, speaks and sys.stderr.isatty(), speaks)
+        self.bar = ProgressBar(title, speaks and sys.stderr.isatty(), speaks)
+        self.bar.start()
+
+    def remark(self, line: str) -> None:
+        """Print a line on stderr, above the bar."""
+        if self.first:
+            self.bar.says(self._in_unit(line), always=True)
 
     def hint(self, unwanted: bool) -> Callable[[str], None] | None:
         """Return what prints advice on stderr, rank 0 only; None where it is not wanted."""
         if unwanted or self.quiet:
             return None
-        return lambda line: print(f"hint: {line}", file=sys.stderr) if self.first else None
+        return lambda line: self.remark(f"hint: {line}")
 
     def write(self, result: Any, plots: bool, further: Sequence[Writer] = ()) -> None:
         """Write a result and its figures; print its summary if --json asks for it.
@@ -178,24 +236,37 @@ class Session:
             SceneError: something further cannot be made.
         """
         assert self._folder is not None
+        self.bar.describe("writing results and figures")
         problems = self._folder.write(result, plots, further)
+        self.bar.stop()
         self.print_json(result.summary)
-        for warning in result.summary["warnings"]:
-            if self.first and not self.quiet:
-                print(f"warning: {warning}", file=sys.stderr)
+        if not self.quiet:
+            for warning in result.summary["warnings"]:
+                self._error(f"warning: {warning}")
         if problems:
             raise problems[0]
+
+    def finish(self, result: Any, plots: bool, further: Sequence[Writer] = ()) -> None:
+        """Write a result (see `write`) and print its report."""
+        from rotfem.commands.printed import report
+
+        assert self._folder is not None
+        self.write(result, plots, further)
+        self.say([*report(result), f"results in {self._folder.path}"])
 
     def print_json(self, summary: dict[str, Any]) -> None:
         """Print a summary if --json asks for it."""
         if self.first and self.as_json:
+            from rotfem.results.files import json_text
+
             sys.stdout.write(json_text(summary))
             self._pass_on()
 
     def say(self, lines: list[str]) -> None:
         """Print what was done."""
         if self.first and not (self.quiet or self.as_json):
-            print("\n".join(map(printable, lines)))
+            self.bar.stop()
+            print(fitted("\n".join(map(printable, lines)), sys.stdout))
 
 
 class ProgressBar:
@@ -204,38 +275,62 @@ class ProgressBar:
     Args:
         title: text before the bar.
         on: whether to draw it.
-        speaks: whether lines may be printed.
+        speaks: whether lines may be printed where it is not drawn.
     """
 
-    def __init__(self, title: str, on: bool, speaks: bool):
+    def __init__(self, title: str = "", on: bool = False, speaks: bool = True):
         self._bar: Any = None
         self._title = title
         self._on, self._speaks = on, speaks
         self._started = monotonic()
         self._due, self._last = self._started + LONG, (0.0, -1.0)
 
-    def says(self, line: str) -> None:
-        """Print a line, above the bar if there is one."""
-        if self._bar is not None:
-            self._bar.console.print(line, markup=False, highlight=False)
-        elif self._speaks:
-            print(line, file=sys.stderr, flush=True)
-
-    def __enter__(self) -> Callable[[float], None]:
+    def start(self) -> None:
+        """Draw the bar, which moves by itself until there is progress; it says so when equations are compiled."""
         if not self._on:
-            return self._tell if self._speaks else lambda share: None
+            return
         from rich.console import Console
-        from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
-        columns = (TextColumn(self._title), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-        self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
+        columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(20))
+        percent = TextColumn("{task.fields[percent]}", markup=False)
+        console = Console(stderr=True)
+        self._bar = Progress(*columns, percent, TimeRemainingColumn(), console=console, transient=True)
+        self._bar.add_task(self._title, total=None, percent="")
         self._bar.start()
-        task = self._bar.add_task("", total=1.0)
-        return lambda share: self._bar.update(task, completed=share)
+        self._log = logging.getLogger("rotfem.compilation")
+        self._log.setLevel(logging.INFO)
+        self._log.propagate = False
+        self._heard = _Heard(self.describe)
+        self._log.addHandler(self._heard)
 
-    def __exit__(self, *_: object) -> None:
+    def stop(self) -> None:
+        """Take the bar away."""
         if self._bar is not None:
             self._bar.stop()
+            self._bar = None
+            self._log.removeHandler(self._heard)
+
+    def describe(self, what: str = "") -> None:
+        """Say what is being done."""
+        if self._bar is not None:
+            self._bar.update(0, description=": ".join(filter(None, (self._title, what))))
+
+    def says(self, line: str, always: bool = False) -> None:
+        """Print a line, above the bar if there is one; where lines are not wanted only what is always to be said."""
+        text = fitted(line, sys.stderr)
+        if self._bar is not None:
+            self._bar.console.print(text, markup=False, highlight=False, soft_wrap=True)
+        elif self._speaks or always:
+            print(text, file=sys.stderr, flush=True)
+
+    def __call__(self, share: float) -> None:
+        """Take note of the share of the work that is done."""
+        if self._bar is None:
+            if self._speaks:
+                self._tell(share)
+        elif share > 0.0:
+            self._bar.update(0, description=self._title, total=1.0, completed=share, percent=f"{100 * share:3.0f} %")
 
     def _tell(self, share: float) -> None:
         """Print how far a long computation is and how long it will still take, by its pace since the last such line."""
@@ -249,6 +344,18 @@ class ProgressBar:
         left = (1.0 - share) * (now - since) / (share - before)
         self._due, self._last = self._started + 2 * (now - self._started), (now, share)
         self.says(f"{self._title}: {100 * share:.3g} % after {now - self._started:.0f} s, about {left:.3g} s to go")
+
+
+class _Heard(logging.Handler):
+    """Hands the messages of a log on."""
+
+    def __init__(self, hand_on: Callable[[str], None]):
+        super().__init__()
+        self._hand_on = hand_on
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Hand on a message."""
+        self._hand_on(record.getMessage())
 
 
 def _interrupt(signum: int, frame: object) -> NoReturn:

@@ -7,18 +7,20 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rotfem.commands.console import Session, missing
 from rotfem.commands.interrupts import held_back
 from rotfem.commands.options import as_path, folder_name, seconds_of
-from rotfem.commands.result_folder import ResultFolder, Writer
 from rotfem.errors import ComputationError, InputError, Stopped
-from rotfem.scene import Scene, load_scene
-from rotfem.scene.extensions import load
 from rotfem.version import __version__
+
+if TYPE_CHECKING:
+    from rotfem.commands.result_folder import ResultFolder, Writer
+    from rotfem.results import Result
+    from rotfem.scene import Scene
 
 app = typer.Typer(
     name="rotfem",
@@ -42,6 +44,8 @@ def _root(
 ) -> None:
     """Rotating beams and plates with FEniCSx."""
     if files:
+        from rotfem.scene.extensions import load
+
         with Session(False, False, False):
             for path in files:
                 load(str(path), path, "command line", "--load")
@@ -71,16 +75,13 @@ class Job:
     plots: bool
     hint: Callable[[str], None] | None
 
-    def progress(self, what: str = "") -> Any:
-        """Return the progress bar of the computation."""
-        return self.session.progress(f"{self.scene.name}: {what or self.scene.model.theory}")
+    def progress(self, share: float) -> None:
+        """Show which share of the computation is done."""
+        self.session.bar(share)
 
-    def finish(
-        self, result: Any, lines: Callable[[dict[str, Any], Path], list[str]], further: Sequence[Writer] = ()
-    ) -> None:
+    def finish(self, result: Result, further: Sequence[Writer] = ()) -> None:
         """Write a result, and what else is wanted, and print its report."""
-        self.session.write(result, self.plots, further)
-        self.session.say(lines(result.summary, self.results.path))
+        self.session.finish(result, self.plots, further)
 
 
 @contextmanager
@@ -114,6 +115,9 @@ def job(
     debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False,
 ) -> Iterator[Job]:
     """Give a command its job; these are, but for its name, the options of all commands."""
+    with held_back():  # in the middle of an import what signals raise becomes any error
+        from rotfem.scene import load_scene
+
     with Session(as_json, quiet, debug) as session:
         wanted = [] if accuracy is None else [f"accuracy={accuracy!r}"]
         if budget is not None:
@@ -123,8 +127,10 @@ def job(
         loaded = load_scene(scene, [*(overrides or ()), *wanted])
         if lacking := missing():
             raise InputError("", None, lacking)
+        session.speed_unit = loaded.output.speed
+        session.start(f"{loaded.name}: {command}")
         folder = session.folder(output or Path("results") / folder_name(loaded.name), command, loaded.inputs)
-        with held_back():  # in the middle of an import what they raise becomes any error
+        with held_back():
             import rotfem.numerics.forms  # noqa: F401  PETSc first, which dolfinx would start in its own way
         try:
             yield Job(loaded, folder, session, not no_plots, session.hint(no_advice))

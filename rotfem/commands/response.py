@@ -71,7 +71,7 @@ def response(
         SceneError: the scene is not valid, or has no harmonic load, no steady state or a free hub.
         ComputationError: no equilibrium, eigenpairs that fail their check, or a frequency of a mode without damping.
     """
-    scene, started = as_scene(scene), perf_counter()
+    scene, started = as_scene(scene).showing("frequency", high if low is None else low), perf_counter()
     with input_of(scene.file):
         problem = Problem.of(scene)
         check_rotating(problem, "a response")

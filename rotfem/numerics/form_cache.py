@@ -98,6 +98,7 @@ def library(compile_in: Compile) -> Library:
     found = Library((temporary(why) if why else home()) / f"{name}.so", name, entries)
     if found.is_sound():
         return found
+    logging.getLogger("rotfem.compilation").info("compiling (first run only)")
     with _locked(found):
         if found.is_sound():  # another program has compiled it in between
             return found

@@ -25,7 +25,7 @@ MEANING = {
     "spin_rate_change": "largest |dΩ/dt|/ω₁²",
     "damping": "ζ, damping ratio of the first mode",
     "tip_mass_ratio": "tip (or other added) mass/mass of the structure",
-    "steps_per_period": "steps in a period of the fastest wanted mode",
+    "steps_per_period": "time steps per period of the last of modes.count modes",
 }
 
 #: Times at which the speed of a motion is sampled.

@@ -79,4 +79,4 @@ def percent(share: float | None) -> str:
     """Return a share in per cent with two digits."""
     if share is None:
         return "unknown"
-    return "0 %" if share < 5e-9 else f"{100 * share:.2g} %" if share < 1.0 else f"{100 * share:.3g} %"
+    return "0 %" if share < 5e-9 else f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.3g} %"

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from rotfem.results.files import json_text, rows_text
 from rotfem.results.frames import Variable, dataset, frame_of_rows
 from rotfem.results.result import Result
+from rotfem.results.tables import ShortTable, number, numbers
 from rotfem.results.units import ShownUnits
 
 if TYPE_CHECKING:
@@ -21,6 +22,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = npt.NDArray[np.float64]
+
+
+#: How a branch is critical, by the kind of the speed.
+MEETINGS = {
+    "forward": "{name}, synchronous",
+    "backward": "{name}, synchronous",
+    "per_rev": "{name} meets {per_rev}Ω",
+}
 
 
 @dataclass(frozen=True)
@@ -200,6 +209,33 @@ class CampbellResult(Result):
         both = self.summary.get("frame") != "fixed" and "whirl" in self.rows[0]
         fixed = {"campbell_fixed.png": partial(campbell_figure, self, fixed=True)}
         return {"campbell.png": partial(campbell_figure, self), **(fixed if both else {})}
+
+    def tables(self) -> list[ShortTable]:
+        """Return the branches, with frequencies at the first and the last speed, and the critical speeds."""
+        units, ends = ShownUnits.of(self.summary), self.speeds[[0, -1]]
+        branches = self.summary["branches"]
+
+        def frequencies(name: str) -> list[str]:
+            known = [None if b[name] is None else float(units.frequencies(b[name])) for b in branches]
+            return ["lost" if x is None else text for x, text in zip(known, numbers(known, 8), strict=True)]
+
+        columns = [
+            [str(b["branch"]) for b in branches],
+            [b["name"] for b in branches],
+            frequencies("frequency_first"),
+            frequencies("frequency_last"),
+            [f"{b['confidence']:.3f}" for b in branches],
+        ]
+        first, last = (f"{units.frequency} at {number(float(units.speeds(x)))} {units.speed}" for x in ends)
+        head = ("branch", "name", first, last, "MAC (–)")
+        critical = [
+            (number(float(units.speeds(c.speed)), digits=8), MEETINGS[c.kind].format(**vars(c)))
+            for c in self.critical_speeds
+        ]
+        out = [ShortTable(head, list(zip(*columns, strict=True)))]
+        return (
+            [*out, ShortTable((f"critical speed ({units.speed})", "what happens there"), critical)] if critical else out
+        )
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return one row a speed and branch, indexed by `speed` (rad/s) and `label`, as in campbell.csv.

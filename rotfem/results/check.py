@@ -13,6 +13,7 @@ import numpy.typing as npt
 from rotfem.results.files import csv_text, json_text
 from rotfem.results.frames import Variable, dataset, frame
 from rotfem.results.result import Result
+from rotfem.results.tables import ShortTable, number, numbers
 
 if TYPE_CHECKING:
     import pandas
@@ -65,6 +66,28 @@ class CheckResult(Result):
         from rotfem.results.plots_scene import check_figure
 
         return {"check.png": partial(check_figure, self)}
+
+    def tables(self) -> list[ShortTable]:
+        """Return length, mass and inertia about the axis of rotation, then vectors and tensors in frame axes."""
+        of = self.summary
+        scalars = [
+            ("length (m)", number(of["length"], digits=9)),
+            ("mass (kg)", number(of["mass"], digits=9)),
+            ("moment of inertia about the axis of rotation (kg·m²)", number(of["inertia_axis"], digits=9)),
+        ]
+        vectors = [
+            ("root, from the origin of the frame (m)", *numbers(of["root"])),
+            ("centre of mass, from there too (m)", *numbers(of["center_of_mass"])),
+            ("mass × its distance from the root (kg·m)", *numbers(of["first_moment_root"])),
+        ]
+        for where, name in (("root", "root"), ("center", "centre of mass")):
+            tensor = np.array(of[f"inertia_{where}"])
+            scale = float(np.max(np.abs(tensor)))
+            vectors += [
+                (f"inertia tensor about the {name} (kg·m²)" if i == 0 else "", *(number(x, scale) for x in row))
+                for i, row in enumerate(tensor)
+            ]
+        return [ShortTable(("", ""), scalars), ShortTable(("axes of the frame", "1", "2", "3"), vectors)]
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return the properties along a beam, indexed by `x`; of a plate the coordinates of its nodes.

@@ -26,6 +26,7 @@ from rotfem.results.files import json_text, read_csv, rows_text
 from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows
 from rotfem.results.result import Result
 from rotfem.results.result_set import read_summary
+from rotfem.results.tables import ShortTable, largest, number, per_cent
 
 if TYPE_CHECKING:
     import pandas
@@ -130,6 +131,19 @@ class CompareResult(Result):
     def drawings(self) -> dict[str, Callable[[], Figure]]:
         """Return compare.png: the results over each other."""
         return {"compare.png": partial(compare_figure, self)}
+
+    def tables(self) -> list[ShortTable]:
+        """Return a table for each result but the reference; differences relative to the largest of the reference."""
+        out, (second, of) = [], ("mac", "MAC (–)") if self.summary["compared"] == "modes" else ("rms", "rms (%)")
+        for title in self.summary["results"][1:]:
+            rows = []
+            for row in (row for row in self.rows if row["result"] == title):
+                scale = largest([row["reference"], row["value"]])
+                values = [number(row[name], scale) for name in ("reference", "value")]
+                last = f"{row['mac']:.3f}" if "mac" in row else per_cent(row.get(second))
+                rows.append((f"{row['quantity']} ({row['unit']})", *values, per_cent(row["difference"]), last))
+            out.append(ShortTable((f"{title}", self.summary["name"], "value", "difference (%)", of), rows))
+        return out
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return the rows, indexed by `result` and `quantity`; raise ImportError without pandas."""

@@ -12,6 +12,7 @@ import numpy as np
 from rotfem.results.files import json_text
 from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows
 from rotfem.results.result import Result
+from rotfem.results.tables import ShortTable, per_cent
 
 if TYPE_CHECKING:
     import pandas
@@ -66,6 +67,33 @@ class ExplainResult(Result):
         from rotfem.results.plots_scene import explain_figure
 
         return {"explain.png": partial(explain_figure, self)}
+
+    def tables(self) -> list[ShortTable]:
+        """Return the dimensionless groups, then how much every effect, theory and discretisation changes the outputs.
+
+        With a check each row is followed by one of the changes as the full models give them.
+        """
+        outputs = self.outputs
+        groups = [(self.summary["meaning"][name], f"{value:.4g}") for name, value in self.summary["groups"].items()]
+        rows = []
+        for row in self.rows:
+            before = {True: "without ", False: "with "}[row["included"]] if row["kind"] == "effect" else ""
+            what = before + row["name"] + (" theory" if row["kind"] == "theory" else "")
+            cells = [self._change(row, name) for name in outputs]
+            rows.append((what, *cells, f"{row['verdict']}: {row['why']}"))
+            if "truth" in row:
+                rows.append(("  by the full models", *(per_cent(row["truth"].get(name)) for name in outputs)))
+        head = ("change of (%)", *outputs, "verdict")
+        return [ShortTable(("of the scene", "value (–)"), groups), ShortTable(head, rows)]
+
+    def _change(self, row: Row, output: str) -> str:
+        """Return an estimate as text; one below the resolution as smaller than that."""
+        estimate, resolution = row["estimate"][output], self.summary["resolution"]
+        if estimate is None:
+            return "unknown"
+        if 0.0 < estimate < resolution:
+            return "<" + per_cent(resolution)
+        return ("<" if output in row.get("bounds", ()) else "") + per_cent(estimate)
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return one row an effect and a theory, indexed by `name`; changes are columns `estimate_…` and `truth_…`.

@@ -19,7 +19,8 @@ from rotfem.errors import InputError
 from rotfem.results.files import csv_text, json_text, rows_text
 from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows, nodes_of
 from rotfem.results.result import Result
-from rotfem.results.units import ShownUnits
+from rotfem.results.tables import ShortTable, numbers, per_cent
+from rotfem.results.units import ShownUnits, in_unit
 
 if TYPE_CHECKING:
     import pandas
@@ -139,6 +140,12 @@ def _real(columns: dict[str, Array]) -> dict[str, Array]:
     largest = moves[np.argmax(np.abs(moves))]
     unit = largest if largest != 0.0 else 1.0
     return {"x": columns["x"]} | {name: np.real(value / unit) for name, value in values.items()}
+
+
+def _error(row: dict[str, Any]) -> float | None:
+    """Return the relative error of a frequency by mesh and round-off; None where it was not estimated."""
+    mesh = row.get("mesh_error")
+    return None if mesh is None else float(mesh + row["error_bound"])
 
 
 def _of(columns: dict[str, Array], direction: str) -> tuple[Array, Array] | None:
@@ -287,6 +294,21 @@ class ModesResult(Result):
             return {}
         draw = plots.shapes_figure if self.triangles is None else plots_plate.modes_figure
         return {"modes.png": partial(draw, self)}
+
+    def tables(self) -> list[ShortTable]:
+        """Return one row a mode: name, frequency, damping ratio and estimated error of the frequency."""
+        unit = ShownUnits.of(self.summary).frequency
+        first = unit if unit != "Hz" else "rad/s"  # there is a column of Hz in any case
+        columns = [
+            [str(row["mode"]) for row in self.rows],
+            [row["name"] for row in self.rows],
+            numbers([float(in_unit(row["frequency"], first)) for row in self.rows], 8),
+            numbers([row["frequency_hz"] for row in self.rows], 8),
+            [per_cent(row["damping"]) for row in self.rows],
+            [per_cent(_error(row)) for row in self.rows],
+        ]
+        head = ("mode", "name", f"frequency ({first})", "(Hz)", "damping (%)", "error (%)")
+        return [ShortTable(head, list(zip(*columns, strict=True)))]
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return one row a mode, indexed by `mode`: label, frequency (rad/s), damping, shares, …, as in modes.csv.

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from rotfem.results.files import json_text, rows_text
 from rotfem.results.frames import Variable, dataset, frame_of_rows
 from rotfem.results.result import Result
+from rotfem.results.tables import ShortTable, by_unit, named, number
 from rotfem.results.units import ShownUnits
 
 if TYPE_CHECKING:
@@ -72,6 +73,16 @@ class ResponseResult(Result):
         from rotfem.results.plots import response_figure
 
         return {"response.png": partial(response_figure, self)}
+
+    def tables(self) -> list[ShortTable]:
+        """Return where every output is largest."""
+        units, peaks = ShownUnits.of(self.summary), self.summary["peaks"]
+        scales = by_unit({name: peak["amplitude"] for name, peak in peaks.items()})
+        rows = [
+            (named(name), number(peak["amplitude"], scales[name]), f"{units.frequencies(peak['frequency']):.8g}")
+            for name, peak in peaks.items()
+        ]
+        return [ShortTable(("output", "largest amplitude", f"at ({units.frequency})"), rows)]
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return one row a frequency, indexed by `frequency` (rad/s), as in response.csv.

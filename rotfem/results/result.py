@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from rotfem.errors import printable
+from rotfem.results.tables import ShortTable
 
 if TYPE_CHECKING:
     import pandas
@@ -57,6 +58,10 @@ class Result(ABC):
     @abstractmethod
     def drawings(self) -> dict[str, Callable[[], Figure]]:
         """Return file name ↦ what draws that figure, the main one first; empty where there is nothing to draw."""
+
+    @abstractmethod
+    def tables(self) -> list[ShortTable]:
+        """Return short tables of what matters most, as commands print them and notebooks show them."""
 
     @abstractmethod
     def to_pandas(self) -> pandas.DataFrame:

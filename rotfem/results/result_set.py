@@ -416,12 +416,18 @@ def said_of(folder: Path) -> str:
         parts[0] += f" failed: {process} was {status} and has ended without a word"
     else:
         parts[0] += f" {status}" + (f": {summary['failure']['what']}" if "failure" in summary else "")
+    return "; ".join([*parts, *([] if at_work else kept_in(folder))])
+
+
+def kept_in(folder: Path) -> list[str]:
+    """Return in words what a set that is not complete has of a history, and how it goes on."""
+    out = []
     with suppress(OSError, ValueError, IndexError, KeyError):
         t = read_csv(folder / "history.csv")["t"]
-        parts.append(f"history.csv has {len(t)} rows, up to t = {t[-1]:.6g} s")
-    if not at_work and status != "done" and _is_checkpoint(folder / CHECKPOINT):
-        parts.append("--resume goes on from its checkpoint")
-    return "; ".join(parts)
+        out.append(f"history.csv has {len(t)} rows, up to t = {t[-1]:.6g} s")
+    if read_summary(folder).get("status") != "done" and _is_checkpoint(folder / CHECKPOINT):
+        out.append("--resume goes on from its checkpoint")
+    return out
 
 
 def _is_checkpoint(path: Path) -> bool:

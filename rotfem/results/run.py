@@ -10,7 +10,6 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 import numpy.typing as npt
 
@@ -19,6 +18,7 @@ from rotfem.results.columns import described
 from rotfem.results.files import csv_text, json_text, line, write_text
 from rotfem.results.frames import Variable, dataset, frame, nodes_of
 from rotfem.results.result import Result
+from rotfem.results.tables import ShortTable, by_unit, largest, named, number
 
 if TYPE_CHECKING:
     import pandas
@@ -68,6 +68,8 @@ class StationHistory:
         Raises:
             OutputError: it cannot be written.
         """
+        import h5py  # takes longer than all other imports of this package
+
         try:
             with h5py.File(path, "w") as file:
                 for name, values in {"t": self.t, "x": self.x, **self.values}.items():
@@ -203,6 +205,22 @@ class RunResult(Result):
         if self.stations is not None and len(self.stations.t):
             out["stations.png"] = partial(self.stations.figure, self.title)
         return out
+
+    def tables(self) -> list[ShortTable]:
+        """Return extremes and last values of the tip's displacement; of a steady state all of tip and root."""
+        found = self.figures
+        ends = {k.removesuffix("_final"): v for k, v in found.items() if k.endswith("_final")}
+        if self.steady:
+            scales = by_unit(ends)
+            return [ShortTable(("", "value"), [(named(name), number(ends[name], scales[name])) for name in ends])]
+        tips = [name for name in ends if name.startswith("tip_u") and f"{name}_min" in found]
+        scale = largest(found[f"{name}_{end}"] for name in tips for end in ("min", "max"))
+        rows = []
+        for name in tips:
+            low, high, last = (number(found[f"{name}_{end}"], scale) for end in ("min", "max", "final"))
+            when = [number(found[f"{name}_{end}_time"], float(self.t[-1])) for end in ("min", "max")]
+            rows.append((named(name), low, when[0], high, when[1], last))
+        return [ShortTable(("", "smallest", "at t (s)", "largest", "at t (s)", "at the end"), rows)] if rows else []
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return the history, one row a time, indexed by `t` (s).

@@ -17,6 +17,7 @@ from rotfem.results.columns import described
 from rotfem.results.files import json_text, rows_text
 from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows
 from rotfem.results.result import Result
+from rotfem.results.tables import ShortTable, numbers
 
 if TYPE_CHECKING:
     import pandas
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 
 #: Panels of the figure, and lines named in its legend, at most.
 PANELS, NAMED = 6, 12
+
+#: Quantities in the table that is printed, at most.
+COLUMNS = 2
 
 #: Part of the largest value, of damping ratios of 1, below which a change is round-off.
 ROUND_OFF = 1e-9
@@ -106,6 +110,14 @@ class SweepResult(Result):
             if len(y) and np.ptp(y) > ROUND_OFF * size:
                 out.append(name)
         return out
+
+    def tables(self) -> list[ShortTable]:
+        """Return one row a point: its place on the grid and the first quantities that vary."""
+        names = self.varying()[:COLUMNS]
+        columns = [[str(row[key]) for row in self.rows] for key in self.keys]
+        columns += [numbers([row.get(name) for row in self.rows]) for name in names]
+        columns.append([row["status"] for row in self.rows])
+        return [ShortTable((*self.keys, *map(labelled, names), "status"), list(zip(*columns, strict=True)))]
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return one row a point, indexed by the swept keys.

@@ -34,7 +34,7 @@ from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, OutputTable, 
 from rotfem.scene.span_tables import FORCE
 from rotfem.scene.structure import designed, is_design
 from rotfem.scene.table import SceneModel, problem, scene_error
-from rotfem.scene.units import in_si
+from rotfem.scene.units import in_si, with_shown, with_shown_speed
 from rotfem.scene.values import ROUND_OFF, Bounds, Limits, Matrix, limits_of
 
 #: Rows up to which a summary repeats a table.
@@ -136,7 +136,7 @@ class Scene(SceneModel):
         check_depth(file, tables)
         with noted_files() as extensions:
             load_wanted(tables, file, directory)
-        whole, hints = in_si(designed(tables, file), file), list[str]()
+        whole, hints = in_si(with_shown_speed(designed(tables, file)), file), list[str]()
         tables = {**whole, "structure": tables["structure"]} if is_design(tables) else whole
         context = {"directory": directory, "limits": limits_of(whole), "accuracy": whole.get("accuracy")}
         try:
@@ -194,6 +194,16 @@ class Scene(SceneModel):
         variant = type(self)._validate(tables, self._name, self._file, self._directory)
         variant._inputs = tuple(dict.fromkeys(variant._inputs + self._inputs))
         return variant
+
+    def showing(self, what: str, given: object) -> Self:
+        """Return the scene with speeds, or frequencies, shown in the unit of a text, if it says nothing of that itself.
+
+        Args:
+            what: "speed" or "frequency".
+            given: text such as "0:15:31rpm"; what is no text changes nothing.
+        """
+        tables = with_shown(self._tables, what, given)
+        return self if tables is self._tables else self.replace({f"output.{what}": tables["output"][what]})
 
     def to_dict(self) -> dict[str, Any]:
         """Return tables of what was set and of all defaults, fit for JSON and TOML; functions become their names."""

@@ -21,6 +21,7 @@ from rotfem.scene.table import (
     problem,
     with_parameters,
 )
+from rotfem.scene.units import AngularUnit
 from rotfem.scene.values import Bounds, Count, Matrix, Number, Positive, as_increasing_rows
 from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
 
@@ -387,9 +388,6 @@ class Solver(SceneModel):
         return self.continuation == "arc_length"
 
 
-AngularUnit = Literal["rad/s", "rpm", "Hz", "deg/s"]
-
-
 def _as_quantities(value: Any) -> tuple[str, ...]:
     sections = dict.fromkeys(name for table in (FORCES, STRAINS, RESULTANTS) for of in table.values() for name in of)
     return as_names(value, (*registry.outputs.names, *sections), "an output")
@@ -423,7 +421,7 @@ class OutputTable(SceneModel):
         format: of the file that they go to.
         fields: formats of the files for ParaView, "vtx" and "xdmf"; VTX of a plate and XDMF of a beam if not given.
         error: whether the error of what is computed is estimated.
-        speed: unit in which speeds are printed and drawn.
+        speed: unit in which speeds are printed and drawn; that of motion.speed if not given.
         frequency: unit in which frequencies of modes are printed and drawn.
     """
 

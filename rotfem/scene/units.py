@@ -7,10 +7,10 @@ that nothing else of the program knows of units.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias, get_args
 
 from rotfem.errors import SceneError
-from rotfem.units import is_quantity, quantity
+from rotfem.units import is_quantity, quantity, unit_of
 
 #: A unit of all numbers below a key, or one for each column of its rows.
 Unit: TypeAlias = str | tuple[str, ...]
@@ -66,6 +66,9 @@ _KEYS: dict[str, dict[Unit, str]] = {
     "time": {"s": "end step max_step min_step output_step"},
 }
 
+#: Units in which speeds and frequencies can be printed and drawn.
+AngularUnit = Literal["rad/s", "rpm", "Hz", "deg/s"]
+
 #: Dotted key ↦ its unit.
 UNITS: dict[str, Unit] = {
     f"{part}.{key}": unit for part, units in _KEYS.items() for unit, keys in units.items() for key in keys.split()
@@ -99,6 +102,23 @@ def in_si(tables: dict[str, Any], file: str) -> dict[str, Any]:
         str(part): _converted(value, (str(part),), lambda key: _unit_of(key, tables), file)
         for part, value in tables.items()
     }
+
+
+def with_shown_speed(tables: dict[str, Any]) -> dict[str, Any]:
+    """Return a scene's tables with the unit of motion.speed as that in which speeds are shown."""
+    motion = tables.get("motion")
+    return with_shown(tables, "speed", motion.get("speed") if isinstance(motion, Mapping) else None)
+
+
+def with_shown(tables: dict[str, Any], what: str, given: object) -> dict[str, Any]:
+    """Return a scene's tables with the unit of a text as output.speed or output.frequency.
+
+    They stay as they are where they have that key, or the text has no unit that it may be.
+    """
+    output, unit = tables.get("output", {}), unit_of(given) if isinstance(given, str) else ""
+    if not isinstance(output, Mapping) or what in output or unit not in get_args(AngularUnit):
+        return tables
+    return {**tables, "output": {**output, what: unit}}
 
 
 def _converted(value: Any, path: tuple[str, ...], unit_of: Callable[[str], Unit | None], file: str) -> Any:

@@ -38,10 +38,10 @@ def test_explain_prints_groups_and_a_row_each(folder: Path, rotfem: Rotfem) -> N
     assert (done.status, done.err) == (0, "")
     assert "Ω/ω₁" in done.out
     assert "L/r" in done.out
-    for name in ("without coriolis", "without centrifugal", "without rotary_inertia", "theory consistent_linear"):
+    for name in ("without coriolis", "without centrifugal", "without rotary_inertia", "consistent_linear theory"):
         assert name in done.out
-    assert "no gravity" in done.out
-    assert "true" not in done.out
+    assert "gravity (no gravity)" in done.out
+    assert "by the full models" not in done.out
     assert {f.name for f in (folder / "results" / "beam").iterdir()} == {"explain.json", "explain.png", "summary.json"}
 
 
@@ -55,7 +55,7 @@ def test_check_puts_the_truth_beside_the_estimates(folder: Path, rotfem: Rotfem)
     assert all(set(row["truth"]) == {"steady", "modes"} for row in rows)
     assert not (folder / "out" / "explain.png").exists()
     assert rotfem("explain", "beam.toml", "-q", "--no-plots", "-o", "out") == (0, "", "")
-    assert "true" in rotfem("explain", "beam.toml", "--check", "--no-plots").out
+    assert "by the full models" in rotfem("explain", "beam.toml", "--check", "--no-plots").out
 
 
 def test_run_says_what_it_has_chosen(folder: Path, rotfem: Rotfem) -> None:

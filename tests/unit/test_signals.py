@@ -18,7 +18,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # which a background j
 
 class Finder:
     def find_spec(self, name, path=None, target=None):
-        if name == "rotfem.results":
+        if name == "rotfem.commands.console":
             signal.raise_signal(signal.SIGINT)
 
 sys.meta_path.insert(0, Finder())

@@ -16,10 +16,12 @@ import tomli_w
 
 from rotfem.commands.accuracy import changes_of
 from rotfem.errors import ComputationError, SceneError
+from rotfem.refinement.estimate import percent
 from rotfem.refinement.refine import Setting
 from rotfem.results import Result
 from rotfem.results.files import json_text, rows_text, write_text
 from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows
+from rotfem.results.tables import ShortTable, per_cent
 from rotfem.scene import Scene
 from rotfem.scene.span_tables import is_path
 
@@ -122,7 +124,7 @@ def step_name(row: Row) -> str:
     """Return the steps of a setting in short."""
     if row["scheme"] is None:
         return "–"
-    return f"{row['step']:.3g}" if row["step"] is not None else f"tol {row['tolerance']:.1e}"
+    return f"{row['step']:.3g}" if row["step"] is not None else f"tol {row['tolerance']:.2g}"
 
 
 def promise(row: Row, uncertainty: float) -> dict[str, float]:
@@ -158,42 +160,34 @@ def _errors(rows: list[Row]) -> list[float]:
     return [error for error in (judged(row) for row in rows if row["candidate"]) if error is not None]
 
 
-def cost_report(summary: dict[str, Any], rows: list[dict[str, Any]], folder: Path) -> list[str]:
+def cost_report(result: CostResult) -> list[str]:
     """Return the lines `cost` prints: the table (its Pareto front, if it is long), model errors, the recommendation."""
+    summary = result.summary
     lines = [
         f"{summary['name']}: error of {summary['output']}, {summary['settings']} settings ({summary['failed']} failed, "
         f"{summary['resumed']} results from before) in {summary['timings']['total']:.1f} s",
-        f"{'theory':<18}{'elements':>9}{'P':>3}{'scheme':>19}{'step (s)':>12}{'dofs':>7}"
-        f"{'CPU (s)':>9}{'time (s)':>10}{'error':>9}{'total':>9}",
+        *(line for table in result.tables() for line in table.lines()),
+        "* no other setting is both cheaper and more accurate"
+        + ("" if len(result.rows) <= LONGEST_TABLE else "; all settings are in cost.csv"),
     ]
-    shown = rows if len(rows) <= LONGEST_TABLE else [row for row in rows if row["pareto"]]
-    for row in sorted(shown, key=lambda r: (r["status"] != "done", r["cost"])):
-        errors = "".join(f"{'–':>9}" if row[n] is None else f"{row[n]:>9.1e}" for n in ("error", "total_error"))
-        lines.append(
-            f"{row['theory']:<18}{mesh_name(row):>9}{row['degree']:>3}{row['scheme'] or '–':>19}{step_name(row):>12}"
-            f"{row['dofs'] or '–':>7}{row['cost']:>9.3f}{row['setup'] + row['time']:>10.3f}"
-            f"{errors if row['status'] == 'done' else row['status'].rjust(18)}{' *' if row['pareto'] else ''}"
-        )
-    if len(shown) < len(rows):
-        lines.append("only the Pareto front is shown; all settings are in cost.csv")
     for theory, error in summary["model_errors"].items():
         known = summary["references"][theory]["uncertainty"]
-        lines.append(f"{theory}: error of the model {error:.1e}, reference known to {known:.0e}")
-    lines += [f"{theory}: failed, {reason}" for theory, reason in summary["reference_failures"].items()]
+        lines.append(f"{theory} theory: error {percent(error)}, known to {percent(known)}")
+    lines += [f"{theory} theory: failed, {reason}" for theory, reason in summary["reference_failures"].items()]
     if summary["budget"]["refused"]:
         lines.append(f"{len(summary['budget']['refused'])} settings were left out for want of time or memory")
-    row = summary["recommended"]
+    row, wanted = summary["recommended"], f"{summary['accuracy']:g}"
     if row is not None:
         lines.append(
-            f"for {summary['accuracy']:g}: {setting_of(row).words()}: error {judged(row):.1e}, known to "
-            f"{summary['uncertainty']:.0e}, {row['cost']:.3g} s of CPU time"
+            f"for a relative accuracy of {wanted}: {setting_of(row).words()}; error {percent(judged(row))}, known to "
+            f"{percent(summary['uncertainty'])}, {row['cost']:.3g} s of CPU time"
         )
     else:
-        lines.append(f"no setting is known to be within {summary['accuracy']:g}: {summary['missing']}")
+        lines.append(f"no setting is known to be within {wanted} (relative): {summary['missing']}")
         if (near := summary["closest"]) is not None:
             words, cost = setting_of(near["row"]).words(), near["row"]["cost"]
-            lines.append(f"within {near['within']:.2g}: {words}, {cost:.3g} s of CPU time")
-    return [*lines, f"results in {folder}"]
+            lines.append(f"within {percent(near['within'])}: {words}, {cost:.3g} s of CPU time")
+    return lines
 
 
 # --- the result ------------------------------------------------------------------------------------------------------
@@ -297,9 +291,16 @@ class CostResult(Result):
         )
         return write_tuned(self.scene, setting_of(row), Path(path), remark)
 
-    def report(self, folder: Path) -> list[str]:
+    def report(self) -> list[str]:
         """Return the lines that the command prints."""
-        return cost_report(self.summary, self.rows, folder)
+        return cost_report(self)
+
+    def tables(self) -> list[ShortTable]:
+        """Return one row a setting, cheapest first; of many settings those of the Pareto front."""
+        rows = self.rows if len(self.rows) <= LONGEST_TABLE else [row for row in self.rows if row["pareto"]]
+        head = ("theory", "elements", "degree", "scheme", "step (s)", "CPU (s)", "error (%)", "")
+        ordered = sorted(rows, key=lambda r: (r["status"] != "done", r["cost"]))
+        return [ShortTable(head, [_cells(row) for row in ordered])]
 
     def _flat_rows(self) -> list[Row]:
         """Return the rows with numbers of elements as text where they are two."""
@@ -336,6 +337,12 @@ class CostResult(Result):
         over: dict[str, Variable] = {name: (("setting",), column_of_rows(rows, name)) for name in rows[0]}
         coordinates: dict[str, Variable] = {"setting": (("setting",), np.arange(len(rows)))}
         return dataset(over, coordinates, self._attributes())
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    error = per_cent(row["total_error"]) if row["status"] == "done" else row["status"]
+    mesh = (mesh_name(row), str(row["degree"]), row["scheme"] or "–", step_name(row))
+    return (row["theory"], *mesh, f"{row['cost']:.3f}", error, "*" if row["pareto"] else "")
 
 
 def write_tuned(scene: Scene, setting: Setting, path: Path, remark: str) -> Path:
