@@ -120,13 +120,16 @@ def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Arra
     if conjugate:
         yb, xb, lb = yb.conj(), xb.conj(), lb.conj()
     here, there = a.pencil.gram(ya, la, xb, lb), b.pencil.gram(yb, lb, xa, la)
-    own_a, own_b = a.pencil.gram(ya, la, xa, la), b.pencil.gram(yb, lb, xb, lb)
+    own_a, own_b = a.own, b.own.conj() if conjugate else b.own
     # The two products cancel the unknown scaling of x_b and y_b against each other.
     scale = np.outer(*(np.maximum(np.abs(np.diag(own)), 1e-300) for own in (own_a, own_b)))
     single = np.abs(here) * np.abs(there.T) / scale
     joint = single.copy()
-    for i in twins(la, a.pairs.bounds):
-        for j in twins(lb, b.pairs.bounds):
+    groups_a, groups_b = twins(la, a.pairs.bounds), twins(lb, b.pairs.bounds)
+    if len(groups_a) == len(la) and len(groups_b) == len(lb):
+        return joint, single
+    for i in groups_a:
+        for j in groups_b:
             if len(i) > 1 or len(j) > 1:
                 part_a, part_b = np.linalg.pinv(own_a[np.ix_(i, i)]), np.linalg.pinv(own_b[np.ix_(j, j)])
                 product = part_a @ here[np.ix_(i, j)] @ part_b @ there[np.ix_(j, i)]
@@ -151,14 +154,20 @@ def assign(node: Node, following: Node) -> float:
     A branch whose best partner is a stranger has the order −1 from there on.
     """
     known = np.flatnonzero(node.order >= 0)
-    (c, single), (c_bar, single_bar) = (
-        [np.clip(x[node.order[known]], 0.0, 1.0) for x in correlation(node.spinning, following.spinning, conjugate)]
-        for conjugate in (False, True)
-    )
+
+    def likeness(conjugate: bool) -> list[Array]:
+        return [
+            np.clip(x[node.order[known]], 0.0, 1.0) for x in correlation(node.spinning, following.spinning, conjugate)
+        ]
+
+    c, single = likeness(False)
     a, b = node.spinning.pairs.values[node.order[known]], following.spinning.pairs.values
     may_pass = a.imag[:, None] + b.imag[None, :] <= STEEPEST * abs(following.speed - node.speed)
-    passed = may_pass & (c_bar > c)
-    c, single = np.where(passed, c_bar, c), np.where(passed, single_bar, single)
+    passed = np.zeros_like(may_pass)
+    if np.any(may_pass):
+        c_bar, single_bar = likeness(True)
+        passed = may_pass & (c_bar > c)
+        c, single = np.where(passed, c_bar, c), np.where(passed, single_bar, single)
     rows, columns = linear_sum_assignment(-c - 1e-3 * single)
     following.order = np.full(len(node.order), -1)
     following.confidence = np.zeros(len(node.order))

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from string import ascii_lowercase
 from time import perf_counter
 from typing import Any
@@ -219,6 +220,11 @@ class Spinning:
     clamped: Pencil
     rigid: bool = False
     reference: Any = None
+
+    @cached_property
+    def own(self) -> Array:
+        """y_i^H [(λ_i + λ_j) M + C] x_j of the pairs."""
+        return self.pencil.gram(self.pairs.left, self.pairs.values, self.pairs.right, self.pairs.values)
 
 
 class ModalAnalysis:

@@ -1,4 +1,4 @@
-"""Modes of a large linear system over a range of speeds, by a basis of its modes at a few of them.
+"""Modes of a linear system over a range of speeds, by a basis of its modes at a few of them.
 
 With the M-orthonormal columns V of modes at some speeds, (λ² M + λ C + K) x = 0 becomes the small problem of VᵀMV, VᵀCV
 and VᵀKV, whose pieces (of Omega, Omega², …) are projected once. It keeps symmetry and skewness, so it is a pencil like
@@ -13,17 +13,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
+from numpy.linalg import norm
 from petsc4py import PETSc
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
-from rotfem.numerics.damped import quadratic
-from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, relative
+from rotfem.numerics.damped import heavily_damped, quadratic
+from rotfem.numerics.eigenproblem import ROUNDED, Eigenpairs, Pencil, RoundOff, relative
 from rotfem.numerics.projection import orthonormal, summed, times
 
 Array = npt.NDArray[Any]
 
-#: Unknowns from which, and speeds from which, a basis saves time.
-LARGE, MANY = 8000, 3
+#: Speeds from which a basis saves time, of so many unknowns and of fewer.
+LARGE, MANY, MANY_OF_SMALL = 8000, 3, 10
 
 #: Accepted relative difference of a frequency from that of the full system; most full solutions in the search for it.
 AGREEMENT, MOST = 1e-6, 9
@@ -31,24 +32,65 @@ AGREEMENT, MOST = 1e-6, 9
 
 def worth_while(analysis: ModalAnalysis, speeds: Sequence[float]) -> bool:
     """Return whether a basis is possible (a linear theory, a fixed hub) and saves time."""
-    return (
-        analysis.system.linear and not analysis.free and analysis.system.A.getSize()[0] >= LARGE and len(speeds) >= MANY
-    )
+    if not analysis.system.linear or analysis.free:
+        return False
+    return len(speeds) >= (MANY if analysis.system.A.getSize()[0] >= LARGE else MANY_OF_SMALL)
 
 
 class SmallPencil(Pencil):
-    """A pencil of so few unknowns that all its eigenvalues are computed; double ones, as of a disk, do no harm then."""
+    """A pencil of arrays, of which all eigenvalues are computed; double ones, as of a disk, do no harm then.
 
-    def _right(self, M: Any, C: Any, K: Any, count: int, target: float) -> tuple[Array, Array, Array]:
-        """Return (λ, x, backward error) of the pairs nearest to the target, by LAPACK."""
-        m, c, k = (A.getValues(range(A.getSize()[0]), range(A.getSize()[1])) for A in (M, C, K))
-        values, x, _ = quadratic(m, c, k, target)
-        wanted = min(2 * count + 2, 2 * len(k) - 2)
-        values, x = values[:wanted], x[:, :wanted]
-        sizes = np.array([np.linalg.norm(a) for a in (k, c, m)])
-        powers = np.array([np.ones_like(values), values, values**2])
-        residual = np.linalg.norm((k @ x) * powers[0] + (c @ x) * powers[1] + (m @ x) * powers[2], axis=0)
-        return values, x, residual / (sizes @ np.abs(powers))
+    Of a conservative one with K = L Lᵀ and M = Rᵀ R positive definite, z = (Lᵀ x, λ R x) is an eigenvector of the skew
+    matrix [[0, G], [−Gᵀ, −R⁻ᵀ C R⁻¹]], G = Lᵀ R⁻¹ (Tisseur & Meerbergen 2001, section 3.7): all λ are imaginary, to
+    the last digit, and left vectors are right ones.
+    """
+
+    def __init__(self, M: Array, C: Array, K: Array):
+        self.M, self.C, self.K = M, C, K
+        self.comm, self.spectrum_error = MPI.COMM_SELF, None
+
+    def apply(self, A: Any, X: Array) -> Array:
+        """Return A X."""
+        return np.asarray(A @ X)
+
+    def asymmetries(self) -> dict[str, float]:
+        """Return how far M and K are from symmetric and C from skew."""
+        signs = {"M": (self.M, -1.0), "C": (self.C, 1.0), "K": (self.K, -1.0)}
+        tiny = np.finfo(float).tiny
+        return {name: float(norm(A.T + s * A) / max(norm(A), tiny)) for name, (A, s) in signs.items()}
+
+    def solve(self, count: int, target: float = 0.0) -> Eigenpairs:
+        """Return the pairs of smallest |λ| (see `Pencil.solve`), their errors those of the small problem."""
+        found = self._skew() if self.conservative else None
+        values, x, y = found or quadratic(self.M, self.C, self.K, target)
+        if found is None and heavily_damped(values[: 2 * count + 2], 0.0) and self.asymmetries()["C"] > 1e-10:
+            whole = (PETSc.Mat().createAIJ(A.shape, csr=_csr(A), comm=MPI.COMM_SELF) for A in (self.M, self.C, self.K))
+            return Pencil(*whole).solve(count, target)
+        telling = (values.real >= 0.0) | (not self.conservative)
+        upper = np.flatnonzero((values.imag > 0.0) | ((values.imag == 0.0) & telling))
+        order = upper[np.argsort(np.abs(values[upper]), kind="stable")[:count]]
+        values, x, y = values[order], x[:, order], y[:, order]
+        MX, CX, KX = self.M @ x, self.C @ x, self.K @ x
+        n = np.sum(y.conj() * (2 * values * MX + CX), axis=0)
+        residual = values**2 * MX + values * CX + KX
+        sizes = np.sqrt(np.abs(np.diag(self.K)))
+        rounded = ROUNDED * (sizes @ np.abs(y)) * (sizes @ np.abs(x))
+        off = (np.sum(np.abs(y) * np.abs(residual), axis=0) + rounded) / np.maximum(np.abs(n * values), 1e-300)
+        return Eigenpairs(values, x, y, off, relative(off))
+
+    def _skew(self) -> tuple[Array, Array, Array] | None:
+        """Return (λ, x, y) with positive imaginary parts; None where M or K is not positive definite."""
+        try:
+            L, R = np.linalg.cholesky(self.K), np.linalg.cholesky(self.M).T
+        except np.linalg.LinAlgError:
+            return None
+        inverse = np.linalg.inv(R)
+        G, C = L.T @ inverse, inverse.T @ self.C @ inverse
+        n = len(L)
+        w, z = np.linalg.eigh(1j * np.block([[np.zeros((n, n)), G], [-G.T, -C]]))
+        x = np.linalg.solve(L.T, z[:n, :n])
+        x = x / np.linalg.norm(x, axis=0)
+        return -1j * w[:n], x, x
 
 
 class ReducedAnalysis(ModalAnalysis):
@@ -86,10 +128,9 @@ class ReducedAnalysis(ModalAnalysis):
             exact = self._solve(middle, count)
             error = self._difference(middle, exact, count)
             self.checks.append({"speed": middle, "difference": error})
-            if error > AGREEMENT:
-                self._add(exact)
-                self._project()
-                gaps += [(low, middle), (middle, high)]
+            self._add(exact)
+            self._project()
+            gaps += [(low, middle), (middle, high)] if error > AGREEMENT else []
 
     def report(self) -> dict[str, Any]:
         """Return what a summary says of the basis: columns, and the checks."""
@@ -121,7 +162,8 @@ class ReducedAnalysis(ModalAnalysis):
         self.mass = massed(self.V)
         products = [times(p.operator, self.V) for p in pieces]
         self._pieces = [(p, summed(self.comm, self.V.T @ PV)) for p, PV in zip(pieces, products, strict=True)]
-        self._grams = np.array([[summed(self.comm, A.T @ B) for B in products] for A in products])
+        stacked = np.hstack(products)
+        self._grams = summed(self.comm, stacked.T @ stacked)
         self._metric = summed(self.comm, self.V.T @ self.V)
         self._norms = [float(p.operator.norm()) for p in pieces]
         self._round_off = RoundOff(Pencil(*system.mass_damping_stiffness(keep=False)))
@@ -134,12 +176,12 @@ class ReducedAnalysis(ModalAnalysis):
         small = {kind: np.zeros((self.V.shape[1],) * 2) for kind in "MCK"}
         for ci, (p, matrix) in zip(c, self._pieces, strict=True):
             small[p.kind] += ci * matrix
-        pencil = SmallPencil(*(PETSc.Mat().createAIJ(m.shape, csr=_csr(m), comm=MPI.COMM_SELF) for m in small.values()))
+        pencil = SmallPencil(small["M"], small["C"], small["K"])
         pairs = pencil.solve(min(count, self.V.shape[1] - 1))
         pairs.errors = self._backward_errors(pairs, c)
-        n = np.diag(pencil.gram(pairs.left, pairs.values, pairs.right, pairs.values))
+        slope = pencil.gram(pairs.left, pairs.values, pairs.right, pairs.values).diagonal()
         lost = self._round_off.stiffness(self.V @ pairs.left, self.V @ pairs.right)
-        pairs.bounds = relative(lost / np.maximum(np.abs(n * pairs.values), 1e-300)) + pairs.bounds
+        pairs.bounds = relative(lost / np.maximum(np.abs(slope * pairs.values), 1e-300)) + pairs.bounds
         pencil.owner = self
         return Spinning(speed, zero, pencil, pairs, pencil)
 
@@ -156,14 +198,12 @@ class ReducedAnalysis(ModalAnalysis):
 
         Norms of full vectors are taken by products of the columns, so nothing below 1e-8 is seen.
         """
-        power = {"M": 2, "C": 1, "K": 0}
-        out = np.empty(len(pairs.values))
-        for j, (lam, x) in enumerate(zip(pairs.values, pairs.right.T, strict=True)):
-            factors = np.array([ci * lam ** power[p.kind] for ci, (p, _) in zip(c, self._pieces, strict=True)])
-            residual = np.einsum("i,k,a,ikab,b->", factors.conj(), factors, x.conj(), self._grams, x).real
-            size = float(np.abs(factors) @ self._norms) * np.sqrt((x.conj() @ self._metric @ x).real)
-            out[j] = np.sqrt(max(residual, 0.0)) / size
-        return out
+        power = np.array([{"M": 2, "C": 1, "K": 0}[p.kind] for p, _ in self._pieces])
+        factors = c[:, None] * pairs.values[None, :] ** power[:, None]
+        parts = (factors[:, None, :] * pairs.right[None, :, :]).reshape(-1, len(pairs.values))
+        residual = np.sum(parts.conj() * (self._grams @ parts), axis=0).real
+        lengths = np.sum(pairs.right.conj() * (self._metric @ pairs.right), axis=0).real
+        return np.asarray(np.sqrt(np.maximum(residual, 0.0) / lengths) / (self._norms @ np.abs(factors)))
 
 
 def _csr(m: Array) -> tuple[Array, Array, Array]:

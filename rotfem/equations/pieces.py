@@ -149,7 +149,7 @@ def geometric_pieces(pieces: Pieces) -> list[tuple[Piece, Any, frozenset[str]]]:
     """
     switches = pieces.model.switches
     form, compiled = pieces.known_form("G")
-    there = set(extract_constants(form))
+    there = set(form.constants())
     adding = [name for name, switch in switches.items() if switch in there]
     loads, displaced = _stressing(pieces, compiled), list[tuple[Any, list[Array]]]()
 
@@ -241,6 +241,11 @@ class Piece:
     at_root: Array
 
 
+#: Signature of a residual, theory and effects ↦ these, and sketches of the forms that follow; the latest ones.
+_KNOWN: dict[Any, tuple[Any, dict[str, Any]]] = {}
+MOST_KNOWN = 32
+
+
 class PolynomialCheck:
     """Compares a term at constants of no special size with what its pieces make of them.
 
@@ -285,7 +290,8 @@ class Pieces:
         root: unit motions of the clamp.
 
     Attributes:
-        at_rest: "f", "K", "C", "M" ↦ UFL form at q = v = a = 0; those that vanish are left out.
+        at_rest: "f", "K", "C", "M" at q = v = a = 0 and "G", the geometric stiffness ↦ UFL form (or what stands for it,
+            see `rotfem.numerics.forms.drawn`); those that vanish are left out.
         constants: name ↦ constant of frame and loads.
         axis: components of the spin axis that w and dw have.
         pattern: a matrix with the pattern of all.
@@ -304,28 +310,55 @@ class Pieces:
         self._free.array[clamped] = 0.0
         self.assembled = 0.0
         loads = {name: constant for name, (constant, _) in self.structure.load_constants.items()}
-        self.at_rest = self._forms_at_rest()
         self.constants: dict[str, Any] = {**model.frame.constants, **loads}
         self.axis: Array = model.motion.axis[2:] if self.structure.planar else model.motion.axis
-        compiled = forms.together(list(self.at_rest.values()), once=True)
-        self._forms = dict(zip(self.at_rest, compiled, strict=True))
+        self.at_rest, self._forms = self._known() or self._made()
         self._assembled = Assembler(self._forms["K"], self.bcs)
         self.pattern = self._assembled.pattern
         self.all: list[Piece] = []
         self.not_polynomial: list[str] = []
-        for kind in self.at_rest:
+        for kind in (kind for kind in self.at_rest if kind != "G"):
             self._decompose(kind)
         self._set_switches(model.switches)
         if self.not_polynomial:
             model.check_smooth()
-        self._geometric = self.geometric(ufl.TestFunction(self.V), ufl.TrialFunction(self.V), self.prestressed)
-        if not isinstance(self._geometric, int):
+        if "G" in self._forms:
             self._prestress()
 
-    def _forms_at_rest(self) -> dict[str, Any]:
-        """Return f, K, C and M at q = v = a = 0 as UFL forms; those that vanish are left out."""
+    def _made(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Return f, K, C and M at q = v = a = 0, and G, as UFL and compiled forms; those that vanish are left out."""
         at_rest = self.model.at_rest(self.model.residual, undeformed=True)
-        return {kind: form for kind, form in at_rest.items() if not form.empty()}
+        at_rest = {kind: form for kind, form in at_rest.items() if not form.empty()}
+        compiled = dict(zip(at_rest, forms.together(list(at_rest.values()), once=True), strict=True))
+        geometric = self.geometric(ufl.TestFunction(self.V), ufl.TrialFunction(self.V), self.prestressed)
+        if not isinstance(geometric, int):
+            at_rest["G"], compiled["G"] = geometric, forms.form(geometric, once=True)
+        sketches = {kind: forms.sketch(form, compiled[kind], self._whole) for kind, form in at_rest.items()}
+        if None not in sketches.values():
+            key, makers = self._key
+            _KNOWN[key] = makers, sketches
+            if len(_KNOWN) > MOST_KNOWN:
+                del _KNOWN[next(iter(_KNOWN))]
+        return at_rest, compiled
+
+    def _known(self) -> tuple[dict[str, Any], dict[str, Any]] | None:
+        """Return the same of a model whose forms have been made on another mesh or with other numbers; or None."""
+        if (found := _KNOWN.get(self._key[0])) is None:
+            return None
+        (data,) = self.model.residual.subdomain_data().values()
+        both = {kind: forms.drawn(known, self._whole, self.V, data) for kind, known in found[1].items()}
+        return {kind: f for kind, (f, _) in both.items()}, {kind: compiled for kind, (_, compiled) in both.items()}
+
+    @cached_property
+    def _key(self) -> tuple[Any, Any]:
+        """What the forms follow from, and the objects that it names by their addresses."""
+        makers = [self.model.theory, *self.model.acting.values()]
+        return (self.model.residual.signature(), *(id(maker) for maker in makers)), makers
+
+    @cached_property
+    def _whole(self) -> tuple[list[Any], list[Any]]:
+        residual = self.model.residual
+        return [*residual.coefficients(), self.prestressed], list(residual.constants())
 
     def _zero_constants(self) -> None:
         for constant in self.constants.values():
@@ -505,11 +538,10 @@ class Pieces:
 
     def known_form(self, name: str) -> tuple[Any, Any]:
         """Return f, K, C, M at rest, or G, as UFL and as compiled form."""
-        return self._geometric if name == "G" else self.at_rest[name], self._forms[name]
+        return self.at_rest[name], self._forms[name]
 
     def _prestress(self) -> None:
         """Add the geometric stiffness of the stresses that each load piece causes in the linear structure."""
-        self._forms["G"] = forms.form(self._geometric, once=True)
         started = perf_counter()
         for load, K, added in geometric_pieces(self):
             self._keep("K", load.key, K, load.of | {PRESTRESS} | added)

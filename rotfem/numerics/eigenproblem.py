@@ -33,6 +33,7 @@ from rotfem.numerics.balance import balanced, least_frequency, power_of_two
 from rotfem.numerics.damped import MORE, damped_pairs, heavily_damped
 from rotfem.numerics.linear import SMALL, transposed, use_direct_solver
 from rotfem.numerics.low_rank import sparse_part
+from rotfem.numerics.projection import times
 
 #: Random vectors by which norms of large matrices are estimated.
 PROBES = 4
@@ -125,14 +126,19 @@ class RoundOff:
 
     def _along_rows(self, values: Array) -> Array:
         """Return for every row the sum of values (n, m) over the columns that K has entries in."""
+        return self._ones @ values if self.pencil.comm.size == 1 else np.real(self.pencil.apply(self._ones, values))
+
+    @cached_property
+    def _ones(self) -> Any:
+        """One for each entry of K."""
         K = self.pencil.K
         indptr, indices, data = K.getValuesCSR()
         if self.pencil.comm.size == 1:
-            return np.asarray(csr_array((np.ones(len(data)), indices, indptr), shape=K.getSize()) @ values)
+            return csr_array((np.ones(len(data)), indices, indptr), shape=K.getSize())
         ones = K.duplicate()
         ones.setValuesCSR(indptr, indices, np.ones(len(data)))
         ones.assemble()
-        return np.real(self.pencil.apply(ones, values.astype(complex)))
+        return ones
 
     def _sum(self, local: Array) -> Array:
         return np.asarray(self.pencil.comm.allreduce(local) if self.pencil.comm.size > 1 else local)
@@ -302,7 +308,6 @@ class Pencil:
         self.M, self.C, self.K = M, C, K
         self.owner: Any = None
         self.comm: MPI.Comm = M.comm.tompi4py()
-        self._x, self._y = K.createVecs()
         self._smallest = 1.0
         #: Unit of λ in the eigensolver, 1/s, a power of two: numbers of order one keep all digits. None: not known yet.
         self.unit: float | None = None
@@ -320,20 +325,9 @@ class Pencil:
 
     def apply(self, A: Any, X: Array) -> Array:
         """Return A X for complex columns X of locally owned unknowns."""
-        sparse = sparse_part(A)
-        return self._apply(A, X) if sparse is A else self._apply(sparse, X) + np.asarray(A.added(X))
-
-    def _apply(self, A: Any, X: Array) -> Array:
-        if self.comm.size == 1:
-            indptr, indices, data = A.getValuesCSR()
-            return np.asarray(csr_array((data, indices, indptr), shape=A.getSize()) @ X)
-        out = np.empty(X.shape, dtype=complex)
-        for j in range(X.shape[1]):
-            for part, factor in ((X[:, j].real, 1.0), (X[:, j].imag, 1j)):
-                self._x.array[:] = part
-                A.mult(self._x, self._y)
-                out[:, j] = factor * self._y.array if factor == 1.0 else out[:, j] + factor * self._y.array
-        return out
+        parts, m = times(sparse_part(A), np.hstack([X.real, X.imag])), X.shape[1]
+        out = parts[:, :m] + 1j * parts[:, m:]
+        return out if sparse_part(A) is A else out + np.asarray(A.added(X))
 
     def gram(self, Y: Array, lam: Array, X: Array, mu: Array) -> Array:
         """Return y_i^H [(λ_i + μ_j) M + C] x_j for all i, j, over all ranks."""

@@ -6,7 +6,7 @@ A kill in the middle, two programs at once, or a damaged cache do no harm.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import basix
 import ffcx.codegeneration.jit as ffcx_jit
@@ -18,6 +18,7 @@ from dolfinx import jit as dolfinx_jit
 from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 from ufl.algorithms import expand_derivatives, extract_coefficients
+from ufl.algorithms.analysis import extract_constants
 from ufl.algorithms.map_integrands import map_integrand_dags
 from ufl.constantvalue import Zero
 from ufl.corealg.map_dag import map_expr_dag
@@ -116,6 +117,64 @@ def _given(compiled: Any, module: Any, make: Callable[..., Any], *arguments: Any
         return make(*arguments)
     finally:
         dolfinx_jit.ffcx_jit = real
+
+
+class Sketch(NamedTuple):
+    """A compiled form without its mesh, to be used again on another one.
+
+    Attributes:
+        code: FFCx's form and its module.
+        integrals: type, subdomain, and places of the coefficients and of the constants in those of a whole, of each.
+        rank: number of arguments.
+    """
+
+    code: tuple[Any, Any]
+    integrals: tuple[tuple[str, Any, list[int], list[int]], ...]
+    rank: int
+
+
+def sketch(f: Any, compiled: Any, whole: tuple[Sequence[Any], Sequence[Any]]) -> Sketch | None:
+    """Return what is to be known of a UFL form; None where it has more than the whole.
+
+    Args:
+        f: the form.
+        compiled: what `form` makes of it.
+        whole: coefficients and constants of a form that another one with its signature has at the same places.
+    """
+    integrals = []
+    for part in f.integrals():
+        own = extract_coefficients(part.integrand()), extract_constants(part.integrand())
+        if any(x not in all_of for mine, all_of in zip(own, whole, strict=True) for x in mine):
+            return None
+        places = [[all_of.index(x) for x in mine] for mine, all_of in zip(own, whole, strict=True)]
+        integrals.append((part.integral_type(), part.subdomain_id(), *places))
+    return Sketch((compiled.ufcx_form, compiled.module), tuple(integrals), len(f.arguments()))
+
+
+def drawn(known: Sketch, whole: tuple[Sequence[Any], Sequence[Any]], V: Any, data: Any) -> tuple[Any, Any]:
+    """Return (a UFL form with the integrals, coefficients and constants of a sketch, but not its terms; it compiled).
+
+    Args:
+        known: the sketch.
+        whole: see `sketch`.
+        V: space of the arguments.
+        data: type of an integral ↦ its subdomain data.
+    """
+    arguments = [ufl.TestFunction(V), ufl.TrialFunction(V)][: known.rank]
+    parts, domain = [], V.mesh.ufl_domain()
+    for kind, subdomain, *places in known.integrals:
+        factors = [x for own, all_of in zip(places, whole, strict=True) for x in (all_of[i] for i in own)]
+        term = sum((_first(x) for x in factors), start=ufl.as_ufl(1.0))
+        for x in arguments:
+            term = term * _first(x)
+        parts.append(ufl.Integral(term, kind, domain, subdomain, {}, data[kind][0]))
+    f = ufl.Form(parts)
+    return f, _given(*known.code, fem.form, f)
+
+
+def _first(x: Any) -> Any:
+    """Return the first component of what may be a number, a vector or a matrix."""
+    return x[(0,) * len(x.ufl_shape)] if x.ufl_shape else x
 
 
 def constant(domain: Any, value: npt.NDArray[Any]) -> fem.Constant:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -190,19 +191,27 @@ def _is_disk(x: npt.NDArray[Any], y: npt.NDArray[Any]) -> bool:
     return max(gaps) < GAP
 
 
+@lru_cache(maxsize=4)
+def _fits(x: bytes, y: bytes) -> list[tuple[int, npt.NDArray[Any], npt.NDArray[Any]]]:
+    """Return of each station along nodes its number, its nodes, and what fits Legendre functions to values there."""
+    along, across = np.frombuffer(x), np.frombuffer(y)
+    edges, out = np.linspace(along.min(), along.max(), STATIONS + 1), []
+    station = np.clip(np.digitize(along, edges) - 1, 0, STATIONS - 1)
+    for i in range(STATIONS):
+        here = np.flatnonzero(station == i)
+        half = np.ptp(across[here]) / 2 if len(here) else 0.0
+        if half > 0.0:
+            s = (across[here] - across[here].min()) / half - 1
+            degree = min(ACROSS, len(np.unique(np.round(s, 6))) - 1)
+            out.append((i, here, np.linalg.pinv(np.polynomial.legendre.legvander(s, degree))))
+    return out
+
+
 def _lines(x: npt.NDArray[Any], y: npt.NDArray[Any], w: npt.NDArray[Any]) -> tuple[int, int]:
     """Return (nodal lines along the plate, nodal lines across it): the largest Legendre part across, and its zeros."""
-    edges = np.linspace(x.min(), x.max(), STATIONS + 1)
-    station = np.clip(np.digitize(x, edges) - 1, 0, STATIONS - 1)
     parts = np.zeros((STATIONS, ACROSS + 1))
-    for i in range(STATIONS):
-        here = station == i
-        half = np.ptp(y[here]) / 2 if np.any(here) else 0.0
-        if half == 0.0:
-            continue
-        s = (y[here] - y[here].min()) / half - 1
-        degree = min(ACROSS, len(np.unique(np.round(s, 6))) - 1)
-        parts[i, : degree + 1] = np.polynomial.legendre.legfit(s, w[here], degree)
+    for i, here, fit in _fits(x.tobytes(), y.tobytes()):
+        parts[i, : len(fit)] = fit @ w[here]
     weight = np.sum(parts**2, axis=0) / (2 * np.arange(ACROSS + 1) + 1)
     along = int(np.argmax(weight))
     return along, sign_changes(parts[:, along], 0.02)
