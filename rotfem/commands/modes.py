@@ -21,7 +21,7 @@ from rotfem.analysis.modal import participation as masses_of
 from rotfem.analysis.stability import Stability, stability_of_pencil
 from rotfem.analysis.theory_error import TheoryCheck, TheoryError
 from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy, within_tolerance
-from rotfem.commands.advice import advise
+from rotfem.commands.advice import advise, few_unknowns
 from rotfem.commands.error_report import error_of_modes
 from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.mode_tables import mode_tables
@@ -197,4 +197,4 @@ def hints_of(analysis: ModalAnalysis, scene: Scene, command: str, hint: Hint | N
     if hint is not None and theory.linear and not theory.prestress:
         with suppress(ComputationError):  # a hint is worth no failure
             critical = critical_speed(analysis.system)
-    return advise(scene, command, hint, speed, critical)
+    return advise(scene, command, hint, speed, critical, few_unknowns(analysis.system.V))

@@ -22,7 +22,7 @@ from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.switching import SMOOTHER, watched_switches
 from rotfem.analysis.theory_error import said_of
 from rotfem.commands import monitor
-from rotfem.commands.advice import advise
+from rotfem.commands.advice import advise, few_unknowns
 from rotfem.commands.checkpoint import Log, Parts
 from rotfem.commands.error_report import RunErrors, output_of
 from rotfem.commands.first_state import Start, first_state, hints_of_start
@@ -97,7 +97,7 @@ class Simulation:
 
     def advise(self, hint: Hint | None) -> None:
         """Give the hints that there are before the computation starts."""
-        also = hints_of_start(self.scene, self.problem)
+        also = [*few_unknowns(self.system.V), *hints_of_start(self.scene, self.problem)]
         self.log.advice = advise(self.scene, "run", hint, critical=self.monitor.critical, also=also)
 
     def run(self, progress: Progress | None = None) -> RunResult:

@@ -81,6 +81,12 @@ def test_examples(document: str, tmp_path: Path) -> None:
     assert sorted(map(int, printed)) == sorted(sayings), "a line prints, but does not say what"
 
 
+def test_every_example_is_run() -> None:
+    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]
+    with_examples = {str(page.relative_to(ROOT)) for page in pages if "```python" in page.read_text(encoding="utf-8")}
+    assert with_examples == set(DOCUMENTS)
+
+
 @pytest.mark.parametrize(
     ("said", "printed", "right"),
     [
