@@ -20,8 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.load_steps import Growth
-from rotfem.analysis.turning import recounted
+from rotfem.analysis.load_steps import Growth, recounted
 from rotfem.errors import ComputationError
 from rotfem.numerics.inertia import surely_negative
 from rotfem.numerics.linear import DirectSolver, Increment

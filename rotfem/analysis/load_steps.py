@@ -10,7 +10,6 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.theory_error import KNOWN, conditioning
-from rotfem.analysis.turning import reached, recounted
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics.theories import richest
@@ -47,6 +46,19 @@ def less(system: System) -> str:
 def richest_advice() -> str:
     """Return the advice to take the theory that holds for any deflection."""
     return f'model.theory = "{richest().name}", which holds at large deflection'
+
+
+def recounted(system: Any, q: Array, change: Array | None = None) -> tuple[Array, Array]:
+    """Return a shape q (local dof array) and a small change of it with rotations that are counted from q itself."""
+    q, rate = q.copy(), np.zeros_like(q) if change is None else change.copy()
+    system.count_rotations_from(system.structure.turns.reset(q, rate, [np.zeros_like(q)]))
+    return q, rate
+
+
+def reached(system: Any, q: Array) -> float:
+    """Return the part of their range that the rotations of q (local dof array) take; 0 where they have no limit."""
+    turns = system.structure.turns
+    return 0.0 if turns is None else float(turns.reached(q))
 
 
 @dataclass

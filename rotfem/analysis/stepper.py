@@ -12,7 +12,6 @@ import numpy as np
 
 from rotfem.analysis.roots import came_true, check_root, energy_gain, turned_with_clamp
 from rotfem.analysis.schemes import Array, Observer, Scheme, Shifts, Stage, State
-from rotfem.analysis.turning import keep_rotations_small
 from rotfem.errors import ComputationError
 from rotfem.mechanics.time_signals import View
 from rotfem.numerics.newton import REACH, Newton, OldFactor
@@ -238,6 +237,29 @@ class StageSolver:
                 break
             previous = d
         raise ComputationError("the old factor is too far from the matrix")
+
+
+def keep_rotations_small(system: Any, scheme: Scheme, state: State, h: float) -> bool:
+    """Count rotations afresh if a step of h (s) might lead out of their range; return whether that was done.
+
+    The motion that the state describes does not change, but the numbers for it do, in the state itself, so that whoever
+    holds it can go on with it. A memory of the scheme that is a second rate, as an auxiliary acceleration is, changes
+    as one; of any other the scheme makes a new one.
+    """
+    turns = system.structure.turns
+    if turns is None:
+        return False
+    system.count_rotations_from(state.reference)
+    if not turns.is_due(state.q, state.v, h):
+        return False
+    is_rate = isinstance(state.memory, np.ndarray) and state.memory.shape == state.a.shape
+    q, v, a = state.q.copy(), state.v.copy(), state.a.copy()
+    second = [a, state.memory.copy()] if is_rate else [a]
+    reference = turns.reset(q, v, second)
+    system.count_rotations_from(reference)
+    state.q, state.v, state.a, state.reference = q, v, a, reference
+    state.memory = second[-1] if is_rate else scheme.start(state.changed(memory=None)).memory
+    return True
 
 
 #: Halvings left with which a step is taken though it feeds the motion.

@@ -7,7 +7,6 @@ The pieces say what they are of (see `rotfem.equations.pieces`), so that a part 
 
 from __future__ import annotations
 
-from abc import ABC
 from collections.abc import Collection, Mapping
 from functools import cached_property
 from typing import Any, Self
@@ -15,9 +14,10 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.equations.clamp import ClampRows
 from rotfem.equations.modal_damping import EFFECT
 from rotfem.equations.model import Model
-from rotfem.equations.pieces import PRESTRESS, ClampRows, Piece, Pieces
+from rotfem.equations.pieces import PRESTRESS, Piece, Pieces
 from rotfem.equations.system import System
 from rotfem.errors import InputError
 from rotfem.mechanics.effects import INTERNAL
@@ -26,131 +26,12 @@ from rotfem.mechanics.theories import Theory, theories
 from rotfem.numerics import compat, forms
 from rotfem.numerics.linear import DirectSolver, Increment, combine, set_diagonal
 
-
-class AffineEnergies(System, ABC):
-    """The energies of a system whose operators are assembled (see `rotfem.equations.affine.AffineSystem`)."""
-
-    _operators: dict[str, Any]
-    _load: Any
-    _work: Any
-    _qva: list[Any]
-
-    def energies(self) -> dict[str, float]:
-        """Return kinetic and strain energy and the Jacobi integral ½ v·Mv + ½ q·Kq + f·q − T0(0), J."""
-        e = super().energies()
-        q, v, _ = self._qva
-        half = [self._quadratic(self._operators[k], x) / 2 for k, x in (("M", v), ("K", q))]
-        e["jacobi"] = sum(half) + self._load.dot(q) - self._rest_energy()
-        return e
-
-    def _quadratic(self, A: Any, x: Any) -> float:
-        A.mult(x, self._work)
-        return float(self._work.dot(x))
-
-    def _rest_energy(self) -> float:
-        """Return T0 of the undeformed structure at the present speed, J: the constant of the Jacobi integral."""
-        spin = self.model.frame.constants.get("w")
-        if spin is None or "T0" not in self._energies.names:
-            return 0.0
-        if self.motion.pitch is not None:
-            return self._undeformed_rest_energy()
-        return self.rest_inertia * float(np.dot(spin.value, spin.value))
-
-    def _undeformed_rest_energy(self) -> float:
-        state = self.q.x.array.copy()
-        self.q.x.array[:] = 0.0
-        energy = self._energies()["T0"]
-        self.q.x.array[:] = state
-        return energy
-
-    @cached_property
-    def rest_inertia(self) -> float:
-        """T0 of the undeformed structure at unit speed, kg·m²: half its moment of inertia about the axis."""
-        spin = self.model.frame.constants["w"]
-        w = spin.value.copy()
-        spin.value[...] = self.motion.axis[-spin.value.size :]
-        inertia = self._undeformed_rest_energy()
-        spin.value[...] = w
-        return inertia
-
-
-class AffineStiffness(System, ABC):
-    """The parts of the stiffness of a system of pieces (see `rotfem.equations.affine.AffineSystem`)."""
-
-    pieces: list[Piece]
-    _decomposed: Pieces
-    _increment: Increment | None
-    _weights: Array
-    _coefficients: Array | None
-    _load: Any
-
-    @property
-    def prestressing(self) -> Any:
-        """The function that N⁰ of the form G is of: the displacement under the loads, by the material alone."""
-        return self._decomposed.prestressed
-
-    def displaced(self) -> Array:
-        """Return the displacement (local dof array) of the structure at rest under the loads at the time set."""
-        if self._increment is None:
-            self._increment = Increment(self.V)
-        return -self._increment.solve(self.material_solver, self._load)
-
-    @property
-    def material(self) -> Any:
-        """Stiffness of the strains alone, clamped rows 1."""
-        return self._decomposed.material
-
-    @property
-    def material_solver(self) -> DirectSolver:
-        """Solver of the `material`."""
-        return self._decomposed.material_solver
-
-    def geometric(self, u: Any, w: Any, base: Any, theory: Theory | None = None) -> Any:
-        """Return ∫ N⁰ D²Γ₁[u, w], a UFL form (see `Pieces.geometric`)."""
-        return self._decomposed.geometric(u, w, base, theory)
-
-    def matrices_at_rest(self) -> tuple[Any, Any]:
-        """Return (M, K) of the undeformed structure at rest without spin and loads (see `System`)."""
-        out = []
-        for kind in "MK":
-            A = self.A.duplicate()
-            chosen = [p.operator for p in self.pieces if p.kind == kind and not p.key and PRESTRESS not in p.of]
-            combine(A, chosen, np.ones(len(chosen)))
-            out.append(A)
-        return out[0], out[1]
-
-    @property
-    def prestressed(self) -> bool:
-        """Whether there is geometric stiffness at the time set."""
-        weights = self._coefficients if self._coefficients is not None else np.zeros(len(self.pieces))
-        return any(PRESTRESS in p.of and value != 0.0 for p, value in zip(self.pieces, weights, strict=True))
-
-    def add_other_stiffness(self, A: Any) -> None:
-        """Add to a matrix the stiffness at the time set that is not that of the strains: of effects and prestress."""
-        assert self._coefficients is not None
-        for p, value in zip(self.pieces, self._coefficients, strict=True):
-            if p.kind == "K" and value != 0.0 and (INTERNAL.name not in p.of or PRESTRESS in p.of):
-                A.axpy(value, p.operator)
-
-    def stiffness_pieces(self) -> tuple[Any, Any]:
-        """Return (K_1, K_2) of K = K_1 + Omega² K_2 without base acceleration and loads; clamped rows 1 and 0."""
-        axis = self._decomposed.axis
-        parts = (self.A.duplicate(), self.A.duplicate())
-        for part, size in zip(parts, (0, 2), strict=True):
-            chosen = [p for p in self.pieces if p.kind == "K" and len(p.key) == size]
-            weights = [np.prod([axis[i] for _, i in p.key]) if p.key else 1.0 for p in chosen]
-            combine(part, [p.operator for p in chosen], np.array(weights))
-        return parts
-
-
-__all__ = ["PRESTRESS", "AffineSystem"]
-
 Array = npt.NDArray[np.float64]
 
 ONE = np.ones(1)
 
 
-class AffineSystem(AffineStiffness, AffineEnergies):
+class AffineSystem(System):
     """System of a linear theory, about the undeformed state: sums of its pieces."""
 
     linear = True
@@ -300,7 +181,7 @@ class AffineSystem(AffineStiffness, AffineEnergies):
         return self._at_clamp(self._coefficients, self._state)
 
     def clamp_tangents(self) -> tuple[Array, Array, Array]:
-        """Return what small q, v and a add to the forces of the clamp (see `Readings`)."""
+        """Return what small q, v and a add to the forces of the clamp (see `System`)."""
         assert self._coefficients is not None
         return self._at_clamp.tangents(self._coefficients, len(self.root.weights))
 
@@ -356,3 +237,103 @@ class AffineSystem(AffineStiffness, AffineEnergies):
                 out.axpy(slope, self._work)
         out.array[self.clamped] = 0.0
         return out
+
+    # --- the parts of the stiffness ------------------------------------------------------------------------------
+
+    @property
+    def prestressing(self) -> Any:
+        """The function that N⁰ of the form G is of: the displacement under the loads, by the material alone."""
+        return self._decomposed.prestressed
+
+    def displaced(self) -> Array:
+        """Return the displacement (local dof array) of the structure at rest under the loads at the time set."""
+        if self._increment is None:
+            self._increment = Increment(self.V)
+        return -self._increment.solve(self.material_solver, self._load)
+
+    @property
+    def material(self) -> Any:
+        """Stiffness of the strains alone, clamped rows 1."""
+        return self._decomposed.material
+
+    @property
+    def material_solver(self) -> DirectSolver:
+        """Solver of the `material`."""
+        return self._decomposed.material_solver
+
+    def geometric(self, u: Any, w: Any, base: Any, theory: Theory | None = None) -> Any:
+        """Return ∫ N⁰ D²Γ₁[u, w], a UFL form (see `Pieces.geometric`)."""
+        return self._decomposed.geometric(u, w, base, theory)
+
+    def matrices_at_rest(self) -> tuple[Any, Any]:
+        """Return (M, K) of the undeformed structure at rest without spin and loads (see `System`)."""
+        out = []
+        for kind in "MK":
+            A = self.A.duplicate()
+            chosen = [p.operator for p in self.pieces if p.kind == kind and not p.key and PRESTRESS not in p.of]
+            combine(A, chosen, np.ones(len(chosen)))
+            out.append(A)
+        return out[0], out[1]
+
+    @property
+    def prestressed(self) -> bool:
+        """Whether there is geometric stiffness at the time set."""
+        weights = self._coefficients if self._coefficients is not None else np.zeros(len(self.pieces))
+        return any(PRESTRESS in p.of and value != 0.0 for p, value in zip(self.pieces, weights, strict=True))
+
+    def add_other_stiffness(self, A: Any) -> None:
+        """Add to a matrix the stiffness at the time set that is not that of the strains: of effects and prestress."""
+        assert self._coefficients is not None
+        for p, value in zip(self.pieces, self._coefficients, strict=True):
+            if p.kind == "K" and value != 0.0 and (INTERNAL.name not in p.of or PRESTRESS in p.of):
+                A.axpy(value, p.operator)
+
+    def stiffness_pieces(self) -> tuple[Any, Any]:
+        """Return (K_1, K_2) of K = K_1 + Omega² K_2 without base acceleration and loads; clamped rows 1 and 0."""
+        axis = self._decomposed.axis
+        parts = (self.A.duplicate(), self.A.duplicate())
+        for part, size in zip(parts, (0, 2), strict=True):
+            chosen = [p for p in self.pieces if p.kind == "K" and len(p.key) == size]
+            weights = [np.prod([axis[i] for _, i in p.key]) if p.key else 1.0 for p in chosen]
+            combine(part, [p.operator for p in chosen], np.array(weights))
+        return parts
+
+    # --- energies ------------------------------------------------------------------------------------------------
+
+    def energies(self) -> dict[str, float]:
+        """Return kinetic and strain energy and the Jacobi integral ½ v·Mv + ½ q·Kq + f·q − T0(0), J."""
+        e = super().energies()
+        q, v, _ = self._qva
+        half = [self._quadratic(self._operators[k], x) / 2 for k, x in (("M", v), ("K", q))]
+        e["jacobi"] = sum(half) + self._load.dot(q) - self._rest_energy()
+        return e
+
+    def _quadratic(self, A: Any, x: Any) -> float:
+        A.mult(x, self._work)
+        return float(self._work.dot(x))
+
+    def _rest_energy(self) -> float:
+        """Return T0 of the undeformed structure at the present speed, J: the constant of the Jacobi integral."""
+        spin = self.model.frame.constants.get("w")
+        if spin is None or "T0" not in self._energies.names:
+            return 0.0
+        if self.motion.pitch is not None:
+            return self._undeformed_rest_energy()
+        return self.rest_inertia * float(np.dot(spin.value, spin.value))
+
+    def _undeformed_rest_energy(self) -> float:
+        state = self.q.x.array.copy()
+        self.q.x.array[:] = 0.0
+        energy = self._energies()["T0"]
+        self.q.x.array[:] = state
+        return energy
+
+    @cached_property
+    def rest_inertia(self) -> float:
+        """T0 of the undeformed structure at unit speed, kg·m²: half its moment of inertia about the axis."""
+        spin = self.model.frame.constants["w"]
+        w = spin.value.copy()
+        spin.value[...] = self.motion.axis[-spin.value.size :]
+        inertia = self._undeformed_rest_energy()
+        spin.value[...] = w
+        return inertia

@@ -20,9 +20,8 @@ import numpy.typing as npt
 import ufl
 from petsc4py import PETSc
 
-from rotfem.equations.by_spin import BySpin
 from rotfem.equations.linearised import BorderedLinearised
-from rotfem.equations.nonlinear import assembled
+from rotfem.equations.nonlinear import BySpin, assembled
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics import work
@@ -339,7 +338,7 @@ class BorderedSystem:
         return self.inner.sizes(x[: len(self.inner.q.x.array)])
 
     def root_reaction(self) -> dict[str, float]:
-        """Return force and moment of the hub on the structure (see `Readings`), in balance with the hub's equation.
+        """Return force and moment of the hub on the structure (see `System`), in balance with the hub's equation.
 
         That takes the work in a turn of the displaced structure, which the residual in a turn of the clamp is to the
         order of the theory, or of the mesh where the theory is exact. The moment about the axis is the former.

@@ -10,17 +10,107 @@ import numpy.typing as npt
 import ufl
 from dolfinx import fem, la
 from dolfinx.fem import petsc as fem_petsc
+from ufl.algorithms import expand_derivatives
+from ufl.algorithms.analysis import extract_constants
 
-from rotfem.equations.by_spin import BySpin
-from rotfem.equations.clamp_work import ClampWork
+from rotfem.equations.clamp import ClampWork
 from rotfem.equations.energy_balance import EnergyBalance
 from rotfem.equations.model import Model
-from rotfem.equations.point_stresses import PointStresses
 from rotfem.equations.system import System
-from rotfem.mechanics.sums import weighted
+from rotfem.mechanics.sums import added, weighted
+from rotfem.mechanics.work import Mechanics
 from rotfem.numerics import compat, forms
 
 Array = npt.NDArray[np.float64]
+
+
+class BySpin:
+    """The column of a free hub's angle in the tangent: c_v ∂/∂Omega + c_m ∂/∂Omega' of a form.
+
+    The speed along the axis of the motion is varied.
+
+    Args:
+        model: the constants of the frame.
+        form: UFL form; only its integrals with the speed or its rate are differentiated.
+
+    Attributes:
+        ufl: the derivative, a UFL form; None if the speed is not in the form.
+    """
+
+    def __init__(self, model: Any, form: Any):
+        self._factors = [model.structure.constant(0.0) for _ in range(2)]
+        parts, expanded = [], expand_derivatives(form)
+        for name, factor in zip(("w", "dw"), self._factors, strict=True):
+            constant = model.frame.constants.get(name)
+            if constant is None:
+                continue
+            within = [part for part in expanded.integrals() if constant in extract_constants(part.integrand())]
+            s = ufl.variable(model.structure.constant(0.0))
+            axis = model.motion.axis[-constant.value.size :]
+            shifted = ufl.as_vector([constant[i] + s * float(e) for i, e in enumerate(axis)])
+            derivative = expand_derivatives(ufl.diff(ufl.replace(ufl.Form(within), {constant: shifted}), s))
+            if not derivative.empty():
+                parts.append(factor * derivative)
+        self.ufl = added(parts) if parts else None
+
+    def set(self, c_v: float, c_m: float) -> None:
+        """Set the factors."""
+        for constant, value in zip(self._factors, (c_v, c_m), strict=True):
+            constant.value = value
+
+
+class PointStresses:
+    """Stresses of their own at the integration points, for the geometric part of Newton's tangent.
+
+    In a slender structure the stress of an iterate, C Γ(q), is nothing like that of the solution: a correction that
+    turns sections also stretches the axis, by half the square of the turn. EA makes a large force of that, of any sign,
+    which the next correction takes away. With the stresses as unknowns of their own (mixed integration point Newton:
+    Magisano, Leonetti & Garcea, Int. J. Numer. Meth. Eng. 112 (2017) 1237) a correction d of q_k gives
+
+        σ_{k+1} = C (Γ(q_k) + DΓ(q_k)[d]),        q_{k+1} = q_k + d.
+
+    Eliminated point by point they leave the residual as it is. In the tangent ∫ σ_{k+1}·D²Γ takes the place of
+    ∫ C Γ(q_{k+1})·D²Γ. Both are the same where d is small, so the solution stays, and the order of convergence.
+
+    Args:
+        mechanics: strains, and the unknowns they are of.
+        V: space of the unknowns.
+    """
+
+    def __init__(self, mechanics: Mechanics, V: fem.FunctionSpace):
+        self.mechanics = mechanics
+        self._q, self._v, *_ = mechanics.k.functions
+        self._before, self._step = fem.Function(V), fem.Function(V)
+        self._now, self._p, self._d = (x.x.array for x in (self._q, self._before, self._step))
+
+    def come_from(self, before: Array) -> None:
+        """Say which q (local dof array) a correction led from to the one that is set."""
+        self._p[:] = before
+        np.subtract(self._now, self._p, out=self._d)
+
+    def change(self, trial: Any, c_v: Any = None) -> Any:
+        """Return ∫ (σ − C Γ(q))·D²Γ[trial, δq], a UFL form: what is to be added to K.
+
+        A viscous stress C η Γ̇ = C η DΓ(q)[v] is taken the same way, with DΓ(q_k)[v_{k+1}] + D²Γ(q_k)[v_k, d].
+
+        Args:
+            trial: direction of the derivative.
+            c_v: ∂v/∂q of the step, a constant (1/s); None of a system at rest, where nothing is viscous.
+        """
+        k, out, viscosity = self.mechanics.k, 0, self.mechanics.damping.stiffness
+        for s in self.mechanics.strains:
+            before = ufl.replace(s.value, {self._q: self._before})
+            stressed = before + ufl.derivative(before, self._before, self._step) - s.value
+            if viscosity is not None and c_v is not None:
+                rate, moved = (ufl.derivative(before, self._before, x) for x in (self._v, self._step))
+                # v_k = v_{k+1} − c_v d
+                rate += ufl.derivative(rate, self._before, self._step) - c_v * ufl.derivative(
+                    moved, self._before, self._step
+                )
+                stressed += viscosity * (rate - k.rate(s.value))
+            bent = ufl.derivative(k.variation(s.value), self._q, trial)
+            out += ufl.inner(s.force(stressed), bent) * s.measure
+        return out
 
 
 class NonlinearSystem(System):
@@ -161,11 +251,11 @@ class NonlinearSystem(System):
         return ClampWork(self)
 
     def clamp_forces(self) -> Array:
-        """Return the part of this process in what the clamp does in its unit motions (see `Readings`)."""
+        """Return the part of this process in what the clamp does in its unit motions (see `System`)."""
         return self._at_clamp(self.sum_of(self._F))
 
     def clamp_tangents(self) -> tuple[Array, Array, Array]:
-        """Return what small q, v and a add to the forces of the clamp (see `Readings`)."""
+        """Return what small q, v and a add to the forces of the clamp (see `System`)."""
         return self._at_clamp.tangents()
 
     def whole(self, kind: str) -> Any:

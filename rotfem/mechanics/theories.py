@@ -97,9 +97,9 @@ def compared(theory: Theory, structure: str) -> Theory | None:
     return richer if holds else None
 
 
-def _measured_in(module: str) -> dict[str, Strains]:
-    """Return the strains of all structures that a module of `rotfem.mechanics.strains` has."""
-    return {kind: f"rotfem.mechanics.strains.{module}:{kind}" for kind in ("planar_beam", "spatial_beam", "plate")}
+def _measured_in(order: str) -> dict[str, Strains]:
+    """Return the strains of an order in `rotfem.mechanics.strains` by structure type."""
+    return {kind: f"rotfem.mechanics.strains:{order}_{kind}" for kind in ("planar_beam", "spatial_beam", "plate")}
 
 
 _LINEAR, _SECOND_ORDER, _VON_KARMAN = (_measured_in(name) for name in ("linear", "second_order", "von_karman"))

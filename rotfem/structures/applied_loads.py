@@ -16,10 +16,7 @@ import numpy.typing as npt
 import ufl
 from dolfinx import fem
 
-from rotfem.mechanics.bodies import AppliedLoad, Kinematics
-from rotfem.mechanics.loads import AnyLoad, Load, PlaceLoad, PointLoads, Shapes, is_moment, named
-from rotfem.mechanics.problem import Problem
-from rotfem.structures.points import Points
+from rotfem.mechanics.loads import Load, PlaceLoad, Shapes
 from rotfem.structures.section_fields import SectionField
 
 Array = npt.NDArray[np.float64]
@@ -143,106 +140,3 @@ def first(values: Array, n: int) -> Array:
 
 def _space(structure: Any, family: str, degree: int, n: int) -> fem.FunctionSpace:
     return fem.functionspace(structure.mesh, (family, degree, (n,) if n > 1 else ()))
-
-
-class LoadsOfStructure:
-    """The loads of a structure (see `rotfem.structures.structure.Structure`).
-
-    Attributes:
-        load_constants: name of a load ↦ its amplitude, and what this is at time t (s).
-    """
-
-    #: Components of a force, and of a moment.
-    dimension: ClassVar[int] = 3
-    turns_in: ClassVar[int] = 3
-
-    problem: Problem
-    comm: Any
-    mesh: Any
-    V: fem.FunctionSpace
-    k: Kinematics
-    dx: Any
-    tip: Any
-    points: Points
-    load_constants: dict[str, tuple[Amplitude, Callable[[float], Array]]]
-
-    def position(self, q: Any) -> Any:
-        """Return the axis or mid-surface r(q), frame components (m)."""
-        raise NotImplementedError
-
-    def turned(self, q: Any, v: Any) -> Any:
-        """Return a vector that turns with the section, frame components; v is what it is at q = 0."""
-        raise NotImplementedError
-
-    def constant(self, value: npt.ArrayLike) -> fem.Constant:
-        """Return a constant on the mesh: its value can change without a new compilation."""
-        raise NotImplementedError
-
-    def moment(self, name: str, m: Any, measure: Any, dead: bool) -> list[AppliedLoad]:
-        """Return the work of a moment m (components of its amplitude) on the rotations."""
-        raise NotImplementedError
-
-    def place(self, point: Array) -> Any:
-        """Return the place of a point (3,) of the mesh as functions of place are given it: x (m) along a beam."""
-        return float(point[0])
-
-    def cells_of(self, region: str) -> npt.NDArray[np.int32]:
-        """Return the local cells of a region of the mesh; a structure without regions is not asked."""
-        raise NotImplementedError
-
-    @property
-    def point_loads(self) -> tuple[PointLoads, ...]:
-        """What works at points of the structure."""
-        return self.problem.loads.at
-
-    def loads(self) -> list[AppliedLoad]:
-        """Return the work of the problem's non-zero loads, forces first; dead ones keep their direction in the frame.
-
-        Raises:
-            InputError: the structure lacks what one of them works on.
-        """
-        given = sorted(named(self.problem.loads).items(), key=lambda item: is_moment(item[0]))
-        return [work for name, load in given if not load.is_zero for work in self.applied(name, load)]
-
-    def applied(self, name: str, load: AnyLoad) -> list[AppliedLoad]:
-        """Return the work of one load."""
-        dead, measure, q = load.kind == "dead", self._measure(name), self.k.q
-        if is_moment(name):
-            return self.moment(name, self.amplitude(name, load, self.turns_in), measure, dead)
-        f = self.amplitude(name, load, self.dimension)
-        vector = ufl.as_vector([f[i] if i < self.dimension else 0 for i in range(3)])
-        force = self.spread(name, vector if dead else self.turned(q, vector))
-        return [AppliedLoad(name, force, self.position(q), measure, dead)]
-
-    def _measure(self, name: str) -> Any:
-        """Return what a load works on: the tip, a point, or the whole structure."""
-        if name.startswith("at."):
-            return self.points.measure(self.point_loads[int(name.split(".")[1])].x)
-        return self.tip if name.startswith("tip") else self.dx
-
-    def spread(self, name: str, load: Any) -> Any:
-        """Return the density of a load on its measure: the load itself at a point and where it is a density already."""
-        return load
-
-    def amplitude(self, name: str, load: AnyLoad, size: int) -> Any:
-        """Return a load in the forms, its first `size` components, and remember its amplitude."""
-        made: Amplitude
-        at: Callable[[float], Array] = load.at
-        if isinstance(load, PlaceLoad):
-            made, at = SpanField.of_place(self, load, size)
-        elif load.is_uniform:
-            made, at = Amplitude(self.constant(np.zeros(size))), lambda t: first(load.at(t), size)
-        else:
-            made = SpanField.of_shapes(self, load, size)
-        made.dead = load.kind == "dead"
-        self.load_constants[name] = (made, at)
-        return made.vector
-
-    def update_loads(self, turn: Array | None = None) -> None:
-        """Make the fields of loads over the span of the amplitudes that have been set.
-
-        Args:
-            turn: matrix (3, 3) that turns those of dead loads, in a frame that does not turn with the hub.
-        """
-        for amplitude, _ in self.load_constants.values():
-            amplitude.update(turn if amplitude.dead else None)

@@ -20,8 +20,7 @@ from rotfem.structures.meshes.plate_mesh import END, apart, beam_nodes
 from rotfem.structures.mode_names import in_phase, sign_changes
 from rotfem.structures.points import Points
 from rotfem.structures.section_fields import SectionField, Valid, not_negative
-from rotfem.structures.structure import Array, Structure
-from rotfem.structures.tip_values import TipValues
+from rotfem.structures.structure import Array, Structure, TipValues
 
 #: Polynomial degree that holds any section property of linearly tapered dimensions (I of a tube: fourth degree).
 TAPER_DEGREE = 4

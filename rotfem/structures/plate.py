@@ -28,11 +28,9 @@ from rotfem.numerics import forms
 from rotfem.structures.memory import check_memory
 from rotfem.structures.meshes.plate_mesh import PlateGrid, plate_grid
 from rotfem.structures.mode_names import Wave, disk_wave, plate_mode_name
-from rotfem.structures.moderate_turns import check_directors
 from rotfem.structures.points import Points
-from rotfem.structures.reference_rotation import DirectorTurns
-from rotfem.structures.structure import Array, Structure
-from rotfem.structures.tip_values import TipValues
+from rotfem.structures.reference_rotation import DirectorTurns, check_directors
+from rotfem.structures.structure import Array, Structure, TipValues
 
 
 def plate_points(plate: Structure) -> Points:

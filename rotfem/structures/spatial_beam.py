@@ -35,8 +35,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.rotations import Turn
 from rotfem.structures.beam import Beam
 from rotfem.structures.mode_names import Wave, shaft_wave
-from rotfem.structures.moderate_turns import check_sections
-from rotfem.structures.reference_rotation import SectionTurns
+from rotfem.structures.reference_rotation import SectionTurns, check_sections
 from rotfem.structures.spatial_section import SectionForms, euler_tensor
 from rotfem.structures.structure import Array
 

@@ -13,18 +13,55 @@ from dolfinx import default_scalar_type, fem
 from mpi4py import MPI
 
 from rotfem.errors import InputError, shown
-from rotfem.mechanics.bodies import Body, Damping, Kinematics, RootSpring, Strain, Support
+from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, RootSpring, Strain, Support
+from rotfem.mechanics.loads import AnyLoad, PlaceLoad, PointLoads, is_moment, named
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import forms
-from rotfem.structures.applied_loads import LoadsOfStructure
+from rotfem.structures.applied_loads import Amplitude, SpanField, first
 from rotfem.structures.mode_names import Wave
+from rotfem.structures.points import Points
 from rotfem.structures.reference_rotation import Turns
-from rotfem.structures.tip_values import TipValues
 
 Array = npt.NDArray[np.float64]
 
 
-class Structure(LoadsOfStructure):
+class TipValues:
+    """Reads a blocked Lagrange function at the node nearest to a point.
+
+    Args:
+        V: blocked function space.
+        point: coordinates (3,), m.
+
+    Attributes:
+        owner: rank that owns the node.
+        dofs: local numbers of its unknowns there.
+        size: number of unknowns of a node.
+    """
+
+    def __init__(self, V: fem.FunctionSpace, point: npt.ArrayLike):
+        self._comm, self.size = V.mesh.comm, V.dofmap.index_map_bs
+        owned = V.dofmap.index_map.size_local
+        distance = np.linalg.norm(V.tabulate_dof_coordinates()[:owned] - np.asarray(point), axis=1)
+        nearest = float(distance.min()) if owned else np.inf
+        self.owner: int
+        _, self.owner = self._comm.allreduce((nearest, self._comm.rank), op=_closest)
+        node = int(distance.argmin()) if owned else 0
+        self.dofs = slice(node * self.size, (node + 1) * self.size)
+
+    def __call__(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Return the (block size,) values at the point from a local dof array of the space."""
+        if self._comm.size == 1:
+            return values[self.dofs].copy()
+        here = values[self.dofs].copy() if self._comm.rank == self.owner else np.empty(self.size)
+        self._comm.Bcast(here, root=self.owner)
+        return here
+
+
+def _closest(a: tuple[float, int], b: tuple[float, int]) -> tuple[float, int]:
+    return min(a, b)
+
+
+class Structure:
     """A discretised structure: blocked Lagrange functions on a mesh, clamped somewhere.
 
     A subclass makes the mesh, calls `discretise`, and gives positions, strains, bodies and loads.
@@ -41,10 +78,14 @@ class Structure(LoadsOfStructure):
         clamped: local numbers of the clamped nodes.
         tip_values: reads the values at the tip.
         points: where loads or masses are at a point.
+        load_constants: name of a load ↦ its amplitude, and what this is at time t (s).
     """
 
     type: ClassVar[str]
     planar: ClassVar[bool] = False
+    #: Components of a force, and of a moment.
+    dimension: ClassVar[int] = 3
+    turns_in: ClassVar[int] = 3
     #: Places along it (m) of rows of tables that are no nodes.
     inner_rows: Array = np.empty(0)
     #: Names of the unknowns.
@@ -64,6 +105,8 @@ class Structure(LoadsOfStructure):
 
     dx: Any
     dx_elastic: Any
+    tip: Any
+    points: Points
     root: Any
     clamped: npt.NDArray[np.int32]
     tip_values: TipValues
@@ -78,7 +121,7 @@ class Structure(LoadsOfStructure):
         self.section: dict[str, Any] = {}
         #: Single numbers that the forms contain, by name.
         self.scalars: dict[str, fem.Constant] = {}
-        self.load_constants = {}
+        self.load_constants: dict[str, tuple[Amplitude, Callable[[float], Array]]] = {}
         #: What finite rotations are counted from; None where they have no limit, or the theory none of large size.
         self.turns: Turns | None = None
 
@@ -214,6 +257,18 @@ class Structure(LoadsOfStructure):
         """Return all mass that is always there or that one of these effects brings, which it then names."""
         raise NotImplementedError
 
+    def position(self, q: Any) -> Any:
+        """Return the axis or mid-surface r(q), frame components (m)."""
+        raise NotImplementedError
+
+    def turned(self, q: Any, v: Any) -> Any:
+        """Return a vector that turns with the section, frame components; v is what it is at q = 0."""
+        raise NotImplementedError
+
+    def moment(self, name: str, m: Any, measure: Any, dead: bool) -> list[AppliedLoad]:
+        """Return the work of a moment m (components of its amplitude) on the rotations."""
+        raise NotImplementedError
+
     # --- constants and fields -----------------------------------------------------------------------------------
 
     def constant(self, value: npt.ArrayLike) -> fem.Constant:
@@ -223,6 +278,73 @@ class Structure(LoadsOfStructure):
     def scalar(self, name: str, value: float) -> fem.Constant:
         """Return the constant of a named number, one and the same at every call."""
         return self.scalars.setdefault(name, self.constant(value))
+
+    # --- loads ------------------------------------------------------------------------------------------------------
+
+    def place(self, point: Array) -> Any:
+        """Return the place of a point (3,) of the mesh as functions of place are given it: x (m) along a beam."""
+        return float(point[0])
+
+    def cells_of(self, region: str) -> npt.NDArray[np.int32]:
+        """Return the local cells of a region of the mesh; a structure without regions is not asked."""
+        raise NotImplementedError
+
+    @property
+    def point_loads(self) -> tuple[PointLoads, ...]:
+        """What works at points of the structure."""
+        return self.problem.loads.at
+
+    def loads(self) -> list[AppliedLoad]:
+        """Return the work of the problem's non-zero loads, forces first; dead ones keep their direction in the frame.
+
+        Raises:
+            InputError: the structure lacks what one of them works on.
+        """
+        given = sorted(named(self.problem.loads).items(), key=lambda item: is_moment(item[0]))
+        return [work for name, load in given if not load.is_zero for work in self.applied(name, load)]
+
+    def applied(self, name: str, load: AnyLoad) -> list[AppliedLoad]:
+        """Return the work of one load."""
+        dead, measure, q = load.kind == "dead", self._measure(name), self.k.q
+        if is_moment(name):
+            return self.moment(name, self.amplitude(name, load, self.turns_in), measure, dead)
+        f = self.amplitude(name, load, self.dimension)
+        vector = ufl.as_vector([f[i] if i < self.dimension else 0 for i in range(3)])
+        force = self.spread(name, vector if dead else self.turned(q, vector))
+        return [AppliedLoad(name, force, self.position(q), measure, dead)]
+
+    def _measure(self, name: str) -> Any:
+        """Return what a load works on: the tip, a point, or the whole structure."""
+        if name.startswith("at."):
+            return self.points.measure(self.point_loads[int(name.split(".")[1])].x)
+        return self.tip if name.startswith("tip") else self.dx
+
+    def spread(self, name: str, load: Any) -> Any:
+        """Return the density of a load on its measure: the load itself at a point and where it is a density already."""
+        return load
+
+    def amplitude(self, name: str, load: AnyLoad, size: int) -> Any:
+        """Return a load in the forms, its first `size` components, and remember its amplitude."""
+        made: Amplitude
+        at: Callable[[float], Array] = load.at
+        if isinstance(load, PlaceLoad):
+            made, at = SpanField.of_place(self, load, size)
+        elif load.is_uniform:
+            made, at = Amplitude(self.constant(np.zeros(size))), lambda t: first(load.at(t), size)
+        else:
+            made = SpanField.of_shapes(self, load, size)
+        made.dead = load.kind == "dead"
+        self.load_constants[name] = (made, at)
+        return made.vector
+
+    def update_loads(self, turn: Array | None = None) -> None:
+        """Make the fields of loads over the span of the amplitudes that have been set.
+
+        Args:
+            turn: matrix (3, 3) that turns those of dead loads, in a frame that does not turn with the hub.
+        """
+        for amplitude, _ in self.load_constants.values():
+            amplitude.update(turn if amplitude.dead else None)
 
     # --- damping ------------------------------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ import pytest
 from rotfem.analysis.load_steps import less
 from rotfem.errors import ComputationError
 from rotfem.mechanics.theories import theories
-from rotfem.structures.moderate_turns import check_sections
+from rotfem.structures.reference_rotation import check_sections
 
 
 @pytest.mark.parametrize("theory", theories(), ids=lambda theory: theory.name)

@@ -1,1 +1,0 @@
-"""Strain measures of the theories, one module an order, one function a structure type (see `mechanics.theories`)."""
