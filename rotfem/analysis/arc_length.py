@@ -18,9 +18,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from mpi4py import MPI
 
-from rotfem.analysis.load_steps import Growth, recounted
+from rotfem.analysis.load_steps import Growth, balance, recounted
 from rotfem.errors import ComputationError
 from rotfem.numerics.inertia import surely_negative
 from rotfem.numerics.linear import DirectSolver, Increment
@@ -89,7 +88,6 @@ class Tracer:
 
     def __init__(self, system: Any, growth: Growth, newton: Newton):
         self.system, self.growth, self.newton = system, growth, newton
-        self._owned = system.V.dofmap.index_map.size_local * system.V.dofmap.index_map_bs
         self._count = system.V.dofmap.index_map.size_global * system.V.dofmap.index_map_bs
         self._y, self._z = Increment(system.V), Increment(system.V)
 
@@ -197,10 +195,7 @@ class Tracer:
 
     def _product(self, a: Array, b: Array) -> float:
         """Return the mean of the products of two arrays in the scales of the unknowns, over all ranks."""
-        n = self._owned
-        here = float(np.sum(a[:n] * b[:n] / self.system.scale[:n] ** 2)) / self._count
-        comm: MPI.Comm = self.system.comm
-        return here if comm.size == 1 else float(comm.allreduce(here))
+        return float(self.system.product(a, b) / self._count)
 
     def _dot(self, a: Point, b: Point) -> float:
         return self._product(a.t_q, b.t_q) + a.t_s * b.t_s
@@ -229,14 +224,4 @@ class Tracer:
         """Return q at the full load, between two points of the path."""
         part = (1.0 - before.s) / (after.s - before.s)
         q = before.q + part * (after.q - before.q)
-
-        def increment() -> float:
-            self._set(q, 1.0)
-            solver = DirectSolver(self.system.tangent(1.0, 0.0, 0.0)[0])
-            dq = self._y.solve(solver, self.system.residual())
-            q[:] += dq
-            return float(self.system.size(dq))
-
-        self.newton.solve(increment, lambda: float(self.system.size(q)))
-        self._set(q, 1.0)
-        return np.asarray(q)
+        return balance(self.system, self.growth, 1.0, q, self.newton, looked_at=False)

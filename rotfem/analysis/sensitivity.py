@@ -18,14 +18,14 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
-from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms import expand_derivatives
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.equations.modal_damping import KEY
+from rotfem.equations.nonlinear import assembled
 from rotfem.errors import InputError
 from rotfem.numerics import compat, forms
-from rotfem.numerics.linear import DirectSolver
+from rotfem.numerics.linear import DirectSolver, transposed
 
 Array = npt.NDArray[Any]
 
@@ -213,8 +213,6 @@ class Sensitivity:
         if system.linear:
             return system.material
         system.set_state(self.base_state)
-        from rotfem.numerics.linear import transposed
-
         return transposed(system.matrix(1.0, 0.0, 0.0, 1.0))
 
     def _denominator(self, j: int) -> complex:
@@ -226,11 +224,7 @@ class Sensitivity:
         return float(self.analysis.comm.allreduce(fem.assemble_scalar(form)))
 
     def _vector(self, form: Any) -> Any:
-        b = compat.create_vector(self.V)
-        fem_petsc.assemble_vector(b, form)
-        b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
-        b.array[self.system.clamped] = 0.0
-        return b
+        return assembled(form, self.V, self.system.clamped)
 
     def _adjoint(self, force: Array, solver: DirectSolver) -> Array:
         b = compat.create_vector(self.V)

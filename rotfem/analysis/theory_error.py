@@ -36,6 +36,7 @@ from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms import expand_derivatives
 
 from rotfem.equations.geometric import geometric_stiffness
+from rotfem.equations.nonlinear import assembled
 from rotfem.errors import ComputationError
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.sums import added
@@ -233,12 +234,7 @@ class TheoryCheck:
             vanishes = isinstance(whole, int) or expand_derivatives(whole).empty()
             self._form = () if vanishes else forms.form(whole, once=True)
         system.set_state(q)
-        r = compat.create_vector(system.V)
-        if self._form != ():
-            fem_petsc.assemble_vector(r, self._form)
-            r.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
-            r.array[system.clamped] = 0.0
-        return r
+        return assembled(self._form, system.V, system.clamped) if self._form != () else compat.create_vector(system.V)
 
     def _stress_stiffness(self, q: Array) -> Any:
         """Return G = ∫ N D²Γ_1 at a state as a PETSc matrix, zero at clamped unknowns."""
@@ -251,8 +247,7 @@ class TheoryCheck:
             G = system.matrix(1.0, 0.0, 0.0, 0.0)
             G.zeroEntries()
             return G
-        G = fem_petsc.create_matrix(compiled := forms.form(out, once=True))
-        fem_petsc.assemble_matrix(G, compiled, system.bcs, 0.0)
+        G = fem_petsc.assemble_matrix(forms.form(out, once=True), system.bcs, 0.0)
         G.assemble()
         set_diagonal(system.clamped, G, 0.0)
         return G

@@ -138,10 +138,9 @@ class Resultants:
         free.array[system.clamped] = 0.0
         rows, blocks = [], []
         for row, block in self._rows:
-            R, W = (fem_petsc.create_matrix(form) for form in (row, block))
-            for A, form in ((R, row), (W, block)):
-                fem_petsc.assemble_matrix(A, form)
-                A.assemble()
+            R, W = (fem_petsc.assemble_matrix(form) for form in (row, block))
+            R.assemble()
+            W.assemble()
             R.diagonalScale(None, free)
             W.scale(-1.0)
             rows.append(R)
@@ -150,8 +149,7 @@ class Resultants:
         grid = _bordered(_empty(M), rows, blocks)
         stressed = None
         if self._stressed is not None and self.system.comm.allreduce(self._has_stress, op=MPI.LOR):
-            stressed = fem_petsc.create_matrix(self._stressed)
-            fem_petsc.assemble_matrix(stressed, self._stressed, system.bcs, 0.0)
+            stressed = fem_petsc.assemble_matrix(self._stressed, system.bcs, 0.0)
             stressed.assemble()
         return Saddle(_diagonal(M, zero), _diagonal(C, zero), _bordered(rest, rows, blocks), grid, rest, stressed)
 

@@ -29,8 +29,8 @@ FULL_TURN = 2 * pi * (1 + 1e-6)
 #: |θ|² below which A, B and C are power series: beyond, the closed forms lose no digits even when derived three times.
 SERIES_UP_TO = 1.0
 
-#: Terms of the series; the first one left out is 1/19! of the sum or less.
-TERMS = 9
+#: Terms of the series; the first one left out is 1/21! of the sum or less.
+TERMS = 10
 
 
 def factors(theta: Any) -> tuple[Any, Any, Any]:
@@ -95,9 +95,6 @@ class Turn:
 
 
 Array = npt.NDArray[np.float64]
-
-#: |θ|² below which the factors are power series, and how many terms of them.
-SERIES_UP_TO, TERMS = 1.0, 10
 
 #: Sine of the angle from the pole of a plate's angles below which the first of them is that of the guess.
 AT_POLE = 1e-8

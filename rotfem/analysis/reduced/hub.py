@@ -1,18 +1,18 @@
 """Reduced models on a free hub: its angle ψ is one more unknown, and its equation one more.
 
-The work of the structure in a rigid turn of the hub is a polynomial in η, η̇ and η̈ and in the constants of frame and
-loads. Its derivatives at rest are read from the hub's row (`rotfem.equations.bordered`) along the basis, one constant
-at a time,
+With the angular momentum of the structure about the axis, H = 2Ω T0(η) + T1(η, η̇) (`ReducedModel.of_spin`),
 
-    G = g + g_q·η + g_v·η̇ + g_a·η̈ + ½ η·Q η + ½ η̇·U η̇ + η̇·W η + η̈·A η,    I ψ̈ + c ψ̇ + G = M(t),
+    I ψ̈ + c ψ̇ + dH/dt = M(t) + N,    dH/dt = 2Ω̇ T0 + 2Ω ∂T0/∂η·η̇ + ∂T1/∂η·η̇ + ∂T1/∂η̇·η̈,
 
-so that it has all of second order, the angular momentum with it.
+N the moment of all that acts from outside. N is linear in the constants of base, gravity and loads. Its part of each is
+read from the hub's row (`rotfem.equations.bordered`) at rest, along the basis and to second order,
+
+    N = Σ c (n + n_q·η + ½ η·Q η).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ import numpy.typing as npt
 from rotfem.analysis.reduced.equations import Excitation, Forces, HeldEquations
 from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.analysis.reduced.solution import Solution
+from rotfem.errors import InputError
 from rotfem.mechanics.time_signals import POINTS, WEIGHTS
 from rotfem.numerics.projection import summed
 
@@ -32,129 +33,114 @@ SMALL = 1e-5
 #: Part of the largest change that is round-off.
 ROUND_OFF = 1e-9
 
-#: Shifts of the row: which of its derivatives it is; and second derivatives, of the row of the first with the second.
-SHIFTS = {"q": (1.0, 0.0, 0.0), "v": (0.0, 1.0, 0.0), "a": (0.0, 0.0, 1.0)}
-PAIRS = {"qq": 0.5, "vv": 0.5, "vq": 1.0, "aq": 1.0}
-
 #: Times at which the speed of a rigid structure is known.
 RIGID = 2001
 
-
-@dataclass
-class Polynomial:
-    """What belongs to one product of constants: value, slopes (3, m) by q, v and a, and matrices (4, m, m) by PAIRS."""
-
-    value: float
-    slopes: Array
-    matrices: Array
-
-    def less(self, other: Polynomial, factor: float = 1.0) -> Polynomial:
-        """Return the difference from another, times a factor."""
-        return Polynomial(
-            factor * (self.value - other.value),
-            factor * (self.slopes - other.slopes),
-            factor * (self.matrices - other.matrices),
-        )
+#: Effects of which the angular momentum is that of the equations.
+OF_MOMENTUM = ("coriolis", "centrifugal", "euler")
 
 
 class HubMoment:
-    """The moment G of a structure on its free hub.
+    """The moment of a structure on its free hub, dH/dt and N.
 
     Args:
         model: of the structure.
         row: the hub's equation.
 
     Attributes:
-        parts: polynomials by the constant and its component that they are multiplied by; ("", 0) by 1, ("ww", 0) by
-            the square of the speed. "w" and "dw" stand for the speed and its rate about the axis.
+        inertia: of the undeformed structure about the axis, kg·m².
+
+    Raises:
+        InputError: the equations lack an effect that angular momentum has.
     """
 
     def __init__(self, model: ReducedModel, row: Any):
         self.model, self.row, self.system = model, row, model.system
-        self.constants = dict(self.system.model.frame.constants)
-        self.constants |= {name: c for name, (c, _) in self.system.structure.load_constants.items()}
-        kept = {name: constant.value.copy() for name, constant in self.constants.items()}
-        self.parts = self._parts()
-        for name, value in kept.items():
-            self.constants[name].value[...] = value
-        self.system.structure.update_loads()
-        parts = self.parts.values()
-        self._values = np.array([p.value for p in parts])
-        self._slopes, self._matrices = np.array([p.slopes for p in parts]), np.array([p.matrices for p in parts])
+        effects = self.system.model.effects
+        for name in OF_MOMENTUM:
+            if name not in effects:
+                why = f'lacks "{name}", which the reduced model of a free hub needs; leave model.reduced out'
+                raise InputError("model.effects", list(effects), why)
+        self._coupled = float(row.coupled)
+        (self._load, self._stiffness), (self.slope, self._coupling), T0 = model.of_spin()
+        self.slope = self._coupled * self.slope
+        self.inertia = 2 * T0
+        self._read_outside()
 
-    def _parts(self) -> dict[tuple[str, int], Polynomial]:
-        base = self._at("", 0, 0.0)
-        parts = {("", 0): base}
-        for name, constant in self.constants.items():
-            if name == "w":
-                plus, minus = self._at("w", 0, 1.0), self._at("w", 0, -1.0)
-                parts["w", 0] = plus.less(minus, 0.5)
-                parts["ww", 0] = plus.less(base, 0.5).less(base.less(minus, 0.5))
-                continue
-            for i in range(1 if name == "dw" else constant.value.size):
-                parts[name, i] = self._at(name, i, 1.0).less(base)
-        return parts
+    def _read_outside(self) -> None:
+        """Read n, n_q and Q of every component of a constant, in the order of `_entries`."""
+        system, m, zero = self.system, self.model.size, self.system.zeros()
+        constants = {name: c for name, c in system.model.frame.constants.items() if name not in ("w", "dw")}
+        constants |= {name: c for name, (c, _) in system.structure.load_constants.items()}
+        everything = [*system.model.frame.constants.values(), *constants.values()]
+        kept = [c.value.copy() for c in everything]
+        for c in everything:
+            c.value[...] = 0.0
+        self._entries = [(name, i) for name, c in constants.items() for i in range(c.value.size)]
+        size = len(self._entries)
+        self._n, self._slopes, self._matrices = np.zeros(size), np.zeros((size, m)), np.zeros((size, m, m))
+        for k, (name, i) in enumerate(self._entries if self.row.has_outside else ()):
+            constants[name].value.flat[i] = 1.0
+            system.structure.update_loads()
+            system.set_state(zero)
+            self._n[k] = -self.row.work()
+            if self.row.coupled and m:
+                self._slopes[k] = rest = self._slope(zero)
+                self._matrices[k] = self._changes(rest)
+            constants[name].value.flat[i] = 0.0
+        for c, value in zip(everything, kept, strict=True):
+            c.value[...] = value
+        system.structure.update_loads()
 
-    def _at(self, name: str, component: int, value: float) -> Polynomial:
-        """Return the polynomial with one constant at a value and all others at zero."""
-        for constant in self.constants.values():
-            constant.value[...] = 0.0
-        if name in ("w", "dw"):
-            constant = self.constants[name]
-            constant.value[...] = value * self.system.motion.axis[-constant.value.size :]
-        elif name:
-            self.constants[name].value.flat[component] = value
-        self.system.structure.update_loads()
-        m, zero = self.model.size, self.system.zeros()
-        self.system.set_state(zero)
-        moment, rest = self.row.work(), {kind: self._slope(kind, zero, zero) for kind in SHIFTS}
-        coupled = self.row.coupled and m
-        matrices = [self._matrix(pair[0], pair[1], rest) if coupled else np.zeros((m, m)) for pair in PAIRS]
-        return Polynomial(moment, np.array(list(rest.values())), np.array(matrices))
+    def _slope(self, q: Array) -> Array:
+        """Return the derivative of N by q along the basis at a state, (m,)."""
+        self.system.set_state(q)
+        vector, owned = self.row.row((1.0, 0.0, 0.0)).array, self.model.owned
+        return -np.asarray(summed(self.system.comm, self.model.V[owned].T @ vector[owned]))
 
-    def _slope(self, kind: str, q: Array, v: Array) -> Array:
-        """Return the row's derivative by q, v or a along the basis at a state, (m,)."""
-        if not self.row.coupled:
-            return np.zeros(self.model.size)
-        self.system.set_state(q, v)
-        vector, owned = self.row.row(SHIFTS[kind]).array, self.model.owned
-        return np.asarray(summed(self.system.comm, self.model.V[owned].T @ vector[owned]))
-
-    def _matrix(self, kind: str, along: str, rest: dict[str, Array]) -> Array:
-        """Return a second derivative along the basis; zeros where a direction of no special kind shows none."""
-        V, zero = self.model.V, self.system.zeros()
+    def _changes(self, rest: Array) -> Array:
+        """Return the second derivative of N by q along the basis; zero where no direction shows one."""
 
         def change(shape: Array) -> Array:
             size = SMALL / max(self.system.size(shape), 1e-300)
-            state = (size * shape, zero) if along == "q" else (zero, size * shape)
-            return np.asarray((self._slope(kind, *state) - rest[kind]) / size)
+            return np.asarray((self._slope(size * shape) - rest) / size)
 
-        any_direction = change(V @ np.cos(np.arange(1.0, self.model.size + 1)))
-        scale = float(np.abs(rest[kind]).max(initial=0.0)) / SMALL
-        if not np.any(np.abs(any_direction) > ROUND_OFF * scale):
+        any_direction = change(self.model.V @ np.cos(np.arange(1.0, self.model.size + 1)))
+        if np.abs(any_direction).max() <= ROUND_OFF * np.abs(rest).max() / SMALL:
             return np.zeros((self.model.size,) * 2)
-        return np.array([change(column) for column in V.T]).T
+        return np.array([change(column) for column in self.model.V.T]).T
 
     # --- at many times -----------------------------------------------------------------------------------------------
 
-    def weights(self, constants: dict[str, Array], speed: Array, rate: Array) -> Array:
-        """Return what the polynomials are multiplied by, in the order of the parts, (n, parts)."""
-        own = {"": np.ones_like(speed), "w": speed, "ww": speed**2, "dw": rate}
-        return np.stack([own[name] if name in own else constants[name][:, i] for name, i in self.parts], axis=1)
+    def outside(self, constants: dict[str, Array], q: Array) -> Array:
+        """Return N at times (n,), N·m.
 
-    def outside(self, weights: Array, q: Array) -> Array:
-        """Return the moment of all forces that are no change of momentum, at rest in the frame (n,), N·m."""
-        apart = np.array([name not in ("", "w", "ww", "dw") for name, _ in self.parts])
-        return -self.value(weights * apart, q, 0 * q, 0 * q)
+        Args:
+            constants: values of those of frame and loads, by name, (n, size).
+            q: coordinates of the structure, (n, m).
+        """
+        if not self._entries:
+            return np.zeros(len(q))
+        c = np.stack([constants[name][:, i] for name, i in self._entries], axis=1)
+        slopes = c @ self._slopes + 0.5 * np.einsum("nij,nj->ni", np.tensordot(c, self._matrices, 1), q)
+        return np.asarray(c @ self._n + np.sum(slopes * q, axis=1))
 
-    def value(self, weights: Array, q: Array, v: Array, a: Array) -> Array:
-        """Return G of states (n, m), (n,)."""
-        slopes, matrices = np.tensordot(weights, self._slopes, 1), np.tensordot(weights, self._matrices, 1)
-        state = {"q": q, "v": v, "a": a}
-        out = weights @ self._values + np.einsum("nki,kni->n", slopes, np.stack([q, v, a]))
-        for k, (pair, factor) in enumerate(PAIRS.items()):
-            out = out + factor * np.einsum("ni,nij,nj->n", state[pair[0]], matrices[:, k], state[pair[1]])
-        return np.asarray(out)
+    def of_momentum(self, speed: Array, rate: Array, q: Array, v: Array, a: Array) -> Array:
+        """Return dH/dt (n,), N·m; that of a rigid structure if the hub is uncoupled.
+
+        Args:
+            speed: Ω at n times, rad/s.
+            rate: Ω̇ there.
+            q: coordinates of the structure, (n, m).
+            v: their rates.
+            a: their accelerations.
+        """
+        q, v, a = (self._coupled * x for x in (q, v, a))
+        bent = q @ self._stiffness
+        T0 = 0.5 * self.inertia - q @ self._load - 0.5 * np.sum(q * bent, axis=1)
+        change = -(v @ self._load) - np.sum(v * bent, axis=1)
+        of_T1 = a @ self.slope + np.sum((a @ self._coupling) * q + (v @ self._coupling) * v, axis=1)
+        return np.asarray(2 * rate * T0 + 2 * speed * change + of_T1)
 
 
 class FreeHubEquations(HeldEquations):
@@ -193,14 +179,11 @@ class FreeHubEquations(HeldEquations):
         there = np.array([t])
         rates = turn + np.array([[0.0, 0.0, 1.0]])
         (*small, f), (*_, pushed) = (self.model.operators(self.excitation.factors(there, x)) for x in (turn, rates))
-        of_rate = [p.slopes[2] for p in self.moment.parts.values()]
-        constants = self.excitation.constants(there, turn)
-        weights = self.moment.weights(constants, turn[:, 1], turn[:, 2])[0]
-        inertia = self.hub.inertia + (self.moment.parts["dw", 0].value if ("dw", 0) in self.moment.parts else 0.0)
+        inertia = self.hub.inertia + self.moment.inertia
         M, C, K = (np.zeros((m + 1, m + 1)) for _ in range(3))
         for whole, own, corner in zip((M, C, K), small, (inertia, self.hub.damping, inertia), strict=True):
             whole[:m, :m], whole[m, m] = own[0], corner
-        M[:m, m], M[m, :m] = (pushed - f)[0], weights @ np.array(of_rate)
+        M[:m, m], M[m, :m] = (pushed - f)[0], self.moment.slope
         return M, C, K
 
     def at(self, t: Array) -> Callable[[Array, Array, Array], Array]:
@@ -215,8 +198,8 @@ class FreeHubEquations(HeldEquations):
             M, C, K, f = self.model.operators(c)
             out = f + sum(np.einsum("nij,nj->ni", A, x) for A, x in ((M, a), (C, v), (K, q)))
             own = self.hub.inertia * turn[:, 2] + self.hub.damping * turn[:, 1] - torque
-            moment = self.moment.value(self.moment.weights(constants, *turn.T[1:]), q, v, a)
-            return np.column_stack([out, own + moment]) + further
+            own = own + self.moment.of_momentum(turn[:, 1], turn[:, 2], q, v, a) - self.moment.outside(constants, q)
+            return np.column_stack([out, own]) + further
 
         return residual
 
@@ -227,8 +210,8 @@ class FreeHubEquations(HeldEquations):
         turn, (q, _, _) = self.turn(t.ravel(), solution), self.coordinates(solution, t.ravel())
         turn[:, 2] = 0.0
         torque = self.hub.torque.many(t.ravel()) - self.hub.damping * turn[:, 1]
-        weights = self.moment.weights(self.excitation.constants(t.ravel(), turn), *turn.T[1:])
-        rates = {"impulse": torque + self.moment.outside(weights, q), "work": torque * turn[:, 1]}
+        constants = self.excitation.constants(t.ravel(), turn)
+        rates = {"impulse": torque + self.moment.outside(constants, q), "work": torque * turn[:, 1]}
         rows, out = np.searchsorted(grid, times), {}
         for name, rate in rates.items():
             parts = np.diff(grid) * (rate.reshape(t.shape) @ WEIGHTS)

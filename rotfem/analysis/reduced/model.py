@@ -11,18 +11,16 @@ the centrifugal force is ∂T0/∂q and that of Euler's acceleration Ω̇ d(∂T
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
-from dolfinx.fem import petsc as fem_petsc
 
 from rotfem.equations.nonlinear import assembled
 from rotfem.equations.pieces import PRESTRESS
-from rotfem.numerics import compat, forms
+from rotfem.numerics import forms
 from rotfem.numerics.eigenproblem import is_symmetric
 from rotfem.numerics.linear import MIDDLE, DirectSolver, combine
 from rotfem.numerics.projection import orthonormal, summed, times
@@ -201,7 +199,7 @@ class ReducedModel:
         M, _, K, f = self.operators(c)
         moving = 0.5 * np.einsum("ni,nij,nj->n", v, M, v)
         jacobi = moving + 0.5 * np.einsum("ni,nij,nj->n", q, K, q) + np.einsum("ni,ni->n", f, q)
-        (load, stiffness), (slope, coupling), inertia = self._of_spin
+        (load, stiffness), (slope, coupling), inertia = self.of_spin()
         T0 = inertia - q @ load - 0.5 * np.einsum("ni,ij,nj->n", q, stiffness, q)
         T1 = v @ slope + np.einsum("ni,ij,nj->n", v, coupling, q)
         return {
@@ -211,9 +209,8 @@ class ReducedModel:
             "momentum": 2 * speed * T0 + T1,
         }
 
-    @cached_property
-    def _of_spin(self) -> tuple[tuple[Array, Array], tuple[Array, Array], float]:
-        """T0 and T1 at unit speed: −∂T0/∂q and −∂²T0/∂q² at rest, ∂T1/∂v and ∂²T1/∂v∂q there, T0 undeformed."""
+    def of_spin(self) -> tuple[tuple[Array, Array], tuple[Array, Array], float]:
+        """Return (−∂T0/∂q, −∂²T0/∂q²) and (∂T1/∂v, ∂²T1/∂v∂q) at rest, and T0 undeformed, all at unit speed."""
         names, zero = self.system.model.energies(), (np.zeros(self.size), np.zeros((self.size,) * 2))
         of_T0 = self._pieces_of("centrifugal", 2) if "T0" in names else zero
         inertia = self.system.rest_inertia if "T0" in names else 0.0
@@ -240,10 +237,7 @@ class ReducedModel:
 
         def slope(q: Array) -> Array:
             system.set_state(q)
-            b = compat.create_vector(system.V)
-            fem_petsc.assemble_vector(b, form)
-            b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
-            return np.asarray(summed(self.comm, self.V[self.owned].T @ b.array[self.owned]))
+            return np.asarray(summed(self.comm, self.V[self.owned].T @ self.assembled(form)))
 
         at_rest = slope(system.zeros())
         coupling = np.array([slope(x) - at_rest for x in self.V.T]).reshape(self.size, self.size).T
