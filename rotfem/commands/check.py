@@ -136,8 +136,8 @@ def axes_along(beam: Any, x: Array) -> tuple[Array, Array]:
     return r, coned @ swept @ bent @ turned
 
 
-def columns_of(structure: Any) -> dict[str, Array]:
-    """Return columns over `x` (m) of a beam, none of another structure.
+def columns_of(structure: Any, at: Array | None = None) -> dict[str, Array]:
+    """Return columns over `x` (m) of a beam, at places (m) or the rows of its tables; none of another structure.
 
     Of a spatial beam `axis_1` … `axis_3` say where its axis runs in the frame (m), `t1_1` … `t3_3` are components of
     the section axes there, `pretwist` is their angle (rad), and the rest is `central_properties`; of a planar beam they
@@ -146,7 +146,7 @@ def columns_of(structure: Any) -> dict[str, Array]:
     section = getattr(structure, "section", None)
     if section is None:
         return {}
-    x = places(structure.knots, structure.length)
+    x = places(structure.knots, structure.length) if at is None else at
     if structure.is_planar:
         return {"x": x, **section.at(x)}
     r, T = axes_along(structure, x)

@@ -55,7 +55,9 @@ def modes(
         bool, typer.Option("--blade-tables", help="mode polynomials for ElastoDyn and a table of modes over the span")
     ] = False,
     participation: Annotated[bool, typer.Option("--participation", help="modal masses and effective masses")] = False,
-    animate: Annotated[int | None, typer.Option("--animate", metavar="MODE", help="animate a mode of a plate")] = None,
+    animate: Annotated[
+        int | None, typer.Option("--animate", metavar="MODE", help="draw a mode in space: mode_N.gif")
+    ] = None,
 ) -> None:
     """Compute the gyroscopic eigenmodes of SCENE at its speed."""
     from rotfem.commands.modes import check_animated
@@ -84,7 +86,7 @@ def modes(
                 serial(result.analysis, "the export of matrices")
                 further.append(lambda folder: write_matrices(result.analysis, result.spinning, folder))
     if animate is not None:
-        from rotfem.results.plots_plate import animate as draw
+        from rotfem.results.animation import animate as draw
 
         further.append(lambda folder: draw(result, animate, folder))
     todo.finish(result, further)

@@ -1,4 +1,4 @@
-"""What a run writes for ParaView: the moving structure, in VTX or XDMF, and its section forces or stress resultants."""
+"""What is written for ParaView, in VTX or XDMF: the moving structure, its modes, section forces, stress resultants."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.commands.check import columns_of
+from rotfem.results.modes import ModesResult
 from rotfem.results.run import StationHistory
+from rotfem.results.surfaces import HALF_WIDTH, Surface
 from rotfem.results.xdmf import chain, write_xdmf
 from rotfem.structures.paraview import MOST, writer
 
@@ -84,5 +87,50 @@ def stations_writer(system: Any, stations: StationHistory) -> Callable[[Path], l
         chosen = sorted({*range(0, len(stations.t), every), len(stations.t) - 1} - {-1})
         frames = [(float(stations.t[i]), frame(i)) for i in chosen]
         return write_xdmf(folder / "stations_line.xdmf", points, chain(len(points)), frames)
+
+    return write
+
+
+# --- modes ------------------------------------------------------------------------------------------------------------
+
+
+def surface_of(structure: Any, shape: dict[str, Array]) -> Surface:
+    """Return the surface that modes move, through the nodes of a mode shape.
+
+    The sections of a beam are drawn as the rectangles of their radii of gyration; those of a planar one are square.
+    """
+    points, triangles = structure.places(shape), structure.surface()
+    if triangles is not None:
+        return Surface.of_plate(points, triangles, structure.length)
+    c = columns_of(structure.data, shape["x"])
+    stiffnesses = ("EI", "EI") if structure.data.is_planar else ("EI3", "EI2")
+    halves = [HALF_WIDTH * np.sqrt(np.abs(c[EI] / c["EA"]))[:, None] for EI in stiffnesses]
+    axes = [
+        np.eye(3)[k - 1] if structure.data.is_planar else np.column_stack([c[f"t{k}_{i}"] for i in (1, 2, 3)])
+        for k in (2, 3)
+    ]
+    return Surface.of_beam(points, (halves[0] * axes[0], halves[1] * axes[1]), structure.length)
+
+
+def modes_writer(analysis: Any, result: ModesResult, scaled: Array, formats: tuple[str, ...]) -> Writer:
+    """Return what writes modes.xdmf (the surface) and modes.bp (the mesh); the time is the number of the mode.
+
+    Args:
+        analysis: of the modes.
+        result: with their shapes and the surface that they move.
+        scaled: the shapes as vectors of the owned unknowns, (n, modes).
+        formats: "vtx" and "xdmf".
+    """
+    surface, shapes = result.surface, result.shapes
+    assert surface is not None
+    first = 1 + len(result.rows) - len(shapes)
+    vtx = writer(analysis.structure, "modes", [(float(first + i), x) for i, x in enumerate(scaled.T)])
+
+    def write(folder: Path) -> list[Path]:
+        paths: list[Path] = vtx(folder) if "vtx" in formats else []
+        if "xdmf" in formats and analysis.comm.rank == 0:
+            frames = surface.frames(shapes, first)
+            paths = [*paths, *write_xdmf(folder / "modes.xdmf", surface.points, surface.triangles, frames)]
+        return paths
 
     return write

@@ -23,6 +23,7 @@ from rotfem.analysis.theory_error import TheoryCheck, TheoryError
 from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.advice import advise, few_unknowns
 from rotfem.commands.error_report import error_of_modes
+from rotfem.commands.fields import modes_writer, surface_of
 from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.mode_tables import mode_tables
 from rotfem.commands.monitor import check_rows
@@ -38,7 +39,6 @@ from rotfem.refinement.frequencies import FrequencyErrors
 from rotfem.refinement.refine import Clock, Setting
 from rotfem.results import ModesResult
 from rotfem.scene import Scene, as_scene
-from rotfem.structures.paraview import writer
 
 Array = npt.NDArray[Any]
 
@@ -126,9 +126,9 @@ def _modes(
         analysis=analysis,
         spinning=spinning,
     )
-    if done.triangles is not None:
-        states = [(float(1 + int(spinning.rigid) + i), x) for i, x in enumerate(found.scaled.T)]
-        done.fields = writer(analysis.structure, "modes", states)
+    if done.shapes:
+        done.surface = surface_of(analysis.structure, next(iter(done.shapes.values())))
+        done.fields = modes_writer(analysis, done, found.scaled, scene.output.formats)
     if sensitivities:
         from rotfem.analysis.sensitivity import sensitivities as derivatives
 
@@ -147,10 +147,8 @@ def check_animated(scene: Scene, mode: int) -> None:
     """See that a mode of a scene can be animated, before anything is computed.
 
     Raises:
-        SceneError: the structure is no plate, or no such mode is wanted.
+        SceneError: no such mode is wanted.
     """
-    if scene.structure.type != "plate":
-        raise SceneError("command line", "--animate", mode, 'needs structure.type = "plate"')
     if not 1 <= mode <= scene.modes.count:
         raise SceneError("command line", "--animate", mode, f"must be from 1 to modes.count, {scene.modes.count}")
 

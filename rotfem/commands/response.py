@@ -6,7 +6,7 @@ together, with their amplitudes and phases, at one frequency that is swept (see 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -43,6 +43,10 @@ Array = npt.NDArray[Any]
 #: Default number of frequencies of a response, and the part beyond the highest mode asked for that they reach to.
 NUMBER, BEYOND = 200, 1.2
 
+#: Change of the log of an amplitude that bends its curve visibly; least distance of frequencies added for it, in parts
+#: of the range; part of the largest amplitude below which one is too small to matter.
+BEND, NARROW, DEEP = 0.2, 2e-4, 1e-6
+
 #: Median difference of the direct response and that by modes above which a warning asks for more modes; the
 #: largest one is found between peaks, where what modes do cancels and little is left to be relative to.
 NOTABLE = 1e-2
@@ -63,7 +67,8 @@ def response(
         scene: scene, path of a scene file, or nested tables; `modes.count` is that of the response by modes.
         low: lowest frequency, rad/s, or a text with a unit such as "0.1 Hz"; 0 if None.
         high: highest frequency; beyond the highest of the modes if None.
-        number: frequencies between them, at equal distances; those by which peaks are seen come on top.
+        number: frequencies between them, at equal distances; those by which peaks are seen and curves run
+            smoothly come on top, of the latter no more than these.
         per_rev: orders k; with them the frequencies are kΩ alone, as far as low and high are None.
         comm: MPI communicator; every rank gets the whole result.
 
@@ -82,6 +87,10 @@ def response(
         answers = FrequencyResponse(analysis, spinning, *loaded(scene, analysis, spinning))
         asked, peaks, undamped = frequencies_of(answers, spinning, (low, high, number, per_rev))
         direct = np.array([answers.direct(omega) for omega in asked])
+        if not len(per_rev) or low is not None or high is not None:
+            given = asked[~peaks]
+            asked, direct = resolved(answers.direct, asked, direct, number)
+            peaks = ~np.isin(asked, given)
         modal = answers.modal(asked, scene.modes.count)
         return result_of(scene, answers, (asked, peaks, undamped), (direct, modal), started)
 
@@ -135,6 +144,37 @@ def frequencies_of(
     more, undamped = answers.peaks(first, last)
     asked = np.unique(np.concatenate([grid, more]))
     return asked, ~np.isin(asked, grid), undamped
+
+
+def resolved(answer: Callable[[float], Array], omegas: Array, values: Array, most: int) -> tuple[Array, Array]:
+    """Return frequencies (rad/s) and answers, so close that amplitudes on a logarithmic scale run smoothly.
+
+    Where the logarithm of an amplitude is off the line through its neighbours by more than BEND, the intervals on both
+    sides are halved, the worst first.
+
+    Args:
+        answer: frequency ↦ amplitudes of the outputs, (outputs,).
+        omegas: frequencies, increasing, at least three.
+        values: the answers there, (frequencies, outputs).
+        most: frequencies that may be added.
+    """
+    least, left = NARROW * float(omegas[-1] - omegas[0]), most
+    while left > 0:
+        sizes = np.abs(values)
+        heights = np.log(np.maximum(sizes, DEEP * np.max(sizes, axis=0, keepdims=True) + 1e-300))
+        part = ((omegas[1:-1] - omegas[:-2]) / (omegas[2:] - omegas[:-2]))[:, None]
+        bend = np.max(np.abs(heights[1:-1] - (1 - part) * heights[:-2] - part * heights[2:]), axis=1)
+        of_interval = np.maximum(np.append(bend, 0.0), np.insert(bend, 0, 0.0))
+        of_interval[np.diff(omegas) < least] = 0.0
+        worst = np.argsort(-of_interval)[:left]
+        chosen = np.sort(worst[of_interval[worst] > BEND])
+        if not len(chosen):
+            break
+        further = 0.5 * (omegas[chosen] + omegas[chosen + 1])
+        values = np.insert(values, chosen + 1, np.array([answer(omega) for omega in further]), axis=0)
+        omegas = np.insert(omegas, chosen + 1, further)
+        left -= len(further)
+    return omegas, values
 
 
 def angular(value: float | str | None, option: str, default: float) -> float:

@@ -19,6 +19,7 @@ from rotfem.errors import InputError
 from rotfem.results.files import csv_text, json_text, rows_text
 from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows, nodes_of
 from rotfem.results.result import Result
+from rotfem.results.surfaces import Surface
 from rotfem.results.tables import ShortTable, numbers, per_cent
 from rotfem.results.units import ShownUnits, in_unit
 
@@ -180,7 +181,8 @@ class ModesResult(Result):
             `dgrowth` (1/s per unit), `relative` (p/ω dω/dp); empty if not asked for.
         blade_tables: whether files of the modes for programs of wind turbines are wanted (see `blade_tables`).
         triangles: of a plate, triangles between the nodes of `shapes`, (m, 3).
-        fields: writes the modes for ParaView into a folder, on all ranks together; None of a beam.
+        surface: that the modes move, as in files for ParaView and animations.
+        fields: writes the modes for ParaView into a folder, on all ranks together.
         analysis, spinning: the compiled scene and its eigenpairs, for further work in Python.
     """
 
@@ -189,6 +191,7 @@ class ModesResult(Result):
     sensitivities: list[dict[str, Any]] = field(default_factory=list)
     blade_tables: bool = False
     triangles: Any = field(default=None, repr=False)
+    surface: Surface | None = field(default=None, repr=False)
     fields: Callable[[Path], list[Path]] | None = field(default=None, repr=False)
     analysis: Any = field(default=None, repr=False)
     spinning: Any = field(default=None, repr=False)

@@ -7,6 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from rotfem.results.columns import ZERO
+from rotfem.results.plots import GRID
+from rotfem.results.surfaces import HALF_WIDTH
+
 if TYPE_CHECKING:
     from rotfem.results.check import CheckResult
     from rotfem.results.explain import ExplainResult
@@ -22,40 +26,34 @@ PANELS = (
     (("mass_center_z", "tension_center_z", "shear_center_z"), "centres, z (m)", False),
 )
 
-#: What is drawn of a section is as wide as the rectangle of its radius of gyration.
-HALF_WIDTH = np.sqrt(3.0)
-
 
 def check_figure(result: CheckResult) -> Figure:
     """Return the structure as seen along axes 3, 2 and 1 with its centre of mass, and properties along a beam."""
     columns = result.columns
     there = [(tuple(n for n in names if n in columns), title, log) for names, title, log in PANELS]
     panels = [panel for panel in there if any(np.any(columns[n]) for n in panel[0])]
-    figure = Figure(figsize=(10, 4.2 + 1.25 * len(panels)))
+    figure = Figure(figsize=(10, 4.2 + 1.2 * len(panels)), layout="constrained")
     grid = figure.add_gridspec(2 + len(panels), 4, height_ratios=[1.7, 1.7, *[1.0] * len(panels)])
     views = ((grid[0, :3], 0, 1), (grid[1, :3], 0, 2), (grid[:2, 3], 1, 2))
     for spot, i, j in views:
-        axis = figure.add_subplot(spot)
-        _view(axis, result, i, j)
-    first = None
+        _view(figure.add_subplot(spot), result, i, j)
     for row, (names, title, logarithmic) in enumerate(panels, start=2):
-        axis = figure.add_subplot(grid[row, :], sharex=first)
-        first = first or axis
-        for name in names:
+        axis = figure.add_subplot(grid[row, :])
+        for name, dashes in zip(names, ("-", "--", ":", "-."), strict=False):  # equal ones lie on each other
             values = np.degrees(columns[name]) if name == "pretwist" else columns[name]
-            axis.plot(columns["x"], values, lw=1.3, label=name)
+            axis.plot(columns["x"], values, lw=1.3, ls=dashes, label=name)
         if logarithmic and all(np.all(columns[name] > 0.0) for name in names):
             axis.set_yscale("log")
+        last = row == len(panels) + 1
+        axis.set_xlim(columns["x"][0], columns["x"][-1])
+        axis.set_xlabel("position X along the axis (m)" if last else "", fontsize=8)
         axis.set_ylabel(title, fontsize=8)
-        axis.grid(True, lw=0.4, alpha=0.6)
+        axis.grid(**GRID)
         if len(names) > 1:
-            axis.legend(fontsize=7, ncols=4)
-        axis.tick_params(labelsize=7)
-    if first is not None:
-        axis.set_xlabel("position X along the axis (m)")
+            axis.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
+        axis.tick_params(labelsize=7, labelbottom=last)
     s = result.summary
     figure.suptitle(f"{s['name']}: {s['mass']:.6g} kg, {s['length']:.6g} m", fontsize=10)
-    figure.subplots_adjust(left=0.09, right=0.97, top=0.95, bottom=0.06, hspace=0.45, wspace=0.35)
     return figure
 
 
@@ -89,19 +87,15 @@ def _view(axis: Any, result: CheckResult, i: int, j: int) -> None:
     axis.set_xlabel(f"{i + 1} (m)", fontsize=8)
     axis.set_ylabel(f"{j + 1} (m)", fontsize=8)
     axis.tick_params(labelsize=7)
-    axis.grid(True, lw=0.4, alpha=0.6)
-
-
-#: Relative changes below it are not drawn.
-ROUND_OFF = 1e-9
+    axis.grid(**GRID)
 
 
 def explain_figure(result: ExplainResult) -> Figure:
     """Return a bar for every effect and theory: relative change of each output; a mark is the true change."""
     rows, outputs = result.rows, result.summary["outputs"]
-    figure = Figure(figsize=(8, 0.45 * len(rows) + 1.4))
+    figure = Figure(figsize=(8, 0.45 * len(rows) + 1.4), layout="constrained")
     axis = figure.add_subplot()
-    shown = [v for row in rows for v in row["estimate"].values() if v and ROUND_OFF < v < np.inf]
+    shown = [v for row in rows for v in row["estimate"].values() if v and ZERO < v < np.inf]
     left, right = 10 ** np.floor(np.log10(min([*shown, 1e-2]))) / 3, 3 * max([*shown, 1.0])
     height = 0.8 / max(len(outputs), 1)
     for j, output in enumerate(outputs):
@@ -133,7 +127,5 @@ def explain_figure(result: ExplainResult) -> Figure:
     axis.set_xlabel("relative change of the output (–)")
     figure.suptitle(f"{result.summary['name']}: what each effect and other theories change", fontsize=10)
     axis.grid(True, axis="x", lw=0.4, alpha=0.6)
-    tall = figure.get_figheight()
-    figure.subplots_adjust(left=0.27, right=0.97, top=1 - 0.65 / tall, bottom=0.55 / tall)
-    figure.legend(fontsize=8, loc="upper right", ncols=4, bbox_to_anchor=(0.98, 1 - 0.28 / tall), frameon=False)
+    figure.legend(fontsize=8, loc="outside lower center", ncols=4, frameon=False)
     return figure

@@ -147,7 +147,7 @@ ROOM = 1000
 OURS = re.compile(
     r"(history|shape|stations|resultants|modes|mode_shapes|sensitivities|unknowns|campbell|cost|check|compare|sweep)\.csv|"
     r"(modes|campbell|explain|cost)\.json|mode_\d+\.gif|state_space\.npz|"
-    r"(history|shape|stations|resultants|modes|mode_\d+|campbell|campbell_fixed|explain|cost|check|compare|sweep)\.png|"
+    r"(history|loads|shape|stations|resultants|modes|mode_\d+|response|campbell|campbell_fixed|explain|cost|check|compare|sweep)\.png|"
     r"[MCK]\.(mtx|npz)|(fields|modes|stations_line)\.(bp|xdmf|h5)|(checkpoint|stations)\.h5"
 )
 

@@ -419,7 +419,7 @@ class OutputTable(SceneModel):
             from end to end.
         every: rows of history.csv from one record of the stations to the next.
         format: of the file that they go to.
-        fields: formats of the files for ParaView, "vtx" and "xdmf"; VTX of a plate and XDMF of a beam if not given.
+        fields: formats of the files for ParaView, "vtx" and "xdmf"; XDMF if not given.
         error: whether the error of what is computed is estimated.
         speed: unit in which speeds are printed and drawn; that of motion.speed if not given.
         frequency: unit in which frequencies of modes are printed and drawn.
@@ -448,13 +448,10 @@ class OutputTable(SceneModel):
         known = (*FORCES[kind], *STRAINS[kind])
         return tuple(name for name in self.quantities if name in known) or known
 
-    def formats(self, kind: str) -> tuple[str, ...]:
-        """Return the formats of the files for ParaView of a structure of a type."""
-        if self.fields is not None:
-            return self.fields
-        if kind in FORCES:
-            return ("xdmf",)
-        return ("vtx", "xdmf") if self.resultants(kind) else ("vtx",)
+    @property
+    def formats(self) -> tuple[str, ...]:
+        """The formats of the files for ParaView."""
+        return ("xdmf",) if self.fields is None else self.fields
 
     def positions(self, length: float) -> tuple[float, ...]:
         """Return the stations along a beam of a length, m; empty if there are none."""

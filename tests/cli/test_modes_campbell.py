@@ -35,6 +35,10 @@ count = 3
 """
 
 
+#: Modes as a surface, for ParaView.
+FIELDS = ("modes.xdmf", "modes.h5")
+
+
 def written(path: Path) -> set[str]:
     return {file.name for file in path.iterdir()}
 
@@ -49,7 +53,7 @@ def test_modes_prints_a_table_and_writes_files(folder: Path, rotfem: Rotfem) -> 
     assert "rad/s" in done.out
     assert "damping" in done.out
     out = folder / "results" / "beam"
-    assert written(out) == {"modes.csv", "modes.json", "mode_shapes.csv", "modes.png", "summary.json"}
+    assert written(out) == {"modes.csv", "modes.json", "mode_shapes.csv", "modes.png", "summary.json", *FIELDS}
     assert len(json.loads((out / "modes.json").read_text())["modes"]) == 3
 
 
@@ -64,7 +68,7 @@ def test_modes_json_is_alone_on_stdout(folder: Path, rotfem: Rotfem) -> None:
     assert hint.startswith('hint: model.theory = "linear"')
     assert warning.startswith("warning: static instability")
     assert beyond.startswith('warning: model.theory = "linear"')
-    assert written(folder / "out") == {"modes.csv", "modes.json", "mode_shapes.csv", "summary.json"}
+    assert written(folder / "out") == {"modes.csv", "modes.json", "mode_shapes.csv", "summary.json", *FIELDS}
     quiet = rotfem("modes", "beam.toml", "-q", *options)
     assert quiet == (0, "", "")
 
@@ -119,7 +123,11 @@ BENT = tuple(
         (("campbell", "missing.toml", "--speeds", "0:1:2"), 2, "missing.toml"),
         (("modes", "beam.toml", "--set", "modes.count=0"), 2, "modes.count"),
         (("modes", "beam.toml", "--set", "modes.about=elsewhere"), 2, "modes.about"),
-        (("modes", "beam.toml", "--animate", "1"), 2, "--animate"),
+        (("modes", "beam.toml", "--animate", "99"), 2, "--animate"),
+        (("campbell", "beam.toml", "--speeds", "0:1:2", "--rated", "fast"), 2, "--rated"),
+        (("campbell", "beam.toml", "--speeds", "0:1:2", "--operating", "12rpm"), 2, "--operating"),
+        (("campbell", "beam.toml", "--speeds", "0:1:2", "--operating", "12:6rpm"), 2, "modes.operating"),
+        (("campbell", "beam.toml", "--speeds", "0:1:2", "--orders", "0,1"), 2, "modes.orders"),
         (("modes", "beam.toml", "-o", "beam.toml/out"), 2, "beam.toml/out"),
         # One Newton iteration is too few for a bent beam, however small the steps of the load.
         (("modes", "beam.toml", *BENT), 3, "no steady state"),

@@ -13,10 +13,13 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.contour import ContourSet
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from matplotlib.tri import Triangulation
 
-from rotfem.results import CampbellResult, ModesResult, RunResult
+from rotfem.results import CampbellResult, ExplainResult, ModesResult, RunResult
+from rotfem.results.check import CheckResult
 from rotfem.results.plots_campbell import campbell_figure, spread
 from rotfem.results.response import ResponseResult
 
@@ -59,7 +62,10 @@ def check(figure: Figure) -> None:
     for axes in figure.axes:
         for name in (axes.get_xlabel(), axes.get_ylabel()):
             assert not name or re.search(r"\([^()]+\)$", name), f"no unit in {name!r}"
-        assert axes.get_ylabel() or axes.get_xlabel()
+        for axis in (axes.xaxis, axes.yaxis):
+            numbers = any(tick.label1.get_visible() and tick.label1.get_text() for tick in axis.get_major_ticks())
+            words = any(re.search("[a-z]", tick.label1.get_text()) for tick in axis.get_major_ticks())
+            assert axis.label.get_text() or words or not numbers, "numbers without what they are"
         within(axes)
 
 
@@ -249,3 +255,78 @@ def test_a_response() -> None:
     sizes = np.abs(direct[:, [1, 2]])
     assert high > sizes.max()
     assert np.all(np.mean(sizes < low, axis=0) < 0.05)
+
+
+# --- plates -----------------------------------------------------------------------------------------------------------
+
+
+def nodes(aspect: float = 0.5) -> tuple[dict[str, Any], Any]:
+    """Return the nodes of a rectangle, 1 m long, and triangles between them."""
+    x, y = (values.ravel() for values in np.meshgrid(np.linspace(0.0, 1.0, 9), np.linspace(0.0, aspect, 6)))
+    return {"x": x, "y": y}, Triangulation(x, y).triangles
+
+
+def colours(axes: Axes) -> tuple[str, float, float]:
+    drawn = axes.collections[-1]
+    return drawn.get_cmap().name, float(drawn.norm.vmin), float(drawn.norm.vmax)
+
+
+def test_stresses_from_zero_in_one_hue_and_what_has_two_signs_about_zero() -> None:
+    columns, triangles = nodes()
+    x, y = columns["x"], columns["y"]
+    result = run_of(np.zeros(1))
+    result.triangles = triangles
+    result.resultants = columns | {"n11": -3.0 * x, "m11": x - 0.3, "m22": 1e-15 * y, "von_mises": 2e8 + 1e8 * y}
+    figure = result.plot(drawing="resultants")
+    check(figure)
+    assert figure.get_suptitle().endswith("0 (below 1e-9 of the largest of the unit): moment m₂₂")
+    found = {axes.get_title(): colours(axes) for axes in figure.axes if axes.get_title()}
+    assert found == {
+        "membrane force n₁₁": ("Blues_r", -3.0, 0.0),
+        "moment m₁₁": ("RdBu_r", -0.7, 0.7),
+        "equivalent stress": ("Reds", 0.0, pytest.approx(2.5e8)),
+    }
+
+
+@pytest.mark.parametrize("count", [1, 3, 7])
+@pytest.mark.parametrize("aspect", [0.1, 1.0])
+def test_modes_of_a_plate(count: int, aspect: float) -> None:
+    """One colour bar from −1 to 1 for all; no nodal line along the clamp."""
+    columns, triangles = nodes(aspect)
+    x, y = columns["x"], columns["y"]
+    shapes, rows = {}, []
+    for i in range(1, count + 1):
+        w = np.sin(i * np.pi * x / 2) * (y - 0.5 * aspect) / aspect
+        shapes[f"mode {i}: torsion {i}"] = columns | {"u1": 0 * x, "u2": 0 * x, "u3": 2 * w}
+        rows.append({"mode": i, "label": f"torsion {i}", "name": f"{i}th torsion", "frequency": 3.0 * i})
+    result = ModesResult(said(speed=1.0), rows, shapes)
+    result.triangles = triangles
+    figure = result.plot()
+    check(figure)
+    assert len(figure.axes) == count + 1
+    assert colours(figure.axes[0]) == ("RdBu_r", -1.0, 1.0)
+    line = next(c for c in figure.axes[0].collections if isinstance(c, ContourSet)).get_paths()[0].vertices
+    assert np.min(line[:, 0]) > 0.0, "the clamp is no nodal line"
+    np.testing.assert_allclose(line[:, 1], 0.5 * aspect, atol=0.1 * aspect)  # linear between nodes 0.2 apart
+
+
+# --- scenes -----------------------------------------------------------------------------------------------------------
+
+
+def test_properties_of_a_blade() -> None:
+    x = np.linspace(0.0, 60.0, 13)
+    columns = {name: np.exp(-x / 20) for name in ("EA", "GA2", "GA3", "EI2", "EI3", "GJ", "mass_per_length")}
+    columns |= {"x": x, "axis_1": x, "axis_2": 0 * x, "axis_3": 0.1 * x, "pretwist": 0.01 * x}
+    columns |= {f"t{k}_{i}": np.full(13, float(k == i)) for k in (2, 3) for i in (1, 2, 3)}
+    center = [20.0, 0.0, 2.0]
+    result = CheckResult(said(mass=1e4, length=60.0, root=[0.0] * 3, center_of_mass=center), columns, {"x": x}, None)
+    check(result.plot())
+
+
+def test_what_effects_change() -> None:
+    rows = [
+        {"kind": "effect", "name": "centrifugal", "included": True, "estimate": {"steady": 1.0, "modes": 0.02}},
+        {"kind": "effect", "name": "rotary_inertia", "included": False, "estimate": {"steady": None, "modes": 1e-5}},
+        {"kind": "theory", "name": "linear", "included": False, "estimate": {"steady": np.inf, "modes": 0.5}},
+    ]
+    check(ExplainResult(said(outputs=["steady", "modes"]), rows).plot())

@@ -11,7 +11,7 @@ from scipy.io import mmread
 import rotfem
 from rotfem import SceneError, modes
 from rotfem.analysis.state_space import write_matrices
-from rotfem.commands.response import response
+from rotfem.commands.response import BEND, NARROW, resolved, response
 from tests.beams import STRUCTURE
 
 #: Damping ratios of some per cent at the first modes, so that what a start leaves dies away soon.
@@ -194,4 +194,32 @@ def test_files_and_figure(swept, tmp_path):
     table = (tmp_path / "response.csv").read_text().splitlines()
     assert table[0].startswith("frequency,frequency_hz,per_rev,tip_u1,tip_u1_phase,tip_u1_modal,tip_u2")
     assert len(table) == 1 + len(swept.rows)
-    assert len(swept.plot().axes) == 7  # u1, u2, alpha, f1, f2, m3 and the phases
+    assert (
+        len(swept.plot().axes) == 8
+    )  # amplitudes and phases of tip displacements, its rotation, root force and moment
+
+
+def test_curves_are_resolved_where_they_bend() -> None:
+    """Of 1/(1 + 0.01iω − ω²) − 1/(5 + 0.01iω − ω²): from 12 frequencies, the bend at all is below BEND at the end.
+
+    Until then the worst are halved first, and no more are added than allowed.
+    """
+
+    def answer(omega: float) -> np.ndarray:
+        return np.array([1 / (1 + 0.01j * omega - omega**2) - 1 / (5 + 0.01j * omega - omega**2)])
+
+    first = np.linspace(0.0, 3.0, 12)
+    values = np.array([answer(omega) for omega in first])
+    omegas, found = resolved(answer, first, values, 500)
+    assert np.all(np.isin(first, omegas))
+    np.testing.assert_array_equal(found, [answer(omega) for omega in omegas])
+    heights = np.log(np.abs(found[:, 0]))
+    bends = [
+        abs(heights[i] - np.interp(omegas[i], omegas[[i - 1, i + 1]], heights[[i - 1, i + 1]]))
+        for i in range(1, len(omegas) - 1)
+        if omegas[i + 1] - omegas[i - 1] > 6.0 * NARROW * 3.0
+    ]
+    assert len(bends) > 30
+    assert max(bends) < BEND
+    few, _ = resolved(answer, first, values, 20)
+    assert len(few) == len(first) + 20
