@@ -27,10 +27,13 @@ class KeptDigits:
 
     Args:
         system: equations of motion of the structure, hub held.
+
+    Attributes:
+        used: whether it has kept more digits of some pairs.
     """
 
     def __init__(self, system: Any):
-        self.system = system
+        self.system, self.used = system, False
         self._resultants: Resultants | None = None
 
     def better(self, pencil: Pencil, pairs: Eigenpairs, count: int) -> Eigenpairs:
@@ -68,7 +71,7 @@ class KeptDigits:
             bounds = bounds + relative(left_out / np.maximum(slope, np.finfo(float).tiny))
         if len(bounds) < min(count, len(pairs.bounds)) or _digits(bounds[:count]) <= _digits(pairs.bounds[:count]):
             return pairs
-        pencil.spectrum_error = kept.spectrum_error
+        pencil.spectrum_error, self.used = kept.spectrum_error, True
         return Eigenpairs(found.values, right, left, found.errors, bounds)
 
     def _in_damping(self, pairs: Eigenpairs, count: int) -> float:

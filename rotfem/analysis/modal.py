@@ -149,7 +149,7 @@ def self_checks(analysis: ModalAnalysis, spinning: Spinning) -> dict[str, float]
     M and K symmetric and C skew without damping and follower loads; then −λ̄ is an eigenvalue with λ. The tangents are
     compared with central differences of the residual in the nonlinear theories.
     """
-    out = {f"asymmetry_{name}": value for name, value in spinning.pencil.asymmetries().items()}
+    out = {f"asymmetry_{name}": value for name, value in spinning.pencil.asymmetries.items()}
     if spinning.pencil.spectrum_error is not None:
         out["spectrum"] = spinning.pencil.spectrum_error
     # A linear system's residual is made of these very matrices.
@@ -271,6 +271,11 @@ class ModalAnalysis:
         assembled = self.system.assembled
         self.seconds = {"compile": perf_counter() - started - assembled, "assemble": assembled}
         self.seconds |= {"equilibrium": 0.0, "factor": 0.0, "eigen": 0.0}
+
+    @property
+    def digits_kept(self) -> bool:
+        """Whether pairs were computed with the stiff strains as unknowns, as round-off had spoilt them."""
+        return self._kept.used
 
     def check_count(self, count: int) -> None:
         """Refuse more modes than there are unknowns.

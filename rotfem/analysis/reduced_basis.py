@@ -8,6 +8,7 @@ the full one. The basis grows until full solutions at speeds between agree.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -31,8 +32,8 @@ AGREEMENT, MOST = 1e-6, 9
 
 
 def worth_while(analysis: ModalAnalysis, speeds: Sequence[float]) -> bool:
-    """Return whether a basis is possible (a linear theory, a fixed hub) and saves time."""
-    if not analysis.system.linear or analysis.free:
+    """Return whether a basis is possible (a linear theory in the rotating frame, a fixed hub) and saves time."""
+    if not analysis.system.linear or analysis.free or analysis.fixed is not None:
         return False
     return len(speeds) >= (MANY if analysis.system.A.getSize()[0] >= LARGE else MANY_OF_SMALL)
 
@@ -53,8 +54,9 @@ class SmallPencil(Pencil):
         """Return A X."""
         return np.asarray(A @ X)
 
+    @cached_property
     def asymmetries(self) -> dict[str, float]:
-        """Return how far M and K are from symmetric and C from skew."""
+        """How far M and K are from symmetric and C from skew."""
         signs = {"M": (self.M, -1.0), "C": (self.C, 1.0), "K": (self.K, -1.0)}
         tiny = np.finfo(float).tiny
         return {name: float(norm(A.T + s * A) / max(norm(A), tiny)) for name, (A, s) in signs.items()}
@@ -63,7 +65,7 @@ class SmallPencil(Pencil):
         """Return the pairs of smallest |λ| (see `Pencil.solve`), their errors those of the small problem."""
         found = self._skew() if self.conservative else None
         values, x, y = found or quadratic(self.M, self.C, self.K, target)
-        if found is None and heavily_damped(values[: 2 * count + 2], 0.0) and self.asymmetries()["C"] > 1e-10:
+        if found is None and heavily_damped(values[: 2 * count + 2], 0.0) and self.asymmetries["C"] > 1e-10:
             whole = (PETSc.Mat().createAIJ(A.shape, csr=_csr(A), comm=MPI.COMM_SELF) for A in (self.M, self.C, self.K))
             return Pencil(*whole).solve(count, target)
         telling = (values.real >= 0.0) | (not self.conservative)
@@ -112,14 +114,16 @@ class ReducedAnalysis(ModalAnalysis):
         self.checks: list[dict[str, float]] = []
         self._columns: list[Array] = []
 
-    def prepare(self, first: float, last: float, count: int) -> None:
-        """Build the basis for speeds from first to last (rad/s) and `count` modes; middle speeds are checked.
+    def prepare(self, first: float, last: float, count: int) -> bool:
+        """Build the basis for speeds from first to last (rad/s) and `count` modes; return whether the checks agree.
 
         Raises:
             ComputationError: a full solution failed.
         """
         for speed in (first, last):
             self._add(self._solve(speed, count))
+        if self.full.digits_kept:  # which the pieces do not keep
+            return False
         self._project()
         gaps = [(first, last)]
         while gaps and len(self.checks) + 2 < MOST:
@@ -131,6 +135,7 @@ class ReducedAnalysis(ModalAnalysis):
             self._add(exact)
             self._project()
             gaps += [(low, middle), (middle, high)] if error > AGREEMENT else []
+        return not gaps
 
     def report(self) -> dict[str, Any]:
         """Return what a summary says of the basis: columns, and the checks."""

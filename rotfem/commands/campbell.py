@@ -163,8 +163,9 @@ class Diagram:
         self.analysis = analysis_of(scene, problem.spinning(), comm)
         self.hints = hints_of(self.analysis, scene, "campbell", hint, max(map(abs, values)))
         if worth_while(self.analysis, values):
-            self.analysis = ReducedAnalysis(self.analysis)
-            self.analysis.prepare(values[0], values[-1], scene.modes.count + SPARE)
+            reduced = ReducedAnalysis(self.analysis)
+            if reduced.prepare(values[0], values[-1], scene.modes.count + SPARE):
+                self.analysis = reduced
 
     def result(self, progress: Progress, started: float) -> CampbellResult:
         """Return the branches over speed, with what the diagram says."""

@@ -60,7 +60,7 @@ class AffineSystem(System):
         self._by_kind = {kind: (index, [self.pieces[i].operator for i in index]) for kind, index in chosen.items()}
         self._increment: Increment | None = None
         self._make_operators()
-        return self._decomposed.pattern.duplicate()
+        return self._decomposed.pattern
 
     def _make_operators(self) -> None:
         """Make M, C, K and f of a time, none of which is set yet."""

@@ -335,14 +335,15 @@ class Pencil:
         mass, gyroscopic = self.comm.allreduce(local) if self.comm.size > 1 else local
         return np.asarray((lam[:, None] + mu[None, :]) * mass + gyroscopic)
 
+    @cached_property
     def asymmetries(self) -> dict[str, float]:
-        """Return how far M and K are from symmetric and C from skew (see `rotfem.numerics.eigenproblem`)."""
+        """How far M and K are from symmetric and C from skew (see `rotfem.numerics.eigenproblem`)."""
         return asymmetries(self)
 
     @cached_property
     def conservative(self) -> bool:
         """Whether M and K are symmetric and C skew to round-off, so that left vectors are right vectors of −λ̄."""
-        return all(value < 1e-10 for value in self.asymmetries().values())
+        return all(value < 1e-10 for value in self.asymmetries.values())
 
     def scale(self) -> float:
         """Return the least |λ|."""
@@ -413,7 +414,7 @@ class Pencil:
     @cached_property
     def damped(self) -> bool:
         """Whether C has a symmetric part."""
-        return self.asymmetries()["C"] > 1e-10
+        return self.asymmetries["C"] > 1e-10
 
     def _damped(self, count: int, target: float) -> Eigenpairs:
         """Return pairs in the order of the undamped frequencies of their shapes (see `rotfem.numerics.damped`)."""
@@ -511,10 +512,15 @@ class Pencil:
             raise ComputationError(
                 f"the eigensolver found {found} of {wanted} eigenvalues", advice="fewer modes.count or another mesh"
             )
-        values, vectors, errors = [], [], []
+        values, vectors, errors = list[complex](), list[Array](), list[float]()
         real, imaginary = K.createVecs()
         for i in range(found):
-            values.append(complex(pep.getEigenpair(i, real, imaginary)))
-            vectors.append(real.array + 1j * imaginary.array)
-            errors.append(pep.computeError(i, SLEPc.PEP.ErrorType.BACKWARD))
+            value = complex(pep.getEigenpair(i, real, imaginary))
+            if values and value.imag != 0.0 and value == values[-1].conjugate():  # conjugate pairs stand together
+                vectors.append(vectors[-1].conj())
+                errors.append(errors[-1])
+            else:
+                vectors.append(real.array + 1j * imaginary.array)
+                errors.append(pep.computeError(i, SLEPc.PEP.ErrorType.BACKWARD))
+            values.append(value)
         return np.array(values), np.array(vectors).T.copy(), np.array(errors)

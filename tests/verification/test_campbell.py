@@ -53,6 +53,31 @@ def exchanges(result: CampbellResult) -> int:
     return count
 
 
+# --- many speeds ------------------------------------------------------------------------------------------------------
+
+
+def test_a_basis_of_modes_gives_what_full_solutions_do(unit_beam: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Through a veering, frequencies and names; to 1e-8, as the basis has a solution more than when it met 1e-6."""
+    beam, speeds = scene(unit_beam, "von_karman_linear", 25, 0.0), [5.0 * i for i in range(13)]
+    quick = campbell(beam, speeds)
+    monkeypatch.setattr("rotfem.analysis.reduced_basis.MANY_OF_SMALL", len(speeds) + 1)
+    full = campbell(beam, speeds)
+    assert "reduced_basis" in quick.summary
+    assert "reduced_basis" not in full.summary
+    assert [row["label"] for row in quick.rows] == [row["label"] for row in full.rows]
+    for name in ("speed", "frequency"):
+        np.testing.assert_allclose([r[name] for r in quick.rows], [r[name] for r in full.rows], rtol=1e-8)
+
+
+def test_digits_that_the_mixed_form_keeps_are_kept_at_many_speeds(unit_beam: Any) -> None:
+    """A beam that hardly stretches: no basis of the displacement form, whose stiffness has lost them."""
+    stiff = slender(0.02) | {"EA": 1e11, "GA": 1e11}
+    beam = unit_beam({"structure.section": stiff, "model.theory": "consistent_linear", "modes.count": 2}, mesh=MESH)
+    result = campbell(beam, [0.1 * i for i in range(12)])
+    assert max(row["error_bound"] for row in result.rows) < 1e-5
+    assert "reduced_basis" not in result.summary
+
+
 # --- E: branches -----------------------------------------------------------------------------------------------------
 
 
