@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from inspect import Parameter, Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -66,6 +67,7 @@ class Job:
         results: folder where its results go.
         session: who speaks.
         plots: whether figures are wanted.
+        report: whether report.html is.
         hint: receives advice; None where none is wanted.
     """
 
@@ -73,6 +75,7 @@ class Job:
     results: ResultFolder
     session: Session
     plots: bool
+    report: bool
     hint: Callable[[str], None] | None
 
     def progress(self, share: float) -> None:
@@ -81,7 +84,20 @@ class Job:
 
     def finish(self, result: Result, further: Sequence[Writer] = ()) -> None:
         """Write a result, and what else is wanted, and print its report."""
-        self.session.finish(result, self.plots, further)
+        self.session.finish(result, self.plots, [*further, *self.reports(result)])
+
+    def reports(self, result: Result) -> list[Writer]:
+        """Return what writes report.html, if that is wanted."""
+        if not self.report:
+            return []
+        from rotfem.commands.check import check
+        from rotfem.results.report import write_report
+
+        drawing = None
+        if result.summary["command"] != "check":
+            with suppress(InputError, ComputationError):
+                drawing = check(self.scene, comm=self.session.comm).plot()
+        return [partial(write_report, result, drawing)]
 
 
 @contextmanager
@@ -110,6 +126,7 @@ def job(
         bool, typer.Option("--no-error", help="estimate no errors, as output.error = false does")
     ] = False,
     no_plots: Annotated[bool, typer.Option("--no-plots", help="write no figures")] = False,
+    report: Annotated[bool, typer.Option("--report", help="write report.html, a page that shows all of it")] = False,
     no_advice: Annotated[bool, typer.Option("--no-advice", help="give no hints at the start")] = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False,
@@ -132,11 +149,16 @@ def job(
         folder = session.folder(output or Path("results") / folder_name(loaded.name), command, loaded.inputs)
         with held_back():
             import rotfem.numerics.forms  # noqa: F401  PETSc first, which dolfinx would start in its own way
+        if report:
+            from rotfem.results.report import require
+
+            require()
+        todo = Job(loaded, folder, session, not no_plots, report, session.hint(no_advice))
         try:
-            yield Job(loaded, folder, session, not no_plots, session.hint(no_advice))
+            yield todo
         except (ComputationError, Stopped) as error:
             if error.result is not None:
-                session.write(error.result, not no_plots)
+                session.write(error.result, not no_plots, todo.reports(error.result))
             raise
 
 

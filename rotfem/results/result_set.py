@@ -145,9 +145,9 @@ ROOM = 1000
 
 #: Names that are those of results in a folder with a summary of one; a set with others lists them in its summary.
 OURS = re.compile(
-    r"(history|shape|stations|resultants|modes|mode_shapes|sensitivities|unknowns|campbell|cost|check|compare|sweep)\.csv|"
-    r"(modes|campbell|explain|cost)\.json|mode_\d+\.gif|state_space\.npz|"
-    r"(history|loads|shape|stations|resultants|modes|mode_\d+|response|campbell|campbell_fixed|explain|cost|check|compare|sweep)\.png|"
+    r"(history|shape|stations|resultants|modes|mode_shapes|sensitivities|unknowns)\.csv|"
+    r"(history|loads|shape|stations|resultants|modes|mode_\d+|response|campbell_fixed)\.png|"
+    r"(campbell|explain|cost|check|compare|sweep)\.(csv|json|png)|modes\.json|report\.html|mode_\d+\.gif|state_space\.npz|"
     r"[MCK]\.(mtx|npz)|(fields|modes|stations_line)\.(bp|xdmf|h5)|(checkpoint|stations)\.h5"
 )
 

@@ -23,7 +23,7 @@ FILE = re.compile(r"(?<![\w./*-])(?:rotfem|tests|demos|docs|meshes|benchmarks|\.
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 #: A word of code with dots in it, and whatever stands behind it in the same span.
 SPAN = re.compile(r"`([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+)(?:\([^`]*\))?`")
-ENDINGS = set("py sh toml json jsonl csv dat md png gif svg pdf msh bp h5 nc npz log opt cache lock xdmf".split())  # noqa: SIM905
+ENDINGS = set("py sh toml json jsonl csv dat md png gif svg pdf html msh bp h5 nc npz log opt cache lock xdmf".split())  # noqa: SIM905
 #: What a first word may be that is no module or class of the program: packages of others, tables of a scene and of
 #: summary.json, and what the examples call a mechanics, a variation and a body.
 OUTSIDE = {"ufl", "np", "numpy", "scipy", "dolfinx", "fem", "MPI", "section", "choice", "m", "delta", "body"}

@@ -1,0 +1,434 @@
+"""One HTML file of a result that needs nothing else: summary, figures that respond, modes that move, tables, scene.
+
+Figures are those of `Result.drawings`: lines, bars and ranges become figures of Bokeh (https://docs.bokeh.org), whose
+script is in the file; what is drawn in three dimensions stays a picture.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from html import escape
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+import tomli_w
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PathCollection, PolyCollection
+from matplotlib.colors import to_hex
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import FixedLocator
+
+from rotfem.errors import InputError
+from rotfem.results.columns import ZERO, described, label
+from rotfem.results.files import json_text, write_text
+from rotfem.results.modes import ModesResult
+from rotfem.results.result import Result
+from rotfem.results.units import ShownUnits
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = npt.NDArray[np.float64]
+
+#: Name of the file.
+NAME = "report.html"
+
+#: Points of a line, at most; numbers of all modes that move, at most; rows of a table, at most.
+POINTS, NUMBERS, ROWS = 2000, 60_000, 2000
+
+#: Largest displacement of a mode that moves, part of the length.
+AMPLITUDE = 0.15
+
+#: What a summary says first ↦ what it is called.
+FACTS = {
+    "theory": "theory",
+    "about": "modes about the state",
+    "frame": "frame",
+    "effects": "effects",
+    "type": "structure",
+    "length": "length (m)",
+    "mass": "mass (kg)",
+    "elements": "elements",
+    "dofs": "unknowns",
+    "steps": "time steps",
+    "speeds_solved": "speeds solved",
+    "frequencies": "frequencies",
+    "output": "output",
+    "accuracy": "accuracy wanted",
+    "truth": "theory of the reference",
+    "settings": "settings measured",
+    "ranks": "processes",
+}
+
+#: Contribution to an error ↦ what it means.
+MEANING = {
+    "time": "finite time steps; a shorter time.step or a smaller time.tolerance lessens it",
+    "space": "finite elements; more mesh.elements or a higher mesh.degree lessen it",
+    "model": "the theory, beside the exact strains; a richer model.theory lessens it",
+    "round_off": "arithmetic with 16 digits; no setting lessens it",
+    "total": "all of them together",
+}
+
+
+def require() -> None:
+    """Raise an InputError where Bokeh is not installed."""
+    if find_spec("bokeh") is None:
+        raise InputError("--report", None, "needs bokeh, which is not installed: pip install bokeh")
+
+
+def write_report(result: Result, drawing: Figure | None, folder: Path) -> Path:
+    """Write report.html into a folder; return its path.
+
+    Args:
+        result: what is reported.
+        drawing: of the scene's structure, where there is one.
+        folder: where the file goes.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    from bokeh.embed import components
+    from bokeh.resources import Resources
+
+    figures = {name: draw() for name, draw in result.drawings().items()}
+    live = {name: found for name, figure in figures.items() if (found := interactive(figure)) is not None}
+    scripts, places = components(live) if live else ("", {})
+    parts = "".join(
+        f"<figure><h3>{escape(_title(figures[name]))}</h3>{places.get(name) or picture(figures[name])}</figure>"
+        for name in figures
+    )
+    hint = (
+        '<p class="hint">Drag to move, zoom with the tools on the right, click a name to hide its line.</p>'
+        if live
+        else ""
+    )
+    moving, cards = animated(result)
+    sections = [
+        header(result.summary),
+        section("Summary", facts(result.summary) + messages(result.summary)),
+        section("Figures", hint + parts) if figures else "",
+        section("Modes in motion", cards) if cards else "",
+        section("Tables", "".join(table(*entry) for entry in tables(result))),
+        section("How exact it is", error_table(result.summary)),
+        section("Scene", scene(result.summary, drawing)),
+        section("Made with", facts_list(result.summary["versions"]) + summary_text(result.summary)),
+    ]
+    content = {
+        "title": escape(f"{result.summary['name']}: rotfem {result.summary['command']}"),
+        "library": Resources(mode="inline", components=["bokeh"]).render_js() if live else "",
+        "content": "\n".join(sections),
+        "modes": json.dumps(moving, separators=(",", ":")),
+        "scripts": scripts,
+    }
+    text = Path(__file__).with_suffix(".html").read_text(encoding="utf-8")
+    for name, value in content.items():
+        before, _, after = text.partition(f"@{name}@")
+        text = before + value + after
+    return write_text(folder / NAME, text)
+
+
+# --- words and tables -------------------------------------------------------------------------------------------------
+
+
+def section(title: str, content: str) -> str:
+    """Return a section; nothing where it has no content."""
+    return f"<section><h2>{title}</h2>\n{content}</section>" if content else ""
+
+
+def header(summary: Mapping[str, Any]) -> str:
+    """Return the heading: scene, command, how it ended."""
+    name, command, status = (escape(str(summary[key])) for key in ("name", "command", "status"))
+    return f'<header><h1>{name}</h1><p>rotfem {command}</p><span class="status {status}">{status}</span></header>'
+
+
+def facts(summary: Mapping[str, Any]) -> str:
+    """Return what was computed and how."""
+    units, found = ShownUnits.of(summary), dict[str, Any]()
+    if isinstance(summary.get("speed"), float):
+        found[f"speed ({units.speed})"] = float(units.speeds(summary["speed"]))
+    found |= {said: summary[key] for key, said in FACTS.items() if summary.get(key) not in (None, [])}
+    if (total := summary.get("error", {}).get("total")) is not None:
+        found["error, estimated"] = f"{100 * total:.2g} %"
+    found["computing time (s)"] = summary.get("timings", {}).get("total")
+    return facts_list(found)
+
+
+def facts_list(found: Mapping[str, Any]) -> str:
+    """Return names and values."""
+    return "<dl>" + "".join(f"<div><dt>{k}</dt><dd>{shown(v)}</dd></div>" for k, v in found.items()) + "</dl>"
+
+
+def messages(summary: Mapping[str, Any]) -> str:
+    """Return what failed, warnings and advice."""
+    out = []
+    if failure := summary.get("failure"):
+        when = "" if failure.get("time") is None else f" at t = {failure['time']:.6g} s"
+        out.append(f'<p class="note failed">{escape(failure["what"])}{when}. {escape(failure.get("advice") or "")}</p>')
+    said = [*summary.get("warnings", ()), *summary.get("advice", ())]
+    return "".join([*out, *(f'<p class="note">{escape(str(text))}</p>' for text in said)])
+
+
+def tables(result: Result) -> Iterator[tuple[str, list[dict[str, Any]]]]:
+    """Yield title and rows of what a summary has in lists, of figures and peaks, and of the settings of a study."""
+    summary, units = result.summary, ShownUnits.of(result.summary)
+    if summary.get("kind") is not None:
+        figures: dict[str, dict[str, Any]] = {}
+        for key, value in summary.get("figures", {}).items():
+            for ending in ("_final", "_min_time", "_max_time", "_min", "_max"):
+                if key.endswith(ending):
+                    name = key.removesuffix(ending)
+                    row = figures.setdefault(name, {"quantity": described(name)[0], "unit": described(name)[1]})
+                    row[ending.strip("_").replace("_", " at t (s), ").replace(" at t (s), time", " at t (s)")] = value
+                    break
+        yield "Largest and last values", list(figures.values())
+    if "peaks" in summary:
+        yield "Peaks", [{"output": label(name), **peak} for name, peak in summary["peaks"].items()]
+    for key, value in summary.items():
+        if isinstance(value, list) and value and all(isinstance(row, dict) for row in value):
+            yield key.replace("_", " ").capitalize(), units.rows(value)
+    if summary["command"] == "cost":
+        yield "Settings", list(getattr(result, "rows", ()))
+
+
+def table(title: str, rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return a table that a click on a heading sorts; dictionaries in a row become columns of their own."""
+    flat = [dict(_flat(row)) for row in rows[:ROWS]]
+    names = list(dict.fromkeys(name for row in flat for name in row))
+    if not flat:
+        return ""
+    numbers = {n: [abs(r[n]) for r in flat if isinstance(r.get(n), float) and np.isfinite(r[n])] for n in names}
+    numbers |= {"damping": [1.0], "growth": numbers.get("frequency", [])}  # what these are 0 beside
+    least = {n: 0.0 if n in EXACT else ZERO * max(values, default=0.0) for n, values in numbers.items()}
+    head = "".join(f"<th{_kind(flat, n)}>{escape(_heading(n))}</th>" for n in names)
+    body = ""
+    for row in flat:
+        cells = ""
+        for n in names:
+            value = row.get(n)
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            small = isinstance(value, float) and abs(value) <= least[n]
+            data = f' data-value="{value!r}"' if number and np.isfinite(float(str(value))) else ""
+            cells += f"<td{_kind(flat, n)}{data}>{shown(0 if small else value)}</td>"
+        body += f"<tr>{cells}</tr>"
+    more = f"<p>the first {ROWS} of {len(rows)} rows</p>" if len(rows) > ROWS else ""
+    inner = f'<table class="sortable"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
+    return f'<h3>{escape(title)}</h3><div class="scroll">{inner}</div>{more}'
+
+
+#: Columns of numbers that are near 0 and not shown as 0.
+EXACT = ("residual", "error_bound", "mesh_error")
+
+
+def _heading(name: str) -> str:
+    what, unit = described(name)
+    if name.endswith(("_first", "_last")):
+        unit = described(name.rpartition("_")[0])[1]
+    what = what.replace("_", " ").replace(".", ", ")
+    return f"{what} ({'–' if unit == '1' else unit})" if unit else what
+
+
+def _kind(rows: Sequence[Mapping[str, Any]], name: str) -> str:
+    return ' class="text"' if any(isinstance(row.get(name), str) for row in rows) else ""
+
+
+def _flat(row: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in row.items():
+        if key == "row":  # of a table of its own
+            continue
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value
+
+
+def shown(value: Any) -> str:
+    """Return a value as it is read."""
+    if value is None:
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list | tuple):
+        return ", ".join(map(shown, value))
+    return escape(str(value))
+
+
+def error_table(summary: Mapping[str, Any]) -> str:
+    """Return the contributions to the error and what they mean; nothing where no error was estimated."""
+    error = summary.get("error", {})
+    rows = [
+        {"contribution": name.replace("_", "-"), "relative error": error[name], "what it is": meaning}
+        for name, meaning in MEANING.items()
+        if name in error
+    ]
+    scale = f"<p>Relative to {error['scale']:.6g} m, the largest displacement.</p>" if error.get("scale") else ""
+    return table("Estimated error", rows) + scale if rows else ""
+
+
+def scene(summary: Mapping[str, Any], drawing: Figure | None) -> str:
+    """Return the drawing and the tables of the scene, those of defaults too."""
+    image = "" if drawing is None else f"<figure>{picture(drawing)}</figure>"
+    if "scene" not in summary:
+        return image
+    text = escape(tomli_w.dumps(summary["scene"]))
+    return f"{image}<details><summary>all keys of the scene</summary><pre>{text}</pre></details>"
+
+
+def summary_text(summary: Mapping[str, Any]) -> str:
+    """Return the whole summary as JSON, folded away."""
+    return f"<details><summary>summary.json</summary><pre>{escape(json_text(dict(summary)))}</pre></details>"
+
+
+# --- figures ----------------------------------------------------------------------------------------------------------
+
+
+def _title(figure: Figure) -> str:
+    return str(figure.get_suptitle() or (figure.axes[0].get_title() if len(figure.axes) == 1 else ""))
+
+
+def picture(figure: Figure) -> str:
+    """Return a figure as an image in the page."""
+    content = io.BytesIO()
+    FigureCanvasAgg(figure)
+    figure.savefig(content, dpi=110, format="png")
+    data = base64.b64encode(content.getvalue()).decode()
+    return f'<img alt="{escape(_title(figure))}" src="data:image/png;base64,{data}">'
+
+
+def interactive(figure: Figure) -> Any:
+    """Return a figure as one of Bokeh, its panels moving together; None if it is more than lines, bars and ranges."""
+    from bokeh.layouts import gridplot
+    from bokeh.models import Range1d
+
+    axes = [axis for axis in figure.axes if axis.axison]
+    if not axes or any(a.name == "3d" or a.images for a in axes):
+        return None
+    known = (Line2D, Rectangle, PolyCollection, PathCollection)
+    if not all(isinstance(artist, known) for a in axes for artist in (*a.lines, *a.patches, *a.collections)):
+        return None
+    x: dict[tuple[float, float], Any] = {}
+    panels = [panel(a, x.setdefault(a.get_xlim(), Range1d(*map(float, a.get_xlim())))) for a in axes]
+    rows, options = [[one] for one in panels], {"logo": None}
+    return gridplot(rows, sizing_mode="stretch_width", toolbar_location="right", toolbar_options=options)
+
+
+#: Dashes of Matplotlib ↦ those of Bokeh.
+DASHES = {"-": "solid", "--": "dashed", ":": "dotted", "-.": "dashdot"}
+
+
+def panel(axes: Any, x_range: Any) -> Any:
+    """Return one panel as a figure of Bokeh."""
+    from bokeh.models import Legend, LegendItem, Range1d, Span
+    from bokeh.plotting import figure
+
+    tall = axes.get_position().height * axes.get_figure().get_figheight() * 100.0
+    plot = figure(
+        height=int(np.clip(tall, 170, 480)),
+        x_range=x_range,
+        y_range=Range1d(*map(float, axes.get_ylim())),
+        x_axis_type=axes.get_xscale(),
+        y_axis_type=axes.get_yscale(),
+        x_axis_label=axes.get_xlabel() or None,
+        y_axis_label=axes.get_ylabel() or None,
+        title=axes.get_title(loc="left") or None,
+        tools="pan,wheel_zoom,box_zoom,reset,hover",
+        tooltips=[("", "$name"), ("x", "$x"), ("y", "$y")],
+    )
+    named: dict[str, list[Any]] = {}
+    for line in (line for line in axes.lines if len(line.get_xydata())):
+        colour = to_hex(line.get_color())
+        dash = DASHES.get(str(line.get_linestyle()), "solid")
+        if line.get_transform() != axes.transData:  # a line over the whole height
+            place = float(np.asarray(line.get_xdata())[0])
+            plot.add_layout(Span(location=place, dimension="height", line_color=colour, line_dash=dash, line_width=1))
+            continue
+        said = str(line.get_label())
+        said = _text_at(axes, line, colour) if said.startswith("_") else said
+        x, y = thinned(np.asarray(line.get_xdata(), float), np.asarray(line.get_ydata(), float))
+        drawn = []
+        if str(line.get_linestyle()) not in ("None", "none", ""):
+            drawn.append(plot.line(x, y, color=colour, line_dash=dash, line_width=line.get_linewidth(), name=said))
+        if str(line.get_marker()) not in ("None", "none", "", " "):
+            face = line.get_markerfacecolor()
+            fill = None if str(face) == "none" else to_hex(face)
+            drawn.append(plot.scatter(x, y, size=line.get_markersize(), color=colour, fill_color=fill, name=said))
+        named.setdefault(said, []).extend(drawn)
+    for bar in axes.patches:
+        (left, bottom), width, height = bar.get_xy(), bar.get_width(), bar.get_height()
+        ends = {"left": left, "right": left + width, "bottom": bottom, "top": bottom + height}
+        said, colour = str(bar.get_label()).removeprefix("_nolegend_"), to_hex(bar.get_facecolor())
+        named.setdefault(said, []).append(plot.quad(**ends, color=colour, name=said))
+    for area in (area for area in axes.collections if isinstance(area, PolyCollection)):
+        for path in area.get_paths():
+            colour, corners = to_hex(np.asarray(area.get_facecolor())[0].tolist()), np.asarray(path.vertices)
+            plot.patch(corners[:, 0], corners[:, 1], color=colour, alpha=0.25, line_width=0)
+    items = [LegendItem(label=said, renderers=drawn) for said, drawn in named.items() if said and drawn]
+    if items and (len(items) > 1 or len(named) > 1):
+        plot.add_layout(
+            Legend(items=items, click_policy="hide", label_text_font_size="9pt", border_line_color=None), "right"
+        )
+    if isinstance(axes.yaxis.get_major_locator(), FixedLocator) and (ticks := axes.get_yticks()) is not None:
+        plot.yaxis.ticker = [float(tick) for tick in ticks]
+        labels = [text.get_text() for text in axes.get_yticklabels()]
+        plot.yaxis.major_label_overrides = {float(t): said for t, said in zip(ticks, labels, strict=True) if said}
+    plot.grid.grid_line_color = "#e6eaee"
+    plot.outline_line_color = "#c3cbd4"
+    return plot
+
+
+def _text_at(axes: Any, line: Line2D, colour: str) -> str:
+    """Return the text of a line's colour that stands nearest to its end; nothing where there is none."""
+    end = float(np.asarray(line.get_ydata(), dtype=np.float64)[-1])
+    there = [text for text in axes.texts if to_hex(text.get_color()) == colour and hasattr(text, "xy")]
+    return str(min(there, key=lambda text: abs(float(text.xy[1]) - end)).get_text()) if there else ""
+
+
+def thinned(x: Array, y: Array) -> tuple[Any, Any]:
+    """Return a line by `POINTS` at most: of every stretch its lowest and highest point."""
+    if len(x) > POINTS:
+        parts = np.array_split(np.arange(len(x)), POINTS // 2)
+        kept = sorted({int(part[i]) for part in parts for i in (np.argmin(y[part]), np.argmax(y[part]))})
+        x, y = x[kept], y[kept]
+    return x.astype(np.float32), y.astype(np.float32)
+
+
+# --- modes ------------------------------------------------------------------------------------------------------------
+
+
+def animated(result: Result) -> tuple[dict[str, Any], str]:
+    """Return nodes, lines between them and shapes of modes as the page draws them, and a card for each mode."""
+    if not isinstance(result, ModesResult) or not result.shapes:
+        return {"flat": True}, ""
+    first = next(iter(result.shapes.values()))
+    n, length = len(first["x"]), float(result.summary["shapes"]["length"])
+    nodes = np.stack([first["x"], first.get("y", np.zeros(n)), np.zeros(n)], axis=-1)
+    flat = result.triangles is None and "u3" not in first
+    lines = np.stack([np.arange(n - 1), np.arange(1, n)], axis=-1)
+    if result.triangles is not None:
+        pairs = np.concatenate([result.triangles[:, [i, j]] for i, j in ((0, 1), (1, 2), (2, 0))])
+        lines = np.unique(np.sort(pairs, axis=1), axis=0)
+    shapes = list(result.shapes.values())[: max(1, NUMBERS // (6 * n))]
+    moves, cards, units = [], "", ShownUnits.of(result.summary)
+    rows = result.rows[len(result.rows) - len(result.shapes) :]  # a rigid-body mode comes first and has no shape
+    for columns, row in zip(shapes, rows, strict=False):
+        u = np.stack([columns.get(f"u{i}", np.zeros(n)) for i in (1, 2, 3)], axis=-1)
+        v = np.stack([columns.get(f"u{i}_imag", np.zeros(n)) for i in (1, 2, 3)], axis=-1)
+        scale = AMPLITUDE * length / max(float(np.max(np.hypot(u, v))), 1e-300)
+        moves.append([np.round(scale * part, 5).tolist() for part in (u, v)])
+        said = f"{row.get('name', row['label'])}, {float(units.frequencies(row['frequency'])):.5g} {units.frequency}"
+        cards += f"<figure><canvas></canvas><figcaption>{row['mode']}: {escape(said)}</figcaption></figure>"
+    low, high = nodes.min(axis=0), nodes.max(axis=0)
+    extent = float(np.linalg.norm(high - low))
+    size = [1.05 * extent, (2.6 * AMPLITUDE if flat else 0.62) * extent]
+    middle = [float(value) for value in (low + high) / 2]
+    data = {"flat": flat, "nodes": np.round(nodes, 5).tolist(), "lines": lines.tolist(), "shapes": moves}
+    hint = "" if flat else '<p class="hint">Drag to turn the view.</p>'
+    return {**data, "size": size, "middle": middle}, f'{hint}<div class="modes">{cards}</div>'

@@ -1,0 +1,180 @@
+"""`--report`: one file, opened in a Chromium without a screen: tables sort, figures answer, modes move, it prints."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("bokeh", reason="the report needs bokeh")
+BROWSER = next((found for name in ("chromium-headless-shell", "chromium") if (found := shutil.which(name))), None)
+Rotfem = Callable[..., Any]
+DEMOS = Path(__file__).resolve().parents[2] / "demos"
+
+SCENE = """\
+[structure]
+type = "planar_beam"
+length = 1.0
+hub_radius = 0.5
+section = { EA = 400.0, GA = 130.0, EI = 1.0, mass_per_length = 1.0, rotary_inertia = 0.0025 }
+[motion]
+type = "constant"
+speed = 3.0
+[model]
+theory = "consistent_linear"
+[mesh]
+elements = 4
+[modes]
+count = 3
+"""
+
+#: Before all else: what goes wrong is kept, and frames come by the clock of the page, which runs ahead of ours.
+FIRST = """<script>
+requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 20);
+window.wrong = [];
+for (const name of ["error", "warn"]) console[name] = (...said) => wrong.push(said.join(" "));
+addEventListener("error", event => wrong.push(event.message));
+</script>"""
+
+#: After all else: what a person does, and what comes of it, as JSON in the page.
+LAST = """<script>
+const pause = time => new Promise(done => setTimeout(done, time));
+const column = (table, i) => [...table.tBodies[0].rows].map(row => +row.cells[i].dataset.value);
+const pixels = canvas => canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data.join("");
+async function act() {
+  const said = {tables: [], ranges: []};
+  for (const table of document.querySelectorAll("table.sortable")) {
+    const i = [...table.tBodies[0].rows[0].cells].findIndex(cell => cell.dataset.value !== undefined);
+    const head = table.tHead.rows[0].cells[i];
+    head.click();
+    const up = column(table, i);
+    head.click();
+    said.tables.push([up, column(table, i), head.ariaSort]);
+  }
+  const all = window.Bokeh ? [...Bokeh.index.query(view => view.model.type === "Figure")] : [];
+  for (const root of new Set(all.map(view => view.root))) {
+    const plots = all.filter(view => view.root === root);
+    const event_of = (view, name, x) => new PointerEvent(name, {
+      clientX: view.el.getBoundingClientRect().left + x, clientY: view.el.getBoundingClientRect().top + 60,
+      buttons: 1, pointerId: 1, pointerType: "mouse", isPrimary: true, bubbles: true, composed: true});
+    const view = plots[0], before = plots.map(p => p.model.x_range.start), target = view.canvas_view.events_el;
+    target.setPointerCapture = () => {};
+    for (const [name, x] of [["pointerdown", 300], ["pointermove", 260], ["pointermove", 220], ["pointerup", 220]]) {
+      target.dispatchEvent(event_of(view, name, x));
+      await pause(50);
+    }
+    said.ranges.push([before, plots.map(p => p.model.x_range.start)]);
+  }
+  const canvas = document.querySelector(".modes canvas");
+  if (canvas) {
+    const then = pixels(canvas);
+    await pause(300);
+    said.moved = then !== pixels(canvas);
+  }
+  return said;
+}
+async function finish() {
+  const said = await act().catch(error => ({wrong: [error.stack]}));
+  said.wrong = [...wrong, ...(said.wrong || [])];
+  const end = document.createElement("pre");
+  end.id = "said";
+  end.textContent = JSON.stringify(said);
+  document.body.append(end);
+}
+addEventListener("load", () => setTimeout(finish, 1500));
+</script>"""
+
+
+def browse(folder: Path, page: Path, *options: str) -> str:
+    """Return what Chromium prints of a page; it has no network."""
+    given = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run")
+    alone = (f"--user-data-dir={folder / 'browser'}", "--proxy-server=127.0.0.1:9", "--virtual-time-budget=8000")
+    command = [str(BROWSER), *given, *alone, *options, page.as_uri()]
+    return subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
+
+
+def opened(folder: Path, page: Path) -> dict[str, Any]:
+    """Return what comes of a person's acts on a page."""
+    text = page.read_text(encoding="utf-8")
+    acted = page.with_name("acted.html")
+    acted.write_text(text.replace("<head>", "<head>" + FIRST, 1).replace("</body>", LAST + "</body>"), encoding="utf-8")
+    found = re.search(r'<pre id="said">(.*?)</pre>', browse(folder, acted, "--dump-dom"), re.DOTALL)
+    assert found is not None, "the page did not get to its end"
+    said: dict[str, Any] = json.loads(html.unescape(found[1]))
+    return said
+
+
+def check_page(folder: Path, page: Path) -> dict[str, Any]:
+    """Check what all reports have in common; return what comes of a person's acts."""
+    text = page.read_text(encoding="utf-8")
+    assert len(text.encode()) <= 3_000_000
+    assert (
+        re.findall(r'(?:src|href)\s*=\s*["\']?(?:https?:)?//', re.sub(r"<script.*?</script>", "", text, flags=re.S))
+        == []
+    )
+    if BROWSER is None:
+        pytest.skip("there is no Chromium: ./with-fenicsx installs it where Debian's packages are")
+    said = opened(folder, page)
+    assert said["wrong"] == []
+    assert said["tables"]
+    for up, down, way in said["tables"]:
+        assert up == sorted(up)
+        assert down == sorted(down, reverse=True)
+        assert way == "descending"
+    for before, after in said["ranges"]:
+        assert all(a > b for a, b in zip(after, before, strict=True)), "the panels do not move together"
+    return said
+
+
+def test_report_of_modes(folder: Path, rotfem: Rotfem) -> None:
+    """The name of the scene is harmful: a text of the page, and nothing else."""
+    (folder / "beam.toml").rename(folder / "a<b>.toml")
+    done = rotfem("modes", "a<b>.toml", "--report", "--no-error", "--no-plots", "-q", "-o", "out")
+    assert done.status == 0, done.err
+    page = folder / "out" / "report.html"
+    text = page.read_text(encoding="utf-8")
+    assert "<h1>a&lt;b&gt;</h1>" in text
+    assert "a<b>" not in text
+    said = check_page(folder, page)
+    assert said["moved"]
+    assert len(said["ranges"]) == 1
+    browse(folder, page, f"--print-to-pdf={folder / 'report.pdf'}", "--no-pdf-header-footer")
+    printed = (folder / "report.pdf").read_bytes()
+    assert printed.startswith(b"%PDF")
+    assert len(re.findall(rb"/Type\s*/Page\b", printed)) >= 2
+
+
+def test_report_of_a_spin_up(folder: Path, rotfem: Rotfem) -> None:
+    options = ("--set", "time.step=0.02", "--set", "time.output_every=1", "--no-error", "--no-plots", "-q")
+    done = rotfem("run", str(DEMOS / "spin_up.toml"), *options, "--report", "-o", "out")
+    assert done.status == 0, done.err
+    said = check_page(folder, folder / "out" / "report.html")
+    assert len(said["ranges"]) >= 1
+
+
+def test_report_of_a_run_that_failed(folder: Path, rotfem: Rotfem) -> None:
+    options = ("--set", "model.theory=linear", "--set", "model.on_exceed=warn", "--no-error", "--no-plots", "-q")
+    done = rotfem("run", str(DEMOS / "spin_up.toml"), "--set", "time.step=0.02", *options, "--report", "-o", "out")
+    assert done.status == 3
+    text = (folder / "out" / "report.html").read_text(encoding="utf-8")
+    assert 'class="status failed"' in text
+    assert re.search(r'class="note failed">the linear solution diverged.*model.theory = ', text)
+
+
+@pytest.mark.parametrize(
+    "verb", [("check",), ("campbell", "--speeds", "0:4:5"), ("explain",)], ids=lambda verb: verb[0]
+)
+def test_every_verb_has_a_report(folder: Path, rotfem: Rotfem, verb: tuple[str, ...]) -> None:
+    done = rotfem(verb[0], "beam.toml", *verb[1:], "--report", "--no-plots", "-q", "-o", "out")
+    assert done.status == 0, done.err
+    text = (folder / "out" / "report.html").read_text(encoding="utf-8")
+    assert f"rotfem {verb[0]}</p>" in text
+    assert "data-root-id" in text  # a figure that answers
+    assert not re.search(r"@(title|library|content|modes|scripts)@", text)
