@@ -75,11 +75,15 @@ def sentences(text: str) -> list[str]:
     return [" ".join(part.split()) for part in parts]
 
 
-@pytest.mark.parametrize(
-    "document", [path for path in DOCUMENTS if path.name != "theory.md"], ids=lambda path: path.name
-)
+PROSE = [*(path for path in DOCUMENTS if path.name != "theory.md"), *sorted((ROOT / "docs" / "tutorials").glob("*.py"))]
+
+
+@pytest.mark.parametrize("document", PROSE, ids=lambda path: path.name)
 def test_sentences_are_short(document: Path) -> None:
-    said = sentences(document.read_text(encoding="utf-8"))
+    text = document.read_text(encoding="utf-8")
+    if document.suffix == ".py":  # the comments of a tutorial are its text
+        text = "\n".join(line[2:] if line.startswith("# ") else "" for line in text.splitlines())
+    said = sentences(text)
     assert [sentence for sentence in said if len(sentence.split()) > LONGEST] == []
 
 
