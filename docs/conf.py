@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
-from pathlib import Path
-
 from docutils.nodes import SkipNode
 from latex2mathml.converter import convert
 
@@ -32,10 +28,6 @@ nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 300
 nb_execution_show_tb = True
-# Figures show without a word of the tutorial about it.
-os.environ["IPYTHONDIR"] = tempfile.mkdtemp()
-(profile := Path(os.environ["IPYTHONDIR"], "profile_default")).mkdir()
-(profile / "ipython_kernel_config.py").write_text('c.IPKernelApp.matplotlib = "inline"')
 
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"

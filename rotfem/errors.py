@@ -68,7 +68,7 @@ def input_of(file: str) -> Iterator[None]:
     except SceneError:
         raise
     except InputError as error:
-        raise SceneError(file, error.key, error.value, error.allowed) from None
+        raise SceneError(file, error.key, error.value, error.allowed) from error.__cause__
 
 
 class SceneError(InputError):

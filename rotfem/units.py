@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from functools import cache, lru_cache
 from typing import Any
+
+from rotfem.errors import InputError
 
 _NUMBER = r"(?>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 #: A name with a power of one digit: what a user writes is given to pint, which would compute 9**9**9 as well.
@@ -38,6 +41,28 @@ def unit_of(text: str) -> str:
     """Return the unit at the end of a text such as "12.1 rpm" or "0:15:31rpm"; empty where there is none."""
     found = re.fullmatch(r"[-+0-9.eE:,\s]*\d\.?\s*((?![eE][-+]?\d)[^\W\d].*?)\s*", text)
     return found[1] if found else ""
+
+
+def si(value: float | str, unit: str | Sequence[str], key: str) -> float:
+    """Return a number in a unit, of a number or a text such as "12.1 rpm".
+
+    Args:
+        value: what was given.
+        unit: the unit, or several, of which the first of its kind is taken.
+        key: of what it is, for errors.
+
+    Raises:
+        InputError: it is no such text.
+    """
+    if not isinstance(value, str):
+        return value
+    units, why = [unit] if isinstance(unit, str) else unit, ""
+    for wanted in units:
+        try:
+            return quantity(value, wanted)
+        except ValueError as error:
+            why = why or str(error)
+    raise InputError(key, value, why)
 
 
 def split_unit(text: str, unit: str = "rad/s") -> tuple[str, float]:

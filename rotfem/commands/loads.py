@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -15,8 +13,8 @@ from rotfem.errors import InputError
 from rotfem.mechanics.loads import WHOLE, AnyLoad, Load, Loads, PlaceLoad, PointLoads, Shapes, Term, named, replaced
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
-from rotfem.mechanics.time_signals import TINY
 from rotfem.scene import Scene
+from rotfem.users_functions import checked
 
 Array = npt.NDArray[np.float64]
 
@@ -137,54 +135,3 @@ def _swept(term: Term) -> Term:
         return term
     factors = np.array([0.0, np.cos(term.phase), np.sin(term.phase)])
     return replace(term, amplitudes=lambda t: np.asarray(factors[np.searchsorted(SWEPT, t)][:, None]))
-
-
-def checked(function: Callable[..., Any], key: str, size: int, of: str, planar: bool = False) -> Callable[..., Array]:
-    """Return a user's function that returns an array (size,), and refuses to return anything else.
-
-    Two components get a third one, zero, where there are three.
-
-    Args:
-        function: of place, time or both.
-        key: key of the scene, for errors.
-        size: number of components.
-        of: what it is a function of, in words.
-        planar: whether the third of three components must be zero.
-
-    Returns:
-        The function; it raises an InputError that says at what arguments the other one failed, and how.
-    """
-
-    def refused(arguments: tuple[Any, ...], why: str) -> InputError:
-        return InputError(key, None, f"the function of {of}, at {', '.join(map(_shown, arguments))}, {why}")
-
-    def at(*arguments: Any) -> Array:
-        try:
-            given = function(*arguments)
-            value: Array = np.array(given, dtype=np.float64, ndmin=1).ravel()
-        except (TypeError, ValueError) as error:
-            raise refused(arguments, f"must return {size} numbers: {error}") from error
-        except Exception as error:
-            raise refused(arguments, f"raised {type(error).__name__}: {error}") from error
-        if value.size == 2 and size == 3:
-            value = np.array([value[0], value[1], 0.0])
-        if value.size == 3 and size == 1 and not np.any(value[:2]):  # a moment about axis 3
-            value = value[2:]
-        if value.size != size:
-            raise refused(arguments, f"returned so many numbers: {value.size}; must be {size}")
-        if not all(map(math.isfinite, value)):
-            raise refused(arguments, f"returned {value}; must return finite numbers")
-        if planar and size == 3 and value[2] != 0.0:
-            raise refused(arguments, f"returned {value}; the third component must be 0 for a planar_beam")
-        return value
-
-    return at
-
-
-def _shown(argument: Any) -> str:
-    """Return an argument of a function as errors show it."""
-    if isinstance(argument, tuple):
-        return f"({', '.join(map(_shown, argument))})"
-    if isinstance(argument, Mapping):
-        return "{" + ", ".join(f"{name}: {_shown(value)}" for name, value in argument.items()) + "}"
-    return f"{argument if abs(argument) > TINY else 0.0:g}"

@@ -25,6 +25,9 @@ class Moment:
     def __init__(self, system: Any, state: State):
         self.system, self.state, self.t = system, state, state.t
 
+    def __repr__(self) -> str:
+        return f"<Moment at t = {self.t:.6g} s>"
+
     @property
     def tip(self) -> dict[str, float]:
         """The unknowns at the tip, relative to the turning frame: u1, u2, … (m), alpha, … (rad)."""

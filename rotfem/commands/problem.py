@@ -13,7 +13,7 @@ from rotfem.analysis.first_motion import FirstMotion
 from rotfem.analysis.march import March, Steps
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import Array, Scheme, State
-from rotfem.commands.loads import checked, loads_of
+from rotfem.commands.loads import loads_of
 from rotfem.commands.mode_tables import mode_tables
 from rotfem.commands.moment import Moment, first_shape
 from rotfem.commands.pitch import cell_of, with_pitch
@@ -29,6 +29,8 @@ from rotfem.numerics.newton import Newton
 from rotfem.results import ModesResult
 from rotfem.scene import Scene, Time, as_scene
 from rotfem.scene.settings import estimates_error, usual
+from rotfem.units import si
+from rotfem.users_functions import checked, number_of
 
 
 class Problem(ProblemData):
@@ -86,8 +88,8 @@ class Problem(ProblemData):
     def march(
         self,
         *,
-        end: float,
-        step: float | None = None,
+        end: float | str,
+        step: float | str | None = None,
         tolerance: float | None = None,
         scheme: Scheme | None = None,
         start: Array | Moment | None = None,
@@ -96,8 +98,8 @@ class Problem(ProblemData):
         """Yield the motion at t = 0 and at the end of every step.
 
         Args:
-            end: last time, s.
-            step: fixed step, s; None for adaptive ones.
+            end: last time, s, or as "2 min".
+            step: fixed step, s, or as "1 ms"; None for adaptive ones.
             tolerance: error of all adaptive steps together, relative to the largest displacement.
             scheme: generalised-α with ρ∞ = 0.9 if None, with a tolerance `esdirk4`.
             start: shape at t = 0, at rest in the turning frame: that of a moment (`steady`), or a local dof array with
@@ -110,24 +112,25 @@ class Problem(ProblemData):
                 with.
             ComputationError: a step failed, however short.
         """
+        end, step = si(end, "s", "time.end"), None if step is None else si(step, "s", "time.step")
         scheme = scheme or Scheme.registry[usual({"tolerance": tolerance})]()
         check_steps(end, step, tolerance, scheme)
         system = self.system(comm=comm)
         march = March(system, scheme, Steps(end, step, tolerance), Newton(), first_shape(system, start))
         return (Moment(system, state) for state in march)
 
-    def steady(self, *, speed: float | None = None, comm: MPI.Comm = MPI.COMM_WORLD) -> Moment:
+    def steady(self, *, speed: float | str | None = None, comm: MPI.Comm = MPI.COMM_WORLD) -> Moment:
         """Return the equilibrium in the rotating frame at a constant speed.
 
         Args:
-            speed: rad/s; that of the motion if None, its last where it changes.
+            speed: rad/s, or as "12.1 rpm"; that of the motion if None, its last where it changes.
             comm: communicator the structure is distributed over.
 
         Raises:
             InputError: gravity across the axis, with which there is none; a mesh or a section as for `system`.
             ComputationError: no equilibrium was reached; says how far the load got.
         """
-        speed = self.motion.final_speed(0.0) if speed is None else speed
+        speed = self._speed(speed)
         still = self.replace(frame="rotating", motion=self.motion.at_speed(speed))
         check_steady(still)
         system = still.system(moving=False, comm=comm)
@@ -138,7 +141,7 @@ class Problem(ProblemData):
         self,
         *,
         count: int = 6,
-        speed: float | None = None,
+        speed: float | str | None = None,
         about: str = "steady",
         comm: MPI.Comm = MPI.COMM_WORLD,
     ) -> ModesResult:
@@ -146,7 +149,7 @@ class Problem(ProblemData):
 
         Args:
             count: number of modes.
-            speed: rad/s; that of the motion if None, its last where it changes.
+            speed: rad/s, or as "12.1 rpm"; that of the motion if None, its last where it changes.
             about: the state that they are about: "steady" or "undeformed".
             comm: communicator the structure is distributed over.
 
@@ -156,7 +159,7 @@ class Problem(ProblemData):
         """
         if about not in ("steady", "undeformed"):
             raise InputError("modes.about", about, 'must be "steady" or "undeformed"')
-        speed = self.motion.final_speed(0.0) if speed is None else speed
+        speed = self._speed(speed)
         problem = self.spinning() if speed != 0.0 else self
         analysis = ModalAnalysis(problem, about, comm=comm)
         analysis.check_count(count)
@@ -168,6 +171,9 @@ class Problem(ProblemData):
         result = ModesResult(summary, found.rows, found.shapes, triangles=surface)
         result.analysis, result.spinning = analysis, found.spinning
         return result
+
+    def _speed(self, speed: float | str | None) -> float:
+        return self.motion.final_speed(0.0) if speed is None else si(speed, "rad/s", "speed")
 
 
 def check_steps(end: float, step: float | None, tolerance: float | None, scheme: Scheme) -> None:
@@ -203,7 +209,7 @@ def motion_of(scene: Scene) -> Motion:
     m: Any = scene.motion
     base = m.base_acceleration
     more = {
-        "base_acceleration": no_acceleration if base is None else base.at,
+        "base_acceleration": no_acceleration if base is None else _base_acceleration(base),
         "is_accelerated": m.is_accelerated,
         "base_knots": None if base is None else base.knots,
     }
@@ -211,6 +217,12 @@ def motion_of(scene: Scene) -> Motion:
         more["cell"] = cell_of(scene.time)
     motion: Motion = _MOTIONS.get(m.type, _by_law)(m, {"axis": m.axis, **more})
     return motion if base is None or base.constant else motion.with_changing_base()
+
+
+def _base_acceleration(base: Any) -> Any:
+    if base.function is None:
+        return base.at
+    return checked(base.function, "motion.base_acceleration", 3, "time")
 
 
 def _by_law(m: Any, more: dict[str, Any]) -> Motion:
@@ -221,8 +233,7 @@ def _by_law(m: Any, more: dict[str, Any]) -> Motion:
 def _torque(m: Any, more: dict[str, Any]) -> Motion:
     torque = Torque(m.pulses or (), m.table)
     if m.function is not None:
-        one = checked(m.function, "motion.function", 1, "t, psi, psi_dot and tip")
-        torque = ControlledTorque(controller=lambda *state: float(one(*state)[0]))
+        torque = ControlledTorque(controller=number_of(m.function, "motion.function", "t, psi, psi_dot and tip"))
     return Motion.free(FreeHub(m.hub_inertia, torque, m.hub_damping, m.coupled, m.speed), **more)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -28,6 +29,7 @@ from rotfem.numerics import forms
 from rotfem.registry import resolved
 from rotfem.structures import build
 from rotfem.structures.structure import Structure
+from rotfem.users_functions import called
 
 
 class HubAngle:
@@ -197,7 +199,8 @@ class Model:
         """Return name ↦ virtual work of every effect for a variation, each times its switch; UFL forms."""
         out = {}
         for name, effect in self.acting.items():
-            term = effect.term(self.mechanics, variation)
+            with called(f"terms.{name}", "the function") if name in self.problem.terms else nullcontext():
+                term = effect.term(self.mechanics, variation)
             if not isinstance(term, int):
                 out[name] = self._switched(name, name in self.effects, term)
         return out
@@ -294,7 +297,11 @@ class Model:
 
     def outputs(self) -> dict[str, Any]:
         """Return name ↦ UFL form of the functionals that are to be recorded."""
-        return {name: resolved(form)(self.mechanics) for name, form in self.problem.outputs.items()}
+        out = {}
+        for name, form in self.problem.outputs.items():
+            with called(f"outputs.{name}", "the function"):
+                out[name] = resolved(form)(self.mechanics)
+        return out
 
     def inside_out(self) -> bool:
         """Return whether the structure is anywhere compressed to less than nothing at the state in q: none real is."""

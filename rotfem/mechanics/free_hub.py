@@ -10,6 +10,9 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.short import short_fields
+from rotfem.units import si
+
 #: Relative difference of two times that rounding can make.
 ROUNDING = 1e-14
 
@@ -34,6 +37,7 @@ class Torque:
 
     pulses: Rows = ()
     table: Rows | None = None
+    __repr__ = short_fields
 
     @cached_property
     def _pulses(self) -> Rows:
@@ -157,7 +161,7 @@ class FreeHub:
     """The hub of a structure, free to turn about the axis (Yigit, Scott & Ulsoy 1988).
 
     Attributes:
-        inertia: I_R, kg·m².
+        inertia: I_R, kg·m², or a text with a unit, as damping and speed.
         torque: what drives it.
         damping: viscous brake, N·m·s.
         coupled: whether it feels the structure's elastic motion; otherwise it turns as if the structure were rigid.
@@ -169,6 +173,11 @@ class FreeHub:
     damping: float = 0.0
     coupled: bool = True
     speed: float = 0.0
+    __repr__ = short_fields
+
+    def __post_init__(self) -> None:
+        for name, unit in (("inertia", "kg*m**2"), ("damping", "N*m*s"), ("speed", "rad/s")):
+            object.__setattr__(self, name, si(getattr(self, name), unit, f"motion.{name}"))
 
     def rigid_speeds(self, times: Array, inertia: float) -> Array:
         """Return the speed (n,), rad/s, at times (n,), s, as if the structure were rigid.

@@ -7,7 +7,7 @@ place and time takes the nodes of the mesh for stations (`PlaceLoad`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeAlias
@@ -16,6 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.mechanics.pitch import Pitch
+from rotfem.short import short_fields
+from rotfem.units import si
 
 Array = npt.NDArray[np.float64]
 
@@ -203,12 +205,13 @@ class ConstantLoad(Load):
     """A load that does not change with time and is the same everywhere.
 
     Args:
-        value: components, N, N/m, N/m² or N·m.
+        value: components, N, N/m, N/m² or N·m, or as "2 kN".
         kind: see `Load`.
     """
 
-    def __init__(self, value: tuple[float, ...], kind: str = "dead"):
-        super().__init__(kind, (Term(Shapes.uniform([value])),))
+    def __init__(self, value: Sequence[float | str], kind: str = "dead"):
+        units = ("N", "N/m", "N/m**2", "N*m")
+        super().__init__(kind, (Term(Shapes.uniform([tuple(si(x, units, "value") for x in value)])),))
 
 
 @dataclass(frozen=True)
@@ -290,6 +293,10 @@ class Loads:
     distributed_moment: AnyLoad | None = None
     pressure: AnyLoad | None = None
     at: tuple[PointLoads, ...] = ()
+    __repr__ = short_fields
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "gravity", tuple(si(g, "m/s**2", "loads.gravity") for g in self.gravity))
 
 
 #: Loads of the whole structure and of its tip.

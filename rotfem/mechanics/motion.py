@@ -20,6 +20,9 @@ from rotfem.mechanics.free_hub import FreeHub
 from rotfem.mechanics.pitch import Pitch, turn_about
 from rotfem.registry import Registry
 from rotfem.registry import motion_laws as registered
+from rotfem.short import short_fields
+from rotfem.units import si
+from rotfem.users_functions import number_of
 
 
 class MotionLaw(ABC):
@@ -111,17 +114,20 @@ class Motion:
     settled: float = 0.0
     hub: FreeHub | None = None
     pitch: Pitch | None = None
+    __repr__ = short_fields
 
     @classmethod
-    def constant_speed(cls, speed: float, axis: npt.ArrayLike = (0, 0, 1), **more: Any) -> Motion:
-        """Return steady rotation at a speed (rad/s)."""
+    def constant_speed(cls, speed: float | str, axis: npt.ArrayLike = (0, 0, 1), **more: Any) -> Motion:
+        """Return steady rotation at a speed (rad/s, or as "12.1 rpm")."""
+        speed = si(speed, "rad/s", "motion.speed")
         turning = (lambda t: speed), (lambda t: 0.0), (lambda t: speed * t)
         state: dict[str, Any] = {"constant": True, "is_spinning": speed != 0.0, "changes_speed": False}
         return cls(*turning, about(axis), **(state | more))
 
     @classmethod
-    def spin_up(cls, speed: float, duration: float, axis: npt.ArrayLike = (0, 0, 1), **more: Any) -> Motion:
+    def spin_up(cls, speed: float | str, duration: float | str, axis: npt.ArrayLike = (0, 0, 1), **more: Any) -> Motion:
         """Return the smooth spin-up from rest to a speed (rad/s) in a time (s); see `smooth_spin_up`."""
+        speed, duration = si(speed, "rad/s", "motion.speed"), si(duration, "s", "motion.duration")
         turns = speed != 0.0
         state: dict[str, Any] = {"is_spinning": turns, "changes_speed": turns, "settled": duration}
         state["arrays"] = True
@@ -166,6 +172,8 @@ class Motion:
             cell: length of time (s) in which these differences have one step, as some steps of a march.
             more: further attributes of the motion.
         """
+        speed = number_of(speed, "motion.speed", "time")
+        rate, angle = (f and number_of(f, f"motion.{name}", "time") for name, f in (("rate", rate), ("angle", angle)))
         points = None if breakpoints is None else tuple(sorted(float(t) for t in breakpoints))
         known = points or ()
         state: dict[str, Any] = {"smooth": False, "breakpoints": points, "knots": known, "sharp": known}

@@ -13,6 +13,7 @@ from rotfem.mechanics.loads import Loads
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.outputs import Functional
 from rotfem.mechanics.theories import Theory
+from rotfem.short import short_fields
 
 
 class TheoryByName:
@@ -65,6 +66,7 @@ class Problem:
     outputs: Mapping[str, Functional] = field(default_factory=dict)
     prestress: str | None = None
     inactive: tuple[str, ...] = ()
+    __repr__ = short_fields
 
     def __post_init__(self) -> None:
         for name in ("terms", "outputs"):

@@ -73,7 +73,7 @@ class Instability:
     until: float | None
 
 
-@dataclass
+@dataclass(repr=False)
 class CampbellResult(Result):
     """Outcome of `rotfem campbell`.
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 
-@dataclass
+@dataclass(repr=False)
 class CheckResult(Result):
     """Outcome of `rotfem check`. Vectors and tensors are in frame axes.
 

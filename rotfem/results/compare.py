@@ -109,7 +109,7 @@ class Compared:
             raise InputError("compare", str(folder), f"its results cannot be read: {error}") from None
 
 
-@dataclass
+@dataclass(repr=False)
 class CompareResult(Result):
     """Outcome of `rotfem compare`.
 

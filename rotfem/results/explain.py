@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Row = dict[str, Any]
 
 
-@dataclass
+@dataclass(repr=False)
 class ExplainResult(Result):
     """Outcome of `rotfem explain`.
 

@@ -32,8 +32,8 @@ def optional(name: str) -> Any:
         raise ImportError(f"to_{name}() needs {missing}, which is not installed: pip install {missing}") from error
 
 
-def frame(columns: Mapping[str, Any], index: str) -> pandas.DataFrame:
-    """Return named columns as a table indexed by one of them."""
+def frame(columns: Mapping[str, Any], index: str | list[str]) -> pandas.DataFrame:
+    """Return named columns as a table indexed by one or several of them."""
     return optional("pandas").DataFrame(dict(columns)).set_index(index)
 
 

@@ -163,7 +163,7 @@ def _of(columns: dict[str, Array], direction: str) -> tuple[Array, Array] | None
 Array = npt.NDArray[np.float64]
 
 
-@dataclass
+@dataclass(repr=False)
 class ModesResult(Result):
     """Outcome of `rotfem modes`.
 

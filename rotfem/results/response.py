@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 
-@dataclass
+@dataclass(repr=False)
 class ResponseResult(Result):
     """Outcome of `rotfem response`.
 

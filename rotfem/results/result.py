@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import base64
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
+from html import escape
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -17,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass
+@dataclass(repr=False)
 class Result(ABC):
     """Outcome of a computation.
 
@@ -31,6 +35,19 @@ class Result(ABC):
         """Return this result with further entries of its summary, or others in the place of those it has."""
         return replace(self, summary={**self.summary, **entries})
 
+    def __repr__(self) -> str:
+        more = f", {n} warning{'s' * (n > 1)}" if (n := len(self.warnings)) else ""
+        return f"<{type(self).__name__} {self.title[:200]!r}, {self.status}{more}>"
+
+    def _repr_html_(self) -> str:
+        """Return title, warnings, short tables and the main figure, as notebooks show a result."""
+        parts = [f"<b>{escape(self.title)}</b>", *(f"<br>warning: {escape(line)}" for line in self.warnings)]
+        parts += [table.html() for table in self.tables()]
+        if self.drawings():
+            image = base64.b64encode(png(self.plot())).decode()
+            parts.append(f'<img src="data:image/png;base64,{image}" style="max-width: 100%">')
+        return "\n".join(parts)
+
     @property
     def status(self) -> str:
         """Word for how it ended: "done", or "failed" or "interrupted", with what was computed until then."""
@@ -39,7 +56,7 @@ class Result(ABC):
     @property
     def warnings(self) -> list[str]:
         """What to know before the numbers are used."""
-        return list(self.summary["warnings"])
+        return list(self.summary.get("warnings", ()))
 
     @property
     def title(self) -> str:
@@ -91,7 +108,7 @@ class Result(ABC):
             return results.publish(self)
 
     def plot(self, path: str | Path | None = None, drawing: str = "") -> Figure:
-        """Return a figure, a Matplotlib one of its own that pyplot does not know of.
+        """Return a figure, a Matplotlib one of its own that pyplot does not know of. A notebook shows it.
 
         Args:
             path: file to write it to as well, in the format of its ending (png, pdf, svg, …).
@@ -109,6 +126,7 @@ class Result(ABC):
             there = ", ".join(drawings) or "none, as too little was computed"
             raise ValueError(f"drawing {drawing!r} is not among those of this result; there is {there}")
         figure = drawings[name]()
+        vars(figure)["_repr_png_"] = partial(png, figure)  # Matplotlib has none without a magic of the notebook
         if path is not None:
             save(figure, Path(path))
         return figure
@@ -117,3 +135,10 @@ class Result(ABC):
         """Return what labelled arrays say of themselves as a whole."""
         names = ("command", "name", "theory", "frame", "kind", "status")
         return {name: self.summary[name] for name in names if name in self.summary}
+
+
+def png(figure: Figure) -> bytes:
+    """Return a figure as PNG of a size that suits a notebook."""
+    file = BytesIO()
+    figure.savefig(file, format="png", dpi=72)
+    return file.getvalue()

@@ -19,6 +19,7 @@ from rotfem.results.files import csv_text, json_text, line, write_text
 from rotfem.results.frames import Variable, dataset, frame, nodes_of
 from rotfem.results.result import Result
 from rotfem.results.tables import ShortTable, by_unit, largest, named, number
+from rotfem.short import short_fields
 
 if TYPE_CHECKING:
     import pandas
@@ -41,6 +42,7 @@ class StationHistory:
     x: Array
     values: dict[str, Array]
     format: str = "csv"
+    __repr__ = short_fields
 
     def __getitem__(self, name: str) -> Array:
         """Return a quantity at all times and stations, (n, m).
@@ -57,6 +59,23 @@ class StationHistory:
         n, m = len(self.t), len(self.x)
         out = {"t": np.repeat(self.t, m), "x": np.tile(self.x, n)}
         return out | {name: values.ravel() for name, values in self.values.items()}
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the columns as a table indexed by `t` (s) and `x` (m).
+
+        Raises:
+            ImportError: pandas is not installed.
+        """
+        return frame(self.columns(), ["t", "x"])
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the quantities over `t` (s) and `x` (m).
+
+        Raises:
+            ImportError: xarray is not installed.
+        """
+        over: dict[str, Variable] = {name: (("t", "x"), values) for name, values in self.values.items()}
+        return dataset(over, {"t": (("t",), self.t), "x": (("x",), self.x)}, {})
 
     def text(self) -> str:
         """Return the columns as CSV."""
@@ -117,7 +136,7 @@ class Table:
         return {name: values[:, i].copy() for i, name in enumerate(self.columns)}
 
 
-@dataclass
+@dataclass(repr=False)
 class RunResult(Result):
     """Outcome of `rotfem run`.
 

@@ -54,7 +54,7 @@ def quantities(summary: Mapping[str, Any]) -> dict[str, float]:
     return {name: value for name, value in summary.items() if isinstance(value, float)}
 
 
-@dataclass
+@dataclass(repr=False)
 class SweepResult(Result):
     """Outcome of `rotfem sweep`.
 

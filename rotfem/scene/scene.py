@@ -36,6 +36,7 @@ from rotfem.scene.structure import designed, is_design
 from rotfem.scene.table import SceneModel, problem, scene_error
 from rotfem.scene.units import in_si, with_shown, with_shown_speed
 from rotfem.scene.values import ROUND_OFF, Bounds, Limits, Matrix, limits_of
+from rotfem.short import short
 
 #: Rows up to which a summary repeats a table.
 LONGEST = 1000
@@ -147,6 +148,10 @@ class Scene(SceneModel):
         scene._name, scene._file, scene._directory, scene._tables, scene._hints = name, file, directory, tables, hints
         scene._inputs = (*extensions, *files)
         return scene
+
+    def __repr__(self) -> str:
+        given = {name: getattr(self, name) for name in type(self).model_fields if name in self.model_fields_set}
+        return short("Scene", {"name": self._name, **given})
 
     @property
     def name(self) -> str:

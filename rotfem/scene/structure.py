@@ -209,6 +209,8 @@ def apart(places: Collection[float], length: float) -> tuple[float, ...]:
 class StructureTable(SceneModel):
     """The [structure] table."""
 
+    part: ClassVar[str] = "structure"
+
     @property
     def is_planar(self) -> bool:
         """Whether it moves in the plane (1, 2) of the frame only, and has rotations about axis 3 only."""

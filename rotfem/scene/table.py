@@ -7,13 +7,17 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
-from typing import TYPE_CHECKING, Any
+from functools import reduce
+from inspect import Parameter, Signature
+from typing import TYPE_CHECKING, Any, ClassVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from rotfem.errors import Problem, SceneError, show
 from rotfem.registry import Registry
+from rotfem.scene.units import UNITS, in_si
+from rotfem.short import short
 
 if TYPE_CHECKING:
     from pydantic._internal._model_construction import ModelMetaclass
@@ -89,21 +93,49 @@ class InputErrors(ModelMetaclass):
     """The metaclass of tables: what a script makes of wrong values is an `InputError`, as in a scene."""
 
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
-        """Return the table.
+        """Return the table; values may be texts with units, as in a scene.
 
         Raises:
             SceneError: it is not valid; the name of the class stands for that of the file.
         """
+        if (part := cls.part) and kwargs:  # type: ignore[attr-defined]
+            tables = reduce(lambda below, name: {name: below}, reversed(part.split(".")), kwargs)
+            kwargs = reduce(lambda tables, name: tables[name], part.split("."), in_si(tables, cls.__name__))
         try:
             return super().__call__(*args, **kwargs)
         except ValidationError as error:
             raise scene_error(cls.__name__, error) from None
+
+    @property
+    def __signature__(cls) -> Signature:
+        """Signature of the class: the keys of the table, with the types that a script may give."""
+        part: str = cls.part  # type: ignore[attr-defined]
+        parameters, kinds = [], get_type_hints(cls)
+        for name, field in cls.model_fields.items():
+            kind = kinds[name] | str if f"{part}.{name}" in UNITS else kinds[name]
+            default = Parameter.empty if field.is_required() else field.get_default(call_default_factory=True)
+            parameters.append(Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=kind))
+        return Signature(parameters)
+
+    @__signature__.setter
+    def __signature__(cls, _: Any) -> None:
+        """Keep it from pydantic, whose own has validators in the place of types."""
 
 
 class SceneModel(BaseModel, metaclass=InputErrors):
     """A table of the scene: immutable, and unknown or missing keys are errors that say what is allowed."""
 
     model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
+
+    #: Its dotted name in a scene, where a script makes it by itself: what its keys' units are found by.
+    part: ClassVar[str] = ""
+
+    def __repr__(self) -> str:
+        given = {name: getattr(self, name) for name in type(self).model_fields if name in self.model_fields_set}
+        return short(type(self).__name__, given)
+
+    def __str__(self) -> str:
+        return repr(self)
 
     @classmethod
     def keys(cls) -> list[str]:

@@ -16,6 +16,7 @@ from rotfem.errors import OutputError
 from rotfem.results import CampbellResult, CriticalSpeed, ExplainResult, Instability, ModesResult, Result, RunResult
 from rotfem.results.columns import described, label
 from rotfem.results.plots import plot
+from rotfem.results.tables import SHORT, ShortTable, numbers
 from rotfem.scene import Scene
 
 T = np.array([0.0, 0.5, 1.0])
@@ -88,6 +89,8 @@ def plate_modes() -> ModesResult:
         "label": "flap 1",
         "name": "1st flapwise",
         "frequency": 2.0,
+        "frequency_hz": 2.0 / (2 * np.pi),
+        "damping": 0.0,
         "growth": 0.0,
         "stability": "stable",
         "turning": 0.0,
@@ -109,8 +112,10 @@ def campbell() -> CampbellResult:
     said = summary(
         command="campbell",
         branches=[
-            {"branch": 1, "label": "lag 1", "name": "1st edgewise"},
-            {"branch": 2, "label": "axial 1", "name": "1st axial"},
+            {"branch": 1, "label": "lag 1", "name": "1st edgewise", "confidence": 1.0}
+            | {"frequency_first": 3.0, "frequency_last": 13.0},
+            {"branch": 2, "label": "axial 1", "name": "1st axial", "confidence": 1.0}
+            | {"frequency_first": 6.0, "frequency_last": None},
         ],
         per_rev=2,
         orders=[1, 2],
@@ -338,6 +343,40 @@ def test_a_column_that_nothing_is_known_of_has_no_unit() -> None:
     assert label("damping") == "damping ratio (–)"
     assert described("whirl") == ("whirl", "")
     assert label("whirl") == "whirl"
+
+
+# --- what a prompt and a notebook show ----------------------------------------------------------------------------
+
+
+@ALL
+def test_a_result_is_a_line_at_a_prompt_and_tables_with_a_figure_in_a_notebook(make: Any) -> None:
+    result: Result = make()
+    assert len(repr(result)) < 500
+    assert result.title in repr(result)
+    page = result._repr_html_()
+    assert "mind the gap" in page
+    assert page.count("<img src=") == 1
+    assert page.count("<table>") == len(result.tables())
+    assert result.plot()._repr_png_().startswith(b"\x89PNG")
+
+
+def test_a_notebook_shows_the_first_rows_of_a_long_table() -> None:
+    table = ShortTable(("x (m)",), [(str(i),) for i in range(100)])
+    assert table.html().count("<tr>") == 1 + SHORT + 1
+    assert "and 88 more" in table.html()
+
+
+def test_a_printed_table() -> None:
+    """Numbers stand at the right, text at the left; round-off beside the largest is 0; the last column folds."""
+    values = numbers([2.5, 1e-10, None, -3e-9])
+    assert values == ["2.5", "0", "–", "-3e-09"]
+    table = ShortTable(("name", "u (m)", "why"), [("a", "2.5", "a long reason " * 8), ("bc", "0", "none")])
+    lines = table.lines(40)
+    assert lines[0] == "name  u (m)  why"
+    assert lines[1].startswith("a       2.5  a long reason")
+    assert lines[-1] == "bc        0  none"
+    assert all(len(line) <= 40 for line in lines)
+    assert len(lines) > 5
 
 
 # --- figures ----------------------------------------------------------------------------------------------------------

@@ -222,7 +222,7 @@ class CostPoint:
         return f"{self.setting.words()}: error {self.error:.1e}, {self.cost:.3g} s of CPU time"
 
 
-@dataclass
+@dataclass(repr=False)
 class CostResult(Result):
     """Outcome of `rotfem cost`.
 

@@ -1,0 +1,95 @@
+"""Functions that a user gives: what they raise, or return of another kind, is an `InputError` with their traceback."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rotfem.errors import InputError
+
+Array = npt.NDArray[np.float64]
+
+#: Arguments of a smaller size are shown as 0.
+TINY = 1e-300
+
+
+@contextmanager
+def called(key: str, what: str) -> Iterator[None]:
+    """Let what a user's function raises be an error of a key.
+
+    Args:
+        key: key of the scene, or argument of a call.
+        what: the function, in words.
+
+    Raises:
+        InputError: from the error, in its place.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(key, None, f"{what} raised {type(error).__name__}: {error}") from error
+
+
+def number_of(function: Callable[..., Any], key: str, of: str) -> Callable[..., float]:
+    """Return a user's function that returns a number; it raises an InputError where the other one does not."""
+    one = checked(function, key, 1, of)
+    return lambda *arguments: float(one(*arguments)[0])
+
+
+def checked(function: Callable[..., Any], key: str, size: int, of: str, planar: bool = False) -> Callable[..., Array]:
+    """Return a user's function that returns an array (size,), and refuses to return anything else.
+
+    Two components get a third one, zero, where there are three.
+
+    Args:
+        function: of place, time or both.
+        key: key of the scene, for errors.
+        size: number of components.
+        of: what it is a function of, in words.
+        planar: whether the third of three components must be zero.
+
+    Returns:
+        The function; it raises an InputError that says at what arguments the other one failed, and how.
+    """
+
+    def at(*arguments: Any) -> Array:
+        try:
+            given = function(*arguments)
+            value: Array = np.array(given, dtype=np.float64, ndmin=1).ravel()
+        except (TypeError, ValueError) as error:
+            raise _refused(key, of, arguments, f"must return {size} numbers: {error}") from error
+        except Exception as error:
+            raise _refused(key, of, arguments, f"raised {type(error).__name__}: {error}") from error
+        if value.size == 2 and size == 3:
+            value = np.array([value[0], value[1], 0.0])
+        if value.size == 3 and size == 1 and not np.any(value[:2]):  # a moment about axis 3
+            value = value[2:]
+        if value.size != size:
+            raise _refused(key, of, arguments, f"returned so many numbers: {value.size}; must be {size}")
+        if not all(map(math.isfinite, value)):
+            raise _refused(key, of, arguments, f"returned {value}; must return finite numbers")
+        if planar and size == 3 and value[2] != 0.0:
+            raise _refused(key, of, arguments, f"returned {value}; the third component must be 0 for a planar_beam")
+        return value
+
+    return at
+
+
+def _refused(key: str, of: str, arguments: tuple[Any, ...], why: str) -> InputError:
+    return InputError(key, None, f"the function of {of}, at {', '.join(map(_shown, arguments))}, {why}")
+
+
+def _shown(argument: Any) -> str:
+    """Return an argument of a function as errors show it."""
+    if isinstance(argument, tuple):
+        return f"({', '.join(map(_shown, argument))})"
+    if isinstance(argument, Mapping):
+        return "{" + ", ".join(f"{name}: {_shown(value)}" for name, value in argument.items()) + "}"
+    return f"{argument if abs(argument) > TINY else 0.0:g}"
