@@ -16,6 +16,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 from numpy.linalg import norm
 from petsc4py import PETSc
+from scipy.linalg import eigh
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.numerics.damped import heavily_damped, quadratic
@@ -38,6 +39,11 @@ def worth_while(analysis: ModalAnalysis, speeds: Sequence[float]) -> bool:
     return len(speeds) >= (MANY if analysis.system.A.getSize()[0] >= LARGE else MANY_OF_SMALL)
 
 
+def product(A: Array, X: Array) -> Array:
+    """Return A X of real A and complex X; numpy would make A complex first."""
+    return np.asarray((A @ np.ascontiguousarray(X, dtype=complex).view(np.float64)).view(np.complex128))
+
+
 class SmallPencil(Pencil):
     """A pencil of arrays, of which all eigenvalues are computed; double ones, as of a disk, do no harm then.
 
@@ -52,7 +58,7 @@ class SmallPencil(Pencil):
 
     def apply(self, A: Any, X: Array) -> Array:
         """Return A X."""
-        return np.asarray(A @ X)
+        return product(A, X)
 
     @cached_property
     def asymmetries(self) -> dict[str, float]:
@@ -63,7 +69,7 @@ class SmallPencil(Pencil):
 
     def solve(self, count: int, target: float = 0.0) -> Eigenpairs:
         """Return the pairs of smallest |λ| (see `Pencil.solve`), their errors those of the small problem."""
-        found = self._skew() if self.conservative else None
+        found = self._skew(count) if self.conservative else None
         values, x, y = found or quadratic(self.M, self.C, self.K, target)
         if found is None and heavily_damped(values[: 2 * count + 2], 0.0) and self.asymmetries["C"] > 1e-10:
             whole = (PETSc.Mat().createAIJ(A.shape, csr=_csr(A), comm=MPI.COMM_SELF) for A in (self.M, self.C, self.K))
@@ -72,7 +78,7 @@ class SmallPencil(Pencil):
         upper = np.flatnonzero((values.imag > 0.0) | ((values.imag == 0.0) & telling))
         order = upper[np.argsort(np.abs(values[upper]), kind="stable")[:count]]
         values, x, y = values[order], x[:, order], y[:, order]
-        MX, CX, KX = self.M @ x, self.C @ x, self.K @ x
+        MX, CX, KX = (product(A, x) for A in (self.M, self.C, self.K))
         n = np.sum(y.conj() * (2 * values * MX + CX), axis=0)
         residual = values**2 * MX + values * CX + KX
         sizes = np.sqrt(np.abs(np.diag(self.K)))
@@ -80,8 +86,8 @@ class SmallPencil(Pencil):
         off = (np.sum(np.abs(y) * np.abs(residual), axis=0) + rounded) / np.maximum(np.abs(n * values), 1e-300)
         return Eigenpairs(values, x, y, off, relative(off))
 
-    def _skew(self) -> tuple[Array, Array, Array] | None:
-        """Return (λ, x, y) with positive imaginary parts; None where M or K is not positive definite."""
+    def _skew(self, count: int) -> tuple[Array, Array, Array] | None:
+        """Return the first (λ, x, y) with positive imaginary parts; None where M or K is not positive definite."""
         try:
             L, R = np.linalg.cholesky(self.K), np.linalg.cholesky(self.M).T
         except np.linalg.LinAlgError:
@@ -89,10 +95,11 @@ class SmallPencil(Pencil):
         inverse = np.linalg.inv(R)
         G, C = L.T @ inverse, inverse.T @ self.C @ inverse
         n = len(L)
-        w, z = np.linalg.eigh(1j * np.block([[np.zeros((n, n)), G], [-G.T, -C]]))
-        x = np.linalg.solve(L.T, z[:n, :n])
-        x = x / np.linalg.norm(x, axis=0)
-        return -1j * w[:n], x, x
+        S = np.block([[np.zeros((n, n)), G], [-G.T, -C]])
+        w, z = eigh(1j * S, subset_by_index=[max(n - count, 0), n - 1], driver="evr", check_finite=False)
+        x = np.linalg.solve(L.T, z[:n])
+        x = x / norm(x, axis=0)
+        return -1j * w, x, x
 
 
 class ReducedAnalysis(ModalAnalysis):
@@ -185,18 +192,19 @@ class ReducedAnalysis(ModalAnalysis):
         pairs = pencil.solve(min(count, self.V.shape[1] - 1))
         pairs.errors = self._backward_errors(pairs, c)
         slope = pencil.gram(pairs.left, pairs.values, pairs.right, pairs.values).diagonal()
-        lost = self._round_off.stiffness(self.V @ pairs.left, self.V @ pairs.right)
+        X = product(self.V, pairs.right)
+        lost = self._round_off.stiffness(X if pairs.left is pairs.right else product(self.V, pairs.left), X)
         pairs.bounds = relative(lost / np.maximum(np.abs(slope * pairs.values), 1e-300)) + pairs.bounds
         pencil.owner = self
         return Spinning(speed, zero, pencil, pairs, pencil)
 
     def right(self, spinning: Spinning) -> Array:
         """Return the eigenvectors in the unknowns of the mesh."""
-        return self.V @ spinning.pairs.right
+        return product(self.V, spinning.pairs.right)
 
     def mass_times(self, spinning: Spinning) -> Array:
         """Return M times the eigenvectors."""
-        return np.asarray(self.mass @ spinning.pairs.right)
+        return product(self.mass, spinning.pairs.right)
 
     def _backward_errors(self, pairs: Eigenpairs, c: Array) -> Array:
         """Return the normwise backward errors of the lifted eigenpairs in the full system, shape (m,).
@@ -206,8 +214,8 @@ class ReducedAnalysis(ModalAnalysis):
         power = np.array([{"M": 2, "C": 1, "K": 0}[p.kind] for p, _ in self._pieces])
         factors = c[:, None] * pairs.values[None, :] ** power[:, None]
         parts = (factors[:, None, :] * pairs.right[None, :, :]).reshape(-1, len(pairs.values))
-        residual = np.sum(parts.conj() * (self._grams @ parts), axis=0).real
-        lengths = np.sum(pairs.right.conj() * (self._metric @ pairs.right), axis=0).real
+        residual = np.sum(parts.conj() * product(self._grams, parts), axis=0).real
+        lengths = np.sum(pairs.right.conj() * product(self._metric, pairs.right), axis=0).real
         return np.asarray(np.sqrt(np.maximum(residual, 0.0) / lengths) / (self._norms @ np.abs(factors)))
 
 

@@ -29,7 +29,7 @@ from rotfem.equations.model import Model
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import SAME, Assembler
-from rotfem.numerics.linear import DirectSolver, restrained, set_diagonal
+from rotfem.numerics.linear import SMALL, DirectSolver, restrained, set_diagonal
 from rotfem.structures.root_reaction import RootReaction
 
 #: Pieces of one load from which on it is seen first whether they make any geometric stiffness.
@@ -219,6 +219,9 @@ class Pieces:
             model.check_smooth()
         if "G" in self._forms:
             self._prestress()
+        if self.pattern.getSize()[0] > SMALL:  # a factor and a matrix, which are hardly needed again
+            self.__dict__.pop("material_solver", None)
+            self._assembled.release()
 
     def _made(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return f, K, C and M at q = v = a = 0, and G, as UFL and compiled forms; those that vanish are left out."""

@@ -56,6 +56,10 @@ class Assembler:
             if all(np.array_equal(x, y) for x, y in zip(there, self.pattern.getRowIJ(), strict=True)):
                 self._own = own, there
 
+    def release(self) -> None:
+        """Give back the memory of a matrix; PETSc assembles what is still to come."""
+        self._own = None
+
     def __call__(self, form: Any) -> Any:
         """Return a compiled form as a new matrix, nothing held."""
         if self._own is None:
