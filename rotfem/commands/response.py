@@ -86,10 +86,14 @@ def response(
         spinning = analysis.at(speed, scene.modes.count)
         answers = FrequencyResponse(analysis, spinning, *loaded(scene, analysis, spinning))
         asked, peaks, undamped = frequencies_of(answers, spinning, (low, high, number, per_rev))
-        direct = np.array([answers.direct(omega) for omega in asked])
+
+        def answer(omega: float) -> Array:  # the same bits on all ranks, which then choose the same frequencies
+            return np.asarray(comm.bcast(answers.direct(omega)))
+
+        direct = np.array([answer(omega) for omega in asked])
         if not len(per_rev) or low is not None or high is not None:
             given = asked[~peaks]
-            asked, direct = resolved(answers.direct, asked, direct, number)
+            asked, direct = resolved(answer, asked, direct, number)
             peaks = ~np.isin(asked, given)
         modal = answers.modal(asked, scene.modes.count)
         return result_of(scene, answers, (asked, peaks, undamped), (direct, modal), started)

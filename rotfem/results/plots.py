@@ -252,9 +252,11 @@ def response_figure(result: ResponseResult) -> Figure:
     at = f"{units.speeds(result.summary['speed']):.6g} {units.speed}"
     notes = ["amplitudes by modes dashed", *filter(None, [said_zero(zero)])]
     figure.suptitle(f"{result.title}, at {at}\n" + "; ".join(notes), fontsize=10)
-    panels = figure.subplots(max(len(rows), 1), 2, sharex=True, squeeze=False)
+    if not rows:
+        return figure
+    panels = figure.subplots(len(rows), 2, sharex=True, squeeze=False)
     x = units.frequencies(result.frequencies)
-    for (left, right), kind in zip(panels, rows, strict=False):
+    for (left, right), kind in zip(panels, rows, strict=True):
         names = [name for name in shown if kinds[name] == kind]
         sizes = np.abs(result.direct[:, [own[name] for name in names]])
         for c, name in enumerate(names):

@@ -79,7 +79,8 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     units, branches = ShownUnits.of(result.summary), drawn_branches(result, fixed)
     rise = float(units.frequencies(1.0) / units.speeds(1.0))  # of the line 1Ω
     orders = [1] if fixed else result.summary["orders"]
-    last = max(float(b.speed[-1]) for b in branches)
+    first = min(0.0, *(float(b.speed[0]) for b in branches))
+    last = max(0.0, *(float(b.speed[-1]) for b in branches))
     shown = branches if fixed or not orders else of_interest(branches, max(orders) * rise)
     top = (1.0 + ROOM) * max(float(np.max(b.frequency)) for b in shown)
     damped = any(np.nanmax(np.abs(b.damping)) > 0.0 for b in shown)
@@ -99,9 +100,11 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
             panels[1].plot(b.speed, b.damping, lw=1.4, **b.style)
     rays = [(f"{k}Ω" if k > 1 else "Ω", k * rise) for k in orders]
     for _, slope in rays:
-        axis.plot([0.0, min(last, top / slope)], [0.0, min(last * slope, top)], lw=0.8, ls=":", color="0.4", zorder=1)
+        reach = top / slope
+        x = np.array([np.clip(first, -reach, 0.0), 0.0, np.clip(last, 0.0, reach)])
+        axis.plot(x, slope * np.abs(x), lw=0.8, ls=":", color="0.4", zorder=1)
     entries += crossings(axis, result, units, fixed)
-    axis.set_xlim(min(0.0, *(float(b.speed[0]) for b in branches)), last)
+    axis.set_xlim(first, last)
     axis.set_ylim(0.0, top)
     name_lines(axis, shown, rays, (heights[0], last, top))
     above = [b for b in branches if b not in shown]

@@ -19,7 +19,15 @@ from tests.beams import SECTION
 
 ROOT = Path(__file__).resolve().parents[2]
 
-FILES_OF_A_HISTORY = ["fields.h5", "fields.xdmf", "history.csv", "history.png", "shape.csv", "summary.json"]
+FILES_OF_A_HISTORY = [
+    "fields.h5",
+    "fields.xdmf",
+    "history.csv",
+    "history.png",
+    "loads.png",
+    "shape.csv",
+    "summary.json",
+]
 
 SCENE = f"""\
 [structure]

@@ -194,9 +194,7 @@ def test_files_and_figure(swept, tmp_path):
     table = (tmp_path / "response.csv").read_text().splitlines()
     assert table[0].startswith("frequency,frequency_hz,per_rev,tip_u1,tip_u1_phase,tip_u1_modal,tip_u2")
     assert len(table) == 1 + len(swept.rows)
-    assert (
-        len(swept.plot().axes) == 8
-    )  # amplitudes and phases of tip displacements, its rotation, root force and moment
+    assert len(swept.plot().axes) == 8  # amplitudes and phases of tip u and α, of root force and moment
 
 
 def test_curves_are_resolved_where_they_bend() -> None:
