@@ -100,11 +100,13 @@ def pareto(rows: Sequence[Row]) -> list[Row]:
 
 def recommend(rows: Sequence[Row], accuracy: float, uncertainty: float = 0.0) -> Row | None:
     """Return the cheapest row whose error, with the uncertainty of what it is measured against, is within accuracy."""
-    for row in pareto(rows):
-        error = judged(row)
-        if error is not None and error + uncertainty <= accuracy:
-            return row
-    return None
+    return next((row for row in pareto(rows) if bound(row, uncertainty) <= accuracy), None)
+
+
+def bound(row: Row, uncertainty: float) -> float:
+    """Return the most that the error of a setting is; that of the reference itself is its uncertainty."""
+    error = judged(row)
+    return math.inf if error is None else error if error == uncertainty else error + uncertainty
 
 
 def setting_of(row: Row) -> Setting:
@@ -129,17 +131,16 @@ def step_name(row: Row) -> str:
 
 def promise(row: Row, uncertainty: float) -> dict[str, float]:
     """Return what a recommended setting promises: its error as measured, and its bound; times (s), memory (bytes)."""
-    error = judged(row) or 0.0
     names = ("time", "cpu_time", "setup", "setup_cpu", "cost", "memory")
-    return {"error": error, "bound": error + uncertainty, **{name: row[name] for name in names}}
+    measured = {"error": judged(row) or 0.0, "bound": bound(row, uncertainty)}
+    return measured | {name: row[name] for name in names}
 
 
 def closest(rows: list[Row], uncertainty: float) -> dict[str, Any] | None:
     """Return `within`, the least accuracy that is known to be met, and the `row` that does; None where none is."""
-    errors = _errors(rows)
-    if not errors or not math.isfinite(uncertainty):
+    within = min((bound(row, uncertainty) for row in pareto(rows)), default=math.inf)
+    if not math.isfinite(within):
         return None
-    within = min(errors) + uncertainty
     within = float(np.nextafter(within, math.inf)) if within == 0.0 else within
     return {"within": within, "row": recommend(rows, within, uncertainty)}
 
