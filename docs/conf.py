@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from docutils.nodes import SkipNode
 from latex2mathml.converter import convert
 
@@ -45,15 +47,21 @@ def as_text(app, what, name, thing, options, lines):
     lines[:] = [line.replace("\\", r"\\").replace("|", r"\|").replace("*", r"\*") for line in lines]
 
 
+def mathml(tex, display):
+    """Return a formula as MathML in the letters of the text: not every machine has a font for formulas."""
+    text = convert(tex, display=display).replace('mathvariant="bold"', 'mathvariant="normal" style="font-weight:bold"')
+    return re.sub("<mi>(.|&#x[0-9A-F]+;)</mi>", r'<mi mathvariant="normal" style="font-style:italic">\1</mi>', text)
+
+
 def inline(writer, node):
-    """Write a formula of a line as MathML."""
-    writer.body.append(convert(node.astext()))
+    """Write a formula of a line."""
+    writer.body.append(mathml(node.astext(), "inline"))
     raise SkipNode
 
 
 def block(writer, node):
-    """Write a formula by itself as MathML."""
-    writer.body.append(f'<div class="math">{convert(node.astext(), display="block")}</div>\n')
+    """Write a formula by itself."""
+    writer.body.append(f"<div>{mathml(node.astext(), 'block')}</div>\n")
     raise SkipNode
 
 

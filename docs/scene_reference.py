@@ -177,8 +177,12 @@ def kind(annotation: Any, metadata: list[Any]) -> str:
     bounds = getattr(check, "__self__", None)
     if isinstance(bounds, Bounds):
         signs = {">": bounds.gt, "≥": bounds.ge, "<": bounds.lt, "≤": bounds.le}
-        limits = ", ".join(f"{sign} {bound:g}" for sign, bound in signs.items() if bound is not None)
-        return f"{check.__name__} {limits}".strip()
+        limits = ", ".join(
+            f"{sign} {bound:g}".replace("e-0", "e-").replace("e+0", "e")
+            for sign, bound in signs.items()
+            if bound is not None
+        )
+        return f"{check.__name__} {limits}".strip().replace("e-0", "e-").replace("e+0", "e")
     of_check = {"as_number": "number", "as_vector3": "3 numbers", "as_padded_vector3": "2 or 3 numbers"}
     if getattr(check, "__name__", "") in of_check:
         return of_check[check.__name__]

@@ -29,15 +29,17 @@ for critical in diagram.critical_speeds:
 diagram.plot()
 
 # %%
-import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
 
-figure, axis = plt.subplots(layout="constrained")
+figure = Figure(layout="constrained")
+axis = figure.subplots()
 for i, (name, wave) in enumerate(diagram.travelling_waves().items()):
     axis.plot(wave["speed"], wave["forward"], f"C{i}", label=name)
     axis.plot(wave["speed"], wave["backward"], f"C{i}--")
 axis.axhline(0.0, color="grey", lw=0.7)
 axis.set(xlabel="speed Ω (rad/s)", ylabel="frequency in the fixed frame (rad/s)", title="backward waves are dashed")
-_ = axis.legend()
+axis.legend()
+figure
 
 # %% [markdown]
 # ## Is it right?

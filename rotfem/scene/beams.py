@@ -84,7 +84,7 @@ class BeamStructure(RootedStructure):
 
     Attributes:
         type: which of them.
-        length: L (m).
+        length: from the clamp to the tip, along the axis (m).
         hub_radius: distance of the clamp from the axis of rotation, or from the origin, along direction 1 (m).
         tip_mass: mass at the free end (kg).
         masses: further masses along the beam.
