@@ -36,6 +36,9 @@ WIDTH, HEIGHT, DAMPING_HEIGHT = 9.0, 4.8, 1.6
 #: Columns of the legend below.
 LEGEND_COLUMNS = 3
 
+#: How many times higher than the modes of interest call for a diagram may be.
+SQUASHED = 2.0
+
 #: Most modes above the diagram that are named there.
 NAMED = 4
 
@@ -69,7 +72,7 @@ class Branch:
 def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     """Return frequencies over speed, lines kΩ with their crossings, what is unstable, and damping where there is any.
 
-    The diagram reaches up to the lowest mode that no line meets; higher ones are named above it.
+    It reaches up to the lowest mode that no line meets; higher ones that would squash it are named above it.
 
     Args:
         result: the branches.
@@ -175,7 +178,10 @@ def seen_fixed(critical: Any) -> float:
 
 
 def of_interest(branches: list[Branch], steepest: float) -> list[Branch]:
-    """Return the branches that the steepest line kΩ meets or passes, the next above, and what lies among them."""
+    """Return the branches that the steepest line kΩ meets or passes, the next above, and what lies among them.
+
+    All are returned where the diagram is at most `SQUASHED` times as high with them.
+    """
     met = [np.any((b.frequency <= steepest * np.abs(b.speed)) | b.unstable) for b in branches]
     others = [float(np.min(b.frequency)) for b, there in zip(branches, met, strict=True) if not there]
     bottom = min(others, default=np.inf)
@@ -183,9 +189,10 @@ def of_interest(branches: list[Branch], steepest: float) -> list[Branch]:
     shown: list[Branch] = []
     while True:  # a branch that begins in the diagram is drawn as far as it goes
         found = [b for b in branches if np.min(b.frequency) <= max(top, bottom)]
+        top = max(float(np.max(b.frequency)) for b in found)
         if len(found) == len(shown):
-            return found
-        shown, top = found, max(float(np.max(b.frequency)) for b in found)
+            return branches if max(float(np.max(b.frequency)) for b in branches) <= SQUASHED * top else found
+        shown = found
 
 
 def marks(axis: Axes, result: CampbellResult, units: ShownUnits, last: float) -> list[Any]:

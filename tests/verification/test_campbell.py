@@ -250,3 +250,25 @@ def test_as_many_lines_as_meet_a_branch(unit_beam: Any) -> None:
     assert campbell(beam, "0:5:2").summary["per_rev"] == 4
     assert campbell(beam, "0:10.5:3").summary["per_rev"] == 3
     assert campbell(beam, "0:5:2", orders=0).summary["critical_speeds"] == []
+
+
+def test_lines_and_speeds_of_operation_that_are_asked_for(unit_beam: Any, tmp_path: Path) -> None:
+    """Of the lines 1 to 4 those asked for; options win over keys of the scene, and speeds are understood with units."""
+    scene = unit_beam({"modes.orders": [4], "modes.operating": ["60 rpm", "90 rpm"]})
+    every, some = (campbell(scene, "0:6:7", orders=orders) for orders in (4, [3, 1]))
+    assert every.summary["orders"] == [1, 2, 3, 4]
+    assert some.summary["orders"] == [1, 3]
+    assert campbell(scene, "0:6:3").summary["orders"] == [4]
+    expected = [c for c in every.critical_speeds if c.order in (1, 3)]
+    assert expected
+    assert [(c.label, c.order) for c in some.critical_speeds] == [(c.label, c.order) for c in expected]
+    np.testing.assert_allclose([c.speed for c in some.critical_speeds], [c.speed for c in expected], rtol=1e-9)
+    marked = campbell(scene, "0:6:3", rated="12.1 rpm", orders=[])
+    np.testing.assert_allclose(marked.summary["rated"], 12.1 * np.pi / 30)
+    marked.write(tmp_path)
+    kept = json.loads((tmp_path / "campbell.json").read_text())
+    np.testing.assert_allclose(kept["operating"], [2 * np.pi, 3 * np.pi])
+    assert (kept["orders"], kept["critical_speeds"]) == ([], [])
+    for wrong in ({"orders": [0]}, {"rated": -1.0}, {"operating": (2.0, 1.0)}, {"operating": ("1 rpm",)}):
+        with pytest.raises(SceneError, match=f"modes.{next(iter(wrong))}"):
+            campbell(scene, "0:6:3", **wrong)
