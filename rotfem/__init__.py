@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from rotfem.mechanics.free_hub import FreeHub, Torque
     from rotfem.mechanics.loads import ConstantLoad, Loads
     from rotfem.mechanics.motion import Motion, MotionLaw
-    from rotfem.mechanics.outputs import Output
+    from rotfem.mechanics.problem import Output
     from rotfem.mechanics.theories import Theory
     from rotfem.results import CampbellResult, CheckResult, ExplainResult, ModesResult, ResponseResult, RunResult
     from rotfem.results.compare import CompareResult, compare
@@ -66,7 +66,7 @@ _HOMES = {
     "mechanics.free_hub": ("FreeHub", "Torque"),
     "mechanics.loads": ("ConstantLoad", "Loads"),
     "mechanics.motion": ("Motion", "MotionLaw"),
-    "mechanics.outputs": ("Output",),
+    "mechanics.problem": ("Output",),
     "mechanics.theories": ("Theory",),
     "commands.cost.result": ("CostResult",),
     "results": ("CampbellResult", "CheckResult", "ExplainResult", "ModesResult", "ResponseResult", "RunResult"),

@@ -90,7 +90,7 @@ schemes: Registry[Any] = Registry(
     "rotfem.analysis.radau",
 )
 shapes: Registry[Any] = Registry("section shape", "rotfem.scene.section_shapes")
-outputs: Registry[Any] = Registry("output", "rotfem.mechanics.outputs")
+outputs: Registry[Any] = Registry("output", "rotfem.mechanics.problem")
 blade_formats: Registry[Any] = Registry(
     "format of blade files",
     "rotfem.scene.blades.openfast",

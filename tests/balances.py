@@ -8,7 +8,7 @@ from typing import Any
 import ufl
 
 from rotfem.mechanics import work
-from rotfem.mechanics.sums import added
+from rotfem.numerics.forms import added
 
 #: Directions of the frame.
 AXES = [ufl.as_vector([float(i == j) for j in range(3)]) for i in range(3)]

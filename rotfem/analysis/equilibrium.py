@@ -14,8 +14,10 @@ from rotfem.analysis.load_steps import (
     Growth,
     Raised,
     balance,
+    check_inside_out,
     counted,
     less,
+    limited,
     on_hinges,
     raised,
     richest_advice,
@@ -29,7 +31,7 @@ from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.inertia import surely_negative
 from rotfem.numerics.linear import DirectSolver, Increment
-from rotfem.numerics.newton import REACH, Newton
+from rotfem.numerics.newton import Newton
 
 Array = npt.NDArray[np.float64]
 
@@ -249,12 +251,11 @@ def static_tip_shape(problem: Problem, displacement: float, newton: Newton, comm
 
 def _led(system: System, displacement: float, q: Array, F: float, newton: Newton) -> tuple[Array, float]:
     """Return (q, F) of the equilibrium with u_2(L) = displacement (m), from that of another displacement."""
-    tip, q, before = system.structure.tip_values, q.copy(), q
+    tip, x = system.structure.tip_values, np.append(q, F)
     under_load, under_residual = Increment(system.V), Increment(system.V)
 
-    def increment() -> float:
-        nonlocal F, before
-        system.set_state(q)
+    def correction(before: Array | None) -> Array:
+        q, F = x[:-1], float(x[-1])
         system.set_time(0.0, load_factor=F + 1.0)
         loaded = system.residual().copy()
         system.set_time(0.0, load_factor=F)
@@ -265,16 +266,8 @@ def _led(system: System, displacement: float, q: Array, F: float, newton: Newton
         if tip(per_force)[1] == 0.0:
             raise ComputationError("a force at the tip does not move it by anything above round-off")
         dF = (displacement - tip(q)[1] - tip(dq)[1]) / tip(per_force)[1]
-        correction = dq + dF * per_force
-        size = float(system.size(correction))
-        part = min(1.0, REACH / size) if size > 0.0 and not system.linear else 1.0
-        before = q.copy()
-        F += part * dF
-        q[:] += part * correction
-        return size
+        return np.append(dq + dF * per_force, dF)
 
-    newton.solve(increment, lambda: float(system.size(q)))
-    system.set_state(q)
-    if not system.linear and system.model.inside_out():
-        raise ComputationError("Newton met a state that is turned inside out (an axial strain below −1)")
-    return q, F
+    newton.solve(limited(system, x, correction, soon=0), lambda: float(system.size(x[:-1])))
+    check_inside_out(system)
+    return x[:-1], float(x[-1])

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.load_steps import SOON
+from rotfem.analysis.load_steps import check_inside_out, limited
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.errors import ComputationError, InputError
 from rotfem.numerics.eigenproblem import Pencil
 from rotfem.numerics.linear import DirectSolver
-from rotfem.numerics.newton import REACH, Newton
+from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
 
 Array = npt.NDArray[np.float64]
@@ -131,7 +131,6 @@ def in_mode(system: Any, state: Array, signal: Array, patterns: Array, newton: N
     system.set_time(0.0, motion)
     system.set_state(state)
     left, q = system.residual().array.copy(), state + shape
-    before, iterations = q.copy(), 0
 
     def along(x: Array) -> Array:
         return np.asarray(summed(system.comm, patterns @ x[:n]))
@@ -142,20 +141,14 @@ def in_mode(system: Any, state: Array, signal: Array, patterns: Array, newton: N
         mu = np.linalg.solve(np.array([along(column) for column in z]).T, along(y) - part)
         return everywhere(system, y - mu @ np.array(z))
 
-    def increment() -> float:
-        nonlocal before, iterations
+    def correction(before: Array | None) -> Array:
         system.set_state(q, rate, acceleration)
         right = system.residual().array - left
-        A = system.tangent(1.0, 0.0, 0.0, before if iterations >= SOON else None)[0]
-        dq = constrained(A, right, along(state + shape - q))
-        size, before, iterations = float(system.size(dq)), q.copy(), iterations + 1
-        q[:] += dq * min(1.0, REACH / size) if size > 0.0 else dq
-        return size
+        return constrained(system.tangent(1.0, 0.0, 0.0, before)[0], right, along(state + shape - q))
 
-    newton.solve(increment, lambda: float(system.size(q)))
+    newton.solve(limited(system, q, correction), lambda: float(system.size(q)))
     system.set_state(q, rate, acceleration)
-    if system.model.inside_out():
-        raise ComputationError("Newton met a state that is turned inside out (an axial strain below −1)")
+    check_inside_out(system)
     pencil = Pencil(*system.mass_damping_stiffness())
     forces = pencil.apply(pencil.C, acceleration[:n, None]) + pencil.apply(pencil.M, jerk[:n, None])
     return q, constrained(pencil.K, -np.real(forces[:, 0]), along(rate))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -247,25 +248,54 @@ def balance(
     """
     growth.set(system, share)
     q, dx = guess.copy(), Increment(system.V)
-    before, followed = q.copy(), 0
 
-    def increment() -> float:
-        nonlocal before, followed
-        system.set_state(q)
+    def correction(before: Array | None) -> Array:
         b = system.residual()
-        A, _ = system.tangent(1.0, 0.0, 0.0, before if followed >= SOON else None)
-        dq = dx.solve(DirectSolver(A), b)
-        size, before, followed = float(system.size(dq)), q.copy(), followed + 1
-        q[:] += dq if system.linear or not size > REACH else dq * (REACH / size)
-        system.set_state(q)
-        return size
+        return dx.solve(DirectSolver(system.tangent(1.0, 0.0, 0.0, before)[0]), b)
 
+    increment = limited(system, q, correction)
     if system.linear:
         if not np.isfinite(increment()) or (system.structure.hinges and conditioning(system, q) >= KNOWN):
             raise ComputationError(f"no steady state at {growth.omega:g} rad/s: the stiffness is singular")
         newton.iterations += 1
     else:
         newton.solve(increment, lambda: system.size(q))
-        if looked_at and system.model.inside_out():
-            raise ComputationError("Newton met a state that is turned inside out (an axial strain below −1)")
+        if looked_at:
+            check_inside_out(system)
     return q
+
+
+def limited(
+    system: System, x: Array, correction: Callable[[Array | None], Array], soon: int = SOON
+) -> Callable[[], float]:
+    """Return an iteration of Newton's method, which corrects x by no more than REACH and returns the size.
+
+    Args:
+        system: equations of motion; the state is set before each correction and after it.
+        x: the unknowns, a local dof array, with further ones behind; overwritten.
+        correction: q from which the last one has led here (see `System.tangent`), or None ↦ change of x.
+        soon: iterations after which that q is given.
+    """
+    n = len(system.q.x.array)
+    before, followed = x[:n].copy(), 0
+
+    def increment() -> float:
+        nonlocal before, followed
+        system.set_state(x[:n])
+        change = correction(before if followed >= soon else None)
+        size, before, followed = float(system.size(change[:n])), x[:n].copy(), followed + 1
+        x[:] += change if system.linear or not size > REACH else change * (REACH / size)
+        system.set_state(x[:n])
+        return size
+
+    return increment
+
+
+def check_inside_out(system: System) -> None:
+    """Refuse a state that is set in a system and turned inside out.
+
+    Raises:
+        ComputationError: it is.
+    """
+    if not system.linear and system.model.inside_out():
+        raise ComputationError("Newton met a state that is turned inside out (an axial strain below −1)")

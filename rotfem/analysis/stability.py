@@ -21,10 +21,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.equilibrium import gravity_turns
+from rotfem.analysis.load_steps import Growth, balance
 from rotfem.analysis.modal import GROWTH
+from rotfem.equations.compiled import with_all_unknowns
 from rotfem.errors import ComputationError
+from rotfem.mechanics.loads import named
+from rotfem.mechanics.problem import Problem
 from rotfem.numerics.eigenproblem import SAME, ZERO, Eigenpairs, Pencil
 from rotfem.numerics.inertia import negative_eigenvalues, surely_negative, symmetric
+from rotfem.numerics.newton import Newton
 
 Array = npt.NDArray[np.float64]
 
@@ -198,3 +204,40 @@ def _energies(pencil: Pencil, pairs: Eigenpairs) -> Array:
     kinetic, potential = (np.real(X.conj() * pencil.apply(A, X)).sum(axis=0) for A in (pencil.M, pencil.K))
     local = np.abs(pairs.values) ** 2 * kinetic + potential
     return np.asarray(pencil.comm.allreduce(local) if pencil.comm.size > 1 else local)
+
+
+# --- constant conditions: an equilibrium that a history moves about ---------------------------------------------------
+
+
+def are_constant(problem: Problem) -> bool:
+    """Return whether speed, base acceleration, loads and gravity are constant in a frame that turns with the hub."""
+    motion, applied = problem.motion, named(problem.loads).values()
+    turning = problem.frame == "rotating" and motion.hub is None
+    return turning and motion.constant and all(load.constant for load in applied) and not gravity_turns(problem)
+
+
+def act_at_start(problem: Problem) -> bool:
+    """Return whether the hub spins, or is accelerated, or a load acts, at t = 0."""
+    motion, applied = problem.motion, [load for load in named(problem.loads).values() if not load.is_zero]
+    forces = [np.asarray(problem.loads.gravity), motion.base_acceleration(0.0), *(load.at(0.0) for load in applied)]
+    return motion.speed(0.0) != 0.0 or any(force.any() for force in forces)
+
+
+def constant_stability(system: Any, newton: Newton) -> Stability | None:
+    """Return the stability of the equilibrium of constant conditions; None where there is none that is found at once.
+
+    A symmetric structure under symmetric loads never leaves an unstable equilibrium by itself: its history looks calm.
+
+    Args:
+        system: equations of motion; state and time are left at the equilibrium where it has all unknowns.
+        newton: iteration control.
+    """
+    problem = system.model.problem
+    if not are_constant(problem):
+        return None
+    system, speed = with_all_unknowns(system), problem.motion.speed(0.0)
+    try:
+        q = balance(system, Growth(speed), 1.0, system.zeros(), newton, looked_at=False)
+        return stability_of(system, q, speed)
+    except ComputationError:
+        return None

@@ -39,10 +39,10 @@ from rotfem.equations.geometric import geometric_stiffness
 from rotfem.equations.nonlinear import assembled
 from rotfem.errors import ComputationError
 from rotfem.mechanics.motion import Motion
-from rotfem.mechanics.sums import added
 from rotfem.mechanics.theories import Theory, compared, richest, stiffened
 from rotfem.numerics import compat, forms
 from rotfem.numerics.eigenproblem import Pencil, RoundOff
+from rotfem.numerics.forms import added
 from rotfem.numerics.linear import DirectSolver, Increment, set_diagonal
 
 Array = npt.NDArray[np.float64]

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.constant_conditions import act_at_start, are_constant, constant_stability
 from rotfem.analysis.equilibrium import static_tip_shape, steady_state
 from rotfem.analysis.modal import ModalAnalysis
-from rotfem.analysis.stability import Stability, stability_of
+from rotfem.analysis.stability import Stability, act_at_start, are_constant, constant_stability, stability_of
 from rotfem.commands.problem import first_motion
 from rotfem.equations.compiled import compile_system, with_all_unknowns
 from rotfem.errors import ComputationError

@@ -23,7 +23,7 @@ from rotfem.mechanics.effects import Work
 from rotfem.mechanics.free_hub import ControlledTorque, FreeHub, Torque
 from rotfem.mechanics.loads import pitched
 from rotfem.mechanics.motion import Motion, no_acceleration
-from rotfem.mechanics.outputs import Functional, Output
+from rotfem.mechanics.problem import Functional, Output
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
 from rotfem.results import ModesResult

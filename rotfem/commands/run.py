@@ -17,7 +17,7 @@ from rotfem.commands.simulation import Simulation
 from rotfem.errors import ComputationError, Stopped, input_of
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.mechanics.effects import Work
-from rotfem.mechanics.outputs import Functional
+from rotfem.mechanics.problem import Functional
 from rotfem.refinement.refine import Clock, Setting
 from rotfem.results.run import RunResult
 from rotfem.scene import Scene, as_scene

@@ -26,8 +26,8 @@ from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics import work
 from rotfem.mechanics.motion import Motion
-from rotfem.mechanics.sums import added, weighted
 from rotfem.numerics import compat, forms
+from rotfem.numerics.forms import added, weighted
 from rotfem.numerics.linear import Increment
 from rotfem.numerics.low_rank import PlusLowRank
 from rotfem.structures.root_reaction import along_axis

@@ -27,9 +27,9 @@ from ufl.algorithms import expand_derivatives
 from rotfem.equations.modal_damping import EFFECT
 from rotfem.equations.model import Model
 from rotfem.mechanics import work
-from rotfem.mechanics.sums import added
 from rotfem.mechanics.work import Variation
 from rotfem.numerics import compat, forms
+from rotfem.numerics.forms import added
 from rotfem.numerics.projection import times
 from rotfem.structures.root_reaction import RootReaction
 

@@ -23,9 +23,9 @@ from rotfem.mechanics.frame import Frame
 from rotfem.mechanics.loads import named
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
-from rotfem.mechanics.sums import added
 from rotfem.mechanics.work import Mechanics, RigidTurn, Variation
 from rotfem.numerics import forms
+from rotfem.numerics.forms import added
 from rotfem.registry import resolved
 from rotfem.structures import build
 from rotfem.structures.structure import Structure

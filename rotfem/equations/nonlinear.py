@@ -17,9 +17,9 @@ from rotfem.equations.clamp import ClampWork
 from rotfem.equations.energy_balance import EnergyBalance
 from rotfem.equations.model import Model
 from rotfem.equations.system import System
-from rotfem.mechanics.sums import added, weighted
 from rotfem.mechanics.work import Mechanics
 from rotfem.numerics import compat, forms
+from rotfem.numerics.forms import added, weighted
 
 Array = npt.NDArray[np.float64]
 

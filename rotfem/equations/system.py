@@ -25,9 +25,9 @@ from rotfem.equations.solutions import Solutions
 from rotfem.errors import ComputationError
 from rotfem.mechanics.loads import is_moment
 from rotfem.mechanics.motion import Motion
-from rotfem.mechanics.sums import added
 from rotfem.mechanics.time_signals import TimeSignal, View
 from rotfem.numerics import compat, forms
+from rotfem.numerics.forms import added
 from rotfem.numerics.linear import DirectSolver, Increment
 from rotfem.numerics.low_rank import PlusLowRank
 from rotfem.structures.root_reaction import RootReaction

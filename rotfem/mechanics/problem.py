@@ -2,18 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, Self, cast, overload
+from typing import Any, ClassVar, Self, cast, overload
 
 from rotfem.errors import InputError
 from rotfem.mechanics.effects import INERTIA, INTERNAL, LOADS, Effect, Work, present_effects
 from rotfem.mechanics.loads import Loads
 from rotfem.mechanics.motion import Motion
-from rotfem.mechanics.outputs import Functional
 from rotfem.mechanics.theories import Theory
+from rotfem.registry import Registry
+from rotfem.registry import outputs as registered
 from rotfem.short import short_fields
+
+#: mechanics ↦ functional of the motion, a UFL form without arguments; see `rotfem.mechanics.work.Mechanics`.
+Functional = str | Callable[..., Any]
+
+
+@dataclass(frozen=True)
+class Output:
+    """One output functional; `[output] quantities` of a scene names those that are wanted.
+
+    Attributes:
+        name: what a scene calls it, and the column of history.csv.
+        form: mechanics ↦ its value as a UFL form.
+        unit: of its value.
+    """
+
+    registry: ClassVar[Registry[Output]] = registered
+
+    name: str
+    form: Functional
+    unit: str = ""
 
 
 class TheoryByName:

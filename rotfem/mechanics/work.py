@@ -21,7 +21,7 @@ from ufl import cross
 
 from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, RootSpring, Strain, Support
 from rotfem.mechanics.frame import Frame
-from rotfem.mechanics.sums import added
+from rotfem.numerics.forms import added
 from rotfem.registry import damping_models, resolved
 
 

@@ -5,7 +5,7 @@ A kill in the middle, two programs at once, or a damaged cache do no harm.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import basix
@@ -297,3 +297,21 @@ def _compiled(compile_all: Any, objects: list[Any], comm: Any, flags: list[str])
         raise failure or RuntimeError(f"rank 0 could not compile a form: {why}")
     out: tuple[list[Any], Any] = library.load()
     return out
+
+
+def added(parts: Iterable[Any]) -> Any:
+    """Return the sum of UFL forms; 0 of none. Zeros count as none.
+
+    It is made at once: a sum of two goes through all that is in them, and n of them n times.
+    """
+    forms = [part for part in parts if not isinstance(part, int)]
+    if len(forms) < 2:
+        return forms[0] if forms else 0
+    if all(isinstance(form, ufl.Form) for form in forms):
+        return ufl.Form([integral for form in forms for integral in form.integrals()])
+    return sum(forms[1:], start=forms[0])
+
+
+def weighted(factors: Iterable[Any], parts: Iterable[Any]) -> ufl.Form:
+    """Return the sum of UFL forms, each times a scalar."""
+    return ufl.Form([c * integral for c, form in zip(factors, parts, strict=True) for integral in form.integrals()])

@@ -214,32 +214,23 @@ class Structure:
         """
         return self._numbers(nodes, self._clamped_components())
 
-    def hinged_unknowns(self, nodes: npt.NDArray[np.int32] | None = None) -> npt.NDArray[np.int32]:
-        """Return the local numbers of those that the clamp leaves free, in order (see `clamped_unknowns`)."""
+    def hinged_unknowns(self) -> npt.NDArray[np.int32]:
+        """Return the local numbers of those of owned nodes that the clamp leaves free, in order."""
         held = self._clamped_components()
-        return self._numbers(nodes, [i for i in range(self.size) if i not in held])
+        return self._numbers(None, [i for i in range(self.size) if i not in held])
 
     def _numbers(self, nodes: npt.NDArray[np.int32] | None, components: list[int]) -> npt.NDArray[np.int32]:
         if nodes is None:
             nodes = self.clamped[self.clamped < self.V.dofmap.index_map.size_local]
         return np.asarray((nodes[:, None] * self.size + np.array(components, dtype=np.int32)).ravel())
 
-    def clamp_conditions(
-        self,
-        V: fem.FunctionSpace | None = None,
-        nodes: npt.NDArray[np.int32] | None = None,
-    ) -> list[Any]:
-        """Return the boundary conditions of the clamp.
-
-        Args:
-            V: another space of the unknowns, as of a finer mesh; that of the structure if None.
-            nodes: clamped nodes of that space; those of the structure if None.
-        """
-        V, nodes, held = V or self.V, self.clamped if nodes is None else nodes, self._clamped_components()
+    def clamp_conditions(self) -> list[Any]:
+        """Return the boundary conditions of the clamp."""
+        held = self._clamped_components()
         if len(held) == self.size:
-            return [fem.dirichletbc(fem.Function(V), nodes)]
+            return [fem.dirichletbc(fem.Function(self.V), self.clamped)]
         zero = default_scalar_type(0.0)
-        return [fem.dirichletbc(zero, nodes * self.size + i, V.sub(i)) for i in held]
+        return [fem.dirichletbc(zero, self.clamped * self.size + i, self.V.sub(i)) for i in held]
 
     def stretch(self, strains: list[Strain]) -> Any:
         """Return an expression that is 1 where the structure is undeformed and at most 0 where it is inside out."""

@@ -18,7 +18,7 @@ from rotfem import registry
 from rotfem.analysis.schemes import Array, Scheme, Stage, State
 from rotfem.errors import SceneError
 from rotfem.mechanics.effects import Effect, present_effects
-from rotfem.mechanics.outputs import Output
+from rotfem.mechanics.problem import Output
 from rotfem.mechanics.theories import Theory, ladder
 from rotfem.registry import Registry, register
 from rotfem.scene import Scene
