@@ -93,7 +93,7 @@ class TheoryError:
         """Return the warning of an error that is to be noticed, or of components in error; empty of others."""
         if not self.estimate > NOTICED:
             return self._of_components()
-        how = "out of its range" if self.estimate >= 1.0 else f"off by about {100 * self.estimate:.2g} %"
+        how = "out of its range" if self.estimate >= 1.0 else f"in error by about {100 * self.estimate:.2g} %"
         return f'model.theory = "{self.theory}" is {how} here ({self.basis}); "{richest().name}" is exact'
 
     def of_poorer(self, theory: Theory, apart: float, components: dict[str, float]) -> TheoryError:

@@ -103,8 +103,8 @@ def _softening(scene: Scene, speed: float, critical: float) -> list[str]:
         return []
     stiffened = min((t for t in theories if t.linear and t.prestress), key=lambda t: t.rank)
     return [
-        f'model.theory = "{theory.name}" loses its stiffness at {critical:.3g} rad/s and the scene reaches '
-        f'{speed:.3g}: "{stiffened.name}" costs the same and does not'
+        f'model.theory = "{theory.name}" has no centrifugal stiffening, and loses its stiffness at {critical:.3g} '
+        f'rad/s; the scene reaches {speed:.3g} rad/s: use "{stiffened.name}", which costs the same'
     ]
 
 
@@ -124,9 +124,9 @@ def _step(scene: Scene, speed: float) -> list[str]:
     half = np.pi * time.step / period
     low = 1 - np.arctan(half) / half
     return [
-        f"time.step = {time.step:g} s is {period / time.step:.1f} steps a period of mode {len(bending)} (about "
-        f"{period:.2g} s): its frequency comes out {100 * low:.2g} % low; {_rounded(period / GOOD_STEPS):g} s would be "
-        f"{GOOD_STEPS} steps"
+        f"time.step = {time.step:g} s is long for mode {len(bending)}, whose period is about {period:.2g} s: its "
+        f"frequency would be {100 * low:.2g} % too low; {_rounded(period / GOOD_STEPS):g} s gives {GOOD_STEPS} steps "
+        "per period"
     ]
 
 
@@ -142,9 +142,8 @@ def _elements(scene: Scene, speed: float) -> list[str]:
         return []
     enough = int(np.ceil(2 * FEW_NODES * shortest.half_waves / scene.mesh.degree))
     return [
-        f"mesh.elements = {elements} of degree {scene.mesh.degree} has {nodes} nodes for the {shortest.half_waves:g} "
-        f"half waves of {shortest.family} {shortest.half_waves + 0.5:g}, among the {scene.modes.count} modes wanted: "
-        f"{enough} elements would do"
+        f"mesh.elements = {elements} is too coarse for {shortest.family} {shortest.half_waves + 0.5:g}, the shortest "
+        f"wave among modes.count = {scene.modes.count} modes: use {enough} elements"
     ]
 
 
@@ -154,8 +153,8 @@ def _nodes(scene: Scene) -> list[str]:
     if not isinstance(elements, int) or places < elements:
         return []
     return [
-        f"masses and kinks at {places} places between the ends are nodes: there are {places + 1} elements, not "
-        f"mesh.elements = {elements}"
+        f"point masses and kinks at {places} places along the beam need a node each: the mesh has {places + 1} "
+        f"elements, not mesh.elements = {elements}"
     ]
 
 

@@ -243,7 +243,7 @@ def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends:
             f"the branches change too fast to be followed: {sweep.solves} speeds were solved, and no more were added "
             "between those asked for"
         )
-    out += [f"{name} left the computed modes before the last speed; more modes.count keeps it" for name in lost]
+    out += [f"{name} left the computed modes before the last speed; a larger modes.count keeps it" for name in lost]
     out += [
         f"ambiguous: {labels[int(a['branch']) - 1]} at {a['speed']:.6g} rad/s, correlation {a['confidence']:.2f}"
         for a in sweep.ambiguous

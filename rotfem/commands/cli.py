@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-import rotfem.commands.compare  # noqa: F401  a verb
 from rotfem.commands.console import Session, missing
 from rotfem.commands.job import Job, app, command
 from rotfem.commands.options import as_path, listed, speeds_of
@@ -59,7 +58,7 @@ def modes(
         int | None, typer.Option("--animate", metavar="MODE", help="draw a mode in space: mode_N.gif")
     ] = None,
 ) -> None:
-    """Compute the gyroscopic eigenmodes of SCENE at its speed."""
+    """Compute natural frequencies, damping and mode shapes of SCENE."""
     from rotfem.commands.modes import check_animated
     from rotfem.commands.modes import modes as analyse
 
@@ -105,7 +104,7 @@ def campbell(
         str | None, typer.Option("--operating", metavar="LOW:HIGH", help="operating range to mark: 6.9:12.1rpm")
     ] = None,
 ) -> None:
-    """Follow the modes of SCENE over a range of speeds."""
+    """Compute the Campbell diagram and critical speeds of SCENE."""
     from rotfem.commands.campbell import campbell as sweep
 
     marks: dict[str, Any] = {
@@ -129,7 +128,7 @@ def response(
     number: Annotated[int, typer.Option("--number", help="frequencies, those that show peaks on top")] = 200,
     per_rev: Annotated[str | None, typer.Option("--per-rev", metavar="K,…", help="multiples of the speed")] = None,
 ) -> None:
-    """Compute amplitude and phase of the tip of SCENE under its harmonic loads, over their frequency."""
+    """Compute amplitudes and phases of SCENE under harmonic loads."""
     from rotfem.commands.response import response as answers
 
     orders = listed("--per-rev", per_rev, float) or ()
@@ -158,9 +157,9 @@ def look(session: Session, path: Path, overrides: Sequence[str]) -> bool:
 
 @command(computes=False, first=look)
 def check(todo: Job) -> None:
-    """Say what the structure of SCENE is, mass, moments, inertias, and draw it; or how the results in a folder ended.
+    """Show mass, centre of mass and inertias of SCENE, and draw it.
 
-    Nothing is computed yet.
+    No motion is computed. Of a result folder it says how the computation ended.
     """
     from rotfem.commands.check import check as weigh
 
@@ -174,7 +173,7 @@ def explain(
         bool, typer.Option("--check", help="run the full models too: true changes next to the estimates")
     ] = False,
 ) -> None:
-    """Say which effects and which theory SCENE calls for, and what each of them changes."""
+    """Show how much each effect and each theory changes in SCENE."""
     from rotfem.commands.explain import explain as estimate
 
     todo.finish(estimate(todo.scene, check=check, progress=todo.progress))
@@ -198,7 +197,10 @@ def cost(
     budget: Annotated[str | None, typer.Option("--budget", metavar="TIME", help="of the study: 60s, 2min, 1h")] = None,
     resume: Annotated[bool, typer.Option("--resume/--fresh", help="go on with what is in the result folder")] = True,
 ) -> None:
-    """Measure what accuracy costs: error and time of SCENE over theory, mesh, degree, step and scheme."""
+    """Measure error against computing time of SCENE over settings.
+
+    Settings are theory, mesh, degree, time step and scheme.
+    """
     from rotfem import cost as study
 
     if write is not None:
@@ -250,7 +252,10 @@ def sweep(
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False,
 ) -> None:
-    """Run a verb for all combinations of values of scene keys; one that was stopped goes on."""
+    """Run a verb over a grid of scene keys, on several processes.
+
+    A sweep that was stopped goes on where it was.
+    """
     from rotfem.commands.sweep import sweep as compute
     from rotfem.commands.sweep import values_of
 
@@ -279,7 +284,10 @@ def import_(
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False,
 ) -> None:
-    """Write the scene of a blade FILE of BeamDyn, ElastoDyn, BModes, HAWC2 or windIO."""
+    """Write the scene of a blade FILE of another program.
+
+    It may be of BeamDyn, ElastoDyn, OpenFAST, BModes, HAWC2 or windIO.
+    """
     from rotfem.commands.import_blade import import_blade, write_imported
     from rotfem.scene.files import noted_files
 
@@ -294,6 +302,9 @@ def import_(
                 hint(line)
         structure = scene.structure
         session.say([f"{output}: {structure.type} of {file.name}, rows at {len(structure.knots) + 2} places"])
+
+
+import rotfem.commands.compare  # noqa: E402, F401  the last of the verbs
 
 
 def main() -> None:

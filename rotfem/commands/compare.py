@@ -30,7 +30,10 @@ def compare(
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False,
 ) -> None:
-    """Say how far the results in folders are from those in the first one: histories, modes, branches, peaks."""
+    """Compare results in folders with those in the first folder.
+
+    Histories, modes, branches, critical speeds and peaks are compared.
+    """
     from rotfem.results.compare import compare as distances
 
     with Session(as_json, quiet, debug) as session:

@@ -318,7 +318,7 @@ class ProgressBar:
 
     def says(self, line: str, always: bool = False) -> None:
         """Print a line, above the bar if there is one; where lines are not wanted only what is always to be said."""
-        text = fitted(line, sys.stderr)
+        text = fitted(line, sys.__stderr__ or sys.stderr)  # the bar has another one in its place
         if self._bar is not None:
             self._bar.console.print(text, markup=False, highlight=False, soft_wrap=True)
         elif self._speaks or always:

@@ -36,16 +36,16 @@ Array = npt.NDArray[np.float64]
 WANTED, AIM = 0.01, 0.5
 
 #: What the error of a theory is estimated by where its foreshortening is computed.
-OF_FORESHORTENING = "its foreshortening, which is given back, changes it by that"
+OF_FORESHORTENING = "the foreshortening by bending that it neglects, computed afterwards, is that large"
 
 #: What it is estimated by where the phase of a vibration counts.
-OF_DRIFT = "its frequencies and strains against the exact ones"
+OF_DRIFT = "its frequencies and strains compared with the exact ones"
 
 #: What it is estimated by where an exact theory's equations were evaluated at the motion.
-OF_DEFECT = "what it leaves of the exact equations changes it by that"
+OF_DEFECT = "its residual in the exact equations changes it by that"
 
 #: What the contributions are called that a warning says to be unknown.
-UNKNOWN = {"time": "steps", "space": "mesh", "model": "theory"}
+UNKNOWN = {"time": "time steps", "space": "mesh", "model": "theory"}
 
 #: Part of the sum from which a contribution is named.
 NAMED = 0.1
@@ -144,7 +144,9 @@ class RunErrors:
             return None
         system, apart, components = found
         if self.shape is not None and self._buckles(system):
-            return TheoryError(1.0, "it is above a buckling load that it does not see", self.problem.theory.name)
+            return TheoryError(
+                1.0, "it is above a buckling load that this theory does not have", self.problem.theory.name
+            )
         base = self.farthest.error(system, tips, from_rest)
         if base is None:
             return None
@@ -245,7 +247,9 @@ class RunErrors:
             return []
         unknown = [word for name, word in UNKNOWN.items() if error.contributions[name] is None]
         said = (
-            [f"the error by the {' and the '.join(unknown)} is unknown: {self._why_unknown(error)}"] if unknown else []
+            [f"the error by the {' and the '.join(unknown)} could not be estimated: {self._why_unknown(error)}"]
+            if unknown
+            else []
         )
         if not error.exceeds(max(WANTED, scene.model.tolerance or 0.0, tolerance or 0.0)):
             return said
@@ -258,28 +262,27 @@ class RunErrors:
         if mesh >= WANTED / 2:
             cures.append("a higher mesh.degree" if scene.structure.mesh_file else "more mesh.elements")
         if model >= WANTED / 2:
-            cures.append("a richer theory")
-        contributions = {"steps": steps, "mesh": mesh, "model": model}
+            cures.append("a more exact model.theory")
+        contributions = {"time steps": steps, "mesh": mesh, "theory": model}
         named = [
             f"{percent(share)} by the {n}"
             for n, share in contributions.items()
             if share > NAMED * sum(contributions.values())
         ]
-        off = (
-            f"the tip may be off by {percent(error.total)} of its largest displacement (estimated: {', '.join(named)})"
-        )
-        return [f"{off}: {', '.join(cures)}" if cures else off, *said]
+        parts = f"(estimated: {', '.join(named)})"
+        off = f"the tip may be in error by {percent(error.total)} of its largest displacement {parts}"
+        return [f"{off}; to reduce it: {', '.join(cures)}" if cures else off, *said]
 
     def _why_unknown(self, error: ErrorEstimate) -> str:
         """Return why a contribution is unknown."""
         known = {name: share is not None for name, share in error.contributions.items()}
         if self.companions is not None and not known["time"]:
             if self.companions.steps.sound:
-                return "what is prescribed leaves no room for steps of twice the length"
-            return "steps of twice the length fail, so that these are hardly short enough"
+                return "the prescribed motion or loads allow no steps of twice the length"
+            return "a run with steps of twice the length failed, so these are hardly short enough"
         if not known["space"]:
-            return "there is no other mesh to compare with, or the same fails there"
-        return "the same in a richer theory fails"
+            return "there is no other mesh to compare with, or the run failed on it"
+        return "the run failed with a more exact theory"
 
 
 def _relative(apart: float, scale: float) -> float:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     name="rotfem",
-    help="Rotating beams and plates with FEniCSx. A scene is a TOML file; docs/scene-reference.md lists its keys.",
+    help="Rotating beams and plates with FEniCSx. SCENE is a TOML file, described in docs/scene.md.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,

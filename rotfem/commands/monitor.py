@@ -137,8 +137,9 @@ def energy_warning(system: Any, history: dict[str, Array], between: bool = False
     if share < GROWN:
         return ""
     return (
-        f"the energy has grown by {share:.2g} of what is exchanged though nothing gives any: the steps are unstable "
-        'or too long for this motion; give a smaller time.step, time.scheme = "energy_conserving", or numerical damping'
+        f"the energy has grown by {100 * share:.2g} % of the energy exchanged, though nothing supplies any: the time "
+        'steps are too long for this motion, or unstable; give a smaller time.step, time.scheme = "energy_conserving", '
+        "or numerical damping"
     )
 
 
@@ -149,8 +150,8 @@ def _said_of_momentum(history: dict[str, Array]) -> str:
     if not off > TURNED * largest:
         return ""
     return (
-        f"the angular momentum of hub and structure is {off / largest:.2g} of itself off the impulse they were given: "
-        "the steps do not resolve how the hub moves, as where it has little inertia of its own; "
+        f"the angular momentum of hub and structure differs by {100 * off / largest:.2g} % from the impulse of the "
+        "torque: the time steps do not resolve the motion of the hub, as where it has little inertia of its own; "
         'give a smaller time.step, or time.scheme = "radau5" or "energy_conserving"'
     )
 
@@ -160,8 +161,9 @@ def _said_of_hub(history: dict[str, Array], between: bool) -> str:
     if share < GROWN:
         return ""
     return (
-        f"the energy of hub and structure has grown by {share:.2g} of what is exchanged beyond the work of the torque: "
-        "the steps do not resolve how the hub moves, as where it has little inertia of its own, or are unstable; "
+        f"the energy of hub and structure has grown by {100 * share:.2g} % of the energy exchanged beyond the work of "
+        "the torque: the time steps do not resolve the motion of the hub, as where it has little inertia of its own, "
+        "or are unstable; "
         "give a smaller time.step or more motion.hub_inertia"
     )
 
@@ -189,13 +191,13 @@ def diverged(
         since: from when on (s) the speed was above that; None if it never was.
         loose: hinges of the root without a spring.
     """
-    why = "the motion is unstable or its load too large for a linear theory"
+    why = "the motion is unstable, or the load is too large for a linear theory"
     if loose:
         why = f"no spring holds the root's hinge ({', '.join(loose)}), which turns beyond what is linear"
     if since is not None:
         why = f"its stiffness is not definite above {critical:.6g} rad/s, passed at t = {since:.4g} s"
         if not theory.prestress:
-            why += ": first-order strains keep the softening by the centrifugal force but not the stiffening"
+            why += ": first-order strains have the softening by the centrifugal force but not the stiffening"
     return ComputationError(
         f"the {theory.name} solution diverged (a displacement exceeds the length, or a rotation 1 rad; {why})",
         time=time,
@@ -213,7 +215,7 @@ def better_theories(theory: Theory, turning: bool = False) -> str:
 
 
 #: What to try where numbers overflow.
-ADVICE = "the numbers of the scene are out of all proportion (units?), or the step is too long for the motion"
+ADVICE = "check the units of the scene, whose numbers are out of all proportion, or use a shorter time step"
 
 
 def check_finite(values: Iterable[tuple[str, Any]], time: float | None = None, where: str = "") -> None:

@@ -40,6 +40,9 @@ from rotfem.units import quantity
 
 Array = npt.NDArray[Any]
 
+#: Modes that a warning names.
+NAMED = 3
+
 #: Default number of frequencies of a response, and the part beyond the highest mode asked for that they reach to.
 NUMBER, BEYOND = 200, 1.2
 
@@ -292,11 +295,13 @@ def remarks(modes: Sequence[Mapping[str, Any]], undamped: Sequence[int], off: fl
     """Return warnings of modes without damping, and of a response by too few modes."""
     out = []
     if undamped:
-        named = ", ".join(f"{modes[j]['label']} at {modes[j]['frequency']:.6g} rad/s" for j in undamped)
+        named = ", ".join(f"{modes[j]['label']} at {modes[j]['frequency']:.6g} rad/s" for j in undamped[:NAMED])
+        named += f" and {len(undamped) - NAMED} more" if len(undamped) > NAMED else ""
         out.append(
-            f"no damping: the response has no height at {named}; what is seen there is how near a frequency came"
+            f"no damping: the response is infinite at {named}; peaks there only show how near a frequency came; "
+            "give [structure.damping]"
         )
     if off > NOTABLE:
-        why = f"at half of the frequencies {count} modes are {100 * off:.2g} % and more off; more modes.count"
-        out.append(f"the response by modes is not that of all modes: {why}")
+        why = f"it differs by {100 * off:.2g} % or more at half of the frequencies; use a larger modes.count"
+        out.append(f"{count} modes are too few for the response by modes: {why}")
     return out

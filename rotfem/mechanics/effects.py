@@ -230,7 +230,7 @@ for _effect in (
     Effect(
         "trapeze",
         present=lambda problem: getattr(problem.structure, "has_fibers", False),
-        reasons=("fibers beside the axis of twist are stretched by it", "no section twists"),
+        reasons=("twist stretches the fibers away from its axis", "no section twists"),
     ),
     Effect(
         "tip_mass",

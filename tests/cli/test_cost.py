@@ -183,5 +183,8 @@ def test_hints_of_modes_and_campbell(rotfem: Rotfem) -> None:
     many = ("--set", "modes.count=6", "--set", "mesh.elements=3", "--no-plots")
     assert rotfem("modes", "beam.toml", *many).err.startswith("hint: mesh.elements = 3")
     fast = ("campbell", "beam.toml", "--speeds", "0,5", "--set", "model.theory=linear", "--set", "modes.count=1")
-    assert 'hint: model.theory = "linear" loses its stiffness at 3.8 rad/s' in rotfem(*fast, "--no-plots").err
+    assert (
+        'hint: model.theory = "linear" has no centrifugal stiffening, and loses its stiffness at 3.8 rad/s'
+        in rotfem(*fast, "--no-plots").err
+    )
     assert "hint" not in rotfem(*fast, "--no-plots", "--no-advice").err

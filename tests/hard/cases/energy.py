@@ -93,7 +93,7 @@ CASES += [
         tolerance=0.005,
         source="20 N·m for 0.5 s",
         expected=expected,
-        words="off the impulse",
+        words="from the impulse",
         nightly=(theory, inertia) != ("consistent_linear", 1e-2),
     )
     for theory, inertia, scheme, expected in (

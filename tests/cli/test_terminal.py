@@ -1,0 +1,224 @@
+"""Every verb at a terminal of 80 columns: how wide, in which words and units, and what is seen meanwhile."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import re
+import signal
+import struct
+import subprocess
+import sys
+import termios
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from tests import blade_decks
+from tests.launch import environment
+
+COLUMNS = 80
+
+BLADE = """\
+[structure]
+type = "spatial_beam"
+length = "10 m"
+section = { EA = 2.8e7, GA2 = 1e7, GA3 = 1e7, GJ = 1e4, EI2 = 1.4e4, EI3 = 2.4e4, mass_per_length = 1.2 }
+[motion]
+type = "constant"
+speed = "30 rpm"
+[mesh]
+elements = 2
+[modes]
+count = 3
+"""
+
+ARM = """\
+[structure]
+type = "planar_beam"
+length = 10.0
+section = { EA = 2.8e7, GA = 1e7, EI = 1.4e4, mass_per_length = 1.2 }
+[motion]
+type = "constant"
+speed = "30 rpm"
+[mesh]
+elements = 2
+[modes]
+count = 2
+[loads.tip_force]
+harmonic = { amplitude = [0, 1], frequency = "1 Hz" }
+[time]
+end = 0.5
+step = 0.05
+"""
+
+VERBS = {
+    "history": ("run", "arm.toml"),
+    "to an accuracy": ("run", "arm.toml", "--accuracy", "1e-2"),
+    "steady": ("run", "blade.toml"),
+    "modes": ("modes", "blade.toml"),
+    "linear": ("modes", "blade.toml", "--set", "model.theory=linear"),
+    "campbell": ("campbell", "blade.toml", "--speeds", "0:60:4rpm"),
+    "response": ("response", "arm.toml", "--from", "0.2Hz", "--to", "1Hz", "--number", "20"),
+    "check": ("check", "blade.toml"),
+    "explain": ("explain", "blade.toml", "--check"),
+    "cost": ("cost", "blade.toml", "--quick", "--repeat", "1", "--budget", "5s", "--accuracy", "0.1"),
+    "sweep": ("sweep", "blade.toml", "--set", "motion.speed=0:20:2rpm", "--", "modes"),
+    "import": ("import", "Blade.st", "-o", "imported.toml"),
+    "unknown key": ("run", "arm.toml", "--set", "motion.sped=3"),
+    "no theory": ("modes", "blade.toml", "--set", "model.theory=nonlinear"),
+    "failure": ("run", "blade.toml", "--set", "motion.speed=1e5 rpm"),
+    "version": ("--version",),
+}
+
+HELPS = ("", "run", "modes", "campbell", "response", "check", "explain", "cost", "sweep", "compare", "import")
+
+#: Sequences that steer a terminal; those of them that colour.
+CONTROL, COLOUR = re.compile(r"\x1b\[[?\d;]*[A-Za-z]"), re.compile(r"\x1b\[[\d;]*3[1-8][\d;]*m")
+
+#: Words of the program's own, which an engineer has not met.
+PRIVATE = re.compile(
+    r"dofs|fastest wanted|integrals in|puts? (?:it )?off|pursu|patience|\bbeside\b|comes out|is off by|is unknown"
+)
+
+
+class Shown(NamedTuple):
+    """What a command wrote to its terminal, when (s) each part of it came, and its exit status."""
+
+    text: str
+    parts: list[tuple[float, str]]
+    status: int
+
+    @property
+    def lines(self) -> list[str]:
+        """Lines as they were seen, each state of a bar too."""
+        return re.split(r"[\r\n]+", CONTROL.sub("", self.text))
+
+
+Terminal = Callable[..., Shown]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with the scenes."""
+    path = tmp_path_factory.mktemp("terminal")
+    for name, text in (("blade.toml", BLADE), ("arm.toml", ARM), ("Blade.st", blade_decks.hawc2(False))):
+        (path / name).write_text(text)
+    return path
+
+
+@pytest.fixture(scope="module")
+def terminal(folder: Path) -> Terminal:
+    """Return a function that runs `rotfem …` there, at a terminal; `stop` ends it with SIGINT at a text."""
+
+    def run(*arguments: str, stop: str = "", **more: str) -> Shown:
+        ours, theirs = os.openpty()
+        fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 40, COLUMNS, 0, 0))
+        inside = {"TERM": "xterm-256color", "COLUMNS": "", "LINES": "", **more}
+        command = [sys.executable, "-m", "rotfem", *arguments]
+        started, text, parts = time.monotonic(), "", []
+        process = subprocess.Popen(
+            command,
+            cwd=folder,
+            env=environment() | inside,
+            stdin=theirs,
+            stdout=theirs,
+            stderr=theirs,
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        )
+        os.close(theirs)
+        while data := _read(ours):
+            text += data
+            parts.append((time.monotonic() - started, data))
+            if stop and stop in CONTROL.sub("", text):
+                process.send_signal(signal.SIGINT)
+                stop = ""
+        os.close(ours)
+        return Shown(text, parts, process.wait(60))
+
+    return run
+
+
+def _read(descriptor: int) -> str:
+    try:
+        return os.read(descriptor, 1 << 16).decode(errors="replace")
+    except OSError:  # the other end is closed
+        return ""
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_what_a_verb_prints(name: str, terminal: Terminal, folder: Path) -> None:
+    """No line is longer than the terminal, no number is round-off, no word the program's own; bad ends say so."""
+    arguments = VERBS[name]
+    where = () if arguments[0] in ("import", "--version") else ("-o", f"out {name}".replace(" ", "-"))
+    at = arguments.index("--") if "--" in arguments else len(arguments)
+    shown = terminal(*arguments[:at], *where, *arguments[at:])
+    assert shown.status == {"unknown key": 2, "no theory": 2, "failure": 3}.get(name, 0), shown.text
+    assert "Traceback" not in shown.text
+    assert [line for line in shown.lines if len(line) > COLUMNS] == []
+    assert re.findall(r"\d+(?:\.\d+)?e-(?:1\d|[2-9]\d)", "\n".join(shown.lines)) == []
+    assert PRIVATE.findall("\n".join(shown.lines)) == []
+
+
+@pytest.mark.parametrize("verb", HELPS)
+def test_help(verb: str, terminal: Terminal) -> None:
+    shown = terminal(*verb.split(), "--help")
+    assert shown.status == 0
+    assert "Usage: rotfem" in shown.text
+    assert "\\[" not in shown.text
+    assert "..." not in shown.text.replace("[ARGS]...", "").replace("VERB...", ""), "a sentence that is cut"
+    assert [line for line in shown.lines if len(line) > COLUMNS] == []
+
+
+def test_speeds_in_rpm_are_answered_in_rpm(terminal: Terminal) -> None:
+    """The scene says 30 rpm; a speed that a warning has in rad/s is there in rpm too."""
+    modes = terminal("modes", "blade.toml", "--set", "model.theory=linear", "-o", "out-linear")
+    assert "state at 30 rpm" in modes.text
+    sweep = terminal("campbell", "blade.toml", "--speeds", "0:60:4rpm", "-o", "out-campbell")
+    assert "rad/s at 60 rpm" in sweep.text
+    assert "critical speed (rpm)" in sweep.text
+    fast = terminal("run", "arm.toml", "--set", "model.theory=linear", "--set", "motion.speed=80 rpm", "-o", "out-fast")
+    said = " ".join(CONTROL.sub("", fast.text).split())
+    assert "stiffness at 3.8 rad/s (36.2873 rpm); the scene reaches 8.38 rad/s" in said
+
+
+def test_comparing(terminal: Terminal) -> None:
+    for folder, elements in (("coarse", "2"), ("fine", "4")):
+        assert terminal("modes", "blade.toml", "-q", "--set", f"mesh.elements={elements}", "-o", folder).text == ""
+    shown = terminal("compare", "coarse", "fine", "-o", "compared")
+    assert shown.status == 0
+    assert "difference (%)" in shown.text
+    assert [line for line in shown.lines if len(line) > COLUMNS] == []
+
+
+def test_no_colour(terminal: Terminal) -> None:
+    assert COLOUR.search(terminal("modes", "blade.toml", "-o", "out-colour").text)
+    plain = terminal("modes", "blade.toml", "-o", "out-colour", NO_COLOR="1")
+    assert "blade: modes" in plain.text, "the bar is there all the same"
+    assert not COLOUR.search(plain.text)
+
+
+def test_compilation_is_said_with_a_bar_that_moves(terminal: Terminal, tmp_path: Path) -> None:
+    """With an empty cache of forms: a bar from the start on, which says so as soon as something is compiled."""
+    shown = terminal("modes", "blade.toml", "-o", "out-cold", XDG_CACHE_HOME=str(tmp_path))
+    whole = shown.parts[-1][0]
+    frames = [(when, text) for when, text in shown.parts if "compiling (first run only)" in text]
+    assert shown.parts[0][0] < 0.5 * whole, "the bar is there long before the result"
+    assert len({text for _, text in frames}) > 3, "it moves"
+    assert frames[-1][0] - frames[0][0] > 0.3 * (whole - frames[0][0]), "it is seen for as long as that takes"
+    warm = terminal("modes", "blade.toml", "-o", "out-cold", XDG_CACHE_HOME=str(tmp_path))
+    assert "compiling" not in warm.text
+
+
+def test_an_interrupted_run_says_where_its_results_are(terminal: Terminal, folder: Path) -> None:
+    """Ctrl-C once the bar shows a share of the run: a step of 1e-4 s to 100 s takes longer than anyone waits."""
+    long = ("--set", "time.end=100.0", "--set", "time.step=1e-4", "--set", "output.error=false", "--no-plots")
+    shown = terminal("run", "arm.toml", *long, "-o", "out-cut", stop=" 0 %")
+    assert shown.status == 130
+    said = " ".join(CONTROL.sub("", shown.text).split())
+    assert "rotfem: interrupted; results until then are in out-cut; history.csv has" in said
+    assert (folder / "out-cut" / "history.csv").exists()
+    assert [line for line in shown.lines if len(line) > COLUMNS] == []
