@@ -29,17 +29,7 @@ for critical in diagram.critical_speeds:
 diagram.plot()
 
 # %%
-from matplotlib.figure import Figure
-
-figure = Figure(layout="constrained")
-axis = figure.subplots()
-for i, (name, wave) in enumerate(diagram.travelling_waves().items()):
-    axis.plot(wave["speed"], wave["forward"], f"C{i}", label=name)
-    axis.plot(wave["speed"], wave["backward"], f"C{i}--")
-axis.axhline(0.0, color="grey", lw=0.7)
-axis.set(xlabel="speed Ω (rad/s)", ylabel="frequency in the fixed frame (rad/s)", title="backward waves are dashed")
-axis.legend()
-figure
+diagram.plot(drawing="campbell_fixed")
 
 # %% [markdown]
 # ## Is it right?
