@@ -1,16 +1,36 @@
-"""Modes once more, with the stiff strains as unknowns, where round-off of the stiffness has spoilt them."""
+"""Modes once more, with the stiff strains as unknowns, where round-off of the stiffness has spoilt them.
+
+In K = Σ ∫ DΓᵀ C DΓ + … a bending mode is what is left when axial and shear strains of 1e12 times its stiffness cancel,
+so round-off of the sums alone is as large as it. With the strains e at the integration points as further unknowns,
+
+    [ K_rest   R_Cᵀ ] [ x ]
+    [ R_C     −W_C  ] [ e ],      R_C = ∫ τ·C DΓ,   W_C = ∫ τ·C e,
+
+nothing is summed that cancels: the second row says e = DΓ x, and the eigenvalues are those of (M, C, K). K_rest has the
+soft strains, the effects, and the stress of the state on the second derivative of the stiff strains.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import Any
 
+import basix.ufl
 import numpy as np
 import numpy.typing as npt
+import ufl
+from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
+from mpi4py import MPI
+from petsc4py import PETSc
 
-from rotfem.equations.mixed_form import Resultants, Saddle
 from rotfem.errors import ComputationError
+from rotfem.mechanics import work
+from rotfem.mechanics.work import Variation
+from rotfem.numerics import forms
 from rotfem.numerics.balance import power_of_two
 from rotfem.numerics.eigenproblem import ROUNDED, Eigenpairs, Pencil, RoundOff, relative
+from rotfem.numerics.linear import set_diagonal
 from rotfem.numerics.low_rank import sparse_part
 
 Array = npt.NDArray[Any]
@@ -20,6 +40,155 @@ LOST = 1e-5
 
 #: Error bound that viscosity alone would leave, from which nothing is gained.
 WORTH = 0.1
+
+
+@dataclass(frozen=True)
+class Saddle:
+    """Matrices over (x, e), and what they are made of.
+
+    Attributes:
+        M, C, K: PETSc matrices; owned unknowns are those of x, then those of e.
+        factors: the same matrix K without K_rest: each entry is one product, rounded relative to itself.
+        rest: K_rest.
+        stressed: geometric stiffness of x per unit strain of the state, whose own round-off is one of numbers of order
+            one; None of a state without stress.
+    """
+
+    M: Any
+    C: Any
+    K: Any
+    factors: Any
+    rest: Any
+    stressed: Any = None
+
+
+class Resultants:
+    """The stiff strains of a system, compiled.
+
+    Args:
+        system: equations of motion of the structure, hub held, not moving.
+    """
+
+    def __init__(self, system: Any):
+        self.system, self.model, self.V = system, system.model, system.V
+        m = self.model.mechanics
+        stiff = [s for s in m.strains if s.name in system.structure.stiff]
+        soft = [s for s in m.strains if s.name not in system.structure.stiff]
+        self._state = fem.Function(self.V)
+        self._rows = [self._compile(s) for s in stiff]
+        self._rest = self._compile_rest(stiff, soft)
+        self._stressed = self._compile_stressed()
+
+    @staticmethod
+    def possible(system: Any) -> bool:
+        """Whether a system has stiff strains."""
+        return bool(system.structure.stiff)
+
+    def _at_rest(self, form: Any) -> Any:
+        q, v, a, _ = self.model.mechanics.k.functions
+        gone = (q, v, a) if self.system.linear else (v, a)
+        return forms.without(form, *gone)
+
+    def _compile(self, strain: Any) -> tuple[Any, Any]:
+        """Return the forms of R_C and W_C of one strain."""
+        mesh, q = self.V.mesh, self.system.q
+        shape, degree = ufl.as_ufl(strain.value).ufl_shape, strain.measure.metadata()["quadrature_degree"]
+        element = basix.ufl.quadrature_element(mesh.basix_cell(), value_shape=shape, degree=degree)
+        Q = fem.functionspace(mesh, element)
+        tau, e, du = ufl.TestFunction(Q), ufl.TrialFunction(Q), ufl.TrialFunction(self.V)
+        slope = ufl.derivative(strain.value, q, du)
+        rows = self._at_rest(ufl.inner(tau, strain.force(slope)) * strain.measure)
+        return forms.form(rows, once=True), forms.form(ufl.inner(tau, strain.force(e)) * strain.measure, once=True)
+
+    def _compile_rest(self, stiff: list[Any], soft: list[Any]) -> Any:
+        """Return the form of K_rest, in a linear theory without what its pieces hold; None where it is empty."""
+        m, du = self.model.mechanics, ufl.TrialFunction(self.V)
+        if self.system.linear and not soft:
+            return None
+        inner = work.internal(replace(m, strains=soft), Variation(m.k)) if soft else 0
+        if not self.system.linear:
+            inner += sum(term for name, term in self.model.terms.items() if name != "internal")
+            for s in stiff:  # the stress of the state, which the derivative does not see
+                stress = s.force(ufl.replace(s.value, {self.system.q: self._state}))
+                inner += ufl.inner(stress, m.k.variation(s.value)) * s.measure
+        form = self._at_rest(ufl.derivative(inner, self.system.q, du))
+        return None if form.empty() else forms.form(form, once=True)
+
+    def _compile_stressed(self) -> Any:
+        """Return the form of ∫ C 1·D²Γ of the strains with large stresses; None where there is none."""
+        m, s, theory, du = self.model.mechanics, self.system.structure, self.model.theory, ufl.TrialFunction(self.V)
+        higher = self.model.strains(theory.prestress_measures(s.type)) if theory.prestress else m.strains
+        out: Any = 0
+        for first, strain in zip(m.strains, higher, strict=True):
+            if strain.name in {*s.stiff, *s.prestressing}:
+                shape = ufl.as_ufl(strain.value).ufl_shape
+                force = first.force(ufl.as_vector([1.0] * shape[0]) if shape else ufl.as_ufl(1.0))
+                out += ufl.inner(force, ufl.derivative(m.k.variation(strain.value), self.system.q, du)) * strain.measure
+        form = self._at_rest(out)
+        return None if form.empty() else forms.form(form, once=True)
+
+    @property
+    def _has_stress(self) -> bool:
+        return self.system.prestressed if self.system.linear else bool(np.any(self._state.x.array))
+
+    def at_state(self, M: Any, C: Any) -> Saddle:
+        """Return the matrices at the state and time set in the system, given its M and C."""
+        system = self.system
+        self._state.x.array[:] = system.q.x.array
+        rest = M.duplicate()
+        if self._rest is not None:
+            rest.zeroEntries()
+            fem_petsc.assemble_matrix(rest, self._rest, system.bcs, 0.0)
+            rest.assemble()
+        if system.linear:
+            system.add_other_stiffness(rest)
+        set_diagonal(system.clamped, rest, 1.0)
+        free = M.createVecRight()
+        free.array[:] = 1.0
+        free.array[system.clamped] = 0.0
+        rows, blocks = [], []
+        for row, block in self._rows:
+            R, W = (fem_petsc.assemble_matrix(form) for form in (row, block))
+            R.assemble()
+            W.assemble()
+            R.diagonalScale(None, free)
+            W.scale(-1.0)
+            rows.append(R)
+            blocks.append(W)
+        zero = [_empty(W) for W in blocks]
+        grid = _bordered(_empty(M), rows, blocks)
+        stressed = None
+        if self._stressed is not None and self.system.comm.allreduce(self._has_stress, op=MPI.LOR):
+            stressed = fem_petsc.assemble_matrix(self._stressed, system.bcs, 0.0)
+            stressed.assemble()
+        return Saddle(_diagonal(M, zero), _diagonal(C, zero), _bordered(rest, rows, blocks), grid, rest, stressed)
+
+
+def _empty(A: Any) -> Any:
+    """Return a matrix of the size of a square one, without entries."""
+    out = PETSc.Mat().createAIJ((A.getSizes()[0], A.getSizes()[0]), nnz=0, comm=A.comm)
+    out.assemble()
+    return out
+
+
+def _joined(grid: list[list[Any]]) -> Any:
+    out = PETSc.Mat().createNest(grid, comm=grid[0][0].comm)
+    out.assemble()
+    return out.convert("aij")
+
+
+def _diagonal(first: Any, others: list[Any]) -> Any:
+    """Return a block-diagonal matrix."""
+    blocks = [first, *others]
+    return _joined([[A if i == j else None for j in range(len(blocks))] for i, A in enumerate(blocks)])
+
+
+def _bordered(corner: Any, rows: list[Any], blocks: list[Any]) -> Any:
+    """Return [[corner, R₁ᵀ, …], [R₁, W₁], …]."""
+    grid = [[corner, *(R.transpose(PETSc.Mat()) for R in rows)]]
+    for i, (R, W) in enumerate(zip(rows, blocks, strict=True)):
+        grid.append([R, *(W if i == j else None for j in range(len(rows)))])
+    return _joined(grid)
 
 
 class KeptDigits:

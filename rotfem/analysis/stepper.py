@@ -57,19 +57,69 @@ MANY, WHOLE = 3, 0.9
 REFINED, RATE, ROUND_OFF = 1e-11, 0.3, 1e-8
 
 
-class StageSolver:
-    """The equations that a scheme's stages are solved with (see `Equations`).
+def keep_rotations_small(system: Any, scheme: Scheme, state: State, h: float) -> bool:
+    """Count rotations afresh if a step of h (s) might lead out of their range; return whether that was done.
+
+    The motion that the state describes does not change, but the numbers for it do, in the state itself, so that whoever
+    holds it can go on with it. A memory of the scheme that is a second rate, as an auxiliary acceleration is, changes
+    as one; of any other the scheme makes a new one.
+    """
+    turns = system.structure.turns
+    if turns is None:
+        return False
+    system.count_rotations_from(state.reference)
+    if not turns.is_due(state.q, state.v, h):
+        return False
+    is_rate = isinstance(state.memory, np.ndarray) and state.memory.shape == state.a.shape
+    q, v, a = state.q.copy(), state.v.copy(), state.a.copy()
+    second = [a, state.memory.copy()] if is_rate else [a]
+    reference = turns.reset(q, v, second)
+    system.count_rotations_from(reference)
+    state.q, state.v, state.a, state.reference = q, v, a, reference
+    state.memory = second[-1] if is_rate else scheme.start(state.changed(memory=None)).memory
+    return True
+
+
+#: Halvings left with which a step is taken though it feeds the motion.
+STUBBORN = 3
+
+#: Parts in which another scheme takes a step that the scheme cannot: it is of lower order.
+PARTS = 2
+
+#: Relative jump of what is prescribed that is none.
+STEADY = 1e-7
+
+
+@contextmanager
+def seen(system: Any, view: View) -> Iterator[None]:
+    """Let a system see what is prescribed as a view shows it."""
+    system.view.side, system.view.window = view.side, view.window
+    try:
+        yield
+    finally:
+        system.view.side, system.view.window = 0, None
+
+
+class Stepper:
+    """Advances a system in time; to a scheme it is the equations that its stages are solved with (see `Equations`).
 
     Args:
         system: equations of motion; its functions q, v, a are overwritten.
+        scheme: of stages and update maps.
         newton: iteration control, shared by all steps so that it learns the quadratic constant.
 
     Attributes:
         back_off: with old factors.
+        substeps, rejected: steps that were halved (Newton failed, or energy rose), and adaptive ones taken back.
+        substituted: steps that the scheme could not take, by the name of the one that did.
+        scheme_back_off: in the scheme, where others may stand in for it.
+        pace: length of the next adaptive step (s), largest displacement so far (scaled), and length that the errors so
+            far allow (s); None before the first.
+        observer: an observer of every step that counts; None without one.
     """
 
-    def __init__(self, system: Any, newton: Newton):
-        self.system, self.newton = system, newton
+    def __init__(self, system: Any, scheme: Scheme, newton: Newton):
+        self.system, self.newton, self.scheme = system, newton, scheme
         self._factored: Shifts | None = None
         #: Matrices, and the stage that they are about.
         self._linearised: Any = None
@@ -81,6 +131,156 @@ class StageSolver:
         #: Share of the last predicted move that came true.
         self._share = 1.0
         self.back_off = BackOff()
+        self.substeps = self.rejected = 0
+        self.substituted: dict[str, int] = {}
+        self.scheme_back_off = BackOff()
+        self.pace: tuple[float, float, float] | None = None
+        self.observer: Observer | None = None
+        #: Energy at the first step that was hard, and ranges of the energies that were seen since (see `fed`).
+        self._exchange: tuple[float, ...] | None = None
+
+    def start(self, t: float, q: Array, v: Array) -> State:
+        """Return the state at t (s) with the acceleration that the equations of motion give."""
+        s = self.system
+        state = State(t, q.copy(), v.copy(), np.zeros_like(q), reference=s.reference)
+        with seen(s, View(1)):
+            s.prescribe(t, state.q, state.v, state.a)
+            s.set_time(t)
+            s.set_state(state.q, state.v, state.a)
+            state.a += s.acceleration(t)
+            state.given = s.given(state)
+        return self.scheme.start(state)
+
+    def restart(self, state: State, before: View, after: View) -> State:
+        """Return a state with the accelerations that hold after a jump of what drives the system.
+
+        Args:
+            state: at the end of a step.
+            before: how that step sees what is prescribed here.
+            after: how the next one does.
+        """
+        s, t = self.system, state.t
+        s.count_rotations_from(state.reference)
+        with seen(s, before):
+            old = s.driven(t)
+        with seen(s, after):
+            if np.allclose(s.driven(t), old, rtol=STEADY, atol=0.0):
+                return self.scheme.kinked(state)
+        return self._accelerated(state, after)
+
+    def _accelerated(self, state: State, view: View) -> State:
+        """Return a state with the accelerations that its equations of motion give, seen by a view."""
+        s, t = self.system, state.t
+        new = state.changed(q=state.q.copy(), v=state.v.copy(), a=state.a.copy(), balanced=True)
+        with seen(s, view):
+            s.prescribe(t, new.q, new.v, new.a)
+            s.set_time(t)
+            s.set_state(new.q, new.v, new.a)
+            new.a += s.acceleration(t)
+            new.given = s.given(new)
+        if new.given is not None and state.given is not None:
+            new.given[:2] = state.given[:2]
+        return self.scheme.jumped(new, new.a - state.a)
+
+    def drift(self, state: State, h: float, end: float, finish: View) -> State:
+        """Return the state at the end of a step too short to be solved for: round-off of q would spoil a.
+
+        The accelerations at both ends count by halves in v (the trapezoidal rule), so that no blow is lost.
+
+        Args:
+            state: where the step starts.
+            h: length of the step, s.
+            end: its last instant, s.
+            finish: how it sees there what is prescribed.
+        """
+        self.system.count_rotations_from(state.reference)
+        q, v = state.q + h * state.v + 0.5 * h * h * state.a, state.v + h * state.a
+        given = state.given
+        if given is not None:
+            given = given + np.array([0.0, self.system.row.impulse(state.t, end), 0.0])
+        new = self._accelerated(state.changed(t=end, q=q, v=v, given=given), finish)
+        return new.changed(v=new.v + 0.5 * h * (new.a - state.a))
+
+    def step(self, state: State, h: float, end: float | None = None) -> State:
+        """Return the state at state.t + h.
+
+        Args:
+            state: where the step starts.
+            h: length of the step, s.
+            end: its last instant, where state.t + h must not have a rounding error (a jump, that is before it).
+
+        Raises:
+            ComputationError: Newton failed; the given state is untouched.
+        """
+        end = state.t + h if end is None else end
+        self._hard = False
+        stages = self.scheme.solved(state, h, end, self)
+        new = self.scheme.finish(state, h, stages)
+        new.reference = state.reference
+        self.system.check_reach(new.q, new.t)
+        new.given = self.system.given(new, state)
+        return new
+
+    def advance(self, state: State, h: float, end: float | None = None, halvings: int = 5) -> State:
+        """Return the state at state.t + h (see `step`), in halved steps where the whole one fails or feeds the motion.
+
+        Raises:
+            ComputationError: Newton failed at the smallest step too; says how small it was.
+        """
+        if keep_rotations_small(self.system, self.scheme, state, h):
+            self._factored = None
+        others, failure, gains = self.scheme.fallbacks(), None, False
+        if halvings == 0 or not others or self.scheme_back_off.over():
+            try:
+                new = self.step(state, h, end)
+            except ComputationError as error:
+                failure = error
+                self.scheme_back_off.failed()
+            else:
+                self.scheme_back_off.worked()
+                gains = halvings > STUBBORN and self._gains_energy(new, state)
+                if not gains:
+                    return new
+        if halvings > 0 and not gains and (stood := self._substituted(others, state, h, end)) is not None:
+            return stood
+        if failure is not None and (halvings == 0 or (self.system.solved_at_once and not others)):
+            raise _cut_down(failure, h) if halvings == 0 else failure
+        self.substeps += 1
+        middle = self.advance(state, h / 2, None, halvings - 1)
+        return self.advance(middle, h / 2, state.t + h if end is None else end, halvings - 1).after(middle)
+
+    def _substituted(self, others: Sequence[Scheme], state: State, h: float, end: float | None) -> State | None:
+        """Return the state at the end of a step that one of other schemes takes, in parts; None if none can."""
+        for scheme in others:
+            other = Stepper(self.system, scheme, self.newton)
+            now, last = scheme.start(state), state.t + h if end is None else end
+            try:
+                for part in range(1, PARTS + 1):
+                    new = other.advance(now, h / PARTS, last if part == PARTS else None)
+                    now = new.after(now) if part > 1 else new
+            except ComputationError:
+                continue
+            self.substituted[scheme.name] = self.substituted.get(scheme.name, 0) + 1
+            self.substeps += other.substeps
+            return self.scheme.start(now)
+        return None
+
+    def _gains_energy(self, new: State, state: State) -> bool:
+        """Return whether a step that was hard to solve raises an energy that is too large already (see `fed`)."""
+        if not self._hard or self._balanced or self.system.linear or not self.system.model.closed:
+            return False
+        self._exchange, gains = energy_gain(self.system, new, state, self._exchange)
+        return gains
+
+    def warnings(self) -> list[str]:
+        """Return what a run says of its steps."""
+        out = [f"{self.substeps} steps were halved where Newton failed or energy rose"] if self.substeps else []
+        for name, number in self.substituted.items():
+            taken = f"{number} steps that {self.scheme.name} could not solve were taken by {name}"
+            out.append(f"{taken}: their errors are those of that scheme")
+        return out
+
+    # --- stages ------------------------------------------------------------------------------------------------------
 
     def predicted(self, stage: Stage, state: State) -> Array:
         """Return q of a stage that turns with the clamp where that moves: it is the better prediction."""
@@ -237,219 +437,6 @@ class StageSolver:
                 break
             previous = d
         raise ComputationError("the old factor is too far from the matrix")
-
-
-def keep_rotations_small(system: Any, scheme: Scheme, state: State, h: float) -> bool:
-    """Count rotations afresh if a step of h (s) might lead out of their range; return whether that was done.
-
-    The motion that the state describes does not change, but the numbers for it do, in the state itself, so that whoever
-    holds it can go on with it. A memory of the scheme that is a second rate, as an auxiliary acceleration is, changes
-    as one; of any other the scheme makes a new one.
-    """
-    turns = system.structure.turns
-    if turns is None:
-        return False
-    system.count_rotations_from(state.reference)
-    if not turns.is_due(state.q, state.v, h):
-        return False
-    is_rate = isinstance(state.memory, np.ndarray) and state.memory.shape == state.a.shape
-    q, v, a = state.q.copy(), state.v.copy(), state.a.copy()
-    second = [a, state.memory.copy()] if is_rate else [a]
-    reference = turns.reset(q, v, second)
-    system.count_rotations_from(reference)
-    state.q, state.v, state.a, state.reference = q, v, a, reference
-    state.memory = second[-1] if is_rate else scheme.start(state.changed(memory=None)).memory
-    return True
-
-
-#: Halvings left with which a step is taken though it feeds the motion.
-STUBBORN = 3
-
-#: Parts in which another scheme takes a step that the scheme cannot: it is of lower order.
-PARTS = 2
-
-#: Relative jump of what is prescribed that is none.
-STEADY = 1e-7
-
-
-@contextmanager
-def seen(system: Any, view: View) -> Iterator[None]:
-    """Let a system see what is prescribed as a view shows it."""
-    system.view.side, system.view.window = view.side, view.window
-    try:
-        yield
-    finally:
-        system.view.side, system.view.window = 0, None
-
-
-class Stepper(StageSolver):
-    """Advances a system in time.
-
-    Args:
-        system: equations of motion; its functions q, v, a are overwritten.
-        scheme: of stages and update maps.
-        newton: iteration control, shared by all steps so that it learns the quadratic constant.
-
-    Attributes:
-        substeps, rejected: steps that were halved (Newton failed, or energy rose), and adaptive ones taken back.
-        substituted: steps that the scheme could not take, by the name of the one that did.
-        scheme_back_off: in the scheme, where others may stand in for it.
-        pace: length of the next adaptive step (s), largest displacement so far (scaled), and length that the errors so
-            far allow (s); None before the first.
-        observer: an observer of every step that counts; None without one.
-    """
-
-    def __init__(self, system: Any, scheme: Scheme, newton: Newton):
-        super().__init__(system, newton)
-        self.scheme = scheme
-        self.substeps = self.rejected = 0
-        self.substituted: dict[str, int] = {}
-        self.scheme_back_off = BackOff()
-        self.pace: tuple[float, float, float] | None = None
-        self.observer: Observer | None = None
-        #: Energy at the first step that was hard, and ranges of the energies that were seen since (see `fed`).
-        self._exchange: tuple[float, ...] | None = None
-
-    def start(self, t: float, q: Array, v: Array) -> State:
-        """Return the state at t (s) with the acceleration that the equations of motion give."""
-        s = self.system
-        state = State(t, q.copy(), v.copy(), np.zeros_like(q), reference=s.reference)
-        with seen(s, View(1)):
-            s.prescribe(t, state.q, state.v, state.a)
-            s.set_time(t)
-            s.set_state(state.q, state.v, state.a)
-            state.a += s.acceleration(t)
-            state.given = s.given(state)
-        return self.scheme.start(state)
-
-    def restart(self, state: State, before: View, after: View) -> State:
-        """Return a state with the accelerations that hold after a jump of what drives the system.
-
-        Args:
-            state: at the end of a step.
-            before: how that step sees what is prescribed here.
-            after: how the next one does.
-        """
-        s, t = self.system, state.t
-        s.count_rotations_from(state.reference)
-        with seen(s, before):
-            old = s.driven(t)
-        with seen(s, after):
-            if np.allclose(s.driven(t), old, rtol=STEADY, atol=0.0):
-                return self.scheme.kinked(state)
-        return self._accelerated(state, after)
-
-    def _accelerated(self, state: State, view: View) -> State:
-        """Return a state with the accelerations that its equations of motion give, seen by a view."""
-        s, t = self.system, state.t
-        new = state.changed(q=state.q.copy(), v=state.v.copy(), a=state.a.copy(), balanced=True)
-        with seen(s, view):
-            s.prescribe(t, new.q, new.v, new.a)
-            s.set_time(t)
-            s.set_state(new.q, new.v, new.a)
-            new.a += s.acceleration(t)
-            new.given = s.given(new)
-        if new.given is not None and state.given is not None:
-            new.given[:2] = state.given[:2]
-        return self.scheme.jumped(new, new.a - state.a)
-
-    def drift(self, state: State, h: float, end: float, finish: View) -> State:
-        """Return the state at the end of a step too short to be solved for: round-off of q would spoil a.
-
-        The accelerations at both ends count by halves in v (the trapezoidal rule), so that no blow is lost.
-
-        Args:
-            state: where the step starts.
-            h: length of the step, s.
-            end: its last instant, s.
-            finish: how it sees there what is prescribed.
-        """
-        self.system.count_rotations_from(state.reference)
-        q, v = state.q + h * state.v + 0.5 * h * h * state.a, state.v + h * state.a
-        given = state.given
-        if given is not None:
-            given = given + np.array([0.0, self.system.row.impulse(state.t, end), 0.0])
-        new = self._accelerated(state.changed(t=end, q=q, v=v, given=given), finish)
-        return new.changed(v=new.v + 0.5 * h * (new.a - state.a))
-
-    def step(self, state: State, h: float, end: float | None = None) -> State:
-        """Return the state at state.t + h.
-
-        Args:
-            state: where the step starts.
-            h: length of the step, s.
-            end: its last instant, where state.t + h must not have a rounding error (a jump, that is before it).
-
-        Raises:
-            ComputationError: Newton failed; the given state is untouched.
-        """
-        end = state.t + h if end is None else end
-        self._hard = False
-        stages = self.scheme.solved(state, h, end, self)
-        new = self.scheme.finish(state, h, stages)
-        new.reference = state.reference
-        self.system.check_reach(new.q, new.t)
-        new.given = self.system.given(new, state)
-        return new
-
-    def advance(self, state: State, h: float, end: float | None = None, halvings: int = 5) -> State:
-        """Return the state at state.t + h (see `step`), in halved steps where the whole one fails or feeds the motion.
-
-        Raises:
-            ComputationError: Newton failed at the smallest step too; says how small it was.
-        """
-        if keep_rotations_small(self.system, self.scheme, state, h):
-            self._factored = None
-        others, failure, gains = self.scheme.fallbacks(), None, False
-        if halvings == 0 or not others or self.scheme_back_off.over():
-            try:
-                new = self.step(state, h, end)
-            except ComputationError as error:
-                failure = error
-                self.scheme_back_off.failed()
-            else:
-                self.scheme_back_off.worked()
-                gains = halvings > STUBBORN and self._gains_energy(new, state)
-                if not gains:
-                    return new
-        if halvings > 0 and not gains and (stood := self._substituted(others, state, h, end)) is not None:
-            return stood
-        if failure is not None and (halvings == 0 or (self.system.solved_at_once and not others)):
-            raise _cut_down(failure, h) if halvings == 0 else failure
-        self.substeps += 1
-        middle = self.advance(state, h / 2, None, halvings - 1)
-        return self.advance(middle, h / 2, state.t + h if end is None else end, halvings - 1).after(middle)
-
-    def _substituted(self, others: Sequence[Scheme], state: State, h: float, end: float | None) -> State | None:
-        """Return the state at the end of a step that one of other schemes takes, in parts; None if none can."""
-        for scheme in others:
-            other = Stepper(self.system, scheme, self.newton)
-            now, last = scheme.start(state), state.t + h if end is None else end
-            try:
-                for part in range(1, PARTS + 1):
-                    new = other.advance(now, h / PARTS, last if part == PARTS else None)
-                    now = new.after(now) if part > 1 else new
-            except ComputationError:
-                continue
-            self.substituted[scheme.name] = self.substituted.get(scheme.name, 0) + 1
-            self.substeps += other.substeps
-            return self.scheme.start(now)
-        return None
-
-    def _gains_energy(self, new: State, state: State) -> bool:
-        """Return whether a step that was hard to solve raises an energy that is too large already (see `fed`)."""
-        if not self._hard or self._balanced or self.system.linear or not self.system.model.closed:
-            return False
-        self._exchange, gains = energy_gain(self.system, new, state, self._exchange)
-        return gains
-
-    def warnings(self) -> list[str]:
-        """Return what a run says of its steps."""
-        out = [f"{self.substeps} steps were halved where Newton failed or energy rose"] if self.substeps else []
-        for name, number in self.substituted.items():
-            taken = f"{number} steps that {self.scheme.name} could not solve were taken by {name}"
-            out.append(f"{taken}: their errors are those of that scheme")
-        return out
 
 
 def _cut_down(error: ComputationError, h: float) -> ComputationError:
