@@ -17,7 +17,10 @@ from rotfem.results import CampbellResult, ExplainResult, ModesResult, RunResult
 from rotfem.results.check import CheckResult
 from rotfem.results.plots_campbell import campbell_figure, spread
 from rotfem.results.response import ResponseResult
+from rotfem.results.run import StationHistory
+from rotfem.section_quantities import FORCES, STRAINS
 from tests.figures import check
+from tests.unit.test_result_classes import cost
 
 
 def said(**more: Any) -> dict[str, Any]:
@@ -169,6 +172,18 @@ def test_a_steady_state() -> None:
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["u₁", "u₃", "rotation θ₂"]
 
 
+def test_section_forces_along_a_beam_with_their_range() -> None:
+    """18 quantities in three columns; one that is 0 at the end, but was not before, has a panel."""
+    x, t = np.linspace(0.0, 10.0, 6), np.linspace(0.0, 1.0, 11)
+    names = [*FORCES["spatial_beam"], *STRAINS["spatial_beam"], "u1", "u2", "u3", "theta1", "theta2", "theta3"]
+    values = {name: 10.0**i * np.outer(np.sin(np.pi * t), 1 + x) for i, name in enumerate(names)}
+    figure = StationHistory(t, x, values).figure("blade")
+    check(figure)
+    assert len(figure.axes) == len(names) == 18
+    extent = figure.axes[0].collections[0].get_paths()[0].get_extents()
+    np.testing.assert_allclose([extent.y0, extent.y1], [0.0, 11.0], atol=1e-9)
+
+
 def test_where_nothing_moves_the_figure_says_so() -> None:
     x = np.linspace(0.0, 2.0, 5)
     still = RunResult(said(kind="steady"), {"t": np.zeros(1), "psi_dot": np.zeros(1)}, {"x": x, "u1": 0 * x})
@@ -289,3 +304,7 @@ def test_what_effects_change() -> None:
         {"kind": "theory", "name": "linear", "included": False, "estimate": {"steady": np.inf, "modes": 0.5}},
     ]
     check(ExplainResult(said(outputs=["steady", "modes"]), rows).plot())
+
+
+def test_costs() -> None:
+    check(cost().plot())
