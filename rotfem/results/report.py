@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 import tomli_w
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import PathCollection, PolyCollection
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_hex
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
@@ -291,7 +291,8 @@ def summary_text(summary: Mapping[str, Any]) -> str:
 
 
 def _title(figure: Figure) -> str:
-    return str(figure.get_suptitle() or (figure.axes[0].get_title() if len(figure.axes) == 1 else ""))
+    text = figure.get_suptitle() or (figure.axes[0].get_title() if len(figure.axes) == 1 else "")
+    return str(text).replace("\n", "; ")
 
 
 def picture(figure: Figure) -> str:
@@ -311,7 +312,7 @@ def interactive(figure: Figure) -> Any:
     axes = [axis for axis in figure.axes if axis.axison]
     if not axes or any(a.name == "3d" or a.images for a in axes):
         return None
-    known = (Line2D, Rectangle, PolyCollection, PathCollection)
+    known = (Line2D, Rectangle, PolyCollection)
     if not all(isinstance(artist, known) for a in axes for artist in (*a.lines, *a.patches, *a.collections)):
         return None
     x: dict[tuple[float, float], Any] = {}
@@ -326,7 +327,7 @@ DASHES = {"-": "solid", "--": "dashed", ":": "dotted", "-.": "dashdot"}
 
 def panel(axes: Any, x_range: Any) -> Any:
     """Return one panel as a figure of Bokeh."""
-    from bokeh.models import Legend, LegendItem, Range1d, Span
+    from bokeh.models import BoxAnnotation, Legend, LegendItem, Range1d, Span
     from bokeh.plotting import figure
 
     tall = axes.get_position().height * axes.get_figure().get_figheight() * 100.0
@@ -346,9 +347,11 @@ def panel(axes: Any, x_range: Any) -> Any:
     for line in (line for line in axes.lines if len(line.get_xydata())):
         colour = to_hex(line.get_color())
         dash = DASHES.get(str(line.get_linestyle()), "solid")
-        if line.get_transform() != axes.transData:  # a line over the whole height
-            place = float(np.asarray(line.get_xdata())[0])
-            plot.add_layout(Span(location=place, dimension="height", line_color=colour, line_dash=dash, line_width=1))
+        if line.get_transform() != axes.transData:  # a line from one side to the other
+            across = line.get_transform() == axes.get_yaxis_transform()
+            place = float(np.asarray(line.get_ydata() if across else line.get_xdata())[0])
+            way = "width" if across else "height"
+            plot.add_layout(Span(location=place, dimension=way, line_color=colour, line_dash=dash, line_width=1))
             continue
         said = str(line.get_label())
         said = _text_at(axes, line, colour) if said.startswith("_") else said
@@ -363,10 +366,15 @@ def panel(axes: Any, x_range: Any) -> Any:
         named.setdefault(said, []).extend(drawn)
     for bar in axes.patches:
         (left, bottom), width, height = bar.get_xy(), bar.get_width(), bar.get_height()
-        ends = {"left": left, "right": left + width, "bottom": bottom, "top": bottom + height}
         said, colour = str(bar.get_label()).removeprefix("_nolegend_"), to_hex(bar.get_facecolor())
+        if bar.get_data_transform() != axes.transData:  # a range from one side to the other
+            across = bar.get_data_transform() == axes.get_yaxis_transform()
+            ends = {"bottom": bottom, "top": bottom + height} if across else {"left": left, "right": left + width}
+            plot.add_layout(BoxAnnotation(**ends, fill_color=colour, fill_alpha=0.3, line_color=None, level="underlay"))
+            continue
+        ends = {"left": left, "right": left + width, "bottom": bottom, "top": bottom + height}
         named.setdefault(said, []).append(plot.quad(**ends, color=colour, name=said))
-    for area in (area for area in axes.collections if isinstance(area, PolyCollection)):
+    for area in axes.collections:
         for path in area.get_paths():
             colour, corners = to_hex(np.asarray(area.get_facecolor())[0].tolist()), np.asarray(path.vertices)
             plot.patch(corners[:, 0], corners[:, 1], color=colour, alpha=0.25, line_width=0)

@@ -94,7 +94,13 @@ addEventListener("load", () => setTimeout(finish, 1500));
 
 def browse(folder: Path, page: Path, *options: str) -> str:
     """Return what Chromium prints of a page; it has no network."""
-    given = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run")
+    given = (
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-background-networking",
+        "--disable-dev-shm-usage",
+    )
     alone = (f"--user-data-dir={folder / 'browser'}", "--proxy-server=127.0.0.1:9", "--virtual-time-budget=8000")
     command = [str(BROWSER), *given, *alone, *options, page.as_uri()]
     return subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
