@@ -5,6 +5,9 @@ and through q, q̇ and q̈ a quintic, of order 6 (Hermite). So what is between i
 schemes up to order 2, whose accelerations of vibrations that they do not resolve are noise, the quintic above. There
 too an acceleration that the cubic knows nothing of is that of such a vibration, as of a rod that is spun at once, which
 would throw the quintic far off: it gives way to the cubic's, and where it is beyond all that, both to a straight line.
+
+The acceleration at the end of a march solves M δa = −F(q, v, a), with the factor of M at rest where that converges
+quickly: M of a structure changes little with its deflection.
 """
 
 from __future__ import annotations
@@ -123,3 +126,24 @@ def resolved(old: State, new: State) -> list[list[Array]]:
         a = np.where(o <= KNOWN * most, s.a, c)
         out.append([s.q, np.where(line, mean, s.v), np.where(line, 0.0, a)])
     return out
+
+
+#: Corrections with the factor at rest, how fast they must shrink, and what may be left, relative to the acceleration.
+MOST, RATE, LEFT = 8, 0.1, 1e-13
+
+
+def end_acceleration(system: Any, state: State) -> Array:
+    """Return q̈ of F(q, q̇, q̈) = 0 at a state, a local dof array; the time is set, the state is written on return."""
+    a = state.a.copy()
+    before, at_rest, left = np.inf, True, MOST
+    while True:
+        system.set_state(state.q, state.v, a)
+        change = system.accelerated(system.forces(state.t), at_rest)
+        a += change
+        size, left = system.increment_size(change), left - 1
+        if not at_rest or (before < np.inf and size * size <= LEFT * before * system.increment_size(a)):
+            break
+        at_rest = left > 0 and size <= RATE * before
+        before = size
+    system.set_state(state.q, state.v, a)
+    return a

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from rotfem.analysis.dense_output import end_acceleration
 from rotfem.analysis.schemes import Array, State
 from rotfem.analysis.stability import Stability, stability_of
 from rotfem.errors import InputError
@@ -89,9 +90,7 @@ def write_state(system: Any, state: State) -> None:
 
     Forces at the root take it; without it they would not balance what the structure is accelerated by.
     """
-    system.set_state(state.q, state.v, state.a)
-    if not state.balanced:
-        system.set_state(state.q, state.v, state.a + system.acceleration(state.t))
+    system.set_state(state.q, state.v, state.a if state.balanced else end_acceleration(system, state))
 
 
 def hub_values(system: Any, state: State) -> dict[str, float]:

@@ -274,10 +274,10 @@ class BorderedSystem:
         """Return −F of the structure at the state and the time t that is set, and that of the hub behind it."""
         return np.append(self.inner.forces(t), -self.row.residual(t))
 
-    def accelerated(self, forces: Array) -> Array:
+    def accelerated(self, forces: Array, at_rest: bool = False) -> Array:
         """Return the acceleration that forces (as of `forces`) give (see `Solutions.accelerated`)."""
         s, row, shifts = self.inner, self.row, (0.0, 0.0, 1.0)
-        solver, massless = s.mass_solver()
+        solver, massless = s.mass_solver(at_rest)
         R, b = s.residual(), s.spin_derivative(0.0, 1.0)
         R.array[:] = forces[:-1]
         R.array[massless] = 0.0

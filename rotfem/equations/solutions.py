@@ -37,6 +37,7 @@ class Solutions:
     _state: tuple[Array, ...]
     _solver: DirectSolver | None
     _dx: Increment
+    _mass: tuple[Any, tuple[DirectSolver | SingularSolver, Array]] | None = None
 
     @abstractmethod
     def residual(self) -> Any:
@@ -136,19 +137,34 @@ class Solutions:
         """Return −F at the state and the time t that is set (a local array), for `accelerated`."""
         return np.array(self.residual().array)
 
-    def accelerated(self, forces: Array) -> Array:
+    def accelerated(self, forces: Array, at_rest: bool = False) -> Array:
         """Return the acceleration that forces (as of `forces`) give, M δa = forces.
 
         Unknowns without inertia (the rotation, where rotary inertia is absent or off) follow the others at once: their
         acceleration keeps their equation in balance, K δa = 0 in their rows.
+
+        Args:
+            forces: as of `forces`.
+            at_rest: whether M is taken of the undeformed structure, or of the reference; its factor is kept.
         """
-        solver, massless = self.mass_solver()
+        solver, massless = self.mass_solver(at_rest)
         b = self.residual()
         b.array[:] = forces
         b.array[massless] = 0.0
         return self._dx.solve(solver, b)
 
-    def mass_solver(self) -> tuple[DirectSolver | SingularSolver, Array]:
+    def mass_solver(self, at_rest: bool = False) -> tuple[DirectSolver | SingularSolver, Array]:
+        """Return a solver with M at the state, or at rest (see `accelerated`), and unknowns without inertia."""
+        if not at_rest:
+            return self._new_mass_solver()
+        if self._mass is None or self._mass[0] is not self.reference:
+            q, v, a = (x.copy() for x in self._state)
+            self.set_state(np.zeros_like(q))
+            self._mass = self.reference, self._new_mass_solver()
+            self.set_state(q, v, a)
+        return self._mass[1]
+
+    def _new_mass_solver(self) -> tuple[DirectSolver | SingularSolver, Array]:
         """Return a solver with M, where it has to be completed with K, and which owned unknowns have no inertia.
 
         A mass beside the axis can leave a rotation without inertia in a direction that is no unknown of its own;

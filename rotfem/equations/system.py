@@ -116,7 +116,7 @@ class System(Solutions, ABC):
         """
         other = copy(self)
         vars(other).pop("balance", None)
-        other._solver, other.factored = None, None
+        other._solver, other.factored, other._mass = None, None, None
         other.seconds = {"assemble": 0.0, "solve": 0.0}
         other.A = self.A.duplicate()
         return other
