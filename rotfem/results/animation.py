@@ -96,7 +96,7 @@ class Moving:
         """Return a PyVista plotter with the surface, its place at rest, the axes and a colour bar."""
         import pyvista
 
-        bar = {"title": f"{self._name} (largest displacement 1)", "n_labels": 2, "title_font_size": 14}
+        bar = {"title": f"{self._name} (–)", "n_labels": 2, "title_font_size": 14}
         bar |= {"label_font_size": 14, "position_x": 0.3, "width": 0.4, "height": 0.06}
         plotter = pyvista.Plotter(off_screen=True, window_size=(900, 600))
         plotter.add_mesh(self._rest.extract_feature_edges(30.0), color="gray", line_width=1)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import ScalarFormatter
+from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from matplotlib.tri import Triangulation
 
 from rotfem.results.columns import ZERO, described, label, zeros
@@ -36,6 +36,7 @@ def maps(number: int, aspect: float, title: str) -> tuple[Figure, list[Axes]]:
     axes = [figure.add_subplot(rows, columns, i + 1) for i in range(number)]
     for i, axis in enumerate(axes):
         axis.set_aspect("equal")
+        axis.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
         axis.tick_params(labelsize=7, labelleft=i % columns == 0, labelbottom=i + columns >= number)
         axis.set_xlabel("x (m)" if i + columns >= number else "", fontsize=8)
         axis.set_ylabel("y (m)" if i % columns == 0 else "", fontsize=8)
