@@ -262,7 +262,7 @@ class RunErrors:
         if mesh >= WANTED / 2:
             cures.append("a higher mesh.degree" if scene.structure.mesh_file else "more mesh.elements")
         if model >= WANTED / 2:
-            cures.append("a more exact model.theory")
+            cures.append("a more exact theory")
         contributions = {"time steps": steps, "mesh": mesh, "theory": model}
         named = [
             f"{percent(share)} by the {n}"

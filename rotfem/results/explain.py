@@ -83,7 +83,7 @@ class ExplainResult(Result):
             rows.append((what, *cells, f"{row['verdict']}: {row['why']}"))
             if "truth" in row:
                 rows.append(("  by the full models", *(per_cent(row["truth"].get(name)) for name in outputs)))
-        head = ("change of (%)", *outputs, "verdict")
+        head = ("change of", *(f"{name} (%)" for name in outputs), "verdict")
         return [ShortTable(("of the scene", "value (–)"), groups), ShortTable(head, rows)]
 
     def _change(self, row: Row, output: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,9 @@ from rotfem.scene import Scene
 T = np.array([0.0, 0.5, 1.0])
 X = np.array([0.0, 2.0, 4.0])
 
+#: Figures of merit of the motion of `history`.
+FIGURES = {"tip_u2_final": 1.0, "tip_u2_min": 0.0, "tip_u2_min_time": 0.0, "tip_u2_max": 1.0, "tip_u2_max_time": 1.0}
+
 
 def summary(**more: Any) -> dict[str, Any]:
     """Return what every summary holds."""
@@ -31,7 +35,7 @@ def summary(**more: Any) -> dict[str, Any]:
 def history(**more: Any) -> RunResult:
     """Return the history of a beam's tip."""
     columns = {"t": T, "psi": T**2, "psi_dot": 2 * T, "tip_u1": -(T**2), "tip_u2": T, "tip_alpha": 0.5 * T}
-    said = summary(command="run", kind="history", frame="rotating", figures={"tip_u2_max": 1.0}) | more
+    said = summary(command="run", kind="history", frame="rotating", figures=FIGURES) | more
     return RunResult(said, columns, {"x": X, "u1": -X, "u2": X**2, "alpha": 2 * X})
 
 
@@ -200,7 +204,7 @@ def test_a_run_by_its_names() -> None:
     assert list(result.tip) == ["u1", "u2", "alpha"]
     np.testing.assert_array_equal(result.tip["u1"], -(T**2))
     np.testing.assert_array_equal(result.column("psi_dot"), 2 * T)
-    assert result.figures == {"tip_u2_max": 1.0}
+    assert result.figures == FIGURES
     assert not result.steady
     assert history(kind="steady").steady
     with pytest.raises(KeyError, match="no column 'tip_u3' in the history; there are t, psi, psi_dot, tip_u1"):
@@ -358,6 +362,18 @@ def test_a_result_is_a_line_at_a_prompt_and_tables_with_a_figure_in_a_notebook(m
     assert page.count("<img src=") == 1
     assert page.count("<table>") == len(result.tables())
     assert result.plot()._repr_png_().startswith(b"\x89PNG")
+
+
+@ALL
+def test_every_number_of_a_table_has_a_unit(make: Any) -> None:
+    """In the heading of its column, or of its row; counts have none."""
+    counts = {"mode", "branch", "elements", "degree"}
+    units = re.compile(r"\(.+\)|(rad/s|rpm|Hz|deg/s) at ")
+    for table in make().tables():
+        for row in table.rows:
+            for head, text in zip(table.head, row, strict=False):
+                if re.fullmatch(r"<?-?[\d.]+(e[-+]?\d+)?", text):
+                    assert head in counts or units.search(head) or units.search(row[0]), (head, row)
 
 
 def test_a_notebook_shows_the_first_rows_of_a_long_table() -> None:

@@ -62,7 +62,7 @@ CASES = [
         tolerance=tolerance,
         source=source,
         expected="warned",
-        words=f'model.theory = "{theory}" is o',
+        words=f'model.theory = "{theory}" is ',
     )
     for theory, displacement, end, reference, tolerance, source in (
         ("linear", 0.05, 10.0, 1.888, 0.1, "reissner in the same steps"),
