@@ -389,7 +389,7 @@ def test_left_vectors(unit_beam: Any, theory: str, conservative: bool) -> None:
     transposes = [transposed(A) for A in (p.M, p.C, p.K)]
     for j, lam in enumerate(pairs.values):
         for operators, x, z in (((p.M, p.C, p.K), pairs.right, lam), (transposes, pairs.left, lam.conjugate())):
-            terms = [c * p.apply(A, x[:, j]) for c, A in zip((z**2, z, 1.0), operators, strict=True)]
+            terms = [c * p.apply(A, x[:, [j]]) for c, A in zip((z**2, z, 1.0), operators, strict=True)]
             assert np.linalg.norm(sum(terms)) < 1e-9 * np.linalg.norm(terms[0])
     gram = p.gram(pairs.left, pairs.values, pairs.right, pairs.values)
     size = np.sqrt(np.outer(np.abs(np.diag(gram)), np.abs(np.diag(gram))))
