@@ -12,9 +12,9 @@ from rotfem.errors import InputError
 #: Environment variable with the memory that may be used, in GB, where it is not what the machine has.
 VARIABLE = "ROTFEM_MEMORY"
 
-#: Bytes per unknown, component and dimension of the mesh: measured on modes of planar beams of 4·10⁴ elements (degrees
-#: 1 and 3: 3 kB per unknown) and a plate of 48 × 48 (15 kB).
-BYTES = 1200
+#: Bytes per unknown, component and dimension of the mesh: measured on modes of plates of 70 × 70 and 140 × 140 (16 and
+#: 17 kB per unknown), and more than planar beams of 4·10⁴ elements took (degrees 1 and 3: 3 kB).
+BYTES = 1700
 
 _GROUP = Path("/sys/fs/cgroup/memory.max")
 
