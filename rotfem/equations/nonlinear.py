@@ -15,6 +15,7 @@ from ufl.algorithms.analysis import extract_constants
 
 from rotfem.equations.clamp import ClampWork
 from rotfem.equations.energy_balance import EnergyBalance
+from rotfem.equations.known_forms import Both, derived_forms
 from rotfem.equations.model import Model
 from rotfem.equations.system import System
 from rotfem.mechanics.work import Mechanics
@@ -142,7 +143,7 @@ class NonlinearSystem(System):
             self._spin = compiled[-1][2] if len(compiled[-1]) > 2 else None
             self._pattern = self._J[0]
         else:
-            self._F = [forms.form(self._at_rest["f"], once=True)]
+            self._F = [self._parts["f"]]
             self._pattern = self._parts["K"]
         return fem_petsc.create_matrix(self._pattern)
 
@@ -183,17 +184,25 @@ class NonlinearSystem(System):
         return self.model.at_rest(self._residual_form)
 
     @cached_property
+    def _derived(self) -> Both:
+        return derived_forms(self.model, "at rest", [], self._made)
+
+    def _made(self) -> Both:
+        derived = {name: form for name, form in self._at_rest.items() if not form.empty()}
+        return derived, {name: forms.form(form, once=True) for name, form in derived.items()}
+
+    @cached_property
     def _parts(self) -> dict[str, Any]:
-        """K, C and M at v = a = 0, compiled; None where one vanishes."""
-        found = {name: self._at_rest[name] for name in "KCM"}
-        return {name: None if form.empty() else forms.form(form, once=True) for name, form in found.items()}
+        """F, and K, C and M, at v = a = 0, compiled; None where one vanishes."""
+        return {name: self._derived[1].get(name) for name in "fKCM"}
 
     def known_form(self, name: str) -> tuple[Any, Any]:
         """Return a form, UFL and compiled: parts of F, and of J of a moving system or else K, C, M."""
         if self.moving:
             kind, i = name[0], int(name[1:])
             return (self._residuals[i], self._F[i]) if kind == "F" else (self._tangents[i], self._J[i])
-        return (self._at_rest["f"], self._F[0]) if name == "F" else (self._at_rest[name], self._parts[name])
+        name = "f" if name == "F" else name
+        return self._derived[0][name], self._parts[name]
 
     @property
     def residual_forms(self) -> tuple[str, ...]:

@@ -25,6 +25,7 @@ from ufl.algorithms.analysis import extract_constants
 
 from rotfem.equations.clamp import AtClamp
 from rotfem.equations.geometric import geometric_stiffness
+from rotfem.equations.known_forms import derived_forms
 from rotfem.equations.model import Model
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
@@ -136,11 +137,6 @@ class Piece:
     at_root: Array
 
 
-#: Signature of a residual, theory and effects ↦ these, and sketches of the forms that follow; the latest ones.
-_KNOWN: dict[Any, tuple[Any, dict[str, Any]]] = {}
-MOST_KNOWN = 32
-
-
 class PolynomialCheck:
     """Compares a term at constants of no special size with what its pieces make of them.
 
@@ -207,7 +203,9 @@ class Pieces:
         loads = {name: constant for name, (constant, _) in self.structure.load_constants.items()}
         self.constants: dict[str, Any] = {**model.frame.constants, **loads}
         self.axis: Array = model.motion.axis[2:] if self.structure.planar else model.motion.axis
-        self.at_rest, self._forms = self._known() or self._made()
+        if model.theory.prestress:  # what effects add to the strains that N⁰ works on has switches of its own
+            model.strains(model.theory.prestress_measures(self.structure.type))
+        self.at_rest, self._forms = derived_forms(model, "pieces", [self.prestressed], self._made)
         self._assembled = Assembler(self._forms["K"], self.bcs)
         self.pattern = self._assembled.pattern
         self.all: list[Piece] = []
@@ -231,32 +229,7 @@ class Pieces:
         geometric = self.geometric(ufl.TestFunction(self.V), ufl.TrialFunction(self.V), self.prestressed)
         if not isinstance(geometric, int):
             at_rest["G"], compiled["G"] = geometric, forms.form(geometric, once=True)
-        sketches = {kind: forms.sketch(form, compiled[kind], self._whole) for kind, form in at_rest.items()}
-        if None not in sketches.values():
-            key, makers = self._key
-            _KNOWN[key] = makers, sketches
-            if len(_KNOWN) > MOST_KNOWN:
-                del _KNOWN[next(iter(_KNOWN))]
         return at_rest, compiled
-
-    def _known(self) -> tuple[dict[str, Any], dict[str, Any]] | None:
-        """Return the same of a model whose forms have been made on another mesh or with other numbers; or None."""
-        if (found := _KNOWN.get(self._key[0])) is None:
-            return None
-        (data,) = self.model.residual.subdomain_data().values()
-        both = {kind: forms.drawn(known, self._whole, self.V, data) for kind, known in found[1].items()}
-        return {kind: f for kind, (f, _) in both.items()}, {kind: compiled for kind, (_, compiled) in both.items()}
-
-    @cached_property
-    def _key(self) -> tuple[Any, Any]:
-        """What the forms follow from, and the objects that it names by their addresses."""
-        makers = [self.model.theory, *self.model.acting.values()]
-        return (self.model.residual.signature(), *(id(maker) for maker in makers)), makers
-
-    @cached_property
-    def _whole(self) -> tuple[list[Any], list[Any]]:
-        residual = self.model.residual
-        return [*residual.coefficients(), self.prestressed], list(residual.constants())
 
     def _zero_constants(self) -> None:
         for constant in self.constants.values():

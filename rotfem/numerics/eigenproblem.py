@@ -324,9 +324,10 @@ class Pencil:
         self.spectrum_error: float | None = None
 
     def apply(self, A: Any, X: Array) -> Array:
-        """Return A X for complex columns X of locally owned unknowns."""
-        parts, m = times(sparse_part(A), np.hstack([X.real, X.imag])), X.shape[1]
-        out = parts[:, :m] + 1j * parts[:, m:]
+        """Return A X for complex columns X, or a vector, of locally owned unknowns."""
+        columns = X.reshape(len(X), -1)
+        parts, m = times(sparse_part(A), np.hstack([columns.real, columns.imag])), columns.shape[1]
+        out = (parts[:, :m] + 1j * parts[:, m:]).reshape(X.shape)
         return out if sparse_part(A) is A else out + np.asarray(A.added(X))
 
     def gram(self, Y: Array, lam: Array, X: Array, mu: Array) -> Array:

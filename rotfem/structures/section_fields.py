@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,9 @@ POINTS = 5
 
 #: Least eigenvalue of a semidefinite matrix with ones on its diagonal, to round-off.
 SEMIDEFINITE = 1e-12
+
+#: Points and weights of the Gauss rule with so many points on −1 … 1.
+leggauss = cache(legendre.leggauss)
 
 
 @dataclass(frozen=True)
@@ -74,7 +78,7 @@ class SectionField:
 
     def _projected(self, ends: Array, inner: Array, x: Array) -> Array:
         """Return the projection at places x (n,) of the element between two ends with rows inside."""
-        (a, b), (xi, w) = ends, legendre.leggauss(POINTS)
+        (a, b), (xi, w) = ends, leggauss(POINTS)
         cuts = np.array([a, *inner, b])
         half = np.diff(cuts)[:, None] / 2
         places = (cuts[:-1, None] + half * (1.0 + xi)).ravel()
@@ -83,7 +87,7 @@ class SectionField:
         basis = legendre.legvander(2.0 * (places - a) / (b - a) - 1.0, self.degree)
         c = (2.0 * n[:, None] + 1.0) / (b - a) * (basis.T @ ((half * w).ravel()[:, None] * samples))
         if self.valid is not None and self.valid(samples):
-            points = np.concatenate([legendre.leggauss(self.degree + i)[0] for i in (0, 1)])
+            points = np.concatenate([leggauss(self.degree + i)[0] for i in (0, 1)])
             if not self.valid(legendre.legvander(points, self.degree) @ c):
                 c[1:] = 0.0
         return np.asarray(legendre.legvander(2.0 * (x - a) / (b - a) - 1.0, self.degree) @ c)

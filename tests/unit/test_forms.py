@@ -18,6 +18,7 @@ from ufl.utils.counted import Counted
 
 import rotfem
 from rotfem.commands.problem import Problem
+from rotfem.equations import known_forms
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.functionals import Functionals
 from rotfem.numerics import forms, traversal
@@ -125,3 +126,37 @@ def test_terminals_and_signatures_are_those_of_ufl() -> None:
             assert found
             assert found == traversal._extract_type(form, classes)
         assert form.signature() == real.compute_form_signature(form, form._compute_renumbering())
+
+
+@pytest.mark.parametrize("theory", ["consistent_linear", "reissner"])
+def test_known_forms_are_those_made_anew(theory: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a tapered blade with a tip mass, gravity and damping: to the last digit on another mesh."""
+    section = {"EA": 1e6, "GA2": 4e5, "GA3": 4e5, "GJ": 1e4, "EI2": 1e3, "EI3": [[0.0, 9e3], [2.0, 3e3]]}
+    structure = {
+        "type": "spatial_beam",
+        "length": 2.0,
+        "tip_mass": 0.5,
+        "precone": 0.1,
+        "damping": {"kelvin_voigt": 1e-4},
+    }
+
+    def matrices(elements: int, speed: float) -> list[Any]:
+        tables = {
+            "structure": structure | {"section": section | {"mass_per_length": 1.0}},
+            "motion": {"type": "constant", "speed": speed, "axis": [0, 0, 1]},
+            "loads": {"gravity": [0.0, 0.0, -9.81]},
+            "model": {"theory": theory},
+            "mesh": {"elements": elements},
+        }
+        system = compile_system(Problem.of(tables), moving=False)
+        system.set_time(0.0)
+        system.set_state(1e-3 * np.arange(len(system.zeros())))
+        return [A.getValuesCSR()[2] for A in system.mass_damping_stiffness()] + [system.residual().array.copy()]
+
+    monkeypatch.setattr(known_forms, "_KNOWN", {})
+    matrices(3, 5.0)
+    assert len(known_forms._KNOWN) == 1
+    shared = matrices(5, 7.0)
+    monkeypatch.setattr(known_forms, "_KNOWN", {})
+    for known, made in zip(shared, matrices(5, 7.0), strict=True):
+        np.testing.assert_array_equal(known, made)
