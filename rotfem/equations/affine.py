@@ -94,7 +94,7 @@ class AffineSystem(System):
     @property
     def integrals(self) -> dict[str, int]:
         """Number of integrals in F, and in the pieces' forms."""
-        count = sum(len(form.integrals()) for kind, form in self._decomposed.at_rest.items() if kind not in "fG")
+        count = sum(len(form.integrals()) for kind, form in self._decomposed.at_rest.items() if kind != "f")
         return {"F": forms.integral_count(self.model.residual), "J": count}
 
     def known_form(self, name: str) -> tuple[Any, Any]:

@@ -1,12 +1,12 @@
 """The forms that follow from a residual: made and compiled once, they serve the same residual on other meshes.
 
 UFL takes longer to derive them than to compute with them on a small mesh. Which they are follows from the signature of
-the residual, in which coefficients and constants stand for their places, from theory and from effects.
+the residual, in which coefficients and constants stand for their places.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 from rotfem.equations.model import Model
@@ -15,34 +15,29 @@ from rotfem.numerics import forms
 #: Name ↦ UFL form (or what stands for it, see `rotfem.numerics.forms.drawn`), and name ↦ compiled form.
 Both = tuple[dict[str, Any], dict[str, Any]]
 
-#: Purpose, signature, theory and effects by their addresses ↦ these objects, and sketches of forms; the latest ones.
-_KNOWN: dict[Any, tuple[Any, dict[str, Any]]] = {}
+#: Purpose and signature ↦ sketches of the forms; the latest ones.
+_KNOWN: dict[tuple[str, str], dict[str, Any]] = {}
 MOST = 32
 
 
-def derived_forms(model: Model, purpose: str, functions: Sequence[Any], make: Callable[[], Both]) -> Both:
-    """Return forms that follow from the residual of a model.
+def derived_forms(model: Model, purpose: str, make: Callable[[], Both]) -> Both:
+    """Return forms that follow from the residual of a model, and from nothing else.
 
     Args:
         model: with the residual.
         purpose: which forms.
-        functions: that they have in addition to the residual's.
         make: derives and compiles them.
     """
-    residual, makers = model.residual, [model.theory, *model.acting.values()]
-    key = (purpose, residual.signature(), *(id(maker) for maker in makers))
-    constants = residual.constants()
-    switches = [switch for switch in model.switches.values() if switch not in constants]
-    whole = [*residual.coefficients(), *functions], [*constants, *switches]
+    residual = model.residual
+    key, whole = (purpose, residual.signature()), (list(residual.coefficients()), list(residual.constants()))
     if key in _KNOWN:
         (data,) = residual.subdomain_data().values()
-        sketches = _KNOWN[key][1]
-        both = {name: forms.drawn(known, whole, model.structure.V, data) for name, known in sketches.items()}
+        both = {name: forms.drawn(known, whole, model.structure.V, data) for name, known in _KNOWN[key].items()}
         return {name: f for name, (f, _) in both.items()}, {name: compiled for name, (_, compiled) in both.items()}
     derived, compiled = make()
     sketches = {name: forms.sketch(f, compiled[name], whole) for name, f in derived.items()}
     if None not in sketches.values():
-        _KNOWN[key] = makers, sketches
+        _KNOWN[key] = sketches
         if len(_KNOWN) > MOST:
             del _KNOWN[next(iter(_KNOWN))]
     return derived, compiled

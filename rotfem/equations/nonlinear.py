@@ -185,7 +185,7 @@ class NonlinearSystem(System):
 
     @cached_property
     def _derived(self) -> Both:
-        return derived_forms(self.model, "at rest", [], self._made)
+        return derived_forms(self.model, "at rest", self._made)
 
     def _made(self) -> Both:
         derived = {name: form for name, form in self._at_rest.items() if not form.empty()}

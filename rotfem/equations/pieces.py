@@ -181,8 +181,8 @@ class Pieces:
         root: unit motions of the clamp.
 
     Attributes:
-        at_rest: "f", "K", "C", "M" at q = v = a = 0 and "G", the geometric stiffness ↦ UFL form (or what stands for it,
-            see `rotfem.numerics.forms.drawn`); those that vanish are left out.
+        at_rest: "f", "K", "C", "M" ↦ UFL form at q = v = a = 0, or what stands for it (`rotfem.numerics.forms.drawn`);
+            those that vanish are left out.
         constants: name ↦ constant of frame and loads.
         axis: components of the spin axis that w and dw have.
         pattern: a matrix with the pattern of all.
@@ -203,33 +203,28 @@ class Pieces:
         loads = {name: constant for name, (constant, _) in self.structure.load_constants.items()}
         self.constants: dict[str, Any] = {**model.frame.constants, **loads}
         self.axis: Array = model.motion.axis[2:] if self.structure.planar else model.motion.axis
-        if model.theory.prestress:  # what effects add to the strains that N⁰ works on has switches of its own
-            model.strains(model.theory.prestress_measures(self.structure.type))
-        self.at_rest, self._forms = derived_forms(model, "pieces", [self.prestressed], self._made)
+        self.at_rest, self._forms = derived_forms(model, "pieces", self._made)
         self._assembled = Assembler(self._forms["K"], self.bcs)
         self.pattern = self._assembled.pattern
         self.all: list[Piece] = []
         self.not_polynomial: list[str] = []
-        for kind in (kind for kind in self.at_rest if kind != "G"):
+        for kind in self.at_rest:
             self._decompose(kind)
         self._set_switches(model.switches)
         if self.not_polynomial:
             model.check_smooth()
-        if "G" in self._forms:
+        self._geometric = self.geometric(ufl.TestFunction(self.V), ufl.TrialFunction(self.V), self.prestressed)
+        if not isinstance(self._geometric, int):
             self._prestress()
         if self.pattern.getSize()[0] > SMALL:  # a factor and a matrix, which are hardly needed again
             self.__dict__.pop("material_solver", None)
             self._assembled.release()
 
     def _made(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Return f, K, C and M at q = v = a = 0, and G, as UFL and compiled forms; those that vanish are left out."""
+        """Return f, K, C and M at q = v = a = 0, as UFL and compiled forms; those that vanish are left out."""
         at_rest = self.model.at_rest(self.model.residual, undeformed=True)
         at_rest = {kind: form for kind, form in at_rest.items() if not form.empty()}
-        compiled = dict(zip(at_rest, forms.together(list(at_rest.values()), once=True), strict=True))
-        geometric = self.geometric(ufl.TestFunction(self.V), ufl.TrialFunction(self.V), self.prestressed)
-        if not isinstance(geometric, int):
-            at_rest["G"], compiled["G"] = geometric, forms.form(geometric, once=True)
-        return at_rest, compiled
+        return at_rest, dict(zip(at_rest, forms.together(list(at_rest.values()), once=True), strict=True))
 
     def _zero_constants(self) -> None:
         for constant in self.constants.values():
@@ -409,10 +404,11 @@ class Pieces:
 
     def known_form(self, name: str) -> tuple[Any, Any]:
         """Return f, K, C, M at rest, or G, as UFL and as compiled form."""
-        return self.at_rest[name], self._forms[name]
+        return self._geometric if name == "G" else self.at_rest[name], self._forms[name]
 
     def _prestress(self) -> None:
         """Add the geometric stiffness of the stresses that each load piece causes in the linear structure."""
+        self._forms["G"] = forms.form(self._geometric, once=True)
         started = perf_counter()
         for load, K, added in geometric_pieces(self):
             self._keep("K", load.key, K, load.of | {PRESTRESS} | added)
