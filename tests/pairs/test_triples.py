@@ -35,7 +35,9 @@ def test_triples(trial: Trial, row: Row) -> None:
 
 @pytest.mark.mpi
 @RANKED
-def test_two_processes(trial: Trial) -> None:
+@pytest.mark.parametrize("when", ["day", pytest.param("night", marks=pytest.mark.nightly)])
+def test_two_processes(trial: Trial, when: str) -> None:
+    """By day and, selected by its mark, by night; the rows are those that were computed before on one process."""
     trial.on_ranks()
 
 

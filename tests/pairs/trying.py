@@ -83,7 +83,7 @@ class Trial:
             AssertionError: with the scenes, what is wrong.
         """
         folder = self.folder / "ranks"
-        folder.mkdir()
+        folder.mkdir(exist_ok=True)
         compute_on_ranks([row for row, _ in self.alone], folder)
         failures = []
         for number, (row, alone) in enumerate(self.alone):
