@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 
-__version__ = "0.6.0"
+__version__ = "0.7.0"
 
 
 def versions() -> dict[str, str]:

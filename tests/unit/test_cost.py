@@ -214,7 +214,7 @@ def test_advice_is_given_where_it_is_due() -> None:
     (fourth,) = said({"modes.count": 4})
     assert "mode 4" in fourth
     (mesh,) = said({"mesh.elements": 3, "modes.count": 8}, "modes")
-    assert "9 nodes" in mesh
+    assert "use 13 elements" in mesh
     assert "lag 8" in mesh
     assert said({"mesh.elements": 12, "modes.count": 8}, "modes") == []
     (theory,) = said({"model.theory": "linear"}, critical=3.8)

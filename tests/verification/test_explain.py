@@ -12,7 +12,7 @@ import pytest
 import ufl
 
 import rotfem
-from rotfem.commands.printed import explain_report
+from rotfem.commands.printed import report
 from rotfem.commands.problem import Problem
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.system import System
@@ -414,9 +414,9 @@ def test_gravity_that_turns_leaves_the_modes() -> None:
     [({"time": {"end": 0.02, "step": 0.01}}, "unknown"), ({"model.theory": "linear", "motion.speed": 9.0}, "inf")],
     ids=["two steps", "diverges"],
 )
-def test_what_is_not_known_is_reported(changes: dict[str, Any], shown: str, tmp_path: Path) -> None:
+def test_what_is_not_known_is_reported(changes: dict[str, Any], shown: str) -> None:
     result = rotfem.explain(scene(SPIN_UP, changes))
-    coriolis = next(line for line in explain_report(result.summary, tmp_path) if line.startswith("without coriolis"))
+    coriolis = next(line for line in report(result) if line.startswith("without coriolis"))
     assert coriolis.split()[2] == shown
     assert all(set(row["estimate"]) == {HISTORY, MODES} for row in result.rows)
     assert '"estimate"' in result.files()["explain.json"]
