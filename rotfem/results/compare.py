@@ -92,9 +92,10 @@ class Compared:
 
     def _read(self, folder: Path) -> None:
         self.summary, self.curves, self.modes = read_summary(folder), dict[str, Curve](), list[Row]()
-        self.command, status = (str(self.summary.get(key, "no result")) for key in ("command", "status"))
+        self.command, status = (str(self.summary.get(key, "")) for key in ("command", "status"))
         if self.command not in COMPARABLE or status != "done":
-            allowed = f"is of {self.command}, {status}; must be finished results of {', '.join(COMPARABLE)}"
+            there = f"{self.command}, {status}" if self.command else "no results of rotfem"
+            allowed = f"has {there}; must be a folder with finished results of {', '.join(COMPARABLE)}"
             raise InputError("compare", str(folder), allowed)
         try:
             if self.command in ("run", "response"):

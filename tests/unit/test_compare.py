@@ -128,7 +128,7 @@ def test_what_cannot_be_compared_is_refused(tmp_path: Path) -> None:
         compare(a)
     with pytest.raises(InputError, match="b: modes.*must be of run, as a is"):
         compare(a, modes("b", (1,)))
-    with pytest.raises(InputError, match="no result.*must be finished results of run, modes"):
+    with pytest.raises(InputError, match="no results.*must be a folder with finished results of run, modes"):
         compare(a, tmp_path)
     with pytest.raises(InputError, match="run, failed"):
         compare(a, a.with_summary(status="failed"))
