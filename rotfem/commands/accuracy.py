@@ -275,7 +275,7 @@ def missed(scene: Scene, done: Result, failure: ComputationError | None) -> Miss
     else:
         share = contribution(error, worst)
         reached = f"an error of {error['total']:.2g} was reached, most of it ({WORDS[worst]}) {share:.2g}, where an "
-        reached += f"estimate of {(scene.accuracy or 0.0) / SAFETY:.2g} is wanted"
+        reached += f"estimate of {(scene.accuracy or 0.0) / (1.0 if worst == 'time' else SAFETY):.2g} is wanted"
     why = "" if failure is None else f", and a further attempt failed: {failure.what}"
     what = f"an accuracy of {scene.accuracy:g} was not met: {reached}{why}"
     return failed(done, what, (failure.advice if failure is not None else None) or advice)

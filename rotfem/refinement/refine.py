@@ -28,7 +28,8 @@ from rotfem.listeners import Hint
 
 R = TypeVar("R")
 
-#: Factor within which estimates of errors hold (theory.md, section 18): answers are accepted with it.
+#: Factor within which estimates of errors hold (theory.md, section 18): answers are accepted with it. The part of the
+#: steps is accepted as it is: of the fourth-order scheme the difference is not divided by what an order promises.
 SAFETY = 2.0
 
 #: Answers at most, and least growth of a number of elements: below, the next answer would be the same one.
@@ -142,9 +143,9 @@ class Setting:
         each = (allowed - contribution(error, "model")) / parts  # steps and mesh have the rest in equal parts
         if each <= 0.0:
             return None
-        if self.tolerance is not None and (error.get("time", 0.0) is None or contribution(error, "time") > each):
-            known = contribution(error, "time")
-            new = replace(new, tolerance=self.tolerance * (AIM * each / known if known > 0.0 else AIM**2))
+        known, of_steps = contribution(error, "time"), SAFETY * each
+        if self.tolerance is not None and (error.get("time", 0.0) is None or known > of_steps):
+            new = replace(new, tolerance=self.tolerance * (AIM * of_steps / known if known > 0.0 else AIM**2))
         if (space := contribution(error, "space")) > each or error.get("space", 0.0) is None:
             order = 2 * self.degree if "round_off" in error else self.degree + 1  # of frequencies, of displacements
             growth = (space / (AIM * each)) ** (1 / order) if space > 0.0 else 2.0
@@ -198,11 +199,14 @@ def is_known(error: Mapping[str, Any]) -> bool:
 
 
 def is_within(error: Mapping[str, Any], accuracy: float) -> bool:
-    """Return whether an error is known and within an accuracy: estimates with SAFETY, a bound of round-off as it is."""
+    """Return whether an error is known and within an accuracy: estimates with SAFETY, bounds as they are.
+
+    The difference by the steps counts as a bound, and so does that of round-off.
+    """
     if not is_known(error) or error["total"] is None:
         return False
-    bound = contribution(error, "round_off")
-    return bool(SAFETY * (error["total"] - bound) + bound <= accuracy)
+    bounds = contribution(error, "round_off") + contribution(error, "time")
+    return bool(SAFETY * (error["total"] - bounds) + bounds <= accuracy)
 
 
 def grown(

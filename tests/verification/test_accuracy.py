@@ -15,7 +15,6 @@ from scipy.interpolate import CubicSpline
 
 from rotfem import campbell, modes, run
 from rotfem.commands.accuracy import Missed
-from rotfem.refinement.refine import SAFETY
 from rotfem.results import RunResult
 from rotfem.scene import Scene
 from tests.beams import STRUCTURE
@@ -63,7 +62,7 @@ def test_the_truth_is_as_near_as_was_asked(name: str, accuracy: float) -> None:
     assert true_error(result, truth(name)) <= accuracy
     told = result.summary["accuracy"]
     assert told["met"]
-    assert result.summary["error"]["total"] == told["estimated"] <= accuracy / SAFETY
+    assert result.summary["error"]["total"] == told["estimated"] <= accuracy
     assert result.summary["warnings"] == []
 
 
