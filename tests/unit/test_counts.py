@@ -89,13 +89,13 @@ def counted() -> Iterator[Counter[str]]:
 def of_a_step(tables: dict[str, Any], steps: int) -> dict[str, float]:
     """Return counts for a step of a run: those of so many steps taken off those of twice as many."""
     found = []
-    for number in (steps, 2 * steps):
+    for number in (2 * steps, steps, 2 * steps):  # the first one compiles, where the cache of forms is empty
         time = {"time": {"end": 0.02 * number, "step": 0.02}, "output": {"error": False}}
         with counted() as counts:
             summary = rotfem.run(tables | time).summary
         found.append(counts | {name: summary[name] for name in ("factorisations", "newton_iterations")})
     names = ("calls", "factorisations", "newton_iterations")
-    return {name: (found[1][name] - found[0][name]) / steps for name in names}
+    return {name: (found[2][name] - found[1][name]) / steps for name in names}
 
 
 def of_a_diagram(tables: dict[str, Any], number: int) -> dict[str, float]:
