@@ -66,7 +66,7 @@ def block(writer, node):
 
 
 def setup(app):
-    """Add what is said above: formulas are MathML, which browsers draw by themselves."""
+    """Register the directives of this file: formulas are MathML, which browsers draw by themselves."""
     app.add_html_math_renderer("mathml", (inline, None), (block, None))
     app.connect("source-read", to_pages)
     app.connect("include-read", lambda app, path, name, content: to_pages(app, name, content))

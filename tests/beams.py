@@ -44,3 +44,21 @@ SPIN_UP: dict[str, Any] = {
     "motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0},
     "mesh": {"elements": 10, "degree": 3},
 }
+
+#: A thick beam in a few unknowns, for tests of commands about modes.
+MODAL_SCENE = """\
+[structure]
+type = "planar_beam"
+length = 1.0
+hub_radius = 0.5
+section = { EA = 400.0, GA = 130.0, EI = 1.0, mass_per_length = 1.0, rotary_inertia = 0.0025 }
+[motion]
+type = "constant"
+speed = 3.0
+[model]
+theory = "consistent_linear"
+[mesh]
+elements = 4
+[modes]
+count = 3
+"""

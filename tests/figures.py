@@ -1,4 +1,4 @@
-"""What holds of every figure: no text over another or cut off, units on axes, data inside, legends beside them."""
+"""What holds of every figure: no text over another or cut off, units on axes, data inside, legends outside the axes."""
 
 from __future__ import annotations
 

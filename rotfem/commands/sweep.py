@@ -1,7 +1,8 @@
 """`rotfem sweep`: a verb over a grid of scene keys, on one or several processes or ranks; a killed sweep goes on.
 
 Every point has a folder of its own, named after all that its result depends on, with the result as the verb writes it.
-A worker takes the next point whose folder nobody has locked. A point is settled when its summary says done or failed.
+A worker takes the next point whose folder no process has locked. A point is settled when its summary says done or
+failed.
 """
 
 from __future__ import annotations
@@ -131,7 +132,7 @@ def settle(point: Point, scene: Path, verb: Sequence[str]) -> bool:
 
 
 def _compute(point: Point, scene: Path, verb: Sequence[str]) -> None:
-    """Run the verb in this process, alone; what fails is said in the point's summary."""
+    """Run the verb in this process, alone; a failure is reported in the point's summary."""
     import rotfem.commands.cli  # noqa: F401  the verbs
 
     changes = [part for change in point.changes for part in ("--set", change)]

@@ -40,7 +40,7 @@ PERIODS, STRETCHES = 500, 250
 #: Height of a peak that counts as a period, part of the range of a history.
 PEAK = 1e-2
 
-#: Part of the largest displacement below which a line cannot be told from 0.
+#: Part of the largest displacement below which a line cannot be distinguished from 0.
 VISIBLE = 1e-3
 
 #: Part of the frequencies, those of deep antiresonances, at which an amplitude may lie below what is drawn.

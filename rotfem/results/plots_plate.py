@@ -69,7 +69,7 @@ def draw(axis: Axes, mesh: Triangulation, values: Array, still: Array | None = N
 
 
 def add_bar(figure: Figure, drawn: Any, axes: Any, caption: str) -> None:
-    """Add a colour bar beside one axis or beside many."""
+    """Add a colour bar to the right of one axis or of several."""
     powers = ScalarFormatter(useMathText=True)
     powers.set_powerlimits((-3, 4))
     bar = figure.colorbar(

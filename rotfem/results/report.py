@@ -71,7 +71,7 @@ FACTS = {
 MEANING = {
     "time": "finite time steps; a shorter time.step or a smaller time.tolerance lessens it",
     "space": "finite elements; more mesh.elements or a higher mesh.degree lessen it",
-    "model": "the theory, beside the exact strains; a richer model.theory lessens it",
+    "model": "the theory, compared with the exact strains; a richer model.theory lessens it",
     "round_off": "arithmetic with 16 digits; no setting lessens it",
     "total": "all of them together",
 }
@@ -204,7 +204,7 @@ def table(title: str, rows: Sequence[Mapping[str, Any]]) -> str:
     if not flat:
         return ""
     numbers = {n: [abs(r[n]) for r in flat if isinstance(r.get(n), float) and np.isfinite(r[n])] for n in names}
-    numbers |= {"damping": [1.0], "growth": numbers.get("frequency", [])}  # what these are 0 beside
+    numbers |= {"damping": [1.0], "growth": numbers.get("frequency", [])}  # the scale below which these are 0
     least = {n: 0.0 if n in EXACT else ZERO * max(values, default=0.0) for n, values in numbers.items()}
     head = "".join(f"<th{_kind(flat, n)}>{escape(_heading(n))}</th>" for n in names)
     body = ""

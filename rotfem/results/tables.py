@@ -10,7 +10,7 @@ from textwrap import wrap
 
 from rotfem.results.columns import described
 
-#: Part of the largest number beside it below which a number is shown as 0; of ratios the number itself.
+#: Part of the largest number in its column below which a number is shown as 0; of ratios the number itself.
 NEGLIGIBLE = 1e-9
 
 #: Columns of characters that a table is made for, and fewest that a column of text is given.

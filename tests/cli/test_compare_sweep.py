@@ -16,26 +16,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.beams import MODAL_SCENE
 from tests.launch import MPIRUN, environment
 
 Rotfem = Callable[..., Any]
+SCENE = MODAL_SCENE
 
-SCENE = """\
-[structure]
-type = "planar_beam"
-length = 1.0
-hub_radius = 0.5
-section = { EA = 400.0, GA = 130.0, EI = 1.0, mass_per_length = 1.0, rotary_inertia = 0.0025 }
-[motion]
-type = "constant"
-speed = 3.0
-[model]
-theory = "consistent_linear"
-[mesh]
-elements = 4
-[modes]
-count = 3
-"""
 OPTIONS = ("-q", "--no-plots", "--no-error")
 
 

@@ -13,27 +13,13 @@ from typing import Any
 
 import pytest
 
+from tests.beams import MODAL_SCENE
+
 pytest.importorskip("bokeh", reason="the report needs bokeh")
 BROWSER = next((found for name in ("chromium-headless-shell", "chromium") if (found := shutil.which(name))), None)
 Rotfem = Callable[..., Any]
+SCENE = MODAL_SCENE
 DEMOS = Path(__file__).resolve().parents[2] / "demos"
-
-SCENE = """\
-[structure]
-type = "planar_beam"
-length = 1.0
-hub_radius = 0.5
-section = { EA = 400.0, GA = 130.0, EI = 1.0, mass_per_length = 1.0, rotary_inertia = 0.0025 }
-[motion]
-type = "constant"
-speed = 3.0
-[model]
-theory = "consistent_linear"
-[mesh]
-elements = 4
-[modes]
-count = 3
-"""
 
 #: Before all else: what goes wrong is kept, and frames come by the clock of the page, which runs ahead of ours.
 FIRST = """<script>

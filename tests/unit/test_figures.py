@@ -1,4 +1,4 @@
-"""What a reader of a figure needs: no text over another or cut off, units on axes, data inside, legends beside them.
+"""What a reader of a figure needs: no text over another or cut off, units on axes, data inside, legends outside.
 
 Judged on the figure as Matplotlib lays it out, of results made by hand.
 """
@@ -138,7 +138,7 @@ def test_a_long_history_is_an_envelope() -> None:
 
 
 def test_what_is_zero_has_no_panel() -> None:
-    """Round-off is 0, as is said; so is a speed that does not change."""
+    """Round-off is 0, as stated; so is a speed that does not change."""
     result = run_of(T, tip_u1=1e-16 * T, tip_u2=np.sin(T), tip_u3=2e-9 * np.sin(T), tip_theta1=0.0 * T)
     figure = result.plot()
     check(figure)
@@ -214,7 +214,7 @@ def test_modes_of_a_beam() -> None:
 
 
 def test_a_response() -> None:
-    """Two resonances; the outputs of a kind share a row, what does not answer is named, a legend stands beside."""
+    """Two resonances; the outputs of a kind share a row, what does not answer is named, a legend stands outside."""
     omega = np.linspace(0.1, 30.0, 400)
     one = 1 / (25 - omega**2 + 0.1j * omega) + 0.2 / (400 - omega**2 + 0.4j * omega)
     outputs = ["tip_u1", "tip_u2", "tip_u3", "tip_theta1", "root_f1", "root_f2", "root_m3", "M3@1.5"]

@@ -383,7 +383,7 @@ def test_a_notebook_shows_the_first_rows_of_a_long_table() -> None:
 
 
 def test_a_printed_table() -> None:
-    """Numbers stand at the right, text at the left; round-off beside the largest is 0; the last column folds."""
+    """Numbers stand at the right, text at the left; round-off of the largest is 0; the last column folds."""
     values = numbers([2.5, 1e-10, None, -3e-9])
     assert values == ["2.5", "0", "–", "-3e-09"]
     table = ShortTable(("name", "u (m)", "why"), [("a", "2.5", "a long reason " * 8), ("bc", "0", "none")])
