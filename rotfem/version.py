@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import platform
+from functools import cache
 
 __version__ = "0.7.0"
 
 
+@cache
 def versions() -> dict[str, str]:
     """Return the versions of the program and of what it computes with."""
     from importlib import metadata  # a sixth of what `import rotfem` takes

@@ -87,8 +87,6 @@ class Node:
     order: Array = field(default_factory=lambda: np.empty(0, dtype=int))
     confidence: Array = field(default_factory=lambda: np.empty(0))
     conjugate: Array = field(default_factory=lambda: np.empty(0, dtype=bool))
-    #: How the modes of a rotor precess; None where that was not asked yet.
-    waves: list[Wave] | None = None
 
     @property
     def speed(self) -> float:
@@ -137,15 +135,18 @@ def correlation(a: Spinning, b: Spinning, conjugate: bool = False) -> tuple[Arra
     return joint, single
 
 
-def twins(values: Array, bounds: Array) -> list[Array]:
+def twins(values: Array, bounds: Array) -> list[list[int]]:
     """Return the indices of eigenvalues (sorted by size) in groups of those that are one.
 
     Args:
         values: the eigenvalues, 1/s.
         bounds: their relative error bounds; what is no farther apart than these, or TWIN, is one.
     """
-    apart = np.abs(np.diff(values)) > np.maximum(TWIN, bounds[1:] + bounds[:-1]) * np.abs(values[1:])
-    return np.split(np.arange(len(values)), np.flatnonzero(apart) + 1)
+    one = np.abs(values[1:] - values[:-1]) <= np.maximum(TWIN, bounds[1:] + bounds[:-1]) * np.abs(values[1:])
+    out = [[0]] if len(values) else []
+    for i, same in enumerate(one.tolist(), start=1):
+        out[-1].append(i) if same else out.append([i])
+    return out
 
 
 def assign(node: Node, following: Node) -> float:
@@ -254,9 +255,8 @@ class Sweep:
 
     def wave(self, node: Node, branch: int) -> Wave | None:
         """Return how the mode of a branch precesses at a node; None where it is lost or no rotor's."""
-        if node.waves is None:
-            node.waves = self.analysis.waves(node.spinning)
-        return node.waves[node.order[branch]] if node.waves and node.order[branch] >= 0 else None
+        waves = self.analysis.described(node.spinning).waves
+        return waves[node.order[branch]] if waves and node.order[branch] >= 0 else None
 
     def direction(self, node: Node, branch: int) -> str:
         """Return "forward" or "backward", how a branch whirls at a node; "" where it stands or is no rotor's."""

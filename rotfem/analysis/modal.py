@@ -13,86 +13,38 @@ those of all modes that a structure at rest has add up to its mass r_iᵀ M r_i 
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from string import ascii_lowercase
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import ufl
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.fixed_frame import FixedFrame, check_rotating, has_anisotropic_supports
 from rotfem.analysis.mixed_modes import KeptDigits
 from rotfem.equations.compiled import compile_system
-from rotfem.equations.functionals import Functionals
-from rotfem.equations.modal_damping import family_products, massed
+from rotfem.equations.modal_damping import massed
+from rotfem.equations.nonlinear import assembled
 from rotfem.errors import InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.work import kinetic_parts
+from rotfem.numerics import forms
 from rotfem.numerics.eigenproblem import SAME, ZERO, Eigenpairs, Pencil
 from rotfem.numerics.newton import Newton
-from rotfem.structures.mode_names import Wave
+from rotfem.numerics.projection import summed
+from rotfem.structures.mode_names import Wave, with_overdamped, with_whirl
 
+Array = npt.NDArray[Any]
 
-def with_overdamped(names: list[str], values: Array, energies: tuple[Array, Array]) -> list[str]:
-    """Return the names of modes, those of overdamped ones as "lag 4, slow" and "lag 4, fast".
+#: Share of kinetic energy from which a mode belongs to one family; below it is named as mixed.
+PURE = 0.8
 
-    The number of an overdamped mode is not that of its nodes, which damping can move, but its place in its family: each
-    undamped mode becomes one that vibrates, or a slow and a fast one.
-
-    Args:
-        names: "kind n" of every mode, in the order of the undamped frequencies of the shapes.
-        values: λ, 1/s.
-        energies: x^H M x and x^H K x of every mode, over all ranks; a negative K shows an instability.
-    """
-    mass, stiffness = (np.real(e) for e in energies)
-    over = (values.imag == 0.0) & (values.real < 0.0) & (stiffness > 0.0) & (mass > 0.0)
-    if not np.any(over):
-        return names
-    vibrating, out = Counter[str](), list(names)
-    counted: dict[str, Counter[str]] = {"slow": Counter(), "fast": Counter()}
-    for j, name in enumerate(names):
-        kind, _, _ = name.rpartition(" ")
-        if not over[j]:
-            vibrating[kind] += 1
-            continue
-        speed = "slow" if abs(values[j]) ** 2 * mass[j] < stiffness[j] else "fast"
-        counted[speed][kind] += 1
-        out[j] = f"{kind} {vibrating[kind] + counted[speed][kind]}, {speed}"
-    return out
-
-
-def distinct(names: list[str]) -> list[str]:
-    """Return the names; those that occur more than once with a letter each."""
-    letters = [ascii_lowercase[names[:i].count(n) % 26] for i, n in enumerate(names)]
-    return [n if names.count(n) == 1 else f"{n}{letter}" for n, letter in zip(names, letters, strict=True)]
-
-
-def with_whirl(names: list[str], waves: Sequence[Wave], omega: Array, speed: float) -> list[str]:
-    """Return the names of a rotor's modes with the direction they run in, and those of whirl by their place.
-
-    The number of a whirling mode is not that of its nodes, which a disk on the shaft can move. It is its place among
-    those of its direction, by the frequency in the fixed frame: "bending 2 backward".
-
-    Args:
-        names: "kind n" of every mode.
-        waves: their precession.
-        omega: their frequencies in the rotor, rad/s.
-        speed: Ω ≥ 0, rad/s.
-    """
-    ways = [wave.direction(w, speed) for wave, w in zip(waves, omega, strict=True)]
-    out = [f"{name} {way}".rstrip() for name, way in zip(names, ways, strict=True)]
-    for way in ("forward", "backward"):
-        same = [j for j, wave in enumerate(waves) if wave.shaft and ways[j] == way]
-        same.sort(key=lambda j: abs(waves[j].seen_fixed(float(omega[j]), speed)))
-        for place, j in enumerate(same, start=1):
-            out[j] = f"bending {place} {way}"
-    return out
+#: Part of an eigenvalue that its real part must exceed to count as growth.
+GROWTH = 1e-6
 
 
 def participation(analysis: ModalAnalysis, spinning: Spinning) -> tuple[list[dict[str, float]], dict[str, float]]:
@@ -107,40 +59,30 @@ def participation(analysis: ModalAnalysis, spinning: Spinning) -> tuple[list[dic
         and `effective_mass_1`, … (kg) along the directions of the frame in which the structure moves; and the mass
         (kg) by the same names of directions.
     """
-    system = analysis.system.held
-    energy = Functionals({"T2": kinetic_parts(system.model.mechanics)["T2"]()}, system.structure.mesh)
-    owned = system.V.dofmap.index_map.size_local * system.V.dofmap.index_map_bs
+    system, names = analysis.system.held, list(analysis.structure.unknowns)
+    owned = system.V.dofmap.index_map.size_local * len(names)
+    energy = kinetic_parts(system.model.mechanics)["T2"]()
+    momentum = forms.form(ufl.derivative(energy, system.v, system.structure.k.dq))
 
-    def twice(v: Array) -> float:
+    def mass_times(v: Array) -> Array:
+        """Return M v, the clamped unknowns included."""
         system.v.x.array[:owned] = v
         system.v.x.scatter_forward()
-        return 2.0 * energy()["T2"]
+        return np.array(assembled(momentum, system.V, []).array)
 
-    names = list(system.structure.unknowns)
-    along = {i + 1: np.zeros(owned) for i in range(3) if f"u{i + 1}" in names}
-    for i, r in along.items():
-        r[names.index(f"u{i}") :: len(names)] = 1.0
+    along = {f"effective_mass_{i + 1}": np.zeros(owned) for i in range(3) if f"u{i + 1}" in names}
+    for name, r in along.items():
+        r[names.index(f"u{name[-1]}") :: len(names)] = 1.0
     system.set_state(spinning.q[: len(system.q.x.array)])
-    whole = {i: twice(r) for i, r in along.items()}
+    momenta = {name: mass_times(r) for name, r in along.items()}
     rows = []
-    for x in analysis.right(spinning).T:
-        shape = x[:owned] / largest(analysis, x[:owned])
-        pieces = [(part, twice(part)) for part in (shape.real, shape.imag)]
-        mass = sum(size for _, size in pieces)
-        row = {"modal_mass": mass}
-        for i, r in along.items():
-            momenta = [0.5 * (twice(part + r) - size - whole[i]) for part, size in pieces]
-            row[f"effective_mass_{i}"] = (momenta[0] ** 2 + momenta[1] ** 2) / mass
-        rows.append(row)
+    for x in analysis.right(spinning)[:owned].T:
+        shape = x / max(analysis.comm.allgather(complex(x[np.argmax(np.abs(x))]) if x.size else 0.0j), key=abs)
+        mass = sum(float(summed(analysis.comm, part @ mass_times(part))) for part in (shape.real, shape.imag))
+        sizes = {name: abs(summed(analysis.comm, p @ shape)) ** 2 for name, p in momenta.items()}
+        rows.append({"modal_mass": mass, **{name: float(size / mass) for name, size in sizes.items()}})
     system.set_state(spinning.q[: len(system.q.x.array)])
-    return rows, {f"effective_mass_{i}": mass for i, mass in whole.items()}
-
-
-def largest(analysis: ModalAnalysis, x: Array) -> complex:
-    """Return the entry of largest size of owned unknowns, over all ranks."""
-    here = complex(x[np.argmax(np.abs(x))]) if x.size else 0.0j
-    found: complex = max(analysis.comm.allgather(here), key=abs)
-    return found
+    return rows, {name: float(summed(analysis.comm, r @ momenta[name])) for name, r in along.items()}
 
 
 def self_checks(analysis: ModalAnalysis, spinning: Spinning) -> dict[str, float]:
@@ -189,16 +131,6 @@ def linearisation_error(analysis: ModalAnalysis, spinning: Spinning) -> float:
     return worst
 
 
-Array = npt.NDArray[Any]
-
-#: Share of kinetic energy from which a mode belongs to one family; below it is named as mixed.
-PURE = 0.8
-
-
-#: Part of the least eigenvalue a real part must exceed to count as growth.
-GROWTH = 1e-6
-
-
 @dataclass
 class Spinning:
     """The structure at one speed: its equilibrium, pencil and eigenpairs.
@@ -211,6 +143,7 @@ class Spinning:
         clamped: M, C, K without the hub's unknown (the same pencil where the hub is not free).
         rigid: whether hub and structure can turn as a rigid body (λ = 0, not among the pairs).
         reference: what the rotations of the equilibrium are counted from; None for the undeformed structure.
+        described: what the modes look like (see `ModalAnalysis.described`).
     """
 
     speed: float
@@ -220,11 +153,16 @@ class Spinning:
     clamped: Pencil
     rigid: bool = False
     reference: Any = None
+    described: Described | None = None
 
     @cached_property
     def own(self) -> Array:
         """y_i^H [(λ_i + λ_j) M + C] x_j of the pairs."""
         return self.pencil.gram(self.pairs.left, self.pairs.values, self.pairs.right, self.pairs.values)
+
+    def first(self, count: int) -> Spinning:
+        """Return it with its first modes alone."""
+        return replace(self, pairs=self.pairs.select(np.arange(min(count, len(self.pairs.values)))), described=None)
 
 
 class ModalAnalysis:
@@ -381,74 +319,87 @@ class ModalAnalysis:
         """Return M times the eigenvectors."""
         return spinning.pencil.apply(spinning.pencil.M, spinning.pairs.right)
 
-    # --- names ------------------------------------------------------------------------------------------------------
+    def described(self, spinning: Spinning) -> Described:
+        """Return what the modes at a speed look like."""
+        if spinning.described is None:
+            spinning.described = Described(self, spinning)
+        return spinning.described
 
-    def shares(self, spinning: Spinning) -> dict[str, Array]:
-        """Return family ↦ share of the kinetic energy x^H M x in its components, shape (m,)."""
-        X, MX = self.right(spinning), self.mass_times(spinning)
-        products = np.real(X.conj() * MX)
-        owned = self.system.V.dofmap.index_map.size_local * self.system.V.dofmap.index_map_bs
-        local = np.array([products.sum(axis=0), products[owned:].sum(axis=0)])  # the hub is on the last rank
-        total, hub = self.comm.allreduce(local) if self.comm.size > 1 else local
-        energies = family_products(self.system.held, X, MX)
-        shares = {name: np.real(np.diag(energy)) / total for name, energy in energies.items()}
-        return {**shares, "hub": hub / total} if self.free else shares
 
-    def rotary_shares(self, spinning: Spinning) -> Array:
-        """Return the share of the rotations of the nodes in the kinetic energy x^H M x of every mode, (m,)."""
-        products = np.real(self.right(spinning).conj() * self.mass_times(spinning))
-        owned = self.system.V.dofmap.index_map.size_local * self.system.V.dofmap.index_map_bs
-        turns = np.array([not name.startswith("u") for name in self.structure.unknowns])
-        turned = products[:owned].reshape(-1, len(turns), products.shape[1])[:, turns].sum(axis=(0, 1))
-        local = np.array([turned, products.sum(axis=0)])
-        part, total = self.comm.allreduce(local) if self.comm.size > 1 else local
-        return np.asarray(part / total)
+class Described:
+    """What modes look like; computed when it is asked for.
 
-    def names(self, spinning: Spinning) -> list[str]:
-        """Return "kind n" for every mode, as its structure counts them; mixed ones name both families.
+    Args:
+        analysis: of the modes.
+        spinning: the structure at their speed.
+    """
 
-        Of a rotor the direction follows: "bending 1 backward".
-        """
-        shares, structure, waves = self.shares(spinning), self.structure, self.waves(spinning)
-        families = [name for name in shares if name != "hub"]
-        table, right = np.array([shares[name] for name in families]), self.right(spinning)
-        out = []
-        for j in range(table.shape[1]):
-            order = np.argsort(-table[:, j])
-            kind, number = structure.mode_name(families[order[0]], *self.shape(right[:, j]))
-            mixed = len(order) > 1 and table[order[0], j] < PURE
-            out.append(f"{kind}–{families[order[1]]} {number}" if mixed else f"{kind} {number}")
-        values = spinning.pairs.values
-        if np.any(values.imag == 0.0):
-            out = with_overdamped(out, values, self._energies(spinning))
-        return with_whirl(out, waves, values.imag, abs(spinning.speed)) if waves else out
+    def __init__(self, analysis: ModalAnalysis, spinning: Spinning):
+        self._analysis, self._spinning, self._structure = analysis, spinning, analysis.structure
 
-    def _energies(self, spinning: Spinning) -> tuple[Array, Array]:
-        """Return x^H M x and x^H K x of every mode, over all ranks, shape (m,) each."""
-        p, X = spinning.pencil, spinning.pairs.right
-        local = np.array([np.sum(X.conj() * p.apply(A, X), axis=0) for A in (p.M, p.K)])
-        mass, stiffness = p.comm.allreduce(local) if p.comm.size > 1 else local
-        return mass, stiffness
+    @cached_property
+    def _right(self) -> Array:
+        return self._analysis.right(self._spinning)
 
-    def waves(self, spinning: Spinning) -> list[Wave]:
-        """Return how every mode of a shaft or a disk precesses; empty for other structures.
+    @cached_property
+    def _shapes(self) -> list[tuple[dict[str, Array], Array]]:
+        """Coordinates of the nodes, m, and complex components (n, components) of every mode, on every rank."""
+        return [self._structure.nodes(x) for x in self._right.T]
+
+    @cached_property
+    def _energies(self) -> Array:
+        """Share of every unknown of a node, and of the hub, in the kinetic energy x^H M x, (unknowns + 1, modes)."""
+        names, X, MX = self._structure.unknowns, self._right, self._analysis.mass_times(self._spinning)
+        owned = self._structure.V.dofmap.index_map.size_local * len(names)
+        x, mx = (self._structure.oriented(Y[:owned].reshape(-1, len(names), X.shape[1])) for Y in (X, MX))
+        hub = np.real(np.sum(X[owned:].conj() * MX[owned:], axis=0))  # on the last rank
+        energies = summed(self._analysis.comm, np.vstack([np.real(np.sum(x.conj() * mx, axis=0)), hub]))
+        return np.asarray(energies / energies.sum(axis=0))
+
+    @cached_property
+    def shares(self) -> dict[str, Array]:
+        """Family ↦ share of the kinetic energy x^H M x in its components, (m,); of a free hub that of the hub too."""
+        shares = {name: self._energies[list(i)].sum(axis=0) for name, (i, _) in self._structure.families.items()}
+        return shares | ({"hub": self._energies[-1]} if self._analysis.free else {})
+
+    @property
+    def rotary(self) -> Array:
+        """Share of the rotations of the nodes in the kinetic energy of every mode, (m,)."""
+        turns = [i for i, name in enumerate(self._structure.unknowns) if not name.startswith("u")]
+        return np.asarray(self._energies[turns].sum(axis=0))
+
+    @cached_property
+    def waves(self) -> list[Wave]:
+        """How every mode of a shaft or a disk precesses; empty for other structures.
 
         The sense of the spin counts, without spin that of its axis.
         """
-        axis = np.asarray(self.system.motion.axis) * (-1.0 if spinning.speed < 0.0 else 1.0)
+        axis = np.asarray(self._analysis.system.motion.axis) * (-1.0 if self._spinning.speed < 0.0 else 1.0)
         found = []
-        for x in self.right(spinning).T:
-            wave = self.structure.wave(*self.shape(x), axis)
+        for shape in self._shapes:
+            wave = self._structure.wave(*shape, axis)
             if wave is None:
                 return []
-            found.append(wave if self.fixed is None else replace(wave, fixed=True))
+            found.append(wave if self._analysis.fixed is None else replace(wave, fixed=True))
         return found
 
-    def shape(self, x: Array) -> tuple[dict[str, Array], Array]:
-        """Return (coordinates of the nodes, m; complex components (n, bs) of a mode), on every rank."""
-        coordinates, real = self.structure.nodes(x.real)
-        _, imaginary = self.structure.nodes(x.imag)
-        return coordinates, real + 1j * imaginary
+    @cached_property
+    def names(self) -> list[str]:
+        """The name "kind n" of every mode, as its structure counts them; mixed ones name both families.
+
+        Of a rotor the direction follows: "bending 1 backward".
+        """
+        families, out = [name for name in self.shares if name != "hub"], []
+        for j, shape in enumerate(self._shapes):
+            first, *others = sorted(families, key=lambda name: -self.shares[name][j])
+            kind, number = self._structure.mode_name(first, *shape)
+            mixed = others and self.shares[first][j] < PURE
+            out.append(f"{kind}–{others[0]} {number}" if mixed else f"{kind} {number}")
+        pencil, pairs, speed = self._spinning.pencil, self._spinning.pairs, self._spinning.speed
+        if np.any(pairs.values.imag == 0.0):
+            local = [np.sum(pairs.right.conj() * pencil.apply(A, pairs.right), axis=0) for A in (pencil.M, pencil.K)]
+            out = with_overdamped(out, pairs.values, tuple(summed(pencil.comm, np.array(local))))
+        return with_whirl(out, self.waves, pairs.values.imag, abs(speed)) if self.waves else out
 
 
 def stability(lam: complex, bound: float = 0.0) -> str:

@@ -1,14 +1,13 @@
 """Modes of a linear system over a range of speeds, by a basis of its modes at a few of them.
 
-With the M-orthonormal columns V of modes at some speeds, (λ² M + λ C + K) x = 0 becomes the small problem of VᵀMV, VᵀCV
-and VᵀKV, whose pieces (of Omega, Omega², …) are projected once. It keeps symmetry and skewness, so it is a pencil like
-the full one. The basis grows until full solutions at speeds between agree.
+With the columns V of modes at some speeds, orthonormal in the stiffness at rest, (λ² M + λ C + K) x = 0 becomes the
+small problem of VᵀMV, VᵀCV and VᵀKV, whose pieces (of Omega, Omega², …) are projected once. It keeps symmetry and
+skewness, so it is a pencil like the full one. The basis grows until full solutions at speeds between agree.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -47,25 +46,26 @@ def product(A: Array, X: Array) -> Array:
 class SmallPencil(Pencil):
     """A pencil of arrays, of which all eigenvalues are computed; double ones, as of a disk, do no harm then.
 
-    Of a conservative one with K = L Lᵀ and M = Rᵀ R positive definite, z = (Lᵀ x, λ R x) is an eigenvector of the skew
-    matrix [[0, G], [−Gᵀ, −R⁻ᵀ C R⁻¹]], G = Lᵀ R⁻¹ (Tisseur & Meerbergen 2001, section 3.7): all λ are imaginary, to
-    the last digit, and left vectors are right ones.
+    Of a conservative one with K = L Lᵀ positive definite and M = Rᵀ R, z = (Lᵀ x, λ R x) is an eigenvector of the skew
+    matrix [[−L⁻¹ C L⁻ᵀ, −Hᵀ], [H, 0]], H = R L⁻ᵀ, its eigenvalue 1/λ (Tisseur & Meerbergen 2001, section 3.7): all λ
+    are imaginary, to the last digit, and left vectors are right ones.
+
+    Args:
+        M, C, K: square arrays.
+        root: R.
+        asymmetries: of the full system, how far M and K are from symmetric and C from skew.
     """
 
-    def __init__(self, M: Array, C: Array, K: Array):
-        self.M, self.C, self.K = M, C, K
+    def __init__(self, M: Array, C: Array, K: Array, root: Array, asymmetries: dict[str, float]):
+        self.asymmetries = asymmetries
+        if self.conservative:  # what a projection lacks of symmetry is round-off
+            M, C, K = 0.5 * (M + M.T), 0.5 * (C - C.T), 0.5 * (K + K.T)
+        self.M, self.C, self.K, self._root = M, C, K, root
         self.comm, self.spectrum_error = MPI.COMM_SELF, None
 
     def apply(self, A: Any, X: Array) -> Array:
         """Return A X."""
         return product(A, X)
-
-    @cached_property
-    def asymmetries(self) -> dict[str, float]:
-        """How far M and K are from symmetric and C from skew."""
-        signs = {"M": (self.M, -1.0), "C": (self.C, 1.0), "K": (self.K, -1.0)}
-        tiny = np.finfo(float).tiny
-        return {name: float(norm(A.T + s * A) / max(norm(A), tiny)) for name, (A, s) in signs.items()}
 
     def solve(self, count: int, target: float = 0.0) -> Eigenpairs:
         """Return the pairs of smallest |λ| (see `Pencil.solve`), their errors those of the small problem."""
@@ -87,19 +87,25 @@ class SmallPencil(Pencil):
         return Eigenpairs(values, x, y, off, relative(off))
 
     def _skew(self, count: int) -> tuple[Array, Array, Array] | None:
-        """Return the first (λ, x, y) with positive imaginary parts; None where M or K is not positive definite."""
+        """Return the first (λ, x, y) with positive imaginary parts; None where K is not positive definite."""
         try:
-            L, R = np.linalg.cholesky(self.K), np.linalg.cholesky(self.M).T
+            inverse = np.linalg.inv(np.linalg.cholesky(self.K))
         except np.linalg.LinAlgError:
             return None
-        inverse = np.linalg.inv(R)
-        G, C = L.T @ inverse, inverse.T @ self.C @ inverse
-        n = len(L)
-        S = np.block([[np.zeros((n, n)), G], [-G.T, -C]])
-        w, z = eigh(1j * S, subset_by_index=[max(n - count, 0), n - 1], driver="evr", check_finite=False)
-        x = np.linalg.solve(L.T, z[:n])
+        H, n = self._root @ inverse.T, len(inverse)
+        S = np.block([[-inverse @ self.C @ inverse.T, -H.T], [H, np.zeros((len(H), len(H)))]])
+        last = min(count, len(H)) - 1
+        m, z = eigh(-1j * S, subset_by_index=[0, last], driver="evr", check_finite=False)
+        x = inverse.T @ z[:n]
         x = x / norm(x, axis=0)
-        return -1j * w, x, x
+        return -1j / m, x, x
+
+
+def root_of(M: Array) -> Array:
+    """Return R, M = Rᵀ R, of a symmetric matrix; as many rows as M has eigenvalues that are not round-off."""
+    squares, vectors = np.linalg.eigh(M)
+    there = squares > len(M) * np.finfo(float).eps * squares[-1]
+    return np.asarray((vectors[:, there] * np.sqrt(squares[there])).T)
 
 
 class ReducedAnalysis(ModalAnalysis):
@@ -120,6 +126,7 @@ class ReducedAnalysis(ModalAnalysis):
         self.estimates, self.past_limits, self.fixed = full.estimates, full.past_limits, full.fixed
         self.checks: list[dict[str, float]] = []
         self._columns: list[Array] = []
+        self._asymmetries: dict[str, float] = {}
 
     def prepare(self, first: float, last: float, count: int) -> bool:
         """Build the basis for speeds from first to last (rad/s) and `count` modes; return whether the checks agree.
@@ -149,7 +156,10 @@ class ReducedAnalysis(ModalAnalysis):
         return {"reduced_basis": {"columns": self.V.shape[1], "checks": self.checks}}
 
     def _solve(self, speed: float, count: int) -> Eigenpairs:
-        return self.full.at(speed, count, keep=False).pairs
+        exact = self.full.at(speed, count, keep=False)
+        for name, value in exact.pencil.asymmetries.items():
+            self._asymmetries[name] = max(value, self._asymmetries.get(name, 0.0))
+        return exact.pairs
 
     def _difference(self, speed: float, exact: Eigenpairs, count: int) -> float:
         reduced = self.at(speed, count).pairs.values
@@ -161,19 +171,18 @@ class ReducedAnalysis(ModalAnalysis):
             self._columns += [x.real, x.imag] if np.max(np.abs(x.imag)) > 0 else [x.real]
 
     def _project(self) -> None:
-        """Make the columns M-orthonormal and project every piece."""
+        """Make the columns orthonormal and project every piece."""
         system = self.system
         self._index = [i for i, p in enumerate(system.pieces) if p.kind in "MCK"]
         pieces = [system.pieces[i] for i in self._index]
-        masses = [p.operator for p in pieces if p.kind == "M"]
-
-        def massed(X: Array) -> Any:
-            return sum(times(M, X) for M in masses)
-
-        self.V = orthonormal(self.comm, np.array(self._columns).T, massed)
-        self.mass = massed(self.V)
+        K = system.material
+        # In the inertia instead, directions that have none would be lost.
+        self.V = orthonormal(self.comm, np.array(self._columns).T, lambda X: times(K, X))
         products = [times(p.operator, self.V) for p in pieces]
         self._pieces = [(p, summed(self.comm, self.V.T @ PV)) for p, PV in zip(pieces, products, strict=True)]
+        masses = [i for i, p in enumerate(pieces) if p.kind == "M"]
+        self.mass = np.sum([products[i] for i in masses], axis=0)
+        self._root = root_of(np.sum([self._pieces[i][1] for i in masses], axis=0))
         stacked = np.hstack(products)
         self._grams = summed(self.comm, stacked.T @ stacked)
         self._metric = summed(self.comm, self.V.T @ self.V)
@@ -188,7 +197,7 @@ class ReducedAnalysis(ModalAnalysis):
         small = {kind: np.zeros((self.V.shape[1],) * 2) for kind in "MCK"}
         for ci, (p, matrix) in zip(c, self._pieces, strict=True):
             small[p.kind] += ci * matrix
-        pencil = SmallPencil(small["M"], small["C"], small["K"])
+        pencil = SmallPencil(small["M"], small["C"], small["K"], self._root, self._asymmetries)
         pairs = pencil.solve(min(count, self.V.shape[1] - 1))
         pairs.errors = self._backward_errors(pairs, c)
         slope = pencil.gram(pairs.left, pairs.values, pairs.right, pairs.values).diagonal()

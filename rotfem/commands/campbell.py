@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -13,7 +12,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.branches import SPARE, Node, Sweep
-from rotfem.analysis.modal import ModalAnalysis, Spinning, distinct, self_checks
+from rotfem.analysis.modal import ModalAnalysis, self_checks
 from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
 from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.error_report import error_of_modes
@@ -32,7 +31,7 @@ from rotfem.refinement.refine import Clock, Setting
 from rotfem.results import CampbellResult
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.values import LARGEST, Limits
-from rotfem.structures.mode_names import engineers_name
+from rotfem.structures.mode_names import distinct, engineers_name
 from rotfem.units import split_unit
 
 Array = npt.NDArray[Any]
@@ -189,7 +188,7 @@ class Diagram:
         for crossing in crossings:
             label = labels[crossing["branch"] - 1]
             crossing |= {"label": label, "name": engineers_name(label)}
-        last = first_modes(sweep.nodes[-1].spinning, count)
+        last = sweep.nodes[-1].spinning.first(count)
         of_last = {} if mesh is None else dict(zip(sweep.nodes[-1].order, mesh, strict=False))
         known = None if mesh is None else [of_last.get(i) for i in range(len(last.pairs.values))]
         ends = mode_rows(analysis, last, known)
@@ -264,7 +263,7 @@ def branch_labels(analysis: ModalAnalysis, sweep: Sweep, count: int) -> list[str
         return len(there), sum(sweep.direction(node, b) != "" for b in there)
 
     node = max(sweep.nodes, key=precessing)  # the first of several
-    names = analysis.names(node.spinning)
+    names = analysis.described(node.spinning).names
     return distinct([names[node.order[b]] for b in range(count)])
 
 
@@ -276,17 +275,13 @@ def branch_summary(sweep: Sweep, b: int) -> dict[str, float | None]:
     return {"confidence": confidence, "frequency_first": first, "frequency_last": last}
 
 
-def first_modes(spinning: Spinning, count: int) -> Spinning:
-    """Return the first modes at a speed; what the mesh does to those far above would be taken for errors of theirs."""
-    return replace(spinning, pairs=spinning.pairs.select(np.arange(min(count, len(spinning.pairs.values)))))
-
-
 def branch_errors(analysis: ModalAnalysis, sweep: Sweep, count: int) -> list[float | None]:
     """Return the relative error of each branch by the mesh, the larger one of those at both ends of the diagram."""
     errors, found = FrequencyErrors(analysis), list[list[float]]()
     for node in (sweep.nodes[0], sweep.nodes[-1]):
         order = [int(i) for i in node.order[:count]]
-        there = errors(first_modes(node.spinning, 1 + max(order)))
+        # What the mesh does to modes far above would be taken for errors of these.
+        there = errors(node.spinning.first(1 + max(order)))
         found.append([np.nan if i < 0 or (e := there[i]) is None else e for i in order])
     larger = np.fmax(*np.array(found))
     return [float(x) if np.isfinite(x) else None for x in larger]
@@ -303,7 +298,7 @@ def node_rows(
         labels: names of the branches.
         mesh: their relative errors by the mesh; None where they are not wanted.
     """
-    columns, rows = mode_rows(analysis, first_modes(node.spinning, 1 + max(node.order[: len(labels)]))), []
+    columns, rows = mode_rows(analysis, node.spinning.first(1 + max(node.order[: len(labels)]))), []
     for b, label in enumerate(labels):
         if node.order[b] < 0:
             continue

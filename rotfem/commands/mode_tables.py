@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.modal import ModalAnalysis, Spinning, distinct, stability
+from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
 from rotfem.refinement.frequencies import FrequencyErrors
-from rotfem.structures.mode_names import Wave, engineers_name
+from rotfem.structures.mode_names import Wave, distinct, engineers_name
 
 Array = npt.NDArray[Any]
 
@@ -61,7 +61,7 @@ def mode_tables(analysis: ModalAnalysis, speed: float, count: int, *, keep: bool
     """
     spinning = analysis.at(speed, count, keep=keep)
     rigid = int(spinning.rigid)
-    spinning.pairs = spinning.pairs.select(np.arange(min(count - rigid, len(spinning.pairs.values))))
+    spinning = spinning.first(count - rigid)
     rows = mode_rows(analysis, spinning, FrequencyErrors(analysis)(spinning) if analysis.estimates else None)
     synchronous = critical(rows, speed, analysis.fixed is not None)
     warnings = [*advice(analysis, speed), *instabilities(rows), *synchronous, *doubtful(rows)]
@@ -82,8 +82,8 @@ def mode_rows(
         spinning: at the speed.
         mesh: relative errors by the mesh; None where they are not wanted.
     """
-    shares, waves = analysis.shares(spinning), analysis.waves(spinning)
-    rows, pairs, names = [], spinning.pairs, distinct(analysis.names(spinning))
+    rows, pairs, described = [], spinning.pairs, analysis.described(spinning)
+    names, waves = distinct(described.names), described.waves
     for i, (lam, error, bound) in enumerate(zip(pairs.values, pairs.errors, pairs.bounds, strict=True)):
         size = abs(lam)
         rows.append(
@@ -96,7 +96,7 @@ def mode_rows(
                 "damping": float(-lam.real / size) if size > 0 else 0.0,
                 "growth": float(lam.real),
                 "stability": stability(lam, float(bound)),
-                **{f"share_{name}": float(share[i]) for name, share in shares.items()},
+                **{f"share_{name}": float(share[i]) for name, share in described.shares.items()},
                 **(whirl(waves[i], float(lam.imag), abs(spinning.speed)) if waves else {}),
                 "residual": float(error),
                 "error_bound": float(bound),
@@ -191,9 +191,9 @@ def scales(analysis: ModalAnalysis, spinning: Spinning) -> Array:
     that of rotations, it is the largest rotation times the length of the structure.
     """
     moves = np.array([name.startswith("u") for name in analysis.structure.components])
-    out, right, turned = [], spinning.pairs.right, analysis.rotary_shares(spinning) > 0.5
+    out, right, turned = [], spinning.pairs.right, analysis.described(spinning).rotary > 0.5
     for i in range(right.shape[1]):
-        values = analysis.shape(right[:, i])[1]
+        values = analysis.structure.nodes(right[:, i])[1]
         translations, rotations = values[:, moves], analysis.structure.length * values[:, ~moves]
         z = rotations if turned[i] or not np.any(translations) else translations
         squares = np.sum(z * z, axis=1)
@@ -210,7 +210,7 @@ def scaled_shape(analysis: ModalAnalysis, x: Array) -> dict[str, Array]:
 
     Translations are parts of the largest one, rotations (rad) are multiplied by the length of the structure over it.
     """
-    coordinates, values = analysis.shape(x)
+    coordinates, values = analysis.structure.nodes(x)
     columns: dict[str, Array] = dict(coordinates)
     for c, name in enumerate(analysis.structure.components):
         column = values[:, c] if name.startswith("u") else analysis.structure.length * values[:, c]

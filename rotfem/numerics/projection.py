@@ -55,8 +55,8 @@ def orthonormal(comm: MPI.Comm, columns: Array, product: Callable[[Array], Array
         columns: of any lengths.
         product: X ↦ B X of the inner product x·B y.
     """
-    sizes = np.sqrt(np.maximum(summed(comm, np.einsum("ij,ij->j", columns, columns)), 1e-300))
-    V: Array = columns / sizes
+    energies = summed(comm, np.einsum("ij,ij->j", columns, product(columns)))
+    V: Array = columns / np.sqrt(np.maximum(energies, 1e-300))
     for _ in range(2):  # once more, as what is left of nearly equal columns is orthogonal only roughly
         gram = summed(comm, V.T @ product(V))
         energies, turns = np.linalg.eigh(0.5 * (gram + gram.T))

@@ -128,7 +128,7 @@ class Case:
         analysis = ModalAnalysis(system.model.problem, self.about, self.newton(), system.comm, system)
         analysis.past_limits = self.past_limits
         spinning = plainly(system, lambda: analysis.at(speed, self.mode_count))
-        names = analysis.names(spinning)[: self.mode_count - int(spinning.rigid)]
+        names = analysis.described(spinning).names[: self.mode_count - int(spinning.rigid)]
         lasting = [not name.endswith(FAST) for name in names]
         return np.asarray(spinning.pairs.values[: len(names)][lasting])
 

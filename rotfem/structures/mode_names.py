@@ -8,8 +8,11 @@ m = 1 (Genta, Dynamics of Rotating Systems, 2005, section 2.4). From the fixed f
 from __future__ import annotations
 
 import re
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from string import ascii_lowercase
 from typing import Any
 
 import numpy as np
@@ -238,3 +241,62 @@ def _polar_lines(x: npt.NDArray[Any], y: npt.NDArray[Any], w: npt.NDArray[Any]) 
     parts, squares = _diameters(x, y, w)
     best = int(np.argmax(squares * np.where(np.arange(len(squares)) == 0, 1, 2)))
     return best, sign_changes(in_phase(parts[:, best]), 0.05)
+
+
+# --- names of several modes ---------------------------------------------------------------------------------------
+
+
+def with_overdamped(names: list[str], values: npt.NDArray[Any], energies: tuple[npt.NDArray[Any], ...]) -> list[str]:
+    """Return the names of modes, those of overdamped ones as "lag 4, slow" and "lag 4, fast".
+
+    The number of an overdamped mode is not that of its nodes, which damping can move, but its place in its family: each
+    undamped mode becomes one that vibrates, or a slow and a fast one.
+
+    Args:
+        names: "kind n" of every mode, in the order of the undamped frequencies of the shapes.
+        values: λ, 1/s.
+        energies: x^H M x and x^H K x of every mode, over all ranks; a negative K shows an instability.
+    """
+    mass, stiffness = (np.real(e) for e in energies)
+    over = (values.imag == 0.0) & (values.real < 0.0) & (stiffness > 0.0) & (mass > 0.0)
+    if not np.any(over):
+        return names
+    vibrating, out = Counter[str](), list(names)
+    counted: dict[str, Counter[str]] = {"slow": Counter(), "fast": Counter()}
+    for j, name in enumerate(names):
+        kind, _, _ = name.rpartition(" ")
+        if not over[j]:
+            vibrating[kind] += 1
+            continue
+        speed = "slow" if abs(values[j]) ** 2 * mass[j] < stiffness[j] else "fast"
+        counted[speed][kind] += 1
+        out[j] = f"{kind} {vibrating[kind] + counted[speed][kind]}, {speed}"
+    return out
+
+
+def distinct(names: list[str]) -> list[str]:
+    """Return the names; those that occur more than once with a letter each."""
+    letters = [ascii_lowercase[names[:i].count(n) % 26] for i, n in enumerate(names)]
+    return [n if names.count(n) == 1 else f"{n}{letter}" for n, letter in zip(names, letters, strict=True)]
+
+
+def with_whirl(names: list[str], waves: Sequence[Wave], omega: npt.NDArray[Any], speed: float) -> list[str]:
+    """Return the names of a rotor's modes with the direction they run in, and those of whirl by their place.
+
+    The number of a whirling mode is not that of its nodes, which a disk on the shaft can move. It is its place among
+    those of its direction, by the frequency in the fixed frame: "bending 2 backward".
+
+    Args:
+        names: "kind n" of every mode.
+        waves: their precession.
+        omega: their frequencies in the rotor, rad/s.
+        speed: Ω ≥ 0, rad/s.
+    """
+    ways = [wave.direction(w, speed) for wave, w in zip(waves, omega, strict=True)]
+    out = [f"{name} {way}".rstrip() for name, way in zip(names, ways, strict=True)]
+    for way in ("forward", "backward"):
+        same = [j for j, wave in enumerate(waves) if wave.shaft and ways[j] == way]
+        same.sort(key=lambda j: abs(waves[j].seen_fixed(float(omega[j]), speed)))
+        for place, j in enumerate(same, start=1):
+            out[j] = f"bending {place} {way}"
+    return out

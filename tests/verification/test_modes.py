@@ -153,7 +153,7 @@ def test_euler_bernoulli_limit(unit_beam: Any, theory: str, delta: float) -> Non
         spinning = analysis.at(eta, 3, spinning)
         expected = transverse(eta, delta)
         worst = max(worst, float(np.max(np.abs(spinning.pairs.values.imag[:3] / expected - 1))))
-        assert analysis.names(spinning)[:3] == ["lag 1", "lag 2", "lag 3"]
+        assert analysis.described(spinning).names[:3] == ["lag 1", "lag 2", "lag 3"]
     print(f"A {theory} delta={delta:g}: {worst:.1e}")
     assert worst < 1e-5
 

@@ -137,7 +137,7 @@ def test_blade_table(theory: str, tip_mass: float, table: dict[float, tuple[floa
     analysis = ModalAnalysis(Problem.of(blade).spinning())
     for speed, printed in table.items():
         spinning = analysis.at(speed, 12)
-        pairs = list(zip(analysis.names(spinning), spinning.pairs.values.imag, strict=True))
+        pairs = list(zip(analysis.described(spinning).names, spinning.pairs.values.imag, strict=True))
         for n, value in enumerate(printed, start=1):
             digits = 3 if tip_mass == 0.0 or (n == 1 and value < 10) else 2
             found = dict(pairs)[f"flap {n}"]
