@@ -15,7 +15,6 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from scipy.signal import find_peaks
 
 from rotfem.results.columns import ZERO, described, is_at_station, label, shown_unit, zeros
 from rotfem.results.files import write_whole
@@ -149,6 +148,8 @@ def said_zero(names: Sequence[str]) -> str:
 
 def history_line(axis: Axes, t: Array, y: Array) -> str:
     """Draw a history, one of more than `PERIODS` periods as range and mean of stretches; return what to say of it."""
+    from scipy.signal import find_peaks  # half of what `import` of this file would take
+
     periods = len(find_peaks(y, prominence=PEAK * float(np.ptp(y)))[0]) if np.ptp(y) > 0.0 else 0
     if periods <= PERIODS:
         axis.plot(t, y, lw=1.0)
