@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import ufl
+
 from rotfem.equations.model import Model
 from rotfem.numerics import forms
 
@@ -20,16 +22,19 @@ _KNOWN: dict[tuple[str, str], dict[str, Any]] = {}
 MOST = 32
 
 
-def derived_forms(model: Model, purpose: str, make: Callable[[], Both]) -> Both:
-    """Return forms that follow from the residual of a model, and from nothing else.
+def derived_forms(model: Model, purpose: str, make: Callable[[], Both], more: tuple[Any, ...] = ()) -> Both:
+    """Return forms that follow from the residual of a model, their purpose, and nothing else.
 
     Args:
         model: with the residual.
         purpose: which forms.
         make: derives and compiles them.
+        more: functions and constants that they can have beyond those of the residual, always in one order.
     """
     residual = model.residual
-    key, whole = (purpose, residual.signature()), (list(residual.coefficients()), list(residual.constants()))
+    constants = [*residual.constants(), *(x for x in more if isinstance(x, ufl.Constant))]
+    functions = [*residual.coefficients(), *(x for x in more if isinstance(x, ufl.Coefficient))]
+    key, whole = (purpose, residual.signature()), (functions, constants)
     if key in _KNOWN:
         (data,) = residual.subdomain_data().values()
         both = {name: forms.drawn(known, whole, model.structure.V, data) for name, known in _KNOWN[key].items()}

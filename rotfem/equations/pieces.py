@@ -213,8 +213,12 @@ class Pieces:
         self._set_switches(model.switches)
         if self.not_polynomial:
             model.check_smooth()
-        self._geometric = self.geometric(ufl.TestFunction(self.V), ufl.TrialFunction(self.V), self.prestressed)
-        if not isinstance(self._geometric, int):
+        symbols = self.structure.section | self.structure.scalars | model.switches
+        purpose = " ".join(("geometric", model.theory.name, *model.effects, *symbols))
+        known, compiled = derived_forms(model, purpose, self._made_geometric, (self.prestressed, *symbols.values()))
+        self._geometric = known.get("G", 0)
+        if compiled:
+            self._forms |= compiled
             self._prestress()
         if self.pattern.getSize()[0] > SMALL:  # a factor and a matrix, which are hardly needed again
             self.__dict__.pop("material_solver", None)
@@ -225,6 +229,11 @@ class Pieces:
         at_rest = self.model.at_rest(self.model.residual, undeformed=True)
         at_rest = {kind: form for kind, form in at_rest.items() if not form.empty()}
         return at_rest, dict(zip(at_rest, forms.together(list(at_rest.values()), once=True), strict=True))
+
+    def _made_geometric(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Return the geometric stiffness likewise, if there is one."""
+        form = self.geometric(ufl.TestFunction(self.V), ufl.TrialFunction(self.V), self.prestressed)
+        return ({}, {}) if isinstance(form, int) else ({"G": form}, {"G": forms.form(form, once=True)})
 
     def _zero_constants(self) -> None:
         for constant in self.constants.values():
@@ -408,7 +417,6 @@ class Pieces:
 
     def _prestress(self) -> None:
         """Add the geometric stiffness of the stresses that each load piece causes in the linear structure."""
-        self._forms["G"] = forms.form(self._geometric, once=True)
         started = perf_counter()
         for load, K, added in geometric_pieces(self):
             self._keep("K", load.key, K, load.of | {PRESTRESS} | added)
