@@ -25,9 +25,6 @@ from typing import Any, ClassVar
 from rotfem.analysis.schemes import Array, Scheme, Span, Stage, State
 from rotfem.registry import register
 
-#: Growth of the step, and distance in steps, from which on the memory is not moved along.
-LONGER, FAR = 6.0, 0.25
-
 
 class AlphaFamily(Scheme):
     """What generalised-α and Newmark share; second-order accurate when γ = ½ + α_f − α_m."""
@@ -88,10 +85,10 @@ class AlphaFamily(Scheme):
         """Return the state with the auxiliary acceleration moved to where the next step takes it.
 
         It stands for q̈ at t + h (α_m − α_f), so it moves when h does; without this a change of step would cost an
-        order. Where `forgets` says so it starts afresh, with q̈.
+        order. Where a step grows by more than steps do it would be an extrapolation, and starts afresh.
         """
         last = new.t - old.t
-        if self.forgets(last, h):
+        if h > self.growth * last * (1 + 1e-9):
             return self.start(new)
         return new.changed(memory=new.memory + self.lag * (1 - h / last) * (new.memory - old.memory))
 
@@ -100,18 +97,6 @@ class AlphaFamily(Scheme):
         """How many steps the auxiliary acceleration is behind, α_f − α_m: 0 to 1, 0 with ρ∞ = 1."""
         alpha_m, alpha_f, _, _ = self.coefficients
         return alpha_f - alpha_m
-
-    def forgets(self, last: float, h: float) -> bool:
-        """Return whether the memory is left behind.
-
-        From a short step to a much longer one it would be an extrapolation, of vibrations too that the long one does
-        not resolve, and their multiple would go on with it.
-        """
-        return h > LONGER * last and self.lag * (h / last - 1) > FAR
-
-    def bent(self, state: State, change: Array) -> State:
-        """Return the state whose auxiliary acceleration lies on the line that q̈ goes on along."""
-        return state.changed(memory=state.memory - self.lag * change)
 
 
 @dataclass(frozen=True)

@@ -1,35 +1,24 @@
-"""The march through a time history, in fixed steps or adaptive ones.
-
-A fixed step is taken in legs where breakpoints of what is prescribed lie in it.
-
-At a kink of what is prescribed the memory of a scheme goes on along another line than it came.
-Generalised-α keeps an acceleration that stands for an instant θ h before the start of the next step, θ = α_f − α_m.
-Where the accelerations jump there, it jumps with them; where their rate jumps by Δȧ, its error is θ h Δȧ, and that of
-velocities θ² h² Δȧ/2 from then on. Over steps of one length that adds up to an error of the order of the
-scheme. Where a step is taken in legs, short and long ones, it does not: a blow of two short legs has up to eight
-times its impulse with ρ∞ = 0. So the memory is put on the line that the accelerations take after the kink.
-"""
+"""The march through a time history, in fixed steps or adaptive ones, over the legs of a time grid."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from rotfem.analysis.alpha_family import GeneralisedAlpha
 from rotfem.analysis.error_measure import ErrorMeasure
 from rotfem.analysis.schemes import Array, Scheme, State
-from rotfem.analysis.stepper import STEADY, Stepper, seen
+from rotfem.analysis.stepper import Stepper, seen
 from rotfem.analysis.switching import watched_switches
-from rotfem.analysis.time_grid import LEAST, Leg, TimeGrid
+from rotfem.analysis.time_grid import SHORT, Leg, TimeGrid
 from rotfem.errors import ComputationError
 from rotfem.mechanics.time_signals import SAME, View
 from rotfem.numerics.newton import Newton
 
-#: Lag of a memory, in steps, up to which kinks between plain steps are left to the order of the scheme.
-PLAIN = 0.06
+#: Order of a scheme up to which straight lines do for what is prescribed in a step with knots.
+LINES = 2
 
 
 @dataclass(frozen=True)
@@ -41,6 +30,7 @@ class Steps:
         step: fixed step, s; None for adaptive ones.
         tolerance: error of all adaptive steps together, relative to the largest displacement; None for fixed ones.
         max_step, min_step: bounds of an adaptive step, s; None for those of the program.
+        breakpoints: times (s) at which something that is prescribed may jump, in addition to the knots of tables.
     """
 
     end: float
@@ -48,11 +38,12 @@ class Steps:
     tolerance: float | None = None
     max_step: float | None = None
     min_step: float | None = None
+    breakpoints: Sequence[float] = ()
 
     @classmethod
     def of(cls, time: Any) -> Steps:
         """Return the steps of anything with these attributes, as a scene's [time] table."""
-        return cls(time.end, time.step, time.tolerance, time.max_step, time.min_step)
+        return cls(time.end, time.step, time.tolerance, time.max_step, time.min_step, time.breakpoints)
 
 
 def fixed_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[State]:
@@ -61,9 +52,11 @@ def fixed_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[State]
     Raises:
         ComputationError: a step failed, however short.
     """
-    assert steps.step is not None
-    reached = state.t
-    legs = (leg for leg in TimeGrid(stepper.system.signals, *grid(steps), stepper.scheme.order) if leg.end > reached)
+    reached, time_grid = (
+        state.t,
+        TimeGrid(stepper.system.signals, *grid(steps), steps.breakpoints, lands=stepper.scheme.order > LINES),
+    )
+    legs = (leg for leg in time_grid if leg.end > reached)
     leg = next(legs, None)
     if leg is not None and reached == 0.0:
         state = started(stepper, state, leg)
@@ -84,7 +77,7 @@ def grid(steps: Steps) -> tuple[Array, float]:
 
 def started(stepper: Stepper, state: State, first: Leg) -> State:
     """Return the state at t = 0 as the first leg starts from it."""
-    return stepper.restart(state, View(1), View(window=(0.0, first.length))) if first.averaged else state
+    return stepper.restart(state, View(1), View(1, first.line)) if first.line else state
 
 
 def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State:
@@ -94,76 +87,24 @@ def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State
         ComputationError: the step failed, however short.
     """
     old = state
-    if leg.free:
-        state = stepper.advance(old, leg.length, leg.end)
-    elif leg.drifts:
-        state = stepper.drift(old, leg.length, leg.end, leg.finish)
-    else:
-        joined = after is not None and leg.joins(after)
-        window = (leg.length, after.length if after is not None and joined else 0.0) if leg.averaged else None
-        with seen(stepper.system, View(-1 if leg.lands else 0, window)):
+    if leg.lands or leg.line:
+        with seen(stepper.system, leg.finish):
             state = stepper.advance(old, leg.length, leg.end)
+    else:
+        state = stepper.advance(old, leg.length, leg.end)
     if stepper.observer is not None:
         stepper.observer(old, state, leg)
-    if after is None or (leg.length == after.length and leg.doubles(after)):
-        return state
-    if not leg.drifts and not after.drifts and after.length != leg.length:
+    return state if after is None else turned_to(stepper, state, old, leg, after)
+
+
+def turned_to(stepper: Stepper, state: State, old: State, leg: Leg, after: Leg) -> State:
+    """Return the state at the end of a leg as the next leg starts from it; the old one is that of its start."""
+    if after.length != leg.length:
         state = stepper.scheme.resized(state, old, after.length)
-    if leg.lands or ((leg.averaged or after.averaged) and not leg.joins(after)):
-        ahead = View(1 if leg.lands else 0, (0.0, after.length) if after.averaged else None)
-        state = stepper.restart(state, leg.finish, ahead)
-    drifts, averaged = leg.drifts or after.drifts, leg.averaged or after.averaged
-    if not (drifts or averaged) and bends(stepper.scheme, leg, after):
-        state = bent(stepper, state, leg.length, after.length)
+    if leg.lands or leg.line != after.line:
+        state = stepper.restart(state, leg.finish, View(1, after.line))
     return state
 
-
-def bends(scheme: Scheme, leg: Leg, after: Leg) -> bool:
-    """Return whether a kink between two legs matters to the memory of a scheme, or the second one starts without it."""
-    if leg.plain and after.plain and scheme.lag <= PLAIN:
-        return False
-    return scheme.lag > 0.0 and (leg.lands or scheme.forgets(leg.length, after.length))
-
-
-def bent(stepper: Stepper, state: State, last: float, h: float) -> State:
-    """Return a state whose memory is on the line that what drives the system takes from here.
-
-    Args:
-        stepper: what takes the steps.
-        state: at the end of a step, with the accelerations and the memory that the next one starts from.
-        last: length of that step, s.
-        h: length of the next one, s.
-    """
-    s, t, scheme = stepper.system, state.t, stepper.scheme
-    if s.clamp is not None:  # its motion is exact, and what it drives follows by waves
-        return state
-    weights = {(t + h, -1): 1.0, (t, 1): -1.0}
-    if not scheme.forgets(last, h):
-        weights |= {(t, -1): -h / last, (t - last, 1): h / last}
-
-    def parts(values: Callable[[float], Array]) -> list[Array]:
-        out = []
-        for (at, side), weight in weights.items():
-            with seen(s, View(side)):
-                out.append(weight * values(at))
-        return out
-
-    def forces(at: float) -> Array:
-        s.set_time(at)
-        s.set_state(state.q, state.v, state.a)
-        return np.asarray(s.forces(at))
-
-    driven = np.array(parts(s.driven))
-    if np.max(np.abs(driven.sum(axis=0)), initial=0.0) <= STEADY * np.max(np.abs(driven), initial=0.0):
-        return state
-    s.count_rotations_from(state.reference)
-    change = np.sum(parts(forces), axis=0)
-    s.set_time(t)
-    s.set_state(state.q, state.v, state.a)
-    return scheme.bent(state, s.accelerated(change))
-
-
-__all__ = ["LARGEST_LINEAR_DEFLECTION", "March", "Steps"]
 
 #: A linear theory has lost its meaning when a displacement exceeds the structure's own length, or a rotation 1 rad.
 LARGEST_LINEAR_DEFLECTION = 1.0
@@ -211,7 +152,7 @@ class March:
         yield from steps(self.stepper, state, self.steps)
 
 
-#: Safety factor, smallest change, smallest relative scale.
+#: Safety factor, smallest change of a step, smallest largest displacement (scaled).
 SAFETY, SHRINK, FLOOR = 0.9, 0.2, 1e-6
 
 #: Both gains of the controller H211PI: h' = h (r_n r_{n−1})^(−GAIN/k) with errors r ∝ hᵏ, parts of what is allowed. It
@@ -219,26 +160,17 @@ SAFETY, SHRINK, FLOOR = 0.9, 0.2, 1e-6
 #: one that was taken back (Hairer, Nørsett & Wanner 1993, section II.4).
 GAIN = 1 / 6
 
-#: Local errors are estimates: the tolerance is divided by this.
-MARGIN = 7.0
+#: Local errors are estimates: the tolerance is divided by MARGIN. NOISE: errors in units of Newton's tolerance.
+MARGIN, NOISE = 7.0, 10.0
 
-#: Steps by which the scale of a motion is found, how alike their results must be, and errors that are noise, in units
-#: of Newton's tolerance.
-SCOUTED, ALIKE, NOISE = (20, 40), 0.6, 10.0
-
-#: The first step, the longest and the shortest, and the stretch within which knots may be too dense to be met, as parts
-#: of the end.
+#: The first step, the longest and the shortest, and the cells of the time grid, as parts of the end.
 FIRST, LONGEST, SHORTEST, CELL = 1e-4, 1 / 20, 1e-9, 1 / 2000
-
-#: Most a signal may be off a straight line over a step, as a part of its largest value.
-BENT = 0.1
 
 #: Error, as a part of what is allowed, of a step that could not be solved, and halvings of one that is short already.
 FAILED, HALVINGS = 100.0, 5
 
-#: Steps, with those taken back, after which a march is given up; steps over which its pace is measured, and by how much
-#: that may be too slow for the rest.
-MOST_STEPS, PACE, HOPELESS = 500_000, 5000, 10.0
+#: Steps, with those taken back, after which a march is given up; or after so many if ten times as many would not do.
+MOST_STEPS, PACE = 500_000, 5000
 
 #: What to do then.
 QUICKER = (
@@ -247,16 +179,11 @@ QUICKER = (
 )
 
 
-class Scout(Stepper):
-    """Steps so long that the acceleration after a knot, or before it, would make the next one overshoot."""
-
-    def restart(self, state: State, before: View, after: View) -> State:
-        """Return the state without an acceleration."""
-        return self.scheme.start(state.changed(a=np.zeros_like(state.a)))
-
-
 class AdaptiveSteps:
     """States whose local errors add up to a tolerance, relative to the largest displacement so far.
+
+    Steps land on the knots of what is prescribed. Where a cell of the time grid has more than a few of them, signals
+    are straight lines over it.
 
     Args:
         stepper: what advances the system.
@@ -270,18 +197,15 @@ class AdaptiveSteps:
         self.longest = steps.max_step or LONGEST * self.end
         self.shortest = steps.min_step or SHORTEST * self.end
         self.measure = ErrorMeasure(stepper.system, stepper.scheme, self.end)
-        cells = np.append(np.arange(round(1 / CELL)) * (CELL * self.end), self.end)
-        self.cells = TimeGrid(stepper.system.signals, cells, CELL * self.end, fixed=False)
-        self.landings, self.dense = self.cells.landings()
-        self.least = NOISE * stepper.newton.tolerance
-        self.wanted, self.before = min(self.longest, FIRST * self.end), 1.0
+        self.cell, self.least = CELL * self.end, NOISE * stepper.newton.tolerance
+        cells = np.append(np.arange(round(1 / CELL)) * self.cell, self.end)
+        legs = list(TimeGrid(stepper.system.signals, cells, self.cell, steps.breakpoints))
+        self.lines = np.array([leg.line for leg in legs if leg.line]).reshape(-1, 2)
+        landings = np.unique([*(leg.end for leg in legs if leg.lands), *self.lines.ravel(), self.end])
+        self.landings = landings[landings > 0.0]
+        self.wanted, self.before, self.largest = min(self.longest, FIRST * self.end), 1.0, FLOOR
         if stepper.pace is not None:
             self.wanted, self.largest, self.before = stepper.pace
-            return
-        self.largest = self.measure.displacement(state)
-        if self.largest < FLOOR:
-            coarse, fine = (self._scouted(n) for n in SCOUTED)
-            self.largest = max(FLOOR, 0.5 * min(coarse, fine) if ALIKE * max(coarse, fine) < min(coarse, fine) else 0.0)
 
     def __iter__(self) -> Iterator[State]:
         """Yield the state at the end of every step.
@@ -291,41 +215,33 @@ class AdaptiveSteps:
         """
         state, wanted, stepper, before = self.state, self.wanted, self.stepper, self.before
         order, most = stepper.scheme.estimate[1] - 1, stepper.scheme.growth
-        least, switches = self.cells.step, watched_switches(stepper.system)
-        began = state.t
+        switches, began = watched_switches(stepper.system), state.t
+        self.largest = max(self.largest, self.measure.displacement(state))
         for number in range(1, MOST_STEPS + 1):
             if state.t >= self.end:
                 return
             if number % PACE == 0:
                 self._check_pace((state.t - began) / PACE, state.t)
                 began = state.t
-            stop, h = self._next(state.t, wanted, least)
-            averaged, lands = self._averaged(state.t, stop), stop in self.landings
-            start = stepper.restart(state, View(), View(window=(0.0, h))) if averaged else state
-            finish = View(-1 if lands else 0, (h, 0.0) if averaged else None)
-            drifts = h <= LEAST * (1 + 1e-6) * min(self.cells.step, wanted)
-            new, ratio = (stepper.drift(start, h, stop, finish), 0.0) if drifts else self._tried(start, h, stop, finish)
-            if averaged and ratio > 1.0 and ratio != FAILED and h <= self.cells.step * (1 + 1e-9):
-                ratio = 1.0  # the time grid has nothing finer; shorter steps would follow each breakpoint after all
+            leg = self._next(state.t, wanted)
+            if state.t == 0.0:
+                state = started(stepper, state, leg)
+            new, ratio = self._tried(state, leg)
             if ratio > 1.0:
                 stepper.rejected += 1
-                least = 0.0 if ratio == FAILED else least
-                wanted, most = self._shorter(state.t, h * max(SAFETY * ratio ** (-1 / order), SHRINK)), 1.0
+                wanted, most = self._shorter(state.t, leg.length * max(SAFETY * ratio ** (-1 / order), SHRINK)), 1.0
                 continue
-            least, ratio = self.cells.step, max(ratio / SAFETY**order, 1e-12)
+            ratio = max(ratio / SAFETY**order, 1e-12)
             factor = float(np.clip((ratio * before) ** (-GAIN / order), SHRINK, most))
             most = stepper.scheme.growth
-            if h >= wanted or factor < 1.0:
-                wanted, before = min(self.longest, h * factor), ratio
+            if leg.length >= wanted or factor < 1.0:
+                wanted, before = min(self.longest, leg.length * factor), ratio
             if switches is not None:
-                switches.passed(number, start, new)
+                switches.passed(number, state, new)
             if stepper.observer is not None:
-                stepper.observer(start, new, Leg(stop, h, lands, averaged, drifts, plain=False))
-            following = self._next(new.t, wanted, least)[1] if new.t < self.end else h
-            if not drifts and following != h:
-                new = stepper.scheme.resized(new, start, following)
-            if lands or averaged:
-                new = stepper.restart(new, finish, View(1 if lands else 0))
+                stepper.observer(state, new, leg)
+            if new.t < self.end:
+                new = turned_to(stepper, new, state, leg, self._next(new.t, wanted))
             state, stepper.pace = new, (wanted, self.largest, before)
             yield state
         raise ComputationError(f"{MOST_STEPS} steps have not reached the end", time=state.t, advice=QUICKER)
@@ -334,75 +250,41 @@ class AdaptiveSteps:
         """Refuse a march whose last steps were so short (s, on average) that it would not reach its end.
 
         Raises:
-            ComputationError: it would take more than HOPELESS times the steps that there may be.
+            ComputationError: it would take more than ten times the steps that there may be.
         """
-        if self.end - t > HOPELESS * MOST_STEPS * advance:
+        if self.end - t > 10 * MOST_STEPS * advance:
             what = f"the last {PACE} steps were of {advance:.3g} s on average: {MOST_STEPS} do not reach the end"
             raise ComputationError(what, time=t, advice=QUICKER)
 
-    def _scouted(self, number: int) -> float:
-        """Return the largest displacement (scaled) in so many steps, which see all that is prescribed; 0 if they fail.
-
-        Where a motion starts from nothing, errors that are small beside what it becomes would be large beside what it
-        is. The scale counts if steps of two lengths agree on it, half of it to be on the safe side.
-        """
-        system, size = self.stepper.system, 0.0
-        scout = Scout(system, GeneralisedAlpha(0.0), self.stepper.newton)
-        try:
-            for state in fixed_steps(scout, scout.scheme.start(self.state), Steps(self.end, self.end / number)):
-                size = max(size, self.measure.displacement(state))
-                self.stepper.rejected += 1
-        except ComputationError:
-            return 0.0
-        return size if np.isfinite(size) else 0.0
-
-    def _tried(self, start: State, h: float, stop: float, finish: View) -> tuple[State, float]:
-        """Return the state at the end of a step, and its error as a part of what is allowed."""
+    def _tried(self, start: State, leg: Leg) -> tuple[State, float]:
+        """Return the state at the end of a leg, and its error as a part of what is allowed."""
         stepper = self.stepper
-        with seen(stepper.system, finish):
+        short = leg.length <= SHORT * self.longest
+        with seen(stepper.system, leg.finish):
             try:
-                new = stepper.advance(start, h, stop, 0 if h > LEAST * self.longest else HALVINGS)
+                new = stepper.advance(start, leg.length, leg.end, HALVINGS if short else 0)
             except ComputationError:
-                if h <= LEAST * self.longest:
+                if short:
                     raise
                 return start, FAILED
         local = stepper.scheme.local_error(new, start)
         self.largest = max(self.largest, self.measure.displacement(new))
         if local is None:  # a fallback has taken it
             return new, 1.0
-        return new, MARGIN * self.measure(local, h) / max(self.tolerance * self.largest, self.least)
+        return new, MARGIN * self.measure(local, leg.length) / max(self.tolerance * self.largest, self.least)
 
-    def _next(self, t: float, wanted: float, least: float) -> tuple[float, float]:
-        """Return end and length of a step from t that is about as long as wanted and steps over nothing.
-
-        Where breakpoints are denser than the time grid it is not shorter than `least`, s.
-        """
-        i = int(np.searchsorted(self.landings, t * (1 + SAME), side="right"))
-        stop = float(self.landings[i]) if i < len(self.landings) else self.end
+    def _next(self, t: float, wanted: float) -> Leg:
+        """Return a leg from t (s) that is about as long as wanted and passes no landing."""
+        stop = float(self.landings[np.searchsorted(self.landings, t * (1 + SAME), side="right")])
         left, h = stop - t, min(wanted, self.longest)
-        if self._averaged(t, t + min(h, left)):
-            if self._is_blow(t):
-                h = min(left, LEAST * self.cells.step)
-                return (stop, left) if h >= left * (1 - 1e-9) else (t + h, h)
-            h = max(h, least)
-        while h > self.cells.step and self.cells.bent(t, t + min(h, left)) > BENT:
-            h /= 2
-        if h >= left * (1 - 1e-9):
-            return stop, left
-        h = left / 2 if h > 0.6 * left else h
-        return t + h, h
-
-    def _averaged(self, begin: float, end: float) -> bool:
-        """Return whether a step meets what is denser than it can follow."""
-        i = np.searchsorted(self.dense[:, 1], begin * (1 + SAME), side="right")
-        return bool(i < len(self.dense) and self.dense[i, 0] < end * (1 - SAME))
-
-    def _is_blow(self, t: float) -> bool:
-        """Return whether what is averaged here is shorter than a cell: steps that drift have its whole impulse."""
-        apart = np.flatnonzero(self.dense[1:, 0] > self.dense[:-1, 1] * (1 + SAME))
-        begins, ends = self.dense[np.append(0, apart + 1), 0], self.dense[np.append(apart, -1), 1]
-        i = int(np.searchsorted(ends, t * (1 + SAME), side="right"))
-        return bool(begins[i] <= t * (1 + SAME) and ends[i] - begins[i] < self.cells.step)
+        if lands := h >= left * (1 - 1e-9):
+            h = left
+        else:
+            h = left / 2 if h > 0.6 * left else h
+            stop = t + h
+        i = int(np.searchsorted(self.lines[:, 1], t + 0.5 * h))
+        there = i < len(self.lines) and self.lines[i, 0] < t + 0.5 * h
+        return Leg(stop, h, lands, (float(self.lines[i, 0]), float(self.lines[i, 1])) if there else None)
 
     def _shorter(self, t: float, h: float) -> float:
         """Return the length (s) of a step to be tried again.

@@ -252,21 +252,8 @@ class Scheme(ABC):
 
     @property
     def lag(self) -> float:
-        """How many steps the memory of a step is behind its start; 0 where kinks of accelerations are no matter."""
+        """How many steps the memory of a step is behind its start."""
         return 0.0
-
-    def forgets(self, last: float, h: float) -> bool:
-        """Return whether a step of length h (s) after one of another length starts with the accelerations alone."""
-        return False
-
-    def bent(self, state: State, change: Array) -> State:
-        """Return a state after a kink of the accelerations.
-
-        Args:
-            state: at the kink.
-            change: of the acceleration over the next step, against what its memory says.
-        """
-        return state
 
     @classmethod
     def check(cls, parameters: dict[str, Any]) -> dict[str, str]:

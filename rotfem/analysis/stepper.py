@@ -93,11 +93,11 @@ STEADY = 1e-7
 @contextmanager
 def seen(system: Any, view: View) -> Iterator[None]:
     """Let a system see what is prescribed as a view shows it."""
-    system.view.side, system.view.window = view.side, view.window
+    system.view.side, system.view.line = view.side, view.line
     try:
         yield
     finally:
-        system.view.side, system.view.window = 0, None
+        system.view.side, system.view.line = 0, None
 
 
 class Stepper:
@@ -181,25 +181,6 @@ class Stepper:
         if new.given is not None and state.given is not None:
             new.given[:2] = state.given[:2]
         return self.scheme.jumped(new, new.a - state.a)
-
-    def drift(self, state: State, h: float, end: float, finish: View) -> State:
-        """Return the state at the end of a step too short to be solved for: round-off of q would spoil a.
-
-        The accelerations at both ends count by halves in v (the trapezoidal rule), so that no blow is lost.
-
-        Args:
-            state: where the step starts.
-            h: length of the step, s.
-            end: its last instant, s.
-            finish: how it sees there what is prescribed.
-        """
-        self.system.count_rotations_from(state.reference)
-        q, v = state.q + h * state.v + 0.5 * h * h * state.a, state.v + h * state.a
-        given = state.given
-        if given is not None:
-            given = given + np.array([0.0, self.system.row.impulse(state.t, end), 0.0])
-        new = self._accelerated(state.changed(t=end, q=q, v=v, given=given), finish)
-        return new.changed(v=new.v + 0.5 * h * (new.a - state.a))
 
     def step(self, state: State, h: float, end: float | None = None) -> State:
         """Return the state at state.t + h.

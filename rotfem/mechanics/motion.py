@@ -84,8 +84,8 @@ class Motion:
         is_spinning: whether Omega is anything but zero, as far as is known.
         changes_speed: whether Omega changes, as far as is known.
         is_accelerated: whether a_o is anything but zero.
-        knots: times (s) between which Omega is smooth.
-        sharp: those of them at which the rate may jump.
+        knots: times (s) between which Omega is smooth and nearly a polynomial.
+        sharp: those of them at which a derivative of it may jump.
         breakpoints: of a function, those that its user named; None if it has to be looked for them.
         smooth: whether Omega is known to be smooth between its knots.
         arrays: whether speed and rate take arrays of times too.
@@ -131,6 +131,7 @@ class Motion:
         turns = speed != 0.0
         state: dict[str, Any] = {"is_spinning": turns, "changes_speed": turns, "settled": duration}
         state["arrays"] = True
+        state["sharp"] = (duration,)
         state["knots"] = tuple(duration * np.arange(1, SPIN_UP_KNOTS + 1) / SPIN_UP_KNOTS)
         return cls(*smooth_spin_up(speed, duration), about(axis), **(state | more))
 
@@ -144,7 +145,7 @@ class Motion:
             "is_spinning": bool(np.any(speeds != 0.0)),
             "changes_speed": len(set(speeds)) > 1,
             "knots": tuple(t),
-            "sharp": () if kind in ("pchip", "cubic") else tuple(t),
+            "sharp": tuple(t),
             "arrays": True,
         }
         return cls(*tabulated(table, kind), about(axis), **(state | more))

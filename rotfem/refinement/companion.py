@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import sqrt
 from typing import Any
 
@@ -55,9 +55,7 @@ class Followed:
 
     def and_then(self, other: Followed) -> Followed:
         """Return both as one."""
-        a, b = self.leg, other.leg
-        leg = replace(b, length=a.length + b.length, plain=a.plain and b.plain)
-        return Followed(leg, self.steps + other.steps)
+        return Followed(self.leg.and_then(other.leg), self.steps + other.steps)
 
     def at(self, t: float, order: int) -> Array:
         """Return q at a time (s)."""
@@ -188,11 +186,11 @@ class Companion:
         step, (single, _) = Followed(leg, ((copy(old), copy(new)),)), self.waiting
         if single is not None:
             self.waiting[0] = None
-            if single.leg.doubles(leg):
+            if not single.leg.lands:
                 self._is_known(single.and_then(step))
                 return
             self._is_known(single)
-        if self.doubles and leg.doubles(leg):
+        if self.doubles and not leg.lands:
             self.waiting[0] = step
         else:
             self._is_known(step)

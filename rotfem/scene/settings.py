@@ -251,6 +251,13 @@ def usual(given: Mapping[str, Any]) -> str:
     return "esdirk4" if given.get("tolerance") is not None and not of_fixed else fixed
 
 
+def _as_times(value: Any) -> tuple[float, ...]:
+    numbers = isinstance(value, list | tuple) and all(type(t) in (int, float) and np.isfinite(t) for t in value)
+    if not numbers or any(t < 0.0 for t in value):
+        raise problem("", value, "must be a list of times (s) of at least 0")
+    return tuple(sorted(float(t) for t in value))
+
+
 class Time(SceneModel):
     """The [time] table. Either step or tolerance is given; the parameters of the scheme are keys as well.
 
@@ -261,6 +268,7 @@ class Time(SceneModel):
         max_step: longest adaptive step (s); `end`/20 if not given.
         min_step: shortest adaptive step (s); 1e-9 `end` if not given.
         scheme: name of a registered scheme; if not given, the usual one of fixed or adaptive steps.
+        breakpoints: times (s) at which a function of time jumps or has a kink; steps end there.
         output_every: number of steps from one output to the next.
         output_step: time (s) from one output to the next, wherever steps end; None where steps are counted.
     """
@@ -274,6 +282,7 @@ class Time(SceneModel):
     max_step: Positive | None = None
     min_step: Positive | None = None
     scheme: str = "generalised_alpha"
+    breakpoints: Annotated[tuple[float, ...], PlainValidator(_as_times)] = ()
     output_every: Count = 1
     output_step: Positive | None = None
 

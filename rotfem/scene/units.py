@@ -63,7 +63,7 @@ _KEYS: dict[str, dict[Unit, str]] = {
     },
     "modes": {"rad/s": "rated operating"},
     "output": {"m": "stations"},
-    "time": {"s": "end step max_step min_step output_step"},
+    "time": {"s": "end step max_step min_step output_step breakpoints"},
 }
 
 #: Units in which speeds and frequencies can be printed and drawn.

@@ -1,81 +1,91 @@
-"""Functions of time are looked at before a march: their jumps are found, and what a step would pass over is marked."""
+"""The time grid: jumps of functions, legs from knot to knot, and straight lines over what is denser."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
 
 from rotfem import SceneError, run
-from rotfem.analysis.time_grid import TimeGrid, find_breakpoints
+from rotfem.analysis.time_grid import FEW, TimeGrid, find_jumps
 from rotfem.mechanics.time_signals import TimeSignal
 from tests.beams import STRUCTURE
 
 TIMES = np.linspace(0.0, 2.0, 201)
 
 
-def looked(f: Any, name: str = "loads.tip_force") -> TimeSignal:
-    signal = TimeSignal(name, f, np.empty(0), np.empty(0), known=False)
-    find_breakpoints(signal, TIMES)
+def searched(f: Any) -> TimeSignal:
+    signal = TimeSignal("loads.tip_force", f, np.empty(0), known=False)
+    find_jumps(signal, TIMES)
     return signal
 
 
 @pytest.mark.parametrize("at", [0.5033, 1.0 / 3.0, 1.25])
 def test_a_jump_is_found_to_round_off(at: float) -> None:
-    """Halving sixty times leaves two neighbouring numbers, one on each side."""
-    signal = looked(lambda t: 3.0 if t >= at else -1.0)
+    """Halving goes on until two neighbouring numbers are left, one on each side."""
+    signal = searched(lambda t: 3.0 if t >= at else -1.0)
     assert len(signal.knots) == 1
     assert signal.knots[0] == pytest.approx(at, rel=4e-16)
 
 
-def test_what_is_smooth_has_no_knots_and_what_is_slow_no_marks() -> None:
-    assert len(looked(lambda t: np.sin(7 * t)).knots) == len(looked(lambda t: np.sin(7 * t)).marks) == 0
-    bump = looked(lambda t: np.exp(-(((t - 0.505) / 1e-3) ** 2)))
-    assert len(bump.knots) == 0
-    assert np.all((bump.marks > 0.48) & (bump.marks < 0.53))
-    assert len(bump.marks) >= 64
+@pytest.mark.parametrize("f", [lambda t: np.sin(7 * t), lambda t: abs(t - 0.5033), lambda t: np.sqrt(t), lambda t: 2.0])
+def test_what_is_continuous_has_no_knots(f: Any) -> None:
+    assert len(searched(f).knots) == 0
 
 
-@pytest.mark.parametrize("step", [0.03, 0.02, 0.0137, 0.01, 0.007])
-@pytest.mark.parametrize(("order", "averages"), [(2, True), (4, False)])
-def test_what_is_smooth_in_up_to_three_steps_is_averaged_wherever_they_end(
-    step: float, order: int, averages: bool
-) -> None:
-    """A parabola of 20 ms: every leg in it is averaged or none, so that hats add up to all of it, 2/3 · 20 ms."""
-    signal = TimeSignal(
-        "motion.rate",
-        lambda t: max(0.0, 1.0 - ((t - 0.51) / 0.01) ** 2),
-        np.empty(0),
-        np.array([0.0, 0.5, 0.52, 1.0]),
-        probes=np.array([0.25, 0.51, 0.76]),
-    )
-    legs = list(TimeGrid([signal], np.append(np.arange(0.0, 1.0, step), 1.0), step, order))
-    inside = [leg for leg in legs if leg.end > 0.5 + 1e-9 and leg.end - leg.length < 0.52 - 1e-9]
-    assert {leg.averaged for leg in inside} == {averages}
-    if averages:
-        ends = [inside[0].end - inside[0].length, *(leg.end for leg in inside)]
-        lengths = [0.0, *np.diff(ends), 0.0]
-        impulse = sum(
-            0.5 * (before + after) * signal.mean(t, before, after)
-            for t, before, after in zip(ends, lengths, lengths[1:], strict=False)
-        )
-        assert impulse == pytest.approx(2 / 3 * 0.02, rel=1e-9)
+def test_steps_have_legs_from_knot_to_knot_or_one_with_a_line() -> None:
+    """Up to FEW knots are landed on, more are not; a knot at the end of a step makes no leg of its own."""
+    few, many = np.linspace(0.11, 0.19, FEW), np.linspace(0.31, 0.39, FEW + 1)
+    signal = TimeSignal("a", lambda t: t, np.concatenate([few, [0.3], many]))
+    legs = list(TimeGrid([signal], np.linspace(0.0, 0.5, 6), 0.1))
+    np.testing.assert_allclose([leg.end for leg in legs], [0.1, *few, 0.2, 0.3, 0.4, 0.5], rtol=1e-12)
+    assert [leg.lands for leg in legs] == [False, *FEW * [True], False, True, False, False]
+    assert [leg.whole for leg in legs] == [True, *FEW * [False], *4 * [True]]
+    assert [leg.line for leg in legs] == [*(FEW + 3) * [None], pytest.approx((0.3, 0.4)), None]
+    whole = list(TimeGrid([signal], np.linspace(0.0, 0.5, 6), 0.1, lands=False))
+    assert [leg.line is not None for leg in whole] == [False, True, False, True, False]
+
+
+@pytest.mark.parametrize("knots", [[0.3, 0.41, 0.7], [], [0.2, 0.2 + 1e-12, 0.9]])
+def test_a_line_has_impulse_and_first_moment_of_its_signal(knots: list[float]) -> None:
+    """∫ f and ∫ t f over the step, of parabolas that jump at knots; a straight f is its own line."""
+
+    def f(t: float) -> float:
+        piece = float(np.searchsorted(knots, t))
+        return piece**2 - 3.0 * piece + (piece + 1.0) * t * t
+
+    begin, end = 0.1, 1.0
+    edges, x, w = [begin, *knots, end], *np.polynomial.legendre.leggauss(5)
+    exact, seen = np.zeros(2), np.zeros(2)
+    signal = TimeSignal("a", f, np.array(knots))
+    for a, b in pairwise(edges):
+        for s, weight in zip((a + b) / 2 + (b - a) / 2 * x, (b - a) / 2 * w, strict=True):
+            exact += weight * f(s) * np.array([1.0, s])
+            seen += weight * signal.on_line(s, begin, end) * np.array([1.0, s])
+    np.testing.assert_allclose(seen, exact, rtol=1e-12)
+    straight = TimeSignal("b", lambda t: 2.0 - 3.0 * t, np.array(knots))
+    assert straight.on_line(0.33, begin, end) == pytest.approx(2.0 - 3.0 * 0.33, rel=1e-12)
 
 
 def beam(**tables: Any) -> Any:
     still = {"motion": {"type": "constant", "speed": 0.0}}
-    return run({"structure": STRUCTURE, "mesh": {"elements": 4}, "time": {"end": 1.0, "step": 0.01}, **still, **tables})
+    time = {"time": {"end": 1.0, "step": 0.01}}
+    return run({"structure": STRUCTURE, "mesh": {"elements": 4}, **time, **still, **tables})
 
 
 def test_a_blow_of_a_function_is_that_of_its_table() -> None:
     """2 ms between two steps; the table's flanks of 0.1 ns are all the two differ in."""
     rows = [[0, 0, 0], [0.5033, 0, 0], [0.5033000001, 0, 200.0], [0.5053, 0, 200.0], [0.5053000001, 0, 0], [9, 0, 0]]
     table = beam(loads={"tip_force": rows})
-    function = beam(loads={"tip_force": lambda t: [0.0, 200.0 if 0.5033 < t < 0.5053 else 0.0]})
+    function = {"tip_force": lambda t: [0.0, 200.0 if 0.5033 < t < 0.5053 else 0.0]}
+    known = {"time": {"end": 1.0, "step": 0.01, "breakpoints": [0.5033, 0.5053]}}
     u2 = table.history["tip_u2"]
     assert np.abs(u2).max() > 0.01
-    np.testing.assert_allclose(function.history["tip_u2"], u2, rtol=0, atol=1e-3 * np.abs(u2).max())
+    np.testing.assert_allclose(
+        beam(loads=function, **known).history["tip_u2"], u2, rtol=0, atol=1e-3 * np.abs(u2).max()
+    )
 
 
 def test_a_speed_that_jumps_is_refused() -> None:

@@ -110,8 +110,7 @@ def test_work_without_end_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_jumps_denser_than_steps_act_by_their_mean() -> None:
     """A force that jumps 10000 times is its mean and a ripple at ω = 10⁴π/T, which moves less than its part of (ω₁/ω)².
 
-    Of 2000 cells of the time grid each has five jumps and one step, and pairs of jumps that are closer than steps can
-    be have one of their own; what is left is the tolerance.
+    Of 2000 cells of the time grid each has five jumps, and one or two steps; what is left is the tolerance.
     """
     end, found = 0.5, []
     starts = np.arange(10_000) * end / 10_000
@@ -122,7 +121,7 @@ def test_jumps_denser_than_steps_act_by_their_mean() -> None:
         model, time = {"theory": "consistent_linear"}, {"end": end, "tolerance": 1e-3}
         found.append(run({**scene, "model": model, "time": time, "output": {"error": False}}))
     ripple, mean = (result.history for result in found)
-    assert found[0].summary["steps"] < 3100
+    assert found[0].summary["steps"] < 4100
     off = np.interp(ripple["t"], mean["t"], mean["tip_u2"]) - ripple["tip_u2"]
     assert np.max(np.abs(off)) < 3e-3 * np.max(np.abs(mean["tip_u2"]))
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from rotfem.analysis.reduced.manifold import Manifold
 from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.analysis.reduced.solution import Solution, States
-from rotfem.analysis.time_grid import find_breakpoints
+from rotfem.analysis.time_grid import find_jumps
 from rotfem.mechanics.time_signals import SAME as RESOLVED
 
 Array = npt.NDArray[np.float64]
@@ -53,9 +53,9 @@ class Excitation:
         self.system, self.motion, self.frame = system, system.motion, system.model.frame
         self._signals = {signal.name: signal for signal in system.signals}
         for signal in system.signals:
-            find_breakpoints(signal, times)
+            find_jumps(signal, times)
         first, last = float(times[0]), float(times[-1])
-        points = np.concatenate([np.empty(0), *(np.concatenate([c.knots, c.marks]) for c in system.signals)])
+        points = np.concatenate([np.empty(0), *(np.concatenate([c.knots, c.smooth]) for c in system.signals)])
         inside = np.unique(points[(points > first) & (points < last)])
         knots = np.concatenate([[first], inside, [last]])
         self.knots: Array = knots[np.append(np.diff(knots) > ASIDE * (last - first), True)]
