@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rotfem.commands.console import Session, missing
-from rotfem.commands.job import Job, app, command
+from rotfem.commands.job import Debug, Job, Json, NoPlots, Quiet, SceneFile, app, command, folder_option
 from rotfem.commands.options import as_path, listed, speeds_of
 from rotfem.errors import input_of
 
 if TYPE_CHECKING:
     from rotfem.commands.result_folder import Writer
+
+#: Exit status where results are farther apart than the tolerance, as diff(1) has it.
+DIFFERENT = 1
 
 
 @command()
@@ -231,26 +234,19 @@ def cost(
 
 @app.command()
 def sweep(
-    scene: Annotated[
-        Path, typer.Argument(metavar="SCENE", parser=as_path, help="scene file (TOML)", show_default=False)
-    ],
+    scene: SceneFile,
     verb: Annotated[
         list[str], typer.Argument(metavar="-- VERB…", help="run, modes, campbell, response or check, with its options")
     ],
     overrides: Annotated[
         list[str], typer.Option("--set", metavar="KEY=A:B:N", help="values of a scene key, or KEY=A,B,…; repeatable")
     ],
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", metavar="DIR", parser=as_path, help="result folder [results/sweep-<scene name>]"
-        ),
-    ] = None,
+    output: Annotated[Path | None, folder_option("results/sweep-<scene name>")] = None,
     jobs: Annotated[int, typer.Option("-j", "--jobs", metavar="N", help="processes that compute")] = 1,
-    as_json: Annotated[bool, typer.Option("--json", help="print the summary as JSON on stdout")] = False,
-    no_plots: Annotated[bool, typer.Option("--no-plots", help="write no figure")] = False,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False,
+    as_json: Json = False,
+    no_plots: NoPlots = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
 ) -> None:
     """Run a verb over a grid of scene keys, on several processes.
 
@@ -281,8 +277,8 @@ def import_(
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="scene key in addition to the file, repeatable"),
     ] = None,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
 ) -> None:
     """Write the scene of a blade FILE of another program.
 
@@ -304,7 +300,32 @@ def import_(
         session.say([f"{output}: {structure.type} of {file.name}, rows at {len(structure.knots) + 2} places"])
 
 
-import rotfem.commands.compare  # noqa: E402, F401  the last of the verbs
+@app.command()
+def compare(
+    folders: Annotated[list[str], typer.Argument(metavar="FOLDER FOLDER…", help="result folders, the reference first")],
+    tolerance: Annotated[
+        float | None, typer.Option("--tolerance", metavar="E", help="exit with status 1 if anything differs by more")
+    ] = None,
+    output: Annotated[Path | None, folder_option("results/compare")] = None,
+    as_json: Json = False,
+    no_plots: NoPlots = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
+) -> None:
+    """Compare results in folders with those in the first folder.
+
+    Histories, modes, branches, critical speeds and peaks are compared.
+    """
+    from rotfem.results.compare import compare as distances
+
+    with Session(as_json, quiet, debug) as session:
+        result = distances(*folders)
+        inputs = [Path(folder) / "summary.json" for folder in folders]
+        session.folder(output or Path("results/compare"), "compare", inputs)
+        session.finish(result, not no_plots)
+        if tolerance is not None and not result.summary["worst"] <= tolerance:
+            session.say([f"farther apart than {tolerance:g}"])
+            raise SystemExit(DIFFERENT)
 
 
 def main() -> None:

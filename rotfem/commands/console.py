@@ -70,6 +70,10 @@ class _Alone:
         """Return what is sent to all."""
         return value
 
+    def allgather(self, value: Any) -> list[Any]:
+        """Return what all send."""
+        return [value]
+
 
 class Session:
     """One command under one set of flags: speaks on rank 0 only, and turns errors into messages and exit status.
@@ -180,11 +184,7 @@ class Session:
                 return
 
     def folder(self, path: Path, command: str, inputs: Sequence[Path]) -> ResultFolder:
-        """Return the result folder, made and locked; say so if the command before was killed there.
-
-        Raises:
-            OutputError: it is not to be written (see `rotfem.results.result_set.ResultSet`).
-        """
+        """Return the result folder, made and locked; say so if the command before was killed there."""
         from rotfem.commands.result_folder import ResultFolder
 
         if self.first:
@@ -195,11 +195,7 @@ class Session:
         return self._folder
 
     def check_writable(self, option: str, path: Path, inputs: Sequence[Path]) -> None:
-        """See that the file of an option can be written, before anything is computed, and is none that was read.
-
-        Raises:
-            SceneError: it cannot.
-        """
+        """See that the file of an option can be written, before anything is computed, and is none that was read."""
         from rotfem.results.files import unwritable
 
         reason = self.comm.bcast(unwritable(path, inputs) if self.first else None)

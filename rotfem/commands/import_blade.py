@@ -42,11 +42,7 @@ def import_blade(file: str | Path, format: str | None = None, changes: Sequence[
 
 
 def write_imported(scene: Scene, source: Path, path: Path) -> Path:
-    """Write an imported scene as TOML, one row of a table on a line, with what it came from; return the path.
-
-    Raises:
-        OutputError: the file cannot be written.
-    """
+    """Write an imported scene as TOML, one row of a table on a line, with what it came from; return the path."""
     head = f"# imported from {source.name}; axes, signs and centres as in docs/blades.md, SI units, rad\n"
     return write_text(path, head + toml_text(scene.tables))
 

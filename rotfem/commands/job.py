@@ -32,6 +32,20 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
+#: Options that several commands have.
+SceneFile = Annotated[
+    Path, typer.Argument(metavar="SCENE", parser=as_path, help="scene file (TOML)", show_default=False)
+]
+Json = Annotated[bool, typer.Option("--json", help="print the summary as JSON, and nothing else, on stdout")]
+NoPlots = Annotated[bool, typer.Option("--no-plots", help="write no figures")]
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")]
+Debug = Annotated[bool, typer.Option("--debug", help="show the traceback of an error")]
+
+
+def folder_option(default: str) -> Any:
+    """Return the option -o of a result folder."""
+    return typer.Option("-o", "--output", metavar="DIR", parser=as_path, help=f"result folder [{default}]")
+
 
 @app.callback()
 def _root(
@@ -103,13 +117,8 @@ class Job:
 @contextmanager
 def job(
     command: str,
-    scene: Annotated[
-        Path, typer.Argument(metavar="SCENE", parser=as_path, help="scene file (TOML)", show_default=False)
-    ],
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="DIR", parser=as_path, help="result folder [results/<scene name>]"),
-    ] = None,
+    scene: SceneFile,
+    output: Annotated[Path | None, folder_option("results/<scene name>")] = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="change a scene key, repeatable")
     ] = None,
@@ -119,17 +128,15 @@ def job(
     budget: Annotated[
         str | None, typer.Option("--budget", metavar="TIME", help="that an accuracy may take: 60s, 2min, 1h")
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="print the summary as JSON, and nothing else, on stdout")
-    ] = False,
+    as_json: Json = False,
     no_error: Annotated[
         bool, typer.Option("--no-error", help="estimate no errors, as output.error = false does")
     ] = False,
-    no_plots: Annotated[bool, typer.Option("--no-plots", help="write no figures")] = False,
+    no_plots: NoPlots = False,
     report: Annotated[bool, typer.Option("--report", help="write report.html, a page that shows all of it")] = False,
     no_advice: Annotated[bool, typer.Option("--no-advice", help="give no hints at the start")] = False,
-    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="print errors only")] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="show the traceback of an error")] = False,
+    quiet: Quiet = False,
+    debug: Debug = False,
 ) -> Iterator[Job]:
     """Give a command its job; these are, but for its name, the options of all commands."""
     with held_back():  # in the middle of an import what signals raise becomes any error

@@ -58,11 +58,7 @@ class Monitor:
         self.stability: Stability | None = None
 
     def step(self, state: State) -> None:
-        """Stop a history that has left the range of its theory.
-
-        Raises:
-            ComputationError: displacements of a linear theory beyond the structure's length, or not finite.
-        """
+        """Stop a history that has left the range of its theory."""
         if not self.system.linear:
             return
         speed = abs(self.system.motion.speed(state.t))
@@ -75,11 +71,7 @@ class Monitor:
         raise diverged(self.system.model.problem.theory, state.t, self.critical, self.since, loose)
 
     def row(self, state: State) -> None:
-        """Take note of a state that is recorded.
-
-        Raises:
-            ComputationError: the motion has left the range of the theory.
-        """
+        """Take note of a state that is recorded."""
         if not self.system.linear:
             self.system.structure.check_range(state.q, state.t)
         self.farthest(state.q, state.t)
@@ -236,11 +228,7 @@ def check_finite(values: Iterable[tuple[str, Any]], time: float | None = None, w
 
 
 def check_rows(rows: Iterable[Mapping[str, Any]]) -> None:
-    """See that all numbers of modes, or of branches over speed, are finite.
-
-    Raises:
-        ComputationError: names the first mode with one that is not.
-    """
+    """See that all numbers of modes, or of branches over speed, are finite."""
     for number, row in enumerate(rows, start=1):
         where = f" at {row['speed']:g} rad/s" if "speed" in row else ""
         check_finite(row.items(), where=f" of mode {row.get('branch', number)}{where}")

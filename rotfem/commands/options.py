@@ -38,33 +38,21 @@ def seconds_of(text: str | float, file: str = "", key: str = "cost --budget") ->
 
 
 def as_path(text: str) -> Path:
-    """Return the path that an option gives.
-
-    Raises:
-        BadParameter: it is empty, which would mean the working directory, or no path.
-    """
+    """Return the path that an option gives."""
     if not text or "\0" in text:
         raise typer.BadParameter("must be a path, not an empty text")
     return Path(text)
 
 
 def folder_name(scene: str) -> str:
-    """Return the name of the folder of a scene's results: the scene's own, if that is the name of one.
-
-    Raises:
-        SceneError: it is not.
-    """
+    """Return the name of the folder of a scene's results: the scene's own, if that is the name of one."""
     if scene in ("", ".", ".."):
         raise SceneError("command line", "-o", None, f'must be given for a scene of the name "{scene}"')
     return scene
 
 
 def listed(option: str, text: str | None, kind: Callable[[str], Any]) -> list[Any] | None:
-    """Return the values of an option such as "2,3"; None where it is not given.
-
-    Raises:
-        SceneError: they are not of the kind.
-    """
+    """Return the values of an option such as "2,3"; None where it is not given."""
     if text is None:
         return None
     try:
@@ -75,11 +63,7 @@ def listed(option: str, text: str | None, kind: Callable[[str], Any]) -> list[An
 
 
 def speeds_of(option: str, text: str, number: int) -> list[float]:
-    """Return so many speeds (rad/s) of an option such as "6.9:12.1rpm".
-
-    Raises:
-        SceneError: it is not that many, or their unit is none of speeds.
-    """
+    """Return so many speeds (rad/s) of an option such as "6.9:12.1rpm"."""
     try:
         numbers, unit = split_unit(text)
         speeds = [float(part) * unit for part in numbers.split(":")]

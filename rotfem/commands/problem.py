@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Self, cast
 
+import numpy as np
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady, steady_state
@@ -16,13 +17,13 @@ from rotfem.analysis.schemes import Array, Scheme, State
 from rotfem.commands.loads import loads_of
 from rotfem.commands.mode_tables import mode_tables
 from rotfem.commands.moment import Moment, first_shape
-from rotfem.commands.pitch import cell_of, with_pitch
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import InputError, SceneError, input_of
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.free_hub import ControlledTorque, FreeHub, Torque
 from rotfem.mechanics.loads import pitched
 from rotfem.mechanics.motion import Motion, no_acceleration
+from rotfem.mechanics.pitch import Pitch, Scalar, constant_pitch, differentiated, harmonic_pitch, tabulated_pitch
 from rotfem.mechanics.problem import Functional, Output
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
@@ -31,6 +32,9 @@ from rotfem.scene import Scene, Time, as_scene
 from rotfem.scene.settings import estimates_error, usual
 from rotfem.units import si
 from rotfem.users_functions import checked, number_of
+
+#: Steps in which differences of a user's function have one step of their own, and parts of a history of adaptive steps.
+CELL, CELLS = 16, 64
 
 
 class Problem(ProblemData):
@@ -245,3 +249,43 @@ _MOTIONS: dict[str, Any] = {
     "callable": lambda m, more: Motion.from_functions(m.speed, m.rate, m.angle, **more),
     "torque": _torque,
 }
+
+
+def with_pitch(scene: Scene, motion: Motion) -> Motion:
+    """Return the motion of a scene with the pitch of its blade, which may change with time."""
+    structure: Any = scene.structure
+    if not structure.pitches:
+        return motion
+    given = structure.root.pitch
+    parts = [constant_pitch(given.value or 0.0)]
+    parts += [harmonic_pitch(h.amplitude, h.phase, _turn(h, motion)) for h in given.harmonic]
+    knots = motion.sharp if any(h.per_rev is not None for h in given.harmonic) else ()
+    if given.table is not None:
+        parts.append(tabulated_pitch(given.table))
+        knots = tuple(sorted({*knots, *(row[0] for row in given.table)}))
+    if given.function is not None:
+        parts.append(differentiated(given.at, given.rate_at if given.rate is not None else None, cell_of(scene.time)))
+    angle, rate, acceleration = (_sum([part[i] for part in parts]) for i in range(3))
+    axis, root = np.array(structure.root_axis), np.array(structure.root_position)
+    known = given.function is None and not given.harmonic
+    return motion.pitched(Pitch(angle, rate, acceleration, axis, root, knots, known, start=angle(0.0)))
+
+
+def cell_of(time: Time | None) -> float | None:
+    """Return the length of time (s) in which differences of a user's function have one step; None without [time]."""
+    if time is None:
+        return None
+    return CELL * time.step if time.step else time.end / CELLS
+
+
+def _turn(harmonic: Any, motion: Motion) -> tuple[Scalar, Scalar, Scalar]:
+    """Return the angle that a harmonic is a cosine of, but for its phase, and its rates."""
+    if harmonic.per_rev is None:
+        omega = harmonic.frequency
+        return (lambda t: omega * t), (lambda t: omega), (lambda t: 0.0)
+    n = harmonic.per_rev
+    return (lambda t: n * motion.angle(t)), (lambda t: n * motion.speed(t)), (lambda t: n * motion.rate(t))
+
+
+def _sum(parts: list[Scalar]) -> Scalar:
+    return lambda t: sum(part(t) for part in parts)

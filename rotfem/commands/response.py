@@ -185,11 +185,7 @@ def resolved(answer: Callable[[float], Array], omegas: Array, values: Array, mos
 
 
 def angular(value: float | str | None, option: str, default: float) -> float:
-    """Return a frequency in rad/s, of a number or a text that may have a unit.
-
-    Raises:
-        SceneError: it is none.
-    """
+    """Return a frequency in rad/s, of a number or a text that may have a unit."""
     if value is None:
         return default
     try:

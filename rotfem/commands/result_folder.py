@@ -53,18 +53,8 @@ class ResultFolder:
             self.set.close(error)
 
     def first_does(self, work: Callable[[ResultSet], T]) -> T:
-        """Return on every rank what rank 0 makes of some work with the files.
-
-        Raises:
-            OutputError: on every rank, if it fails there.
-            SceneError: likewise.
-        """
-
-        def with_files() -> T:
-            assert self.set is not None
-            return work(self.set)
-
-        done: T = self._on_first(with_files)
+        """Return on every rank what rank 0 makes of some work with the files, or raise its error."""
+        done: T = self._on_first(lambda: work(self.set))  # type: ignore[arg-type]
         return done
 
     def _on_first(self, work: Callable[[], T], shared: bool = True) -> Any:
@@ -91,16 +81,13 @@ class ResultFolder:
             OutputError: the small files cannot be written.
         """
         fields: Writer | None = getattr(result, "fields", None)
-        writers = [self._of_first(write) for write in (*result.large(), *further)]
-        if plots:
-            writers.append(self._of_first(partial(_plot, result)))
-        if fields is not None:
-            writers.append(partial(self._of_all, fields))
+        of_first: list[Writer] = [*result.large(), *further, *([partial(_plot, result)] if plots else [])]
+        writers = [(write, False) for write in of_first] + ([] if fields is None else [(fields, True)])
         self.first_does(lambda files: files.publish(result, not writers))
         problems: list[OutputError | SceneError] = []
-        for write in writers:
+        for write, together in writers:
             try:
-                write()
+                self._staged(write, together)
             except (OutputError, SceneError) as problem:
                 problems.append(problem)
         if writers:
@@ -109,24 +96,20 @@ class ResultFolder:
             self.first_does(lambda files: files.finish(result.summary))
         return problems
 
-    def _of_first(self, write: Writer) -> Callable[[], None]:
-        def staged(files: ResultSet) -> None:
-            with files.stage() as new:
+    def _staged(self, write: Writer, together: bool) -> None:
+        """Write files into a hidden folder, on rank 0 or on all ranks together; whole ones become part of the set."""
+        new, problem = self.first_does(lambda files: files.open_stage()), None
+        if together or self.comm.rank == 0:
+            try:
                 write(new)
-
-        return lambda: self.first_does(staged)
-
-    def _of_all(self, write: Writer) -> None:
-        new = self.first_does(lambda files: files.open_stage())
-        problem = None
-        try:
-            write(new)
-        except OutputError as error:
-            problem = error
+            except (OutputError, SceneError) as error:
+                problem = error
         problem = next((p for p in self.comm.allgather(problem) if p is not None), None)
         self.first_does(lambda files: files.close_stage(new, problem is None))
-        if problem is not None:
+        if isinstance(problem, OutputError):
             raise OutputError(self.path / Path(str(problem.path)).name, problem.reason)
+        if problem is not None:
+            raise problem
 
 
 def _plot(result: Result, folder: Path) -> None:

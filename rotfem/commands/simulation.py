@@ -261,11 +261,7 @@ class Simulation:
         return self.record.result(found, history)
 
     def _with_cause(self, error: ComputationError) -> ComputationError:
-        """Return a failure, with what was wrong before it as its cause if something was.
-
-        Raises:
-            InputError: a term of a user cannot be computed with at rest.
-        """
+        """Return a failure, with what was wrong before it as its cause if something was."""
         if self.stepper is None:
             return error
         if self.log.steps == 0:

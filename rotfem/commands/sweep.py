@@ -62,11 +62,7 @@ class Point:
 
 
 def values_of(text: str) -> list[Any]:
-    """Return the values of "first:last:number" or "a,b,…", with a unit at the end; the text where it is one value.
-
-    Raises:
-        InputError: a range has no number of values, or ends that are no numbers.
-    """
+    """Return the values of "first:last:number" or "a,b,…", with a unit at the end; the text where it is one value."""
     if found := RANGE.fullmatch(text):
         first, last, number, unit = found.groups()
         try:
@@ -94,11 +90,7 @@ def _number(text: str) -> Any:
 
 
 def grid(scene: Path, keys: Mapping[str, Sequence[Any]], verb: Sequence[str], folder: Path) -> list[Point]:
-    """Return the points of all combinations, the last key fastest. Every scene is read.
-
-    Raises:
-        SceneError: one is not valid.
-    """
+    """Return the points of all combinations, the last key fastest. Every scene is read."""
     out = []
     for values in product(*keys.values()):
         changes = [f"{k}={v if isinstance(v, str) else json.dumps(v)}" for k, v in zip(keys, values, strict=True)]
@@ -108,11 +100,7 @@ def grid(scene: Path, keys: Mapping[str, Sequence[Any]], verb: Sequence[str], fo
 
 
 def settle(point: Point, scene: Path, verb: Sequence[str]) -> bool:
-    """Compute a point unless that is done; return whether it is, and no other process is at it.
-
-    Raises:
-        OutputError: its folder cannot be written.
-    """
+    """Compute a point unless that is done; return whether it is, and no other process is at it."""
     if point.settled:
         return True
     point.folder.mkdir(parents=True, exist_ok=True)

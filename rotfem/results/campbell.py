@@ -241,9 +241,6 @@ class CampbellResult(Result):
         """Return one row a speed and branch, indexed by `speed` (rad/s) and `label`, as in campbell.csv.
 
         `to_pandas()["frequency"].unstack("label")` is the table of frequencies over speed.
-
-        Raises:
-            ImportError: pandas is not installed.
         """
         return frame_of_rows(self.rows, ["speed", "label"])
 
@@ -251,9 +248,6 @@ class CampbellResult(Result):
         """Return the numbers of campbell.csv over `speed` (rad/s) and `branch`, whose coordinate are the labels.
 
         NaN where a branch is lost; `refined` marks the speeds that were not asked for.
-
-        Raises:
-            ImportError: xarray is not installed.
         """
         over: dict[str, Variable] = {name: (("speed", "branch"), self.column(name)) for name in self._numbers()}
         coordinates: dict[str, Variable] = {

@@ -90,20 +90,12 @@ class CheckResult(Result):
         return [ShortTable(("", ""), scalars), ShortTable(("axes of the frame", "1", "2", "3"), vectors)]
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the properties along a beam, indexed by `x`; of a plate the coordinates of its nodes.
-
-        Raises:
-            ImportError: pandas is not installed.
-        """
+        """Return the properties along a beam, indexed by `x`; of a plate the coordinates of its nodes."""
         columns = self.columns or self.nodes
         return frame(columns, next(iter(columns)))
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the properties along a beam over `x`; of a plate the coordinates over `node`.
-
-        Raises:
-            ImportError: xarray is not installed.
-        """
+        """Return the properties along a beam over `x`; of a plate the coordinates over `node`."""
         columns = self.columns or {"node": np.arange(len(next(iter(self.nodes.values()))), dtype=float), **self.nodes}
         name, *others = columns
         over: dict[str, Variable] = {other: ((name,), columns[other]) for other in others}

@@ -157,6 +157,15 @@ def label(column: str, shown: str = "") -> str:
     return f"{described(column)[0]} {shown_unit(column, shown)}".rstrip()
 
 
+def label_of(name: str) -> str:
+    """Return a number of a summary, as frequency_last_1, in words with the unit of the column that it begins with."""
+    words = name.split("_")
+    known = ("_".join(words[:n]) for n in range(len(words), 0, -1))
+    unit = next(filter(None, map(shown_unit, known)), "")
+    what = described(name)[0]
+    return f"{what if what != name else ' '.join(words).replace('.', ', ')} {unit}".rstrip()
+
+
 def shown_unit(column: str, shown: str = "") -> str:
     """Return the unit of a column, or the one that it is shown in, as "(m)"; "" of one without."""
     unit = shown or described(column)[1]

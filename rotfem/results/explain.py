@@ -96,11 +96,7 @@ class ExplainResult(Result):
         return ("<" if output in row.get("bounds", ()) else "") + per_cent(estimate)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return one row an effect and a theory, indexed by `name`; changes are columns `estimate_…` and `truth_…`.
-
-        Raises:
-            ImportError: pandas is not installed.
-        """
+        """Return one row an effect and a theory, indexed by `name`; changes are columns `estimate_…` and `truth_…`."""
         rows = []
         for row in self.rows:
             flat = {name: row[name] for name in ("name", "kind", "included", "worst", "verdict", "why")}
@@ -113,9 +109,6 @@ class ExplainResult(Result):
         """Return `estimate` and, with a check, `truth` over `name` and `output`, and the other columns over `name`.
 
         Infinite where a model fails, NaN where the truth was not computed.
-
-        Raises:
-            ImportError: xarray is not installed.
         """
         names = ("kind", "included", "worst", "verdict", "why")
         over: dict[str, Variable] = {name: (("name",), column_of_rows(self.rows, name)) for name in names}

@@ -26,11 +26,7 @@ CHECKPOINT, CHECKPOINT_MAGIC = "checkpoint.h5", "rotfem-checkpoint"
 
 
 def prepare_folder(folder: str | Path) -> Path:
-    """Make the result folder and see that it can be written, before anything is computed.
-
-    Raises:
-        OutputError: it cannot be made or written.
-    """
+    """Make the result folder and see that it can be written, before anything is computed."""
     path = Path(folder)
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -114,11 +110,7 @@ def _jsonable(data: Any) -> Any:
 
 
 def write_text(path: Path, text: str) -> Path:
-    """Write a text file, in UTF-8, whole or not at all; return its path.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
+    """Write a text file, in UTF-8, whole or not at all; return its path."""
     return write_whole(path, text.encode())
 
 

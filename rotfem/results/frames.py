@@ -20,11 +20,7 @@ Variable = tuple[tuple[str, ...], npt.NDArray[Any]]
 
 
 def optional(name: str) -> Any:
-    """Return a package that rotfem can do without.
-
-    Raises:
-        ImportError: it, or one that it needs, is not installed.
-    """
+    """Return a package that rotfem can do without."""
     try:
         return import_module(name)
     except ModuleNotFoundError as error:

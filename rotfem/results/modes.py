@@ -314,11 +314,7 @@ class ModesResult(Result):
         return [ShortTable(head, list(zip(*columns, strict=True)))]
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return one row a mode, indexed by `mode`: label, frequency (rad/s), damping, shares, …, as in modes.csv.
-
-        Raises:
-            ImportError: pandas is not installed.
-        """
+        """Return one row a mode, indexed by `mode`: label, frequency (rad/s), damping, shares, …, as in modes.csv."""
         return frame_of_rows(self.rows, "mode")
 
     def to_xarray(self) -> xarray.Dataset:
@@ -326,9 +322,6 @@ class ModesResult(Result):
 
         Shapes `shape_u1`, … are complex, scaled as `shapes`, NaN for the rigid-body mode, which has none.
         Coordinates are the modes' labels, the speed (rad/s), the nodes' `x` (m), of a plate `y` and `triangles` too.
-
-        Raises:
-            ImportError: xarray is not installed.
         """
         names = [name for name in (self.rows[0] if self.rows else ()) if name not in ("mode", "label")]
         over: dict[str, Variable] = {name: (("mode",), column_of_rows(self.rows, name)) for name in names}

@@ -47,11 +47,7 @@ RARE = 0.05
 
 
 def plot(result: Result, folder: Path) -> list[Path]:
-    """Write all figures of a result into a folder; return their paths.
-
-    Raises:
-        OutputError: one cannot be written.
-    """
+    """Write all figures of a result into a folder; return their paths."""
     return [save(draw(), folder / name) for name, draw in result.drawings().items()]
 
 

@@ -26,7 +26,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import FixedLocator
 
 from rotfem.errors import InputError
-from rotfem.results.columns import ZERO, described, label
+from rotfem.results.columns import ZERO, described, label, label_of
 from rotfem.results.files import json_text, write_text
 from rotfem.results.modes import ModesResult
 from rotfem.results.result import Result
@@ -206,7 +206,7 @@ def table(title: str, rows: Sequence[Mapping[str, Any]]) -> str:
     numbers = {n: [abs(r[n]) for r in flat if isinstance(r.get(n), float) and np.isfinite(r[n])] for n in names}
     numbers |= {"damping": [1.0], "growth": numbers.get("frequency", [])}  # the scale below which these are 0
     least = {n: 0.0 if n in EXACT else ZERO * max(values, default=0.0) for n, values in numbers.items()}
-    head = "".join(f"<th{_kind(flat, n)}>{escape(_heading(n))}</th>" for n in names)
+    head = "".join(f"<th{_kind(flat, n)}>{escape(label_of(n))}</th>" for n in names)
     body = ""
     for row in flat:
         cells = ""
@@ -224,14 +224,6 @@ def table(title: str, rows: Sequence[Mapping[str, Any]]) -> str:
 
 #: Columns of numbers that are near 0 and not shown as 0.
 EXACT = ("residual", "error_bound", "mesh_error")
-
-
-def _heading(name: str) -> str:
-    what, unit = described(name)
-    if name.endswith(("_first", "_last")):
-        unit = described(name.rpartition("_")[0])[1]
-    what = what.replace("_", " ").replace(".", ", ")
-    return f"{what} ({'–' if unit == '1' else unit})" if unit else what
 
 
 def _kind(rows: Sequence[Mapping[str, Any]], name: str) -> str:

@@ -85,19 +85,11 @@ class ResponseResult(Result):
         return [ShortTable(("output", "largest amplitude", f"at ({units.frequency})"), rows)]
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return one row a frequency, indexed by `frequency` (rad/s), as in response.csv.
-
-        Raises:
-            ImportError: pandas is not installed.
-        """
+        """Return one row a frequency, indexed by `frequency` (rad/s), as in response.csv."""
         return frame_of_rows(self.rows, "frequency")
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the complex responses `direct` and `modal` over `frequency` (rad/s) and `output`.
-
-        Raises:
-            ImportError: xarray is not installed.
-        """
+        """Return the complex responses `direct` and `modal` over `frequency` (rad/s) and `output`."""
         over = ("frequency", "output")
         variables: dict[str, Variable] = {"direct": (over, self.direct), "modal": (over, self.modal)}
         coordinates: dict[str, Variable] = {

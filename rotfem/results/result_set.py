@@ -19,8 +19,8 @@ import re
 import shutil
 import socket
 import tempfile
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Collection, Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -62,11 +62,7 @@ class FolderLock:
         self.folder, self._key, self._mine = folder, os.path.realpath(folder), False
 
     def acquire(self) -> None:
-        """Take the lock.
-
-        Raises:
-            OutputError: another process has it, or nothing can be written in the folder.
-        """
+        """Take the lock."""
         if self._mine:
             return
         descriptor, times = _locks.get(self._key, (-1, 0))
@@ -219,6 +215,8 @@ class ResultSet:
         """
         if self.begun and not self.ended:
             self._fail(error)
+        for name in self._staged:
+            remove(self.folder / name)
         self._lock.release()
 
     def _fail(self, error: BaseException | None) -> None:
@@ -252,11 +250,7 @@ class ResultSet:
         self.begun, self.files = True, []
 
     def mark(self, status: str) -> None:
-        """Write a summary.json that says only what is going on.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
+        """Write a summary.json that says only what is going on."""
         self._summarise(self._owned(status))
         self.ended = status not in AT_WORK
 
@@ -274,42 +268,20 @@ class ResultSet:
         return json_text({**mark, **summary, **({"files": further} if further else {})})
 
     def put(self, texts: Mapping[str, str]) -> list[Path]:
-        """Write files, all or none; return their paths.
-
-        Raises:
-            OutputError: one cannot be written; the set before is still there, if this one has not begun.
-        """
-        with self.stage() as new:
-            for name, text in texts.items():
-                write_text(new / name, text)
-        return [self.folder / name for name in texts]
-
-    @contextmanager
-    def stage(self) -> Iterator[Path]:
-        """Give a hidden folder; what is in it at the end becomes part of the set, unless there was an error.
-
-        Raises:
-            OutputError: it cannot be made, or its files cannot be moved.
-        """
+        """Write files, all or none; return their paths."""
         new, whole = self.open_stage(), False
         try:
-            yield new
+            for name, text in texts.items():
+                write_text(new / name, text)
             whole = True
         except OutputError as error:
-            raise self.outside(error) from None
+            raise OutputError(self.folder / Path(str(error.path)).name, error.reason) from None
         finally:
             self.close_stage(new, whole)
-
-    def outside(self, error: OutputError) -> OutputError:
-        """Return an error with a file of a hidden folder as one with the name that it would have had."""
-        return OutputError(self.folder / Path(str(error.path)).name, error.reason)
+        return [self.folder / name for name in texts]
 
     def open_stage(self) -> Path:
-        """Return a new hidden folder.
-
-        Raises:
-            OutputError: it cannot be made.
-        """
+        """Return a new hidden folder."""
         try:
             new = Path(tempfile.mkdtemp(dir=self.folder, prefix=PART, suffix=".part"))
         except OSError as error:
@@ -318,11 +290,7 @@ class ResultSet:
         return new
 
     def close_stage(self, new: Path, whole: bool) -> None:
-        """Move what is in a hidden folder into the set if it is whole, and remove the folder.
-
-        Raises:
-            OutputError: it cannot be moved.
-        """
+        """Move what is in a hidden folder into the set if it is whole, and remove the folder."""
         try:
             if whole:
                 self._adopt(new)
@@ -344,11 +312,7 @@ class ResultSet:
             raise OutputError(self.folder, error.strerror or str(error)) from None
 
     def grow(self, name: str, table: Table) -> LiveTable:
-        """Return a table of the set that is on disk while it grows.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
+        """Return a table of the set that is on disk while it grows."""
         self.begin("running")
         self.live = LiveTable(self.folder / name, table)
         self.files.append(name)
@@ -399,11 +363,7 @@ def is_ours(summary: Mapping[str, Any]) -> bool:
 
 
 def said_of(folder: Path) -> str:
-    """Return in words how the set of a folder ended, and what is left of one that is not complete.
-
-    Raises:
-        OutputError: it is no folder with results.
-    """
+    """Return in words how the set of a folder ended, and what is left of one that is not complete."""
     summary = read_summary(folder)
     if not is_ours(summary):
         raise OutputError(folder, "there are no results of rotfem")

@@ -61,19 +61,11 @@ class StationHistory:
         return out | {name: values.ravel() for name, values in self.values.items()}
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the columns as a table indexed by `t` (s) and `x` (m).
-
-        Raises:
-            ImportError: pandas is not installed.
-        """
+        """Return the columns as a table indexed by `t` (s) and `x` (m)."""
         return frame(self.columns(), ["t", "x"])
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the quantities over `t` (s) and `x` (m).
-
-        Raises:
-            ImportError: xarray is not installed.
-        """
+        """Return the quantities over `t` (s) and `x` (m)."""
         over: dict[str, Variable] = {name: (("t", "x"), values) for name, values in self.values.items()}
         return dataset(over, {"t": (("t",), self.t), "x": (("x",), self.x)}, {})
 
@@ -242,20 +234,13 @@ class RunResult(Result):
         return [ShortTable(("", "smallest", "at t (s)", "largest", "at t (s)", "at the end"), rows)] if rows else []
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return the history, one row a time, indexed by `t` (s).
-
-        Raises:
-            ImportError: pandas is not installed.
-        """
+        """Return the history, one row a time, indexed by `t` (s)."""
         return frame(self.history, "t")
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the history over `t` (s), and the shape at its end over `node` with the nodes' `x` (m).
 
         A plate has the nodes' `y` and the `triangles` between them too.
-
-        Raises:
-            ImportError: xarray is not installed.
         """
         over: dict[str, Variable] = {name: (("t",), values) for name, values in self.history.items() if name != "t"}
         nodes = nodes_of(self.shape, self.triangles)

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.errors import OutputError
-from rotfem.results.columns import described
+from rotfem.results.columns import label_of
 from rotfem.results.files import json_text, rows_text
 from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows
 from rotfem.results.result import Result
@@ -117,34 +117,18 @@ class SweepResult(Result):
         columns = [[str(row[key]) for row in self.rows] for key in self.keys]
         columns += [numbers([row.get(name) for row in self.rows]) for name in names]
         columns.append([row["status"] for row in self.rows])
-        return [ShortTable((*self.keys, *map(labelled, names), "status"), list(zip(*columns, strict=True)))]
+        return [ShortTable((*self.keys, *map(label_of, names), "status"), list(zip(*columns, strict=True)))]
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return one row a point, indexed by the swept keys.
-
-        Raises:
-            ImportError: pandas is not installed.
-        """
+        """Return one row a point, indexed by the swept keys."""
         return frame_of_rows(self.rows, list(self.keys))
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return what was computed over the swept keys, each a dimension.
-
-        Raises:
-            ImportError: xarray is not installed.
-        """
+        """Return what was computed over the swept keys, each a dimension."""
         over: dict[str, Variable] = {name: (tuple(self.keys), self.array(name)) for name in self.names}
         shape = [len(values) for values in self.keys.values()]
         over["status"] = tuple(self.keys), column_of_rows(self.rows, "status").reshape(shape)
         return dataset(over, {k: ((k,), np.array(v)) for k, v in self.keys.items()}, self._attributes())
-
-
-def labelled(name: str) -> str:
-    """Return a name of `quantities` in words with its unit: that of the column that it begins with."""
-    words = name.split("_")
-    units = (described("_".join(words[:n]))[1] for n in range(len(words), 0, -1))
-    unit = next((unit for unit in units if unit), "")
-    return f"{' '.join(words)} ({'–' if unit == '1' else unit})" if unit else " ".join(words)
 
 
 def sweep_figure(result: SweepResult) -> Figure:
@@ -161,7 +145,7 @@ def sweep_figure(result: SweepResult) -> Figure:
             said = ", ".join(f"{k} = {v[i]}" for k, v, i in zip(others, lines, place, strict=True))
             colour = f"C{j}" if y.shape[1] <= 10 else None
             axis.plot(result.keys[first], y[:, j], ".-", lw=1.2, color=colour, label=said)
-        axis.set_ylabel(labelled(name))
+        axis.set_ylabel(label_of(name))
         axis.grid(True, lw=0.4, alpha=0.6)
     axes[-1].set_xlabel(first)
     if others:

@@ -321,19 +321,11 @@ class CostResult(Result):
         return {"cost.png": partial(cost_figure, self)}
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return one row a setting, as in cost.csv.
-
-        Raises:
-            ImportError: pandas is not installed.
-        """
+        """Return one row a setting, as in cost.csv."""
         return frame_of_rows(self._flat_rows())
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the columns of cost.csv over `setting`, the number of the row from 0 on.
-
-        Raises:
-            ImportError: xarray is not installed.
-        """
+        """Return the columns of cost.csv over `setting`, the number of the row from 0 on."""
         rows = self._flat_rows()
         over: dict[str, Variable] = {name: (("setting",), column_of_rows(rows, name)) for name in rows[0]}
         coordinates: dict[str, Variable] = {"setting": (("setting",), np.arange(len(rows)))}
