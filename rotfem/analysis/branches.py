@@ -334,7 +334,7 @@ class Sweep:
         for i, (before, after) in enumerate(pairwise(kinds)):
             if before == after:
                 continue
-            speed = self._change(self.nodes[i], self.nodes[i + 1], before, after)
+            speed = self._bisect(self.nodes[i], self.nodes[i + 1], before, after)
             if speed is None:
                 continue
             if before is not None and out:
@@ -344,37 +344,16 @@ class Sweep:
         ends = [np.inf if r["until"] is None else r["until"] for r in out]
         return [r for r, end in zip(out, ends, strict=True) if any(r["speed"] <= s <= end for s in sure)]
 
-    def _change(self, left: Node, right: Node, before: str | None, after: str | None) -> float | None:
-        """Return the speed where the kind of instability changes; None if it only left the computed modes."""
-        if None in (before, after) and "static instability" in (before, after):
-            speed = self._static_onset(left, right)
-            if speed is not None or after is None:
-                return speed
-        return self._bisect(left, right, before, after)
-
-    def _static_onset(self, left: Node, right: Node) -> float | None:
-        """Return the speed where λ² of the least eigenvalue passes zero; None if it does not between the nodes."""
-
-        def square(speed: float) -> float:
-            try:
-                values = self.solve(speed, left.spinning, False).spinning.pairs.values
-            except ComputationError:
-                return 0.0  # K is singular: this is the speed
-            return float((values[np.argmin(np.abs(values))] ** 2).real)
-
-        ends = (left.speed, right.speed)
-        at_ends = [square(speed) for speed in ends]
-        return None if not at_ends[0] * at_ends[1] <= 0.0 else root(square, ends, at_ends)
-
     def _bisect(self, left: Node, right: Node, before: str | None, after: str | None) -> float | None:
-        """Return the lowest speed that is no longer of the kind before; None where growth ends with a jump."""
+        """Return the lowest speed that is no longer of the kind before; None where growth ends as its mode is lost."""
         low, high = left.spinning, right.speed
         while high - low.speed > 1e-9 * max(abs(high), abs(low.speed)):
-            middle = self.solve(0.5 * (low.speed + high), low, False).spinning
-            if unstable(middle, bounded=False) == before:
-                low = middle
-            else:
-                high = middle.speed
+            speed = 0.5 * (low.speed + high)
+            try:
+                middle = self.solve(speed, low, False).spinning
+            except ComputationError:  # K is singular: this is the speed
+                return speed
+            low, high = (middle, high) if unstable(middle, bounded=False) == before else (low, speed)
         worst = max(low.pairs.values, key=lambda lam: lam.real)
         return None if after is None and worst.real > 1e-2 * abs(worst) else high
 

@@ -31,11 +31,24 @@ LARGE, MANY, MANY_OF_SMALL = 8000, 3, 10
 AGREEMENT, MOST = 1e-6, 9
 
 
-def worth_while(analysis: ModalAnalysis, speeds: Sequence[float]) -> bool:
-    """Return whether a basis is possible (a linear theory in the rotating frame, a fixed hub) and saves time."""
-    if not analysis.system.linear or analysis.free or analysis.fixed is not None:
-        return False
-    return len(speeds) >= (MANY if analysis.system.A.getSize()[0] >= LARGE else MANY_OF_SMALL)
+def in_basis(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> ModalAnalysis:
+    """Return the analysis in a basis where that is possible and saves time, else the analysis itself.
+
+    It is possible of a linear theory in the rotating frame with a fixed hub.
+
+    Args:
+        analysis: compiled problem.
+        speeds: increasing speeds, rad/s.
+        count: number of modes at each.
+
+    Raises:
+        ComputationError: a full solution failed.
+    """
+    few = MANY if analysis.system.A.getSize()[0] >= LARGE else MANY_OF_SMALL
+    if not analysis.system.linear or analysis.free or analysis.fixed is not None or len(speeds) < few:
+        return analysis
+    reduced = ReducedAnalysis(analysis)
+    return reduced if reduced.prepare(speeds[0], speeds[-1], count) else analysis
 
 
 def product(A: Array, X: Array) -> Array:

@@ -13,21 +13,18 @@ from mpi4py import MPI
 
 from rotfem.analysis.branches import SPARE, Node, Sweep
 from rotfem.analysis.modal import ModalAnalysis, self_checks
-from rotfem.analysis.reduced_basis import ReducedAnalysis, worth_while
-from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy, within_tolerance
+from rotfem.analysis.reduced_basis import in_basis
 from rotfem.commands.error_report import error_of_modes
 from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
-from rotfem.commands.modes import analysis_of, hints_of, theory_error
+from rotfem.commands.modes import analysis_of, answered, hints_of, theory_error
 from rotfem.commands.monitor import check_rows
 from rotfem.commands.problem import Problem
 from rotfem.commands.summary import modal_summary
-from rotfem.errors import SceneError, input_of
+from rotfem.errors import SceneError
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.mechanics.effects import Work
-from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.refinement.frequencies import FrequencyErrors
-from rotfem.refinement.refine import Clock, Setting
 from rotfem.results import CampbellResult
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.values import LARGEST, Limits
@@ -113,19 +110,11 @@ def campbell(
     text = speeds if isinstance(speeds, str) else ",".join(repr(float(s)) for s in speeds)
     values = parse_speeds(text, scene.limits)
 
-    def attempt(setting: Setting | None = None) -> CampbellResult:
-        started, variant = perf_counter(), scene if setting is None else scene.replace(changes_of(scene, setting))
-        sweep = Diagram(variant, Problem.of(variant, terms=terms), values, comm, hint)
-        return sweep.result(progress or (lambda share: None), started)
+    def compute(variant: Scene) -> CampbellResult:
+        started, problem = perf_counter(), Problem.of(variant, terms=terms).spinning()
+        return diagram(variant, analysis_of(variant, problem, comm), values, started, progress, hint)
 
-    scene.check_tables("what modes are about" if scene.time is None else "")
-    with input_of(scene.file):
-        if scene.model.tolerance is not None:
-            return within_tolerance(scene, attempt, comm)
-        if scene.accuracy is None:
-            return attempt()
-        refuse(scene, ("frequencies",), "campbell")
-        return to_accuracy(scene, first_setting(scene, scene.modes.count), attempt, Clock(scene.accuracy_budget, comm))
+    return answered(scene, compute, comm, "campbell")
 
 
 def with_marks(
@@ -146,83 +135,78 @@ def with_marks(
     return scene.replace(changes) if changes else scene
 
 
-class Diagram:
-    """One Campbell diagram of a scene.
+def diagram(
+    scene: Scene,
+    analysis: ModalAnalysis,
+    values: Sequence[float],
+    started: float,
+    progress: Progress | None = None,
+    hint: Hint | None = None,
+) -> CampbellResult:
+    """Return the branches over speed, with what the diagram says.
 
     Args:
         scene: validated scene.
-        problem: of the scene.
+        analysis: of its modes.
         values: increasing speeds, rad/s.
-        comm: MPI communicator.
-        hint: called with every line of advice; None asks for none.
+        started: `perf_counter()` at the start.
+        progress: see `campbell`.
+        hint: see `campbell`.
     """
-
-    def __init__(self, scene: Scene, problem: ProblemData, values: Sequence[float], comm: MPI.Comm, hint: Hint | None):
-        self.scene, self.values = scene, values
-        self.analysis = analysis_of(scene, problem.spinning(), comm)
-        self.hints = hints_of(self.analysis, scene, "campbell", hint, max(map(abs, values)))
-        if worth_while(self.analysis, values):
-            reduced = ReducedAnalysis(self.analysis)
-            if reduced.prepare(values[0], values[-1], scene.modes.count + SPARE):
-                self.analysis = reduced
-
-    def result(self, progress: Progress, started: float) -> CampbellResult:
-        """Return the branches over speed, with what the diagram says."""
-        analysis, count, values = self.analysis, self.scene.modes.count, self.values
-        sweep = Sweep(analysis, count, self.scene.limits.speeds)
-        sweep.run(values, progress)
-        sweep.count = count = min(count, len(sweep.nodes[0].order))
-        found = [node.value(b).imag for node in sweep.nodes for b in range(count)]
-        lowest = min((w for w in found if w > 0), default=0.0)
-        fastest = max(abs(values[0]), abs(values[-1]))
-        marks = self.scene.modes
-        orders = marks.orders
-        if orders is None:
-            most = int(np.clip(np.ceil(max(found, default=lowest) / max(fastest, 1e-300)), 1, 4))
-            orders = tuple(range(1, most + 1))
-        labels = branch_labels(analysis, sweep, count)
-        mesh = branch_errors(analysis, sweep, count) if analysis.estimates else None
-        rows = [row for node in sweep.nodes for row in node_rows(analysis, node, labels, mesh)]
-        check_rows(rows)
-        crossings, onsets = sweep.critical_speeds(orders), sweep.onsets()
-        for crossing in crossings:
-            label = labels[crossing["branch"] - 1]
-            crossing |= {"label": label, "name": engineers_name(label)}
-        last = sweep.nodes[-1].spinning.first(count)
-        of_last = {} if mesh is None else dict(zip(sweep.nodes[-1].order, mesh, strict=False))
-        known = None if mesh is None else [of_last.get(i) for i in range(len(last.pairs.values))]
-        ends = mode_rows(analysis, last, known)
-        warnings = [
-            *advice(analysis, fastest),
-            *frozen_inputs(self.analysis.problem),
-            *remarks(sweep, labels, onsets, ends),
-        ]
-        off = theory_error(analysis, last)
-        warnings += [off.warning()] if off and off.warning() else []
-        summary = {
-            **modal_summary("campbell", analysis, self.scene, started),
-            "branches": [
-                {"branch": b + 1, "label": labels[b], "name": engineers_name(labels[b]), **branch_summary(sweep, b)}
-                for b in range(count)
-            ],
-            "per_rev": max(orders, default=0),
-            "orders": list(orders),
-            **({} if marks.rated is None else {"rated": marks.rated}),
-            **({} if marks.operating is None else {"operating": list(marks.operating)}),
-            "critical_speeds": crossings,
-            "instabilities": onsets,
-            "ambiguous": sweep.ambiguous,
-            "speeds": len(values),
-            "speeds_solved": sweep.solves,
-            **({} if off is None else {"theory_error": off.summary()}),
-            **({"error": error_of_modes(rows, off).summary()} if self.scene.output.error else {}),
-            "checks": self_checks(analysis, sweep.nodes[-1].spinning),
-            **analysis.report(),
-            "lowest_frequency": lowest,
-            "warnings": warnings,
-            "advice": self.hints,
-        }
-        return CampbellResult(summary, rows)
+    fastest, marks, count = max(map(abs, values)), scene.modes, scene.modes.count
+    hints = hints_of(analysis, scene, "campbell", hint, fastest)
+    analysis = in_basis(analysis, values, count + SPARE)
+    sweep = Sweep(analysis, count, scene.limits.speeds)
+    sweep.run(values, progress or (lambda share: None))
+    sweep.count = count = min(count, len(sweep.nodes[0].order))
+    found = [node.value(b).imag for node in sweep.nodes for b in range(count)]
+    lowest = min((w for w in found if w > 0), default=0.0)
+    orders = marks.orders
+    if orders is None:
+        most = int(np.clip(np.ceil(max(found, default=lowest) / max(fastest, 1e-300)), 1, 4))
+        orders = tuple(range(1, most + 1))
+    labels = branch_labels(analysis, sweep, count)
+    mesh = branch_errors(analysis, sweep, count) if analysis.estimates else None
+    rows = [row for node in sweep.nodes for row in node_rows(analysis, node, labels, mesh)]
+    check_rows(rows)
+    crossings, onsets = sweep.critical_speeds(orders), sweep.onsets()
+    for crossing in crossings:
+        label = labels[crossing["branch"] - 1]
+        crossing |= {"label": label, "name": engineers_name(label)}
+    last = sweep.nodes[-1].spinning.first(count)
+    of_last = {} if mesh is None else dict(zip(sweep.nodes[-1].order, mesh, strict=False))
+    known = None if mesh is None else [of_last.get(i) for i in range(len(last.pairs.values))]
+    off = theory_error(analysis, last)
+    warnings = [
+        *advice(analysis, fastest),
+        *frozen_inputs(analysis.problem),
+        *remarks(sweep, labels, onsets, mode_rows(analysis, last, known)),
+        *([off.warning()] if off and off.warning() else []),
+    ]
+    summary = {
+        **modal_summary("campbell", analysis, scene, started),
+        "branches": [
+            {"branch": b + 1, "label": labels[b], "name": engineers_name(labels[b]), **branch_summary(sweep, b)}
+            for b in range(count)
+        ],
+        "per_rev": max(orders, default=0),
+        "orders": list(orders),
+        **({} if marks.rated is None else {"rated": marks.rated}),
+        **({} if marks.operating is None else {"operating": list(marks.operating)}),
+        "critical_speeds": crossings,
+        "instabilities": onsets,
+        "ambiguous": sweep.ambiguous,
+        "speeds": len(values),
+        "speeds_solved": sweep.solves,
+        **({} if off is None else {"theory_error": off.summary()}),
+        **({"error": error_of_modes(rows, off).summary()} if scene.output.error else {}),
+        "checks": self_checks(analysis, sweep.nodes[-1].spinning),
+        **analysis.report(),
+        "lowest_frequency": lowest,
+        "warnings": warnings,
+        "advice": hints,
+    }
+    return CampbellResult(summary, rows)
 
 
 def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends: list[dict[str, Any]]) -> list[str]:

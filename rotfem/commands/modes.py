@@ -6,13 +6,12 @@ C = ∂F/∂v, K = ∂F/∂q at (q̄, 0, 0).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeVar
 
-import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.critical_speed import critical_speed
@@ -38,9 +37,10 @@ from rotfem.refinement.discretisation import richer_problem
 from rotfem.refinement.frequencies import FrequencyErrors
 from rotfem.refinement.refine import Clock, Setting
 from rotfem.results import ModesResult
+from rotfem.results.result import Result
 from rotfem.scene import Scene, as_scene
 
-Array = npt.NDArray[Any]
+R = TypeVar("R", bound=Result)
 
 #: An instability that grows by more than this, relative to the modes that are asked for, is none of them.
 GROWS_AS_SAID = 1.001
@@ -75,28 +75,45 @@ def modes(
     if blade_tables and scene.structure.type == "plate":
         raise SceneError(scene.file, "structure.type", "plate", "mode polynomials and tables are those of beams")
 
-    def attempt(setting: Setting | None = None) -> ModesResult:
-        started, variant = perf_counter(), scene if setting is None else scene.replace(changes_of(scene, setting))
-        found = _modes(variant, Problem.of(variant, terms=terms), comm, sensitivities, (hint, started))
+    def compute(variant: Scene) -> ModesResult:
+        found = _modes(variant, Problem.of(variant, terms=terms), comm, sensitivities, hint)
         found.blade_tables = blade_tables
         if participation:
             add_participation(found)
         return found
+
+    return answered(scene, compute, comm, "modes")
+
+
+def answered(scene: Scene, compute: Callable[[Scene], R], comm: MPI.Comm, command: str) -> R:
+    """Return what a command computes of the modes of a scene, to its accuracy or tolerance if it has one.
+
+    Args:
+        scene: as it was given.
+        compute: variant of the scene ↦ result.
+        comm: MPI communicator.
+        command: the verb.
+
+    Raises:
+        SceneError: the scene is not valid for the command.
+        ComputationError: see `modes`.
+    """
+
+    def attempt(setting: Setting) -> R:
+        return compute(scene.replace(changes_of(scene, setting)))
 
     scene.check_tables("what modes are about" if scene.time is None else "")
     with input_of(scene.file):
         if scene.model.tolerance is not None:
             return within_tolerance(scene, attempt, comm)
         if scene.accuracy is None:
-            return attempt()
-        refuse(scene, ("frequencies",), "modes")
+            return compute(scene)
+        refuse(scene, ("frequencies",), command)
         return to_accuracy(scene, first_setting(scene, scene.modes.count), attempt, Clock(scene.accuracy_budget, comm))
 
 
-def _modes(
-    scene: Scene, problem: ProblemData, comm: MPI.Comm, sensitivities: bool, around: tuple[Hint | None, float]
-) -> ModesResult:
-    hint, started = around
+def _modes(scene: Scene, problem: ProblemData, comm: MPI.Comm, sensitivities: bool, hint: Hint | None) -> ModesResult:
+    started = perf_counter()
     analysis = analysis_of(scene, problem, comm)
     speed = problem.motion.final_speed(scene.time.end if scene.time is not None else 0.0)
     hints = hints_of(analysis, scene, "modes", hint, speed)

@@ -21,7 +21,7 @@ from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady
 from rotfem.commands.accuracy import changes_of
-from rotfem.commands.campbell import Diagram
+from rotfem.commands.campbell import diagram
 from rotfem.commands.cost.settings import sweep_speeds
 from rotfem.commands.interrupts import held_back
 from rotfem.commands.modes import analysis_of
@@ -203,11 +203,11 @@ class Bench:
         return go
 
     def _sweep(self, variant: Scene) -> Go:
-        problem, speeds, started = Problem.of(variant), sweep_speeds(variant), perf_counter()
-        diagram = Diagram(variant, problem, speeds, self.comm, None)
+        speeds, started = sweep_speeds(variant), perf_counter()
+        analysis = analysis_of(variant, Problem.of(variant).spinning(), self.comm)
 
         def go() -> tuple[Array, tuple[int, int, int]]:
-            result = diagram.result(lambda share: None, started)
+            result = diagram(variant, analysis, speeds, started)
             rows = sorted((r["speed"], r["frequency"]) for r in result.rows if not r["refined"])
             values = np.array([[frequency] for _, frequency in rows])
             return values, (result.summary["dofs"], result.summary["speeds_solved"], 0)
