@@ -1,30 +1,33 @@
 """What every effect and every theory changes: answers with one less, or another theory, against the scene's own.
 
-A history is marched once, with the companions that know its error (`rotfem.refinement.discretisation`). The one on half
-the cells, in steps of twice the length, is followed by one more companion for every model that differs by one effect or
-by the theory. So the two have mesh, steps and their errors in common, and what is between them is the change by the
-model,
+A history is marched once, with the companions that know its error (`rotfem.refinement.discretisation`). Then the own
+model is marched on half the cells in steps as long as that error allows, followed by one companion for every model that
+differs by one effect or by the theory. So the two have mesh, steps and their errors in common, and what is between them
+is the change by the model,
 
     max_t |u_model − u_own| / max_t |u_own|,    max_i |λ_model,i − λ_own,i| / |λ_own,i|,
 
-with u the displacement of the tip and λ the eigenvalues, sorted by size. Steady states and modes are on half the cells,
-too. How well the change is known follows from the errors of the two answers, which the rows of steps and mesh say.
+with u the displacement of the tip and λ the eigenvalues, sorted by size. Where the own answer is in error by more than
+the asymptotic range, changes that are not large are marched again in half the steps. Steady states and modes are on
+half the cells, too.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
+from scipy.interpolate import CubicSpline
 
 from rotfem.analysis.equilibrium import check_steady, steady_state
-from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION, March, Steps
+from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION, LONGEST, March, Steps
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import Scheme, State
+from rotfem.analysis.time_grid import Leg
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
@@ -32,9 +35,9 @@ from rotfem.mechanics.theories import Theory, theories
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import OtherMesh, on_other_mesh
 from rotfem.refinement.companion import Companion
-from rotfem.refinement.discretisation import HistoryErrors, Start
-from rotfem.refinement.distance import distance, distance_each, tip
-from rotfem.refinement.estimate import ASYMPTOTIC
+from rotfem.refinement.discretisation import CERTAIN, HistoryErrors, Start
+from rotfem.refinement.distance import distance, distance_each, largest, tip
+from rotfem.refinement.estimate import ASYMPTOTIC, error_of
 
 Array = npt.NDArray[Any]
 T = TypeVar("T")
@@ -52,6 +55,9 @@ RESOLVED = 1e-8
 #: Distance of two histories, relative to the largest displacement, from which steps are too long to compare models in:
 #: a sine that is late by a twelfth of its period is as far from itself.
 FAR = 0.5
+
+#: Shortest steps that changes are computed in, relative to the case's own.
+SHORTEST = 0.25
 
 #: Part of a change to which steps are solved: it is shown with two digits.
 DIGITS = 1e-2
@@ -148,6 +154,18 @@ def plainly(system: Any, compute: Callable[[], T]) -> T:
         held.plain = True
 
 
+@dataclass(frozen=True)
+class History:
+    """The displacement of the tip over time: `times` (n,) s, `tips` (n, components) m."""
+
+    times: Array
+    tips: Array
+
+    def distance(self, coarse: History) -> float:
+        """Return the largest distance of one in longer steps at its times, relative to the largest displacement."""
+        return distance(CubicSpline(self.times, self.tips)(coarse.times), coarse.tips)
+
+
 @dataclass
 class Change:
     """What one step from a model to another changes, or what steps or mesh do.
@@ -170,15 +188,23 @@ class Change:
     truth: dict[str, float] = field(default_factory=dict)
     bounds: list[str] = field(default_factory=list)
 
-    def settle(self, output: str, rough: float | None, fine: float | None) -> None:
-        """Take the change of an output from two computations of it; the finer one alone where the other is unknown."""
-        self.estimate[output] = fine
-        if rough is None or fine is None:
-            return
-        smaller, larger = sorted((rough, fine))
-        if larger > SAFETY * smaller:
-            self.estimate[output] = larger
+    def settle(self, output: str, size: float | None, rough: float | None, error: float) -> bool:
+        """Take the size of the change of an output; return whether it is known.
+
+        Args:
+            output: name.
+            size: computed; None where that failed.
+            rough: the same in longer steps; None where there is none.
+            error: of the own answer, relative.
+        """
+        size = size if error <= FAR else None
+        self.estimate[output], self.bounds = size, [name for name in self.bounds if name != output]
+        if size is None or error <= ASYMPTOTIC or size >= LARGE:
+            return size is not None
+        if rough is not None and max(size, rough) > SAFETY * min(size, rough):
+            self.estimate[output] = max(size, rough)
             self.bounds.append(output)
+        return rough is not None and output not in self.bounds
 
     @property
     def worst(self) -> float:
@@ -299,86 +325,130 @@ class Explanation:
     # --- a history ----------------------------------------------------------------------------------------------------
 
     def _history(self) -> OtherMesh | None:
-        """March the own model with its companions, and write what they say; return the problem on another mesh.
-
-        Where steps of twice the length fail, or their error is beyond the asymptotic range, models are marched again in
-        the case's own steps. A change that is not the same in both within a factor of SAFETY is below the larger one.
-        """
-        case, system, newton = self.case, self.system, self.case.newton()
+        """March the own model with its companions, then the changes; return the problem on another mesh."""
+        case, steps = self.case, self.case.steps
         assert case.scheme is not None
+        assert steps is not None
         try:
-            errors = HistoryErrors(self.problem, system, case.scheme, newton, case.start)
-            own = errors.mesh if errors.mesh and errors.other and errors.other.ratio > 1.0 else errors.steps
-            rough = self._march(errors.steps, own, newton, self.changes)
-            known, apart = errors.errors(self.scale), errors.steps.difference[0] + own.difference[0]
-            if not own.sound or apart > FAR * self.scale:
-                rough = dict.fromkeys(rough)
-            of_doubt = [c for c in self.changes if not (rough[c.name] or 0.0) >= LARGE]
-            fine: dict[str, float | None] = {}
-            if of_doubt and (not own.sound or apart > ASYMPTOTIC * self.scale):
-                own = Companion(own.system, system, case.scheme, newton, doubles=False)
-                own.begin(*case.start(own.system))
-                fine = self._march(own, own, newton, of_doubt)
-                if not own.sound or (known["time"] or 0.0) > FAR:
-                    fine = dict.fromkeys(fine)
+            errors = HistoryErrors(self.problem, self.system, case.scheme, case.newton(), case.start)
+            own = self._marched(self.system, steps, [errors.steps])
         except ComputationError as error:
             self._fails(HISTORY, error.what)
             return on_other_mesh(self.problem, self.system)
-        self.mesh.estimate[HISTORY] = known["space"]
-        self.steps.estimate[HISTORY] = known["time"]
-        for change in self.changes:
-            change.settle(HISTORY, rough[change.name], fine.get(change.name, rough[change.name]))
-        return errors.other
+        self.scale = largest(own.tips)
+        known = errors.errors(self.scale)
+        self.mesh.estimate[HISTORY], self.steps.estimate[HISTORY] = known["space"], known["time"]
+        system, mesh, other = self.system, errors.mesh, errors.other
+        if mesh and other and other.ratio > 1.0 and mesh.sound and mesh.difference[0] <= ASYMPTOTIC * self.scale:
+            system = other.system
+        self._refine(system, own, known["time"])
+        return other
 
-    def _march(
-        self, first: Companion, own: Companion, newton: Newton, changes: Sequence[Change]
-    ) -> dict[str, float | None]:
-        """March the own model to the end, and return the name of each change ↦ its size; None where that is unknown.
+    def _refine(self, system: Any, own: History, error: float | None) -> None:
+        """March the changes in steps as long as the error allows, and those in doubt again in shorter ones.
+
+        A change is known where the error of the own model in these steps is in the asymptotic range, or where it is the
+        same in steps of twice the length within a factor of SAFETY. Else it is below the larger of the two.
 
         Args:
-            first: companion that follows it.
-            own: companion of the own model, which passes its steps on to those of the changes.
-            newton: iteration control.
+            system: of the own model, on the mesh of the comparison.
+            own: its history in the case's own steps.
+            error: of that by the steps, relative; None where it is unknown.
+        """
+        scheme, doubt, before, rough = self.case.scheme, self.changes, own, dict[str, float | None]()
+        assert scheme is not None
+        if error is None or error > FAR:
+            error, ratio = np.inf, 0.5
+        elif error > ASYMPTOTIC:
+            ratio = 2.0
+        else:
+            ratio = max(2.0, (ASYMPTOTIC / SAFETY / max(error, RESOLVED)) ** (1 / scheme.order) // 1)
+        while doubt and ratio >= SHORTEST:
+            try:
+                history, found = self._changed(system, ratio, doubt)
+            except ComputationError:
+                history, found, reached = own, dict[str, float | None](), np.inf
+            else:
+                longer = ratio >= 1.0
+                apart = own.distance(history) if longer else history.distance(before)
+                reached = error + apart if longer else error_of(apart, min(scheme.order, CERTAIN))
+            doubt = [
+                change
+                for change in doubt
+                if not change.settle(HISTORY, found.get(change.name), rough.get(change.name), reached)
+            ]
+            before, rough, ratio = own if ratio > 1.0 else history, found, ratio / 2.0
+
+    def _steps(self, ratio: float) -> Steps:
+        """Return the case's steps in another length; adaptive ones by the tolerance."""
+        steps, scheme = self.case.steps, self.case.scheme
+        assert steps is not None
+        assert scheme is not None
+        if steps.step is None:
+            assert steps.tolerance is not None
+            return replace(steps, tolerance=min(steps.tolerance * ratio**scheme.order, ASYMPTOTIC))
+        return replace(steps, step=min(steps.step * ratio, max(LONGEST * steps.end, steps.step)))
+
+    def _marched(self, system: Any, steps: Steps, watches: Sequence[Companion]) -> History:
+        """Return the history of the own model, followed by companions."""
+        case, times, tips = self.case, list[float](), list[Array]()
+        assert case.scheme is not None
+
+        def passed_on(old: State, new: State, leg: Leg) -> None:
+            for companion in watches:
+                companion(old, new, leg)
+
+        march = March(system, case.scheme, steps, case.newton(), *case.start(system))
+        march.stepper.observer = passed_on
+        for state in march:
+            size = float(system.size(state.q))
+            self.size = max(self.size, size) if system is self.system else self.size
+            if system.linear and not size <= LARGEST_LINEAR_DEFLECTION:
+                raise ComputationError(f"it diverges at t = {state.t:.4g} s")
+            times.append(state.t)
+            tips.append(tip(system, state))
+        for companion in watches:
+            companion.finish()
+        return History(np.array(times), np.array(tips))
+
+    def _changed(self, system: Any, ratio: float, changes: Sequence[Change]) -> tuple[History, dict[str, float | None]]:
+        """Return the history of the own model in steps of another length, and name ↦ size of changes; None of unknown.
+
+        Args:
+            system: of the own model.
+            ratio: of the steps to the case's own.
             changes: those that are wanted.
         """
-        case, system, others = self.case, self.system, self._following(own, changes)
-        assert case.scheme is not None
-        assert case.steps is not None
-        march = March(system, case.scheme, case.steps, newton, *case.start(system))
-        march.stepper.observer = first
-        for state in march:
-            self.size = max(self.size, float(system.size(state.q)))
-            if system.linear and not self.size <= LARGEST_LINEAR_DEFLECTION:
-                raise ComputationError(f"it diverges at t = {state.t:.4g} s")
-            self.scale = max(self.scale, float(np.linalg.norm(tip(system, state))))
-        first.finish()
-        out: dict[str, float | None] = {}
+        others = self._following(system, changes)
+        history = self._marched(system, self._steps(ratio), [other for other in others if other is not None])
+        scale, out = largest(history.tips), dict[str, float | None]()
         for change, other in zip(changes, others, strict=True):
             size, at = (np.inf, 0.0) if other is None else other.difference
-            out[change.name] = float(size / self.scale if self.scale > 0.0 else np.inf * size) if size > 0.0 else 0.0
+            out[change.name] = float(size / scale if scale > 0.0 else np.inf * size) if size > 0.0 else 0.0
             if other is None:
                 continue
+            change.notes.pop(HISTORY, None)
             if size > other.limit:
                 change.notes[HISTORY], out[change.name] = f"it diverges at t = {at:.4g} s", float(np.inf)
-            elif not other.sound and size < LARGE * self.scale:
+            elif not other.sound and size < LARGE * scale:
                 out[change.name] = None
-        return out
+        return history, out
 
-    def _following(self, own: Companion, changes: Sequence[Change]) -> list[Companion | None]:
-        """Return companions of changes that follow that of the own model, which passes its steps on to them."""
+    def _following(self, own: Any, changes: Sequence[Change]) -> list[Companion | None]:
+        """Return companions of changes that follow the own model; None of a theory without all terms."""
         out: list[Companion | None] = []
-        for system in self._variants(own.system, changes):
+        assert self.case.scheme is not None
+        for system in self._variants(own, changes):
             if system is None:
                 out.append(None)
                 continue
-            companion = Companion(system, own.system, own.stepper.scheme, own.stepper.newton, doubles=False)
-            largest = LARGEST_LINEAR_DEFLECTION if system.linear else FARTHEST
-            companion.limit, companion.part = largest * system.structure.length, DIGITS
+            companion = Companion(system, own, self.case.scheme, self.case.newton(), doubles=False)
+            longest = LARGEST_LINEAR_DEFLECTION if system.linear else FARTHEST
+            companion.limit, companion.part = longest * system.structure.length, DIGITS
             try:
                 companion.begin(*self.case.start(system))
             except ComputationError:
                 companion.sound = False
-            own.further.append(companion)
             out.append(companion)
         return out
 

@@ -54,6 +54,11 @@ ALL: dict[str, Any] = {
 }
 
 
+#: The beam vibrates after the pull of a moment.
+RUNNING = {"type": "constant", "speed": 2.0}
+PULLED = {"tip_force": [[0, 0, 0], [0.1, 0, 10.0], [0.2, 0, 0], [20.0, 0, 0]]}
+
+
 def scene(tables: dict[str, Any], changes: dict[str, Any] | None = None) -> Scene:
     return Scene.from_dict(copy.deepcopy(tables)).replace(changes or {})
 
@@ -314,13 +319,14 @@ def test_an_explanation_starts_as_its_scene_does(initial: dict[str, Any]) -> Non
     ids=["function", "follower", "gravity that turns"],
 )
 def test_an_explanation_takes_the_loads_of_a_run(loads: dict[str, Any]) -> None:
+    """Within a factor of 2: the explanation takes several steps of the scene as one."""
     tables = {"structure": STRUCTURE, "motion": {"type": "constant", "speed": 2.0}, "mesh": {"elements": 4}}
     own = Scene.from_dict({**tables, "loads": loads, "time": {"end": 2.0, "step": 0.01}})
     rows, full = rows_of(own), tip(rotfem.run(own))
     for name in set(own.effective_effects()) - {"rotary_inertia"}:
         kept = [other for other in own.effective_effects() if other != name]
         true = distance(full, tip(rotfem.run(own.replace({"model.effects": kept}))))
-        assert rows[name]["estimate"][HISTORY] == pytest.approx(true, rel=0.2), name
+        assert true / 2 < rows[name]["estimate"][HISTORY] < 2 * true, name
 
 
 def test_modes_of_a_free_hub_are_at_the_speed_it_reaches() -> None:
@@ -410,8 +416,11 @@ def test_gravity_that_turns_leaves_the_modes() -> None:
 
 @pytest.mark.parametrize(
     ("changes", "shown"),
-    [({"time": {"end": 0.02, "step": 0.01}}, "unknown"), ({"model.theory": "linear", "motion.speed": 9.0}, "inf")],
-    ids=["two steps", "diverges"],
+    [
+        ({"time": {"end": 20.0, "step": 2.0}, "motion": RUNNING, "loads": PULLED}, "unknown"),
+        ({"model.theory": "linear", "motion.speed": 9.0}, "inf"),
+    ],
+    ids=["steps of more than a period", "diverges"],
 )
 def test_what_is_not_known_is_reported(changes: dict[str, Any], shown: str) -> None:
     result = rotfem.explain(scene(SPIN_UP, changes))
