@@ -30,6 +30,7 @@ class AlphaFamily(Scheme):
     """What generalised-α and Newmark share; second-order accurate when γ = ½ + α_f − α_m."""
 
     order: ClassVar[int] = 2
+    filters_jumps: ClassVar[bool] = True
 
     @property
     @abstractmethod

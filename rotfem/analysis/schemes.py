@@ -44,6 +44,7 @@ class State:
         reference: what the rotations in q are counted from; None for the undeformed structure.
         balanced: whether the equations hold with q, v and a; otherwise a is that of another instant.
         inner: instants (s) within the step that led here at which the equations hold, too, and q, v, a there.
+        jump: what of a came at once, at the start or by a jump of what drives the system; None of a step's end.
     """
 
     t: float
@@ -55,6 +56,7 @@ class State:
     reference: Any = None
     balanced: bool = True
     inner: tuple[Instant, ...] = ()
+    jump: Array | None = None
 
     @classmethod
     def at_rest(cls, system: Any, q: Array, v: Array | None = None) -> State:
@@ -180,6 +182,8 @@ class Scheme(ABC):
     stages: ClassVar[int] = 1
     #: Whether the equations hold with the q, v, a that a step ends in; otherwise with its mean q and v, and that a.
     balanced_at_end: ClassVar[bool] = True
+    #: Whether a step of a free hub starts with only as much of a jump of accelerations as it resolves (see `Stepper`).
+    filters_jumps: ClassVar[bool] = False
 
     #: (C, m, s) of the error estimate C (ωh)^m A of a vibration of amplitude A, which grows as (s ωh)² A where it is
     #: not resolved, and most by which a step may grow.

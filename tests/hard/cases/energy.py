@@ -92,15 +92,13 @@ CASES += [
         reference=10.0,
         tolerance=0.005,
         source="20 N·m for 0.5 s",
-        expected=expected,
-        words="from the impulse",
         nightly=(theory, inertia) != ("consistent_linear", 1e-2),
     )
-    for theory, inertia, scheme, expected in (
-        ("consistent_linear", 1.0, "newmark", "right"),
-        ("consistent_linear", 1e-2, "newmark", "warned"),
-        ("consistent_linear", 1e-6, "newmark", "failed"),
-        ("reissner", 1.0, "newmark", "right"),
-        ("reissner", 1e-6, "generalised_alpha", "failed"),
+    for theory, inertia, scheme in (
+        ("consistent_linear", 1.0, "newmark"),
+        ("consistent_linear", 1e-2, "newmark"),
+        ("consistent_linear", 1e-6, "newmark"),
+        ("reissner", 1.0, "newmark"),
+        ("reissner", 1e-6, "generalised_alpha"),
     )
 ]
