@@ -6,7 +6,7 @@ Buhl, FAST User's Guide, NREL/EL-500-38230, 2005, "blade input file").
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -45,60 +45,6 @@ NODE = 1e-3
 ELASTODYN = {("flap", 1): "BldFl1Sh", ("flap", 2): "BldFl2Sh", ("lag", 1): "BldEdgSh"}
 
 
-def mode_table(result: ModesResult) -> list[dict[str, Any]]:
-    """Return one row a mode and node: displacement and slope in flap and lag, and twist, over the span.
-
-    Columns are `mode`, `label`, `frequency_hz`, `span` (x/L), `flap_displacement`, `flap_slope`, `lag_displacement`,
-    `lag_slope`, `twist`, as far as the beam has them; the phase is that at which the largest displacement is real, and
-    the largest of all displacements is 1 (m; slopes 1/m, twist rad/m).
-
-    Raises:
-        InputError: the structure is no beam.
-    """
-    out = []
-    for row, columns in _beam_modes(result):
-        x = columns["x"]
-        values: dict[str, Array] = {"span": x / x[-1]}
-        for direction in DIRECTIONS:
-            found = _of(columns, direction)
-            if found is not None:
-                values |= {f"{direction}_displacement": found[0], f"{direction}_slope": found[1]}
-        if "theta1" in columns:
-            values["twist"] = columns["theta1"] / x[-1]
-        named = {name: row[name] for name in ("mode", "label", "frequency_hz")}
-        out += [named | {name: float(column[i]) for name, column in values.items()} for i in range(len(x))]
-    return out
-
-
-def mode_polynomials(result: ModesResult) -> list[dict[str, Any]]:
-    """Return one row a bending mode: the polynomial of its leading displacement, and how well it fits.
-
-    Columns are `mode`, `label`, `direction` ("flap" or "lag"), `number` among those of the direction, `frequency_hz`,
-    `c2` … `c6`, and `fit_error` and `fit_rms`, the largest and the root mean square of what the polynomial is off at
-    the nodes, in parts of the displacement of the tip. Modes that leave the tip where it is have none.
-
-    Raises:
-        InputError: the structure is no beam.
-    """
-    out: list[dict[str, Any]] = []
-    for row, columns in _beam_modes(result):
-        found = {name: _of(columns, name) for name in DIRECTIONS}
-        sizes = {name: float(np.max(np.abs(pair[0]))) for name, pair in found.items() if pair is not None}
-        direction = max(sizes, key=lambda name: sizes[name])
-        pair = found[direction]
-        assert pair is not None
-        shape = pair[0]
-        if sizes[direction] < 0.5 or abs(shape[-1]) < NODE * sizes[direction]:
-            continue  # torsion and stretch, and shapes with a node at the tip
-        coefficients, off = fit(columns["x"] / columns["x"][-1], shape / shape[-1])
-        number = 1 + sum(other["direction"] == direction for other in out)
-        named = {"mode": row["mode"], "label": row["label"], "direction": direction, "number": number}
-        terms = {f"c{k}": float(c) for k, c in zip(POWERS, coefficients, strict=True)}
-        errors = {"fit_error": float(np.max(np.abs(off))), "fit_rms": float(np.sqrt(np.mean(off**2)))}
-        out.append(named | {"frequency_hz": row["frequency_hz"]} | terms | errors)
-    return out
-
-
 def fit(span: Array, shape: Array) -> tuple[Array, Array]:
     """Return c₂ … c₆ of the polynomial that is 1 at ξ = 1 and closest to a shape, and what it is off, (n,).
 
@@ -123,14 +69,6 @@ def elastodyn_lines(rows: Sequence[dict[str, Any]]) -> str:
         of = f"{'Flap' if row['direction'] == 'flap' else 'Edge'} mode {row['number']}"
         lines += [f"{row[f'c{k}']:18.10f}   {name}({k}) - {of}, coeff of x^{k}" for k in POWERS]
     return "\n".join(lines) + "\n"
-
-
-def _beam_modes(result: ModesResult) -> list[tuple[dict[str, Any], dict[str, Array]]]:
-    """Return row and real columns of every mode that has a shape."""
-    if result.triangles is not None:
-        raise InputError("structure.type", "plate", "tables over the span are those of beams")
-    rows = result.rows[len(result.rows) - len(result.shapes) :]
-    return [(row, _real(columns)) for row, columns in zip(rows, result.shapes.values(), strict=True)]
 
 
 def _real(columns: dict[str, Array]) -> dict[str, Array]:
@@ -273,21 +211,62 @@ class ModesResult(Result):
             "elastodyn_modes.dat": elastodyn_lines(fitted),
         }
 
+    def _of_beam(self) -> Iterator[tuple[dict[str, Any], dict[str, Array], dict[str, tuple[Array, Array]]]]:
+        """Yield of every mode with a shape its number and names, real columns, and direction ↦ displacement, slope."""
+        if self.triangles is not None:
+            raise InputError("structure.type", "plate", "tables over the span are those of beams")
+        rows = self.rows[len(self.rows) - len(self.shapes) :]
+        for row, shape in zip(rows, self.shapes.values(), strict=True):
+            columns = _real(shape)
+            found = {name: pair for name in DIRECTIONS if (pair := _of(columns, name)) is not None}
+            yield {name: row[name] for name in ("mode", "label", "frequency_hz")}, columns, found
+
     def mode_table(self) -> list[dict[str, Any]]:
-        """Return the modes of a beam over its span (see `rotfem.results.modes.mode_table`).
+        """Return one row a mode and node: displacement and slope in flap and lag, and twist, over the span.
+
+        Columns are `mode`, `label`, `frequency_hz`, `span` (x/L), `flap_displacement`, `flap_slope`,
+        `lag_displacement`, `lag_slope`, `twist`, as far as the beam has them; the phase is that at which the largest
+        displacement is real, and the largest of all displacements is 1 (m; slopes 1/m, twist rad/m).
 
         Raises:
             InputError: the structure is no beam.
         """
-        return mode_table(self)
+        out = []
+        for named, columns, found in self._of_beam():
+            values: dict[str, Array] = {"span": columns["x"] / columns["x"][-1]}
+            for direction, pair in found.items():
+                values |= dict(zip((f"{direction}_displacement", f"{direction}_slope"), pair, strict=True))
+            if "theta1" in columns:
+                values["twist"] = columns["theta1"] / columns["x"][-1]
+            rows = zip(*(column.tolist() for column in values.values()), strict=True)
+            out += [named | dict(zip(values, row, strict=True)) for row in rows]
+        return out
 
     def mode_polynomials(self) -> list[dict[str, Any]]:
-        """Return polynomials of the bending modes (see `rotfem.results.modes.mode_polynomials`).
+        """Return one row a bending mode: the polynomial of its leading displacement, and how well it fits.
+
+        Columns are `mode`, `label`, `direction` ("flap" or "lag"), `number` among those of the direction,
+        `frequency_hz`, `c2` … `c6`, and `fit_error` and `fit_rms`, the largest and the root mean square of what the
+        polynomial is off at the nodes, in parts of the displacement of the tip. Modes that leave the tip where it is
+        have none.
 
         Raises:
             InputError: the structure is no beam.
         """
-        return mode_polynomials(self)
+        out: list[dict[str, Any]] = []
+        for named, columns, found in self._of_beam():
+            sizes = {name: float(np.max(np.abs(shape))) for name, (shape, _) in found.items()}
+            direction = max(sizes, key=lambda name: sizes[name])
+            shape = found[direction][0]
+            if sizes[direction] < 0.5 or abs(shape[-1]) < NODE * sizes[direction]:
+                continue  # torsion and stretch, and shapes with a node at the tip
+            coefficients, off = fit(columns["x"] / columns["x"][-1], shape / shape[-1])
+            number = 1 + sum(other["direction"] == direction for other in out)
+            terms = {f"c{k}": float(c) for k, c in zip(POWERS, coefficients, strict=True)}
+            errors = {"fit_error": float(np.max(np.abs(off))), "fit_rms": float(np.sqrt(np.mean(off**2)))}
+            first = {"mode": named["mode"], "label": named["label"], "direction": direction, "number": number}
+            out.append(first | named | terms | errors)
+        return out
 
     def drawings(self) -> dict[str, Callable[[], Figure]]:
         """Return modes.png, the shapes of all modes."""
