@@ -30,8 +30,8 @@ from slepc4py import SLEPc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics.balance import balanced, least_frequency, power_of_two
-from rotfem.numerics.damped import MORE, damped_pairs, heavily_damped
-from rotfem.numerics.linear import SMALL, transposed, use_direct_solver
+from rotfem.numerics.damped import MORE, damped_pairs, heavily_damped, quadratic
+from rotfem.numerics.linear import transposed, use_direct_solver
 from rotfem.numerics.low_rank import sparse_part
 from rotfem.numerics.projection import times
 
@@ -43,16 +43,14 @@ ROUND_OFF = 1e-14
 
 
 def asymmetries(pencil: Pencil) -> dict[str, float]:
-    """Return relative ‖M − Mᵀ‖, ‖C + Cᵀ‖ and ‖K − Kᵀ‖ (Frobenius).
+    """Return estimates of relative ‖M − Mᵀ‖, ‖C + Cᵀ‖ and ‖K − Kᵀ‖ (Frobenius).
 
-    Of large matrices, and of one with a part of low rank, they are estimates from a few random signs r: the mean of
-    ‖A r‖² is the norm's square.
+    They are those by a few random signs r: the mean of ‖A r‖² is the norm's square.
     """
-    out = {}
-    matrices = pencil.M, pencil.C, pencil.K
+    out, matrices = {}, (pencil.M, pencil.C, pencil.K)
     with balanced(*matrices, scale=pencil.unknowns):  # else the unit of length would say which entries count
         for name, A, sign in zip("MCK", matrices, (-1.0, 1.0, -1.0), strict=True):
-            distance, size = (_distance(A, sign), A.norm()) if sparse_part(A) is A else _by_probes(A, sign)
+            distance, size = _by_probes(A, sign)
             out[name] = distance / size if size > 0 else 0.0
     return out
 
@@ -61,15 +59,6 @@ def is_symmetric(A: Any) -> bool:
     """Return whether a PETSc matrix is symmetric to round-off, by random probes."""
     distance, size = _by_probes(A, -1.0)
     return distance <= ROUND_OFF * size
-
-
-def _distance(A: Any, sign: float) -> float:
-    """Return ‖Aᵀ + sign A‖."""
-    if A.getSize()[0] > SMALL:
-        return _by_probes(A, sign)[0]
-    D = transposed(A)
-    D.axpy(sign, A)
-    return float(D.norm())
 
 
 def _by_probes(A: Any, sign: float) -> tuple[float, float]:
@@ -266,27 +255,17 @@ def dense(A: Any) -> Array:
 def dense_pairs(M: Array, C: Array, K: Array, wanted: int, target: float) -> tuple[Array, Array, Array]:
     """Return (λ, x, backward error) of the eigenvalues of a small pencil that are nearest to a target.
 
-    With λ = σ + 1/μ and P = σ²M + σC + K the pencil is μ²P + μ(2σM + C) + M, in first order an eigenproblem for μ of
-    (μx, x). Those of unknowns without mass and damping, μ = 0, are left out. A Krylov space that is to be the whole
-    space breaks down before it is.
+    Those of unknowns without mass and damping are left out. A Krylov space that is to be the whole space breaks down
+    before it is.
 
     Raises:
-        ComputationError: P is singular.
+        ComputationError: the stiffness is singular, or there are no finite eigenvalues.
     """
-    n, P = len(K), target**2 * M + target * C + K
-    try:
-        right_hand = np.linalg.solve(P, np.hstack([-(2 * target * M + C), -M]))
-    except np.linalg.LinAlgError:
-        raise ComputationError("the stiffness is singular") from None
-    mu, vectors = np.linalg.eig(np.vstack([right_hand, np.eye(n, 2 * n)]))
     moves = np.any(M != 0.0, axis=1)
     finite = 2 * np.count_nonzero(moves) + np.count_nonzero(np.any(C != 0.0, axis=1) & ~moves)
-    nearest = np.argsort(-np.abs(mu), kind="stable")[: min(wanted, finite)]
-    nearest = nearest[mu[nearest] != 0.0]
-    if not len(nearest):
+    values, X, _ = (part[..., : min(wanted, finite)] for part in quadratic(M, C, K, target))
+    if not len(values):
         raise ComputationError("the pencil has no finite eigenvalues")
-    values, X = target + 1 / mu[nearest].astype(complex), vectors[n:, nearest].astype(complex)
-    X = X / np.linalg.norm(X, axis=0)
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows has no small error
         sizes = [np.linalg.norm(A) for A in (M, C, K)]
         residual = np.linalg.norm(M @ X * values**2 + C @ X * values + K @ X, axis=0)
