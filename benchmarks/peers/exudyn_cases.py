@@ -58,15 +58,45 @@ def spin_up(elements: int, steps: int, tolerance: float) -> tuple[float, Any]:
     """Return seconds of the time loop, and rows of t, u₂ of the tip in the rotating frame."""
     mbs = exu.SystemContainer().AddSystem()
     nodes = cables(mbs, elements, LENGTH, 2.8e7, 1.4e4, 1.2)
+    drive(mbs, nodes[0], (None, None, cosine, sine))
+    seconds, (t, _, y, _) = driven(mbs, nodes[-1], steps, tolerance, dense=elements < 12)
+    return seconds, np.column_stack([t, y]).tolist()
+
+
+def spatial(elements: int, steps: int, tolerance: float) -> tuple[float, Any]:
+    """Return seconds of the time loop, and rows of t, u₁, u₂, u₃ of a beam that spins up and falls from its axis."""
+    mbs = exu.SystemContainer().AddSystem()
+    h = LENGTH / elements
+    nodes = [
+        mbs.AddNode(item.NodePointSlope1(referenceCoordinates=[i * h, 0, 0, 1, 0, 0])) for i in range(elements + 1)
+    ]
+    for pair in pairwise(nodes):
+        stiffness = {"bendingStiffness": 1.4e4, "axialStiffness": 2.8e7, "massPerLength": 1.2}
+        body = mbs.AddObject(
+            item.ObjectANCFCable(length=h, nodeNumbers=list(pair), useReducedOrderIntegration=1, **stiffness)
+        )
+        whole = mbs.AddMarker(item.MarkerBodyMass(bodyNumber=body))
+        mbs.AddLoad(item.LoadMassProportional(markerNumber=whole, loadVector=[0, 0, -9.81]))
+    drive(mbs, nodes[0], (None, None, None, cosine, sine, None))
+    seconds, (t, x, y, z) = driven(mbs, nodes[-1], steps, tolerance, dense=elements < 8)
+    return seconds, np.column_stack([t, x - LENGTH, y, z]).tolist()
+
+
+def drive(mbs: Any, root: Any, functions: tuple[Any, ...]) -> None:
+    """Give the coordinates of the root what they change by over time; None is nothing."""
     ground = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(item.NodePointGround()), coordinate=0))
-    for coordinate, turned in ((0, None), (1, None), (2, cosine), (3, sine)):
-        own = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=nodes[0], coordinate=coordinate))
+    for coordinate, turned in enumerate(functions):
+        own = mbs.AddMarker(item.MarkerNodeCoordinate(nodeNumber=root, coordinate=coordinate))
         constraint = mbs.AddObject(item.CoordinateConstraint(markerNumbers=[ground, own]))
         if turned is not None:
             function = CreateSymbolicUserFunction(mbs, turned, "offsetUserFunction", constraint)
             mbs.SetObjectParameter(constraint, "offsetUserFunction", function)
-    tip = mbs.AddSensor(
-        item.SensorNode(nodeNumber=nodes[-1], outputVariableType=exu.OutputVariableType.Position, storeInternal=True)
+
+
+def driven(mbs: Any, tip: Any, steps: int, tolerance: float, dense: bool) -> tuple[float, Any]:
+    """March; return seconds of the time loop, and t and the position of the tip in the rotating frame."""
+    sensor = mbs.AddSensor(
+        item.SensorNode(nodeNumber=tip, outputVariableType=exu.OutputVariableType.Position, storeInternal=True)
     )
     mbs.Assemble()
     settings = exu.SimulationSettings()
@@ -78,17 +108,17 @@ def spin_up(elements: int, steps: int, tolerance: float) -> tuple[float, Any]:
     newton.relativeTolerance = newton.absoluteTolerance = tolerance
     settings.solution.file.write = False
     settings.solution.sensors.writePeriod = 0.5
-    dense = elements < 12
     settings.linearSolver.solverType = exu.LinearSolverType.EXUdense if dense else exu.LinearSolverType.EigenSparse
     started = perf_counter()
     mbs.SolveDynamic(settings)
     seconds = perf_counter() - started
-    t, x, y, _ = np.asarray(mbs.GetSensorStoredData(tip)).T
+    t, x, y, z = np.asarray(mbs.GetSensorStoredData(sensor)).T
     k = 2 * np.pi / DURATION
     angle = np.where(
         t < DURATION, SPEED / DURATION * (t * t / 2 + (np.cos(k * t) - 1) / k**2), SPEED * (t - DURATION / 2)
     )
-    return seconds, np.column_stack([t, -np.sin(angle) * x + np.cos(angle) * y]).tolist()
+    c, s = np.cos(angle), np.sin(angle)
+    return seconds, (t, c * x + s * y, c * y - s * x, z)
 
 
 def spinning(mbs: Any, held: Any, turns: tuple[Any, Any], speeds: list[float], count: int) -> list[list[float]]:

@@ -24,17 +24,34 @@ SPIN_UP = {
     "motion": {"type": "spin_up", "speed": 6.0, "duration": 15.0},
     "model": {"theory": "reissner"},
 }
+SECTION = {"EA": 2.8e7, "GA2": 1e10, "GA3": 1e10, "GJ": 1e4, "EI2": 1.4e4, "EI3": 1.4e4, "mass_per_length": 1.2}
+SPATIAL = SPIN_UP | {
+    "structure": {"type": "spatial_beam", "length": 10.0, "section": SECTION},
+    "loads": {"gravity": [0.0, 0.0, -9.81]},
+    "initial": {"state": "undeformed"},
+}
 THIN = {"EA": 1e6, "GA": 1e6, "EI": 1.0, "mass_per_length": 1.0}
 PLATE = {"type": "plate", "length": 1.0, "width": 1.0, "thickness": 0.01, "E": 70e9, "nu": 0.3, "rho": 2700.0}
 
 
 def spin_up(elements: int, steps: int, scheme: str) -> tuple[float, Values]:
-    """March; rows of t, u₂ of the tip. Seconds are those of the time loop."""
-    tables = {"mesh": {"elements": elements, "degree": 3}, "time": {"end": 20.0, "step": 20.0 / steps}}
-    system = Problem.of(SPIN_UP | tables).system()
+    """Return seconds of the time loop, and rows of t, u₂ of the tip."""
+    seconds, rows = marched(SPIN_UP, elements, steps, scheme)
+    return seconds, [[row[0], row[2]] for row in rows]
+
+
+def spatial(elements: int, steps: int, scheme: str, degree: int) -> tuple[float, Values]:
+    """Return seconds of the time loop, and rows of t, u₁, u₂, u₃ of a beam that spins up and falls from its axis."""
+    return marched(SPATIAL, elements, steps, scheme, degree)
+
+
+def marched(scene: dict[str, Any], elements: int, steps: int, scheme: str, degree: int = 3) -> tuple[float, Values]:
+    """March; return seconds of the time loop, and rows of t and the displacement of the tip."""
+    tables = {"mesh": {"elements": elements, "degree": degree}, "time": {"end": 20.0, "step": 20.0 / steps}}
+    system = Problem.of(scene | tables).system()
     march = March(system, schemes[scheme](), Steps(20.0, 20.0 / steps), Newton())
     started = perf_counter()
-    rows = [[state.t, float(system.tip(state.q, state.t)[1])] for state in march]
+    rows = [[state.t, *map(float, system.tip(state.q, state.t)[:3])] for state in march]
     return perf_counter() - started, rows
 
 
