@@ -2,7 +2,8 @@
 
 Numbers that the stepper and Newton's method have learnt are all their attributes but the parts that a run makes anew;
 unknowns are kept in the common order of nodes, so that any number of processes may go on. A kept factor is that of a
-tangent at a state, which is kept in its place.
+tangent at a state, which is kept in its place. A sum protects the file from chance only: before anything is put back
+its tree is compared with that which the run itself would write.
 """
 
 from __future__ import annotations
@@ -14,23 +15,29 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from rotfem.analysis.schemes import State
+from rotfem.analysis.stability import Stability
 from rotfem.analysis.stepper import Stepper
 from rotfem.commands.monitor import Monitor
 from rotfem.commands.recorder import Recorder
 from rotfem.errors import SceneError
-from rotfem.refinement.companion import Companion
+from rotfem.refinement.companion import Companion, Followed
 from rotfem.refinement.refine import Setting
 from rotfem.scene import Scene, Time
 from rotfem.structures.numbering import Numbering
+from rotfem.structures.reference_rotation import ReferenceRotation
 from rotfem.version import versions
 
 #: Positions of nodes that differ by this part of the structure's size are those of another mesh.
 MOVED = 1e-9
+
+#: Shape of what a free hub and its structure were given (see `State`).
+GIVEN = (3,)
 
 #: What a run counts and has to say, and what its monitor has seen, that changes while it goes on.
 OF_LOG, OF_MONITOR = ("steps", "warnings", "resumed"), ("since",)
@@ -44,6 +51,17 @@ APART = {
 }
 
 Tree = dict[str, Any]
+
+#: Parts of a checkpoint, and the types they may have.
+PARTS: dict[str, Any] = {
+    **dict.fromkeys(("identity", "versions", "state", "stepper", "run", "seen", "every"), dict),
+    **dict.fromkeys(("factored", "stations", "resultants", "snapshots", "settings"), (dict, NoneType)),
+    **dict.fromkeys(("positions", "rows"), np.ndarray),
+    **dict.fromkeys(("t", "elapsed"), float),
+    "given": (np.ndarray, NoneType),
+    "factorisations": int,
+    **dict.fromkeys(("columns", "companions"), list),
+}
 
 
 def identity(scene: Scene, terms: Mapping[str, Any], outputs: Mapping[str, Any]) -> Tree:
@@ -73,7 +91,11 @@ def differences(there: Any, here: Any, key: str = "") -> list[str]:
 
 
 def check_identity(path: Path, tree: Tree, mine: Tree) -> None:
-    """Refuse a checkpoint of another run."""
+    """Refuse a checkpoint of another run.
+
+    Raises:
+        SceneError: it is of another scene, or of another version of the program; says what differs.
+    """
     there, here = tree["versions"]["rotfem"], versions()["rotfem"]
     if there != here:
         why = f"was written by rotfem {there}, this is {here}; start the run anew, without --resume"
@@ -84,14 +106,39 @@ def check_identity(path: Path, tree: Tree, mine: Tree) -> None:
         raise SceneError("command line", "--resume", path, f"is of another run: {'; '.join(lines[:4])}{more}")
 
 
+def check_parts(path: Path, tree: Tree) -> None:
+    """Refuse a tree that does not consist of what `Memory.taken` writes, each part of its type.
+
+    Raises:
+        SceneError: it does not; names the part.
+    """
+    wrong = set(tree) ^ set(PARTS) or {name for name, kinds in PARTS.items() if not isinstance(tree[name], kinds)}
+    if wrong:
+        raise damaged(path, ", ".join(sorted(map(str, wrong))))
+    try:
+        json.dumps([tree["identity"], tree["versions"]["rotfem"]])
+        every = [tree["every"][name] for name in ("seconds", "steps") if tree["every"][name] is not None]
+        if len(every) != 1 or not every[0] > 0.0:
+            raise ValueError("every")
+        if (settings := tree["settings"]) is not None:
+            known = {name: settings[name] for name in ("elements", "scheme")}
+            alike(vars(Setting((), None, 0)) | known, settings, "settings")
+    except (LookupError, TypeError, ValueError) as error:
+        raise damaged(path, f"{type(error).__name__}: {error}") from None
+
+
 def damaged(path: Path, what: str) -> SceneError:
-    """Return the error of a checkpoint that is whole and does not fit this run."""
+    """Return the error of a checkpoint whose sum is right and whose content is not."""
     why = f"does not hold what a checkpoint of this run does: {what}; start the run anew, without --resume"
     return SceneError("command line", "--resume", path, why)
 
 
 def check_end(path: Path, tree: Tree, end: float) -> None:
-    """Refuse an end (s) that lies before the checkpoint."""
+    """Refuse an end (s) that lies before the checkpoint.
+
+    Raises:
+        SceneError: it does.
+    """
     if end < tree["t"]:
         raise SceneError("command line", "--resume", path, f"is of t = {tree['t']:g} s, after time.end = {end:g} s")
 
@@ -126,10 +173,18 @@ class Packing:
         if not isinstance(value, dict):
             return value
         kind, values = value["kind"], value["values"]
+        if len(value) != 2 or not isinstance(kind, str):
+            raise ValueError("kind")
         if kind == "dict":
             return {k: self.unpacked(v) for k, v in values.items()}
         if ":" in kind:
-            return record_of(kind)(**{k: self.unpacked(v) for k, v in values.items()})
+            record = record_of(kind)(**{k: self.unpacked(v) for k, v in values.items()})
+            for name, hint in get_type_hints(type(record)).items():
+                if not suits(getattr(record, name), hint):
+                    raise TypeError(f"{name} of {type(record).__name__}")
+            return record
+        if values.shape[:1] != (self.numbering.count(kind),) or values.dtype.kind not in "biuf":
+            raise ValueError(f"{kind} of shape {values.shape}")
         return self.numbering.local(values, kind)
 
 
@@ -202,6 +257,7 @@ class Memory:
             "companions": self._of_companions(),
             "elapsed": run.log.elapsed + perf_counter() - run.log.started,
             "factorisations": run.system.factorisations,
+            "columns": list(run.record.history.columns),
             "rows": np.array(run.record.history.rows()).reshape(len(run.record.history), -1),
             "stations": None if run.record.stations is None else run.record.stations.kept_arrays(),
             "resultants": None if run.record.resultants is None else run.record.resultants.kept_arrays(),
@@ -217,37 +273,78 @@ class Memory:
         }
 
     def put_back(self, path: Path, tree: Tree) -> State:
-        """Make the run know what a checkpoint says; return the state to go on from."""
+        """Make the run know what a checkpoint says; return the state to go on from.
+
+        Raises:
+            SceneError: the mesh is another one, or something in the tree is not what a run has.
+        """
         try:
             self._check_mesh(path, tree["positions"])
+            self._check_rows(tree)
             return self._put_back(tree)
         except SceneError:
             raise
-        except (ArithmeticError, AttributeError, ImportError, LookupError, TypeError, ValueError) as error:
+        except (
+            ArithmeticError,
+            AttributeError,
+            ImportError,
+            LookupError,
+            RuntimeError,
+            TypeError,
+            ValueError,
+        ) as error:
             raise damaged(path, " ".join(f"{type(error).__name__}: {error}".split())) from None
 
     def _put_back(self, tree: Tree) -> State:
         run, stepper = self.run, self.run.stepper
         assert stepper is not None
         state, system = State(**self.packing.unpacked(tree["state"]), given=tree["given"]), run.system.held
+        check_state(run.system, stepper, state)
+        if state.t != tree["t"]:
+            raise ValueError("t")
+        alike(self._changing(), tree["run"], "run")
+        seen = self.packing.unpacked(tree["seen"])
+        alike({"farthest": run.monitor.farthest.seen, "stability": None}, {**seen, "stability": None}, "seen")
+        if not suits(seen["stability"], Stability | None):
+            raise TypeError("stability")
+        for name, kind in (("warnings", str), ("resumed", dict)):
+            if not all(isinstance(entry, kind) for entry in tree["run"]["log"][name]):
+                raise TypeError(name)
         restored(run.system, self.packing.unpacked(tree["factored"]), state)
         system.factored_before = tree["factorisations"] - system.factorisations
-        vars(run.log).update(tree["run"]["log"], elapsed=tree["elapsed"])
+        vars(run.log).update(tree["run"]["log"])
         vars(run.monitor).update(tree["run"]["monitor"])
         put_back_stepper(stepper, self.packing, tree["stepper"], state)
-        seen = self.packing.unpacked(tree["seen"])
         run.monitor.farthest.seen, run.monitor.stability = seen["farthest"], seen["stability"]
         self._put_back_companions(tree["companions"])
-        record = run.record
         for row in tree["rows"]:
-            record.history.append(row)
-        if record.stations is not None:
-            record.stations.put_back(tree["stations"])
-        if record.resultants is not None:
-            record.resultants.put_back(tree["resultants"])
-        if record.snapshots is not None:
-            vars(record.snapshots).update(self.packing.unpacked(tree["snapshots"]))
+            run.record.history.append(row)
+        if run.record.stations is not None:
+            run.record.stations.put_back(tree["stations"], len(tree["rows"]))
+        if run.record.resultants is not None:
+            run.record.resultants.put_back(tree["resultants"], len(tree["rows"]))
+        if run.record.snapshots is not None:
+            run.record.snapshots.put_back(self.packing.unpacked(tree["snapshots"]), len(tree["rows"]))
+        run.log.elapsed = tree["elapsed"]
         return state
+
+    def _check_rows(self, tree: Tree) -> None:
+        """Refuse a history that has not as many rows as the steps have made, of columns as they are here.
+
+        Raises:
+            ValueError: it is.
+        """
+        rows, t, time = tree["rows"], tree["t"], self.run.time
+        if tree["columns"] != list(self.run.record.history.columns) or tree["run"]["log"]["steps"] < 0:
+            raise ValueError("columns")
+        if time.output_step is None:
+            due = 1 + tree["run"]["log"]["steps"] // time.output_every
+        else:
+            due = 1 + int(min(t, time.end) / time.output_step * (1 + 1e-9))
+        if rows.ndim != 2 or rows.shape[1] != len(tree["columns"]) or not due <= len(rows) <= due + 1:
+            raise ValueError(f"rows of shape {rows.shape} for {due} of {len(tree['columns'])} columns")
+        if rows[0, 0] != 0.0 or np.any(np.diff(rows[:, 0]) <= 0.0) or rows[-1, 0] > t or not np.all(np.isfinite(rows)):
+            raise ValueError("rows")
 
     def _companions(self) -> list[tuple[Companion, Packing]]:
         """Return the companions of the march, each with what packs arrays over its own mesh."""
@@ -270,14 +367,21 @@ class Memory:
 
     def _put_back_companions(self, trees: list[Tree]) -> None:
         for (companion, own), tree in zip(self._companions(), trees, strict=True):
-            state = companion.state = own.unpacked(tree["state"])
-            companion.waiting = self.packing.unpacked(tree["waiting"])
-            companion.stepper.differences = own.unpacked(tree["differences"])
+            state, waiting = own.unpacked(tree["state"]), self.packing.unpacked(tree["waiting"])
+            stepper, differences = companion.stepper, own.unpacked(tree["differences"])
+            alike(plain(companion), tree["known"], "known")
+            if not suits(state, State | None) or not suits(tuple(waiting), tuple[Followed | None, Followed | None]):
+                raise TypeError("companions")
+            for end in (end for step in waiting if step is not None for pair in step.steps for end in pair):
+                check_motion(self.run.system, vars(end))
+            alike([(0.0, companion.system.zeros())] * min(len(differences), 2), differences, "differences")
+            companion.state, companion.waiting, stepper.differences = state, waiting, differences
             vars(companion).update(tree["known"])
             if state is not None:
                 state.given = tree["given"]
+                check_state(companion.system, stepper, state)
                 restored(companion.system, own.unpacked(tree["factored"]), state)
-                put_back_stepper(companion.stepper, own, tree["stepper"], state)
+                put_back_stepper(stepper, own, tree["stepper"], state)
 
     def _check_mesh(self, path: Path, there: Any) -> None:
         here = self.numbering.comm.bcast(self.numbering.positions)
@@ -286,8 +390,43 @@ class Memory:
             raise SceneError("command line", "--resume", path, "is of another mesh")
 
 
+def check_state(system: Any, stepper: Stepper, state: State) -> None:
+    """Refuse a state that a system cannot be in, or that a stepper cannot go on from.
+
+    Raises:
+        ValueError: it is one.
+    """
+    check_motion(system, vars(state))
+    if not 0.0 <= state.t < np.inf or not isinstance(state.balanced, bool):
+        raise ValueError("state")
+    if (state.given is None) != (system.hub is None) or (state.given is not None and state.given.shape != GIVEN):
+        raise ValueError("given")
+    if not suits(state.reference, ReferenceRotation | None):
+        raise ValueError("reference")
+    memory, first = state.memory, stepper.scheme.start(state.changed(memory=None)).memory
+    kinds = (type(first),) if first is not None else (stepper.scheme.remembers, tuple, type(None))
+    arrays = [x for x in (*vars(memory).values(),) if isinstance(x, np.ndarray)] if is_dataclass(memory) else [memory]
+    shapes = {x.shape for x in arrays if isinstance(x, np.ndarray)}
+    if not isinstance(memory, kinds) or not shapes <= {state.q.shape}:
+        raise ValueError("memory")
+
+
+def check_motion(system: Any, known: Mapping[str, Any]) -> None:
+    """Refuse q, v and a that a system does not have.
+
+    Raises:
+        ValueError: they are of other sizes, or not finite.
+    """
+    for name in "qva":
+        if known[name].shape != system.zeros().shape or not np.all(np.isfinite(known[name])):
+            raise ValueError(name)
+
+
 def restored(system: Any, factored: Any, state: State) -> None:
     """Make the factor that a system kept at a state anew, from what is known of it."""
+    if factored is not None:
+        check_motion(system.held, factored)
+        alike((0.0, 0.0, 0.0), tuple(factored["shifts"]), "shifts")
     system.held.count_rotations_from(state.reference)
     system.held.refactor(factored)
     system.held.count_rotations_from(state.reference)
@@ -301,6 +440,23 @@ def record_of(name: str) -> Any:
     if not (isinstance(found, type) and is_dataclass(found)):
         raise SceneError("command line", "--resume", name, "is no record of rotfem")
     return found
+
+
+def suits(value: Any, hint: Any) -> bool:
+    """Return whether a value is of the declared type of a field of a record."""
+    kind, of = get_origin(hint) or hint, get_args(hint)
+    if kind is Any:
+        return True
+    if kind in (Union, UnionType):
+        return any(suits(value, one) for one in of)
+    if kind is tuple and isinstance(value, tuple) and of:
+        each = [of[0]] * len(value) if of[-1] is Ellipsis else of
+        return len(each) == len(value) and all(map(suits, value, each))
+    if kind is float:
+        return isinstance(value, int | float) and not isinstance(value, bool)
+    if kind is int:
+        return isinstance(value, int) and not isinstance(value, bool)
+    return isinstance(value, kind) if isinstance(kind, type) else True
 
 
 def learning(stepper: Stepper) -> dict[str, Any]:
@@ -320,8 +476,17 @@ def of_stepper(stepper: Stepper, packing: Packing) -> Tree:
 
 
 def put_back_stepper(stepper: Stepper, packing: Packing, tree: Tree, state: State) -> None:
-    """Make a stepper know what it had learnt at a state."""
-    stepper.make_matrices(packing.unpacked(tree["matrices"]))
+    """Make a stepper know what it had learnt at a state.
+
+    Raises:
+        TypeError: it cannot have learnt that.
+    """
+    learnt = {name: plain(part) for name, part in learning(stepper).items()}
+    alike(learnt, {name: value for name, value in tree.items() if name != "matrices"}, "stepper")
+    matrices = packing.unpacked(tree["matrices"])
+    if matrices is not None:
+        check_motion(stepper.system, matrices)
+    stepper.make_matrices(matrices)
     stepper.system.held.count_rotations_from(state.reference)
     stepper.system.set_time(state.t)
     for name, part in learning(stepper).items():
@@ -350,3 +515,31 @@ def plain(thing: Any) -> Tree:
     if lost:
         raise TypeError(f"a checkpoint cannot hold {', '.join(lost)} of {type(thing).__name__}")
     return found
+
+
+def alike(here: Any, there: Any, name: str) -> None:
+    """Refuse a value that has not the type of the one which is there already, and so at all depths.
+
+    What is None here may be a number, or several, there. Lists may be of any length.
+
+    Raises:
+        TypeError: it has not; names it.
+    """
+    here, there = (x.item() if isinstance(x, np.generic) else x for x in (here, there))
+    if isinstance(here, dict) and here and isinstance(there, dict):
+        if set(here) != set(there):
+            raise TypeError(f"{name} has {', '.join(sorted(map(str, set(here) ^ set(there))))} on one side only")
+        for key, value in here.items():
+            alike(value, there[key], f"{name}.{key}")
+    elif isinstance(here, tuple) and isinstance(there, tuple) and len(here) == len(there):
+        for i, pair in enumerate(zip(here, there, strict=True)):
+            alike(*pair, f"{name}[{i}]")
+    elif isinstance(here, np.ndarray) and isinstance(there, np.ndarray):
+        if here.shape != there.shape:
+            raise TypeError(f"{name} has the shape {there.shape}")
+    elif here is None:
+        for entry in there if isinstance(there, tuple) else (there,):
+            if not isinstance(entry, bool | int | float | None):
+                raise TypeError(f"{name} is a {type(there).__name__}")
+    elif type(here) is not type(there) and not (type(here) is float and type(there) is int):
+        raise TypeError(f"{name} is a {type(there).__name__}")

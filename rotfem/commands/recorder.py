@@ -46,7 +46,11 @@ class ResultantRows:
         self.largest: tuple[float, ...] = ()
 
     def __call__(self, t: float) -> float:
-        """Keep the values at the state that is written into the system; return the largest equivalent stress, Pa."""
+        """Keep the values at the state that is written into the system; return the largest equivalent stress, Pa.
+
+        Raises:
+            ComputationError: a number is not finite.
+        """
         values = self._resultants()
         worst = int(np.argmax(values[:, self._stress]))
         stress = float(values[worst, self._stress])
@@ -75,12 +79,18 @@ class ResultantRows:
         more = {name: value for name, value in vars(self.frames).items() if name != "kept"}
         return {"frames": frames, "more": more, "last": self.last, "largest": list(self.largest)}
 
-    def put_back(self, known: dict[str, Any]) -> None:
-        """Take what a checkpoint has."""
-        frames = known["frames"]
+    def put_back(self, known: dict[str, Any], rows: int) -> None:
+        """Take what a checkpoint has, where the history has so many rows.
+
+        Raises:
+            ValueError: it is not what there is after so many.
+        """
+        frames, last = known["frames"], known["last"]
         kept = [(float(t), x) for t, x in zip(frames["t"], frames["values"], strict=True)]
-        vars(self.frames).update(known["more"], kept=kept)
-        self.last, self.largest = known["last"], tuple(known["largest"])
+        if any(x.shape != last.shape for _, x in kept) or len(known["largest"]) != 4:  # value, x, y, t
+            raise ValueError("resultants")
+        self.frames.put_back({**known["more"], "kept": kept}, rows)
+        self.last, self.largest = last, tuple(known["largest"])
 
 
 class StationRows:
@@ -109,7 +119,11 @@ class StationRows:
         return self.seen % self.output.every == 0
 
     def __call__(self, t: float) -> None:
-        """Keep the values at the state that is written into the system, or pass the row by."""
+        """Keep the values at the state that is written into the system, or pass the row by.
+
+        Raises:
+            ComputationError: a number is not finite.
+        """
         if self.due:
             values = self._stations()[:, self._columns]
             check_finite(zip(self.names, map(float, values.sum(axis=0)), strict=True), t, " at the stations")
@@ -120,10 +134,17 @@ class StationRows:
         """Return what a checkpoint has of it."""
         return {"seen": self.seen, "t": [t for t, _ in self.kept], "values": [x.tolist() for _, x in self.kept]}
 
-    def put_back(self, known: dict[str, Any]) -> None:
-        """Take what a checkpoint has."""
-        self.seen = known["seen"]
-        self.kept = [(t, np.array(x)) for t, x in zip(known["t"], known["values"], strict=True)]
+    def put_back(self, known: dict[str, Any], rows: int) -> None:
+        """Take what a checkpoint has, where the history has so many rows.
+
+        Raises:
+            ValueError: it is not what there is after so many.
+        """
+        t, values = np.array(known["t"], dtype=float), np.array(known["values"], dtype=float)
+        shape = 1 + (rows - 1) // self.output.every, len(self._stations.positions), len(self.names)
+        if known["seen"] != rows or t.shape != shape[:1] or values.shape != shape:
+            raise ValueError(f"values at stations of shape {values.shape} instead of {shape}")
+        self.seen, self.kept = rows, [(float(a), x) for a, x in zip(t, values, strict=True)]
 
     def result(self) -> StationHistory:
         """Return what has been kept."""
@@ -137,7 +158,11 @@ Array = npt.NDArray[np.float64]
 
 
 def check_names(outputs: Sequence[str], taken: Sequence[str]) -> None:
-    """Refuse outputs of a user with the name of something that is recorded anyway."""
+    """Refuse outputs of a user with the name of something that is recorded anyway.
+
+    Raises:
+        InputError: a name is taken.
+    """
     for name in outputs:
         if name in taken:
             why = f"is the name of a column already; choose another one than {', '.join(taken)}"
@@ -179,7 +204,11 @@ class Recorder:
         self.history = Table((*columns, *further, *stress))
 
     def __call__(self, state: State) -> None:
-        """Add a row for a state."""
+        """Add a row for a state.
+
+        Raises:
+            ComputationError: a number of it is not finite.
+        """
         system, t = self.system, state.t
         system.set_time(t)
         write_state(system, state)
@@ -206,7 +235,11 @@ class Recorder:
         return [] if self.resultants is None else [self.resultants(t)]
 
     def add(self, row: Sequence[float], state: State | None) -> None:
-        """Add a row, and keep the state that it is of if there is one."""
+        """Add a row, and keep the state that it is of if there is one.
+
+        Raises:
+            ComputationError: a number of it is not finite.
+        """
         check_finite(zip(self.history.columns, row, strict=True), row[0])
         self.history.append(row)
         if state is None:

@@ -11,7 +11,7 @@ from typing import Any
 from mpi4py import MPI
 
 from rotfem.analysis.schemes import State
-from rotfem.commands.checkpoint import Memory, Parts, Tree, check_end, check_identity, comparable, identity
+from rotfem.commands.checkpoint import Memory, Parts, Tree, check_end, check_identity, check_parts, comparable, identity
 from rotfem.commands.interrupts import Interrupts
 from rotfem.commands.result_folder import ResultFolder
 from rotfem.errors import OutputError, SceneError, Stopped
@@ -40,7 +40,11 @@ class Interval:
 
     @classmethod
     def of(cls, text: str | int) -> Interval:
-        """Return the interval of "30s" or "500"."""
+        """Return the interval of "30s" or "500".
+
+        Raises:
+            SceneError: it is none.
+        """
         found = re.fullmatch(r"(\d+(?:\.\d+)?)(s?)", str(text))
         if found is None or float(found[1]) == 0.0 or not (found[2] or found[1].isdigit()):
             allowed = 'must be a time in seconds such as "30s", or a number of steps such as "500"'
@@ -103,6 +107,7 @@ class RunStore:
 
         def read(files: ResultSet) -> Tree:
             tree = read_checkpoint(path)
+            check_parts(path, tree)
             check_identity(path, tree, self._identity)
             check_end(path, tree, end)
             return tree
@@ -158,7 +163,11 @@ class RunStore:
         return state
 
     def stepped(self, state: State) -> None:
-        """Take note of the end of a step."""
+        """Take note of the end of a step.
+
+        Raises:
+            Stopped: a signal has asked one of the ranks to end.
+        """
         if self._live is not None:
             self._live.update()
         comparable = ASKED * self._interrupts.asked + DUE * self._is_due()

@@ -27,7 +27,11 @@ HEAD = 512
 
 
 def write_checkpoint(path: Path, tree: dict[str, Any]) -> None:
-    """Write a tree (dicts, lists, numbers, text, arrays), whole or not at all, and wait until it is on the disk."""
+    """Write a tree (dicts, lists, numbers, text, arrays), whole or not at all, and wait until it is on the disk.
+
+    Raises:
+        OutputError: it cannot be written; the one before is still there.
+    """
     content = content_of(tree)
     head = f"{MAGIC} {FORMAT}\n{len(content)}\n{hashlib.sha256(content).hexdigest()}\n".encode().ljust(HEAD, b"\0")
     write_whole(path, head, content, durable=True)
@@ -46,7 +50,11 @@ def content_of(tree: dict[str, Any]) -> bytes:
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:
-    """Return the tree of a checkpoint file."""
+    """Return the tree of a checkpoint file.
+
+    Raises:
+        SceneError: there is none, or it is damaged, of another format, or no checkpoint.
+    """
 
     def refused(why: str) -> SceneError:
         return SceneError("command line", "--resume", path, why)
@@ -67,12 +75,31 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
         raise refused("is damaged: it does not sum up to what its head says; start the run anew, without --resume")
     try:
         with h5py.File(io.BytesIO(data), "r") as file:
-            text = file["tree"][()].tobytes().decode()
-            arrays = [file[f"arrays/{i}"][()] for i in range(len(file.get("arrays", ())))]
+            text = _array(file["tree"], len(data)).tobytes().decode()
+            arrays = [_array(file[f"arrays/{i}"], len(data)) for i in range(len(file.get("arrays", ())))]
         tree = _full(json.loads(text), arrays)
-    except (OSError, LookupError, ValueError) as error:
+    except (OSError, KeyError, ValueError, TypeError, IndexError, AttributeError, RecursionError) as error:
         raise refused(f"is damaged ({type(error).__name__}); start the run anew, without --resume") from None
-    return dict(tree)
+    if not isinstance(tree, dict):
+        raise refused("is damaged (no tree); start the run anew, without --resume")
+    return tree
+
+
+def _array(data: Any, size: int) -> np.ndarray[Any, Any]:
+    """Return an HDF5 dataset of numbers that lies in the file as it is, so that it takes no more memory than that.
+
+    Args:
+        data: the dataset.
+        size: of the file, bytes.
+
+    Raises:
+        ValueError: it is none: packed, of text, elsewhere, or of a shape that is not all in the file.
+    """
+    placed = data.size == 0 or data.id.get_offset() is not None  # what is packed, missing or elsewhere has no place
+    if data.dtype.kind not in "biufc" or not placed or data.nbytes > size:
+        raise ValueError("a dataset is not in the file")
+    out: np.ndarray[Any, Any] = data[()]
+    return np.asarray(out)
 
 
 def _plain(value: Any, arrays: list[Any]) -> Any:

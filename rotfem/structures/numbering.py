@@ -34,6 +34,7 @@ class Numbering:
         self.comm, self.size = mesh.comm, V.dofmap.index_map_bs
         cells = mesh.topology.index_map(mesh.topology.dim)
         number = np.asarray(mesh.topology.original_cell_index, dtype=np.int64)
+        self._all_nodes, self._all_cells = int(nodes.size_global), int(cells.size_global)
         owned = cells.size_local
         self._cells, self._owned_cells = number[: owned + cells.num_ghosts], owned
         mine = np.arange(nodes.size_local + nodes.num_ghosts, dtype=np.int32)
@@ -61,6 +62,12 @@ class Numbering:
         here = [name for name, count in counts.items() if len(x) == count]
         everywhere = set(here).intersection(*self.comm.allgather(here))
         return next((name for name in counts if name in everywhere), "")
+
+    def count(self, kind: str) -> int:
+        """Return the length of the first axis of an array in the common order; -1 if there is no such kind."""
+        unknowns: int = self.size * self._all_nodes
+        counts = {"nodes": self._all_nodes, "cells": self._all_cells}
+        return {"unknowns": unknowns, "unknowns and hub": unknowns + 1, **counts}.get(kind, -1)
 
     def gather(self, x: Array, kind: str) -> Array | None:
         """Return a local array in the common order, on rank 0.

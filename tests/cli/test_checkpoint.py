@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import hashlib
+import io
 import json
 import os
 import re
@@ -341,3 +344,97 @@ def test_numbers_learnt_are_all_in_the_checkpoint(tmp_path: Path) -> None:
     stepper.newton.curvature = np.zeros(3)
     with pytest.raises(TypeError, match="cannot hold curvature of Newton"):
         plain(stepper.newton)
+
+
+#: Wrong trees that are tried of each kind of run.
+MANY = 8
+
+#: What is put into them.
+WRONG: list[Any] = [
+    None,
+    True,
+    -3,
+    float("nan"),
+    "x",
+    [],
+    {},
+    (1,),
+    np.zeros(0),
+    np.full((3, 2), np.nan),
+    ["x"],
+    {"x": 1},
+]
+
+
+def places(tree: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Return where something lies in a tree, of lists and tuples the first entry only."""
+    below = tree.items() if isinstance(tree, dict) else list(enumerate(tree))[:1] if isinstance(tree, list) else ()
+    return [path, *(place for key, entry in below for place in places(entry, (*path, key)))]
+
+
+def changed(tree: Any, path: tuple[Any, ...], value: Any) -> Any:
+    """Return a copy of a tree with something else in a place, or nothing where the value is `places`."""
+    out = copy.deepcopy(tree)
+    inner = out
+    for key in path[:-1]:
+        inner = inner[key]
+    if value is places:
+        del inner[path[-1]]
+    else:
+        inner[path[-1]] = value
+    return out
+
+
+def resumed(scene: rotfem.Scene, folder: Path) -> tuple[Any, str]:
+    """Return the result of a run that goes on from a checkpoint, or None and why it is refused."""
+    try:
+        return rotfem.run(scene, folder=folder, resume=True), ""
+    except SceneError as error:
+        return None, str(error)
+
+
+@pytest.mark.parametrize("kind", ["fixed steps", "free hub", "stations", "adaptive"])
+def test_a_right_sum_over_a_wrong_tree_is_refused_in_words(kind: str, tmp_path: Path) -> None:
+    """Whatever lies anywhere: it is refused with one error, or makes no difference to what goes on."""
+    kinds = KINDS | {"stations": {"output": {"stations": [0.5, 1.0]}}}
+    scene = scene_of({**kinds[kind], "mesh": {"elements": 1, "degree": 2}})
+    whole = rotfem.run(scene, folder=tmp_path / "whole", checkpoint=15)
+    tree = checkpoint_file.read_checkpoint(tmp_path / "whole" / "checkpoint.h5")
+    everywhere = [place for place in places(tree) if place and place[:2] != ("identity", "scene")]
+    rng = np.random.default_rng([11, len(everywhere)])
+    wrong = [(place, WRONG[int(rng.integers(len(WRONG)))]) for place in everywhere]
+    wrong += [(place, places) for place in everywhere if len(place) == 1]
+    wrong = [
+        (("rows",), tree["rows"][:0]),
+        (("rows",), tree["rows"][:-3]),
+        *(wrong[i] for i in rng.permutation(len(wrong))),
+    ]
+    taken = []
+    for i, (place, value) in enumerate(wrong[:MANY]):
+        folder = tmp_path / str(i)
+        folder.mkdir()
+        checkpoint_file.write_checkpoint(folder / "checkpoint.h5", changed(tree, place, value))
+        result, said = resumed(scene, folder)
+        if result is None:
+            assert "checkpoint.h5" in said, (place, value)
+            assert os.listdir(folder) == ["checkpoint.h5"], (place, value)
+        else:
+            taken.append((place, value))
+            assert list(result.history["t"]) == list(whole.history["t"]), (place, value)
+    assert not any(place[0] in ("rows", "state", "columns", "positions") for place, _ in taken), taken
+    assert len(taken) < MANY // 4, taken
+
+
+def test_arrays_that_are_not_in_the_file_are_not_read(tmp_path: Path) -> None:
+    """A dataset of zeros that was never written takes 8 GB from 10 kB; so do packed ones, and those elsewhere."""
+    path = tmp_path / "checkpoint.h5"
+    for options in ({"shape": 10**9}, {"data": np.zeros(10**6), "compression": "gzip"}, {"data": "text"}):
+        image = io.BytesIO()
+        with h5py.File(image, "w", userblock_size=512) as file:
+            file["tree"] = np.frombuffer(b'{"dict": {"rows": {"array": 0}}}', dtype=np.uint8)
+            file.create_dataset("arrays/0", **options)
+        content = image.getvalue()[512:]
+        head = f"rotfem-checkpoint {checkpoint_file.FORMAT}\n{len(content)}\n{hashlib.sha256(content).hexdigest()}\n"
+        path.write_bytes(head.encode().ljust(512, b"\0") + content)
+        with pytest.raises(SceneError, match="is damaged"):
+            checkpoint_file.read_checkpoint(path)
