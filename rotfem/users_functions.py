@@ -58,13 +58,14 @@ def checked(function: Callable[..., Any], key: str, size: int, of: str, planar: 
     Returns:
         The function; it raises an InputError that says at what arguments the other one failed, and how.
     """
+    needed = "a number" if size == 1 else f"{size} numbers"
 
     def at(*arguments: Any) -> Array:
         try:
             given = function(*arguments)
             value: Array = np.array(given, dtype=np.float64, ndmin=1).ravel()
         except (TypeError, ValueError) as error:
-            raise _refused(key, of, arguments, f"must return {size} numbers: {error}") from error
+            raise _refused(key, of, arguments, f"must return {needed}: {error}") from error
         except Exception as error:
             raise _refused(key, of, arguments, f"raised {type(error).__name__}: {error}") from error
         if value.size == 2 and size == 3:
@@ -72,7 +73,7 @@ def checked(function: Callable[..., Any], key: str, size: int, of: str, planar: 
         if value.size == 3 and size == 1 and not np.any(value[:2]):  # a moment about axis 3
             value = value[2:]
         if value.size != size:
-            raise _refused(key, of, arguments, f"returned so many numbers: {value.size}; must be {size}")
+            raise _refused(key, of, arguments, f"must return {needed}, not {value.size}")
         if not all(map(math.isfinite, value)):
             raise _refused(key, of, arguments, f"returned {value}; must return finite numbers")
         if planar and size == 3 and value[2] != 0.0:

@@ -15,6 +15,7 @@ from rotfem.listeners import Hint
 from rotfem.numerics.linear import SMALL
 from rotfem.registry import theories
 from rotfem.scene.scene import Scene
+from rotfem.section_quantities import FORCES
 
 #: Steps a period, below which the error of the first mode's frequency is more than 1 %, and those to be advised.
 FEW_STEPS, GOOD_STEPS = 18, 40
@@ -37,13 +38,19 @@ class Estimate(NamedTuple):
 def estimates(scene: Scene, speed: float, count: int) -> list[Estimate]:
     """Return the lowest modes of a beam at a speed (rad/s), roughly, lowest first; none for a plate.
 
-    The spin raises the square of a bending frequency across the plane of rotation by about (n(2n − 1) + 0.2) Ω², and by
-    1.5 n(2n − 1) Ω² R/L more with a hub; in the plane by Ω² less. For a chain without hub n(2n − 1) is exact.
+    None with full matrices or supports either. The spin raises the square of a bending frequency across the plane of
+    rotation by about (n(2n − 1) + 0.2) Ω², and by 1.5 n(2n − 1) Ω² R/L more with a hub; in the plane by Ω² less. For a
+    chain without hub n(2n − 1) is exact.
     """
-    beam = scene.structure.mean_beam()
-    if beam is None:
+    structure: Any = scene.structure
+    if structure.type not in FORCES or structure.section.way.name == "matrix" or getattr(structure, "supports", ()):
         return []
-    L, hub, EA, mass, bending = beam
+    properties = structure.section.at if structure.is_planar else structure.section.central
+    L, hub = structure.length, structure.root_position[0]
+    means = {name: float(np.mean(values)) for name, values in properties(np.linspace(0.0, L, 33)).items()}
+    EA, mass = means["EA"], means["mass_per_length"] + (structure.tip_mass + sum(m.mass for m in structure.masses)) / L
+    lag = means["EI" if structure.is_planar else "EI3"]  # of each family EI, and 1 across the plane of rotation
+    bending = {"lag": (lag, 0.0)} if structure.is_planar else {"flap": (means["EI2"], 1.0), "lag": (lag, 0.0)}
     out = [Estimate("axial", n - 0.5, float((n - 0.5) * np.pi / L * np.sqrt(EA / mass))) for n in range(1, count + 1)]
     for family, (EI, across) in bending.items():
         for n in range(1, count + 1):

@@ -264,7 +264,9 @@ def with_pitch(scene: Scene, motion: Motion) -> Motion:
         parts.append(tabulated_pitch(given.table))
         knots = tuple(sorted({*knots, *(row[0] for row in given.table)}))
     if given.function is not None:
-        parts.append(differentiated(given.at, given.rate_at if given.rate is not None else None, cell_of(scene.time)))
+        key = "structure.root.pitch"
+        rate = given.rate and number_of(given.rate, f"{key}.rate", "time")
+        parts.append(differentiated(number_of(given.function, key, "time"), rate, cell_of(scene.time)))
     angle, rate, acceleration = (_sum([part[i] for part in parts]) for i in range(3))
     axis, root = np.array(structure.root_axis), np.array(structure.root_position)
     known = given.function is None and not given.harmonic

@@ -11,10 +11,10 @@ from pydantic_core import PydanticCustomError
 
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_through
-from rotfem.scene.root import Root, RootedStructure, SpatialRoot, Support
+from rotfem.scene.root import Hinge, Root, SpatialRoot, Support
 from rotfem.scene.section import PlanarSection, SpatialSection
 from rotfem.scene.span_tables import with_tables
-from rotfem.scene.structure import Damping, MeanBeam, apart, check_one_hub, means
+from rotfem.scene.structure import Damping, StructureTable, apart, check_one_hub
 from rotfem.scene.table import SceneModel, problem, problems_at
 from rotfem.scene.values import (
     DIGITS,
@@ -79,7 +79,7 @@ class PointMass(SceneModel):
         return self
 
 
-class BeamStructure(RootedStructure):
+class BeamStructure(StructureTable):
     """What planar and spatial beams share; a planar one is clamped at (hub_radius, 0, 0) of the frame.
 
     Attributes:
@@ -109,6 +109,21 @@ class BeamStructure(RootedStructure):
         return apart([body.x for body in self.masses], self.length)
 
     @property
+    def hinges(self) -> dict[int, Hinge]:
+        """Axis ↦ the hinge about it at the root."""
+        return self._root.hinges
+
+    @property
+    def pitches(self) -> bool:
+        """Whether its pitch changes with time."""
+        return isinstance(self._root, SpatialRoot) and self._root.pitch.changes
+
+    @property
+    def _root(self) -> Root:
+        root: Root = vars(self)["root"]
+        return root
+
+    @property
     def has_tip_mass(self) -> bool:
         """Whether there is anything at the tip, or at another point, that has inertia."""
         return self.tip_mass > 0.0 or bool(np.any(_as_matrix(vars(self)["tip_inertia"]))) or bool(self.masses)
@@ -122,10 +137,6 @@ class BeamStructure(RootedStructure):
     def _section(self) -> PlanarSection | SpatialSection:
         section: PlanarSection | SpatialSection = vars(self)["section"]
         return section
-
-    def _mean(self, section: dict[str, float], bending: dict[str, tuple[float, float]]) -> MeanBeam:
-        mass = section["mass_per_length"] + (self.tip_mass + sum(body.mass for body in self.masses)) / self.length
-        return MeanBeam(self.length, self.root_position[0], section["EA"], mass, bending)
 
     def _check_tables(self, slack: float = ROUND_OFF) -> None:
         """Refuse tapers of the section that end elsewhere, properties of a size that cannot be, masses elsewhere."""
@@ -169,16 +180,6 @@ class PlanarBeamStructure(BeamStructure):
     def root_position(self) -> tuple[float, float, float]:
         """Position of the root in the frame (m)."""
         return self.hub_radius + self.root.hinge_offset, 0.0, 0.0
-
-    @property
-    def release_limit(self) -> float:
-        """Length (m), which a displacement of the tip to be released from must stay below."""
-        return self.length
-
-    def mean_beam(self) -> MeanBeam:
-        """Return the uniform beam with the mean of its section."""
-        s = means(self.section.at, self.length)
-        return self._mean(s, {"lag": (s["EI"], 0.0)})
 
     @model_validator(mode="before")
     @classmethod
@@ -283,13 +284,6 @@ class SpatialBeamStructure(BeamStructure):
     def has_fibers(self) -> bool:
         """Whether the sections have fibers beside the axis they twist about, as all have but where it is denied."""
         return self.section.polar_radius != 0.0
-
-    def mean_beam(self) -> MeanBeam | None:
-        """Return the uniform beam with the mean of its section; None with full matrices or supports."""
-        if self.section.given.keys() & {"stiffness", "mass"} or self.supports:
-            return None
-        s = means(self.section.central, self.length)
-        return self._mean(s, {"flap": (s["EI2"], 1.0), "lag": (s["EI3"], 0.0)})
 
     @model_validator(mode="before")
     @classmethod

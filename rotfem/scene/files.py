@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 import numpy as np
 from pydantic import ValidationInfo
@@ -231,11 +231,8 @@ def existing_file(value: Any, info: ValidationInfo) -> Path:
     return path
 
 
-class Reader(Protocol):
-    """What makes a table of rows and refuses those that are none, as `as_increasing_rows` does."""
-
-    def __call__(self, value: Any, columns: Sequence[int], shape: str, row_name: Callable[[int], str] = ...) -> Matrix:
-        """Return the rows."""
+#: What makes a table of rows and refuses those that are none, as `as_increasing_rows` does.
+Reader: TypeAlias = Callable[..., Matrix]
 
 
 def as_time_table(value: Any, info: ValidationInfo, columns: Sequence[int], shape: str) -> Matrix:

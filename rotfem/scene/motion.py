@@ -6,29 +6,15 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import ConfigDict, Discriminator, Field, PlainValidator, Tag, ValidationInfo, model_validator
+from pydantic import ConfigDict, Discriminator, Field, PlainValidator, Tag, model_validator
 
 from rotfem.errors import show
 from rotfem.registry import Registry, motion_laws, register
-from rotfem.scene.files import as_time_table
-from rotfem.scene.signals import Signal, TimeFunction, arguments
+from rotfem.scene.signals import Signal, TimeFunction, function_of, time_table
 from rotfem.scene.table import SceneModel, check_parameters, parameters_of, problem, with_parameters
-from rotfem.scene.values import Matrix, NonNegative, Number, Positive, Vector3, as_rows, as_vector3
+from rotfem.scene.values import Matrix, NonNegative, Number, Positive, Vector3, as_rows, as_vector3, such
 
-
-def _as_axis(value: Any) -> Vector3:
-    axis = as_vector3(value)
-    if not any(axis):
-        raise problem("", value, "must be a direction; not all three components can be 0")
-    return axis
-
-
-def _as_speed_table(value: Any, info: ValidationInfo) -> Matrix:
-    return as_time_table(value, info, (2,), "a table [[t, speed], …]")
-
-
-def _as_torque_table(value: Any, info: ValidationInfo) -> Matrix:
-    return as_time_table(value, info, (2,), "a table [[t, torque], …]")
+Axis = Annotated[Vector3, such(as_vector3, any, "must be a direction; not all three components can be 0")]
 
 
 def _as_pulses(value: Any) -> Matrix:
@@ -37,13 +23,6 @@ def _as_pulses(value: Any) -> Matrix:
         if end <= start:
             raise problem("", value, f"pulse {i} must end after it starts; it runs from {start:g} to {end:g} s")
     return rows
-
-
-def _as_controller(value: Any) -> Callable[..., float]:
-    if not callable(value) or arguments(value) != 4:
-        raise problem("", value, "must be a Python function of (t, psi, psi_dot, tip)")
-    function: Callable[..., float] = value
-    return function
 
 
 class Motion(SceneModel):
@@ -62,7 +41,7 @@ class Motion(SceneModel):
     #: Whether the speeds it takes are known beforehand.
     is_known: ClassVar[bool] = False
 
-    axis: Annotated[Vector3, PlainValidator(_as_axis)] = (0.0, 0.0, 1.0)
+    axis: Axis = (0.0, 0.0, 1.0)
     base_acceleration: Signal | None = None
 
     @property
@@ -99,16 +78,6 @@ class Motion(SceneModel):
                     why = f"has no meaning with type = {show(data['type'])}; it belongs to type = {', '.join(types)}"
                     raise problem(key, data[key], why)
         return data
-
-
-class Swept:
-    """A motion whose speed is swept: whether it spins does not follow from its own speed."""
-
-    def __init__(self, motion: Motion, is_spinning: bool):
-        self._motion, self.is_spinning = motion, is_spinning
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._motion, name)
 
 
 class ConstantMotion(Motion):
@@ -160,7 +129,7 @@ class TableMotion(Motion):
     name: ClassVar[str] = "table"
     is_known: ClassVar[bool] = True
     type: Literal["table"]
-    table: Annotated[Matrix, PlainValidator(_as_speed_table)] = Field(
+    table: Annotated[Matrix, time_table("speed")] = Field(
         description="a table [[t, speed], …] or the path of a CSV file"
     )
     interpolation: Literal["pchip", "cubic", "linear"] = "pchip"
@@ -194,8 +163,8 @@ class TorqueMotion(Motion):
     type: Literal["torque"]
     hub_inertia: Positive = Field(description="a number greater than 0 (kg·m²)")
     pulses: Annotated[Matrix, PlainValidator(_as_pulses)] | None = None
-    table: Annotated[Matrix, PlainValidator(_as_torque_table)] | None = None
-    function: Annotated[Callable[..., float], PlainValidator(_as_controller)] | None = None
+    table: Annotated[Matrix, time_table("torque")] | None = None
+    function: Annotated[Callable[..., float], function_of("(t, psi, psi_dot, tip)", 4)] | None = None
     coupled: Annotated[bool, Field(strict=True)] = True
     hub_damping: NonNegative = 0.0
     speed: Number = 0.0

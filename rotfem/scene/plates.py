@@ -85,10 +85,7 @@ class PlateStructure(StructureTable):
         damping: damping coefficients.
     """
 
-    WAYS: ClassVar[tuple[Way, ...]] = (
-        Way("rectangle", ("length", "width")),
-        Way("mesh", ("mesh",)),
-    )
+    WAYS: ClassVar[tuple[Way, ...]] = (Way("rectangle", ("length", "width")), Way("mesh", ("mesh",)))
     MATERIALS: ClassVar[tuple[Way, ...]] = (
         Way("isotropic", ("E", "nu")),
         Way("orthotropic", ("E1", "E2", "nu12", "G12"), ("G13", "G23")),

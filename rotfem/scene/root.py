@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field, PlainValidator, ValidationInfo, model_validator
+from pydantic import Field, PlainValidator, model_validator
 
-from rotfem.errors import InputError
-from rotfem.scene.files import as_time_table
-from rotfem.scene.signals import Given, Harmonic, TimeFunction
-from rotfem.scene.structure import StructureTable
+from rotfem.scene.signals import Given, Harmonic, TimeFunction, time_table
 from rotfem.scene.table import SceneModel, problem
 from rotfem.scene.values import Bounds, Matrix, NonNegative, Number, as_rows
-
-KEY = "structure.root.pitch"
-
-
-def _as_rows(value: Any, info: ValidationInfo) -> Matrix:
-    return as_time_table(value, info, (2,), "a table [[t, angle], …]")
 
 
 class HarmonicAngle(Harmonic):
@@ -45,7 +35,7 @@ class PitchAngle(Given):
     WAYS: ClassVar[tuple[str, ...]] = ("value", "table", "function")
 
     value: Number | None = None
-    table: Annotated[Matrix, PlainValidator(_as_rows)] | None = None
+    table: Annotated[Matrix, time_table("angle")] | None = None
     function: TimeFunction | None = None
     rate: TimeFunction | None = None
     harmonic: tuple[HarmonicAngle, ...] = ()
@@ -61,35 +51,11 @@ class PitchAngle(Given):
         """The angle of one that does not change, rad."""
         return (self.value or 0.0) + (self.table[0][1] if self.table is not None else 0.0)
 
-    def at(self, t: float) -> float:
-        """Return what the function returns at a time (s), rad; an InputError if that is no finite number."""
-        return _number(self.function, t, KEY, "rad")
-
-    def rate_at(self, t: float) -> float:
-        """Return what the function of the rate returns at a time (s), rad/s, as `at` does."""
-        return _number(self.rate, t, f"{KEY}.rate", "rad/s")
-
     @model_validator(mode="after")
     def _check_rate(self) -> Self:
         if self.rate is not None and self.function is None:
             raise problem("rate", None, "is that of a function; tables and harmonics have their own")
         return self
-
-
-def _number(function: Any, t: float, key: str, unit: str) -> float:
-    """Return what a function returns at a time (s), or raise an InputError that names the key."""
-    where = f"the function of time, at {t:g},"
-    try:
-        given: Any = function(t)
-    except Exception as error:
-        raise InputError(key, None, f"{where} raised {type(error).__name__}: {error}") from error
-    try:
-        number = float(given)
-    except (TypeError, ValueError) as error:
-        raise InputError(key, None, f"{where} must return a number ({unit}): {error}") from error
-    if not math.isfinite(number):
-        raise InputError(key, None, f"{where} returned {number}; must return a finite number ({unit})")
-    return number
 
 
 class Hinge(NamedTuple):
@@ -213,19 +179,3 @@ class Support(SceneModel):
         rest = [((A[0][0] - A[1][1]) / 2, (A[0][1] + A[1][0]) / 2) for A in (self.stiffness, self.damping)]
         stiffness, damping = (((a, b), (b, -a)) for a, b in rest)
         return stiffness, damping
-
-
-class RootedStructure(StructureTable):
-    """What a beam has of its `root`."""
-
-    @property
-    def hinges(self) -> dict[int, Hinge]:
-        """Axis ↦ the hinge about it at the root."""
-        root: Root = vars(self)["root"]
-        return root.hinges
-
-    @property
-    def pitches(self) -> bool:
-        """Whether its pitch changes with time."""
-        root: Root = vars(self)["root"]
-        return isinstance(root, SpatialRoot) and root.pitch.changes

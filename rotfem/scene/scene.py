@@ -12,16 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import (
-    BaseModel,
-    Discriminator,
-    Field,
-    PlainValidator,
-    PrivateAttr,
-    Tag,
-    ValidationError,
-    model_validator,
-)
+from pydantic import BaseModel, Discriminator, Field, PlainValidator, PrivateAttr, Tag, ValidationError, model_validator
 
 from rotfem import registry
 from rotfem.errors import SceneError, show
@@ -29,7 +20,7 @@ from rotfem.scene.beams import Structure
 from rotfem.scene.extensions import Extensions, load_wanted
 from rotfem.scene.files import apply_overrides, check_depth, noted_files, read_toml, set_key, to_builtin
 from rotfem.scene.loads import Loads, check_loads, doubtful_table
-from rotfem.scene.motion import AnyMotion, Motion, Swept, TorqueMotion
+from rotfem.scene.motion import AnyMotion, Motion, TorqueMotion
 from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver, Time
 from rotfem.scene.span_tables import FORCE
 from rotfem.scene.structure import designed, is_design
@@ -226,30 +217,6 @@ class Scene(SceneModel):
         digest: dict[str, Any] = abridged(self.to_dict(), self._tables)
         return digest
 
-    @property
-    def frame(self) -> str:
-        """Frame to which displacements refer: "rotating" or "inertial"."""
-        return self.model.frame
-
-    def effective_effects(self, spinning: bool | None = None) -> tuple[str, ...]:
-        """Return the names of the effects that this scene includes, in the order in which they are registered.
-
-        With `effects = "auto"` these are all for which the scene has data (a speed, a tip mass, …); with a list,
-        those of the list for which it has.
-
-        Args:
-            spinning: whether the structure spins; by default what the motion says. A speed sweep, which does not use
-                the scene's own speed, says True.
-        """
-        seen = self if spinning is None else self.model_copy(update={"motion": Swept(self.motion, spinning)})
-        listed, rotates = self.model.effects, self.frame == "rotating"
-        return tuple(
-            effect.name
-            for effect in registry.effects
-            if (listed == "auto" or effect.name in listed) and (rotates or not effect.of_rotation)
-            if effect.present(seen)
-        )
-
     def check_run(self) -> None:
         """Check that the scene can be run: a time history needs times, a steady state a constant speed.
 
@@ -345,7 +312,8 @@ def check_together(scene: Scene) -> None:
     structure, motion, model = scene.structure, scene.motion, scene.model
     if structure.is_planar:
         check_planar(motion, scene.loads)
-    check_supports(structure, motion)
+    if getattr(structure, "supports", ()) and (motion.axis[1] != 0.0 or motion.axis[2] != 0.0):
+        raise problem("motion.axis", list(motion.axis), "must be [1, 0, 0] or [-1, 0, 0] with structure.supports")
     check_loads(structure, motion, scene.loads)
     check_mesh(structure, scene.mesh)
     check_theory(structure, model)
@@ -368,12 +336,6 @@ def check_planar(motion: Motion, loads: Loads) -> None:
             raise problem(key, value, "the third component must be 0 for a planar_beam")
     if loads.gravity[2] != 0.0:
         raise problem("loads.gravity", list(loads.gravity), "the third component must be 0 for a planar_beam")
-
-
-def check_supports(structure: Any, motion: Motion) -> None:
-    """Refuse supports of a beam that spins about another axis than its own."""
-    if getattr(structure, "supports", ()) and (motion.axis[1] != 0.0 or motion.axis[2] != 0.0):
-        raise problem("motion.axis", list(motion.axis), "must be [1, 0, 0] or [-1, 0, 0] with structure.supports")
 
 
 def check_mesh(structure: Any, mesh: BeamMesh | PlateMesh) -> None:
@@ -443,12 +405,12 @@ def check_frame(structure: Any, motion: Motion, model: Model) -> None:
 
 def check_initial(structure: Any, motion: Motion, model: Model, initial: Initial) -> None:
     """Refuse an initial state that the scene cannot have."""
-    displacement, limit = initial.tip_displacement, structure.release_limit
+    displacement = initial.tip_displacement
     if displacement is not None:
-        if limit is None:
+        if not structure.is_planar:
             raise problem("initial.tip_displacement", displacement, "is allowed only for a planar_beam")
-        if abs(displacement) >= limit:
-            reason = f"must be less than the length {limit:g} in size"
+        if abs(displacement) >= structure.length:
+            reason = f"must be less than the length {structure.length:g} in size"
             raise problem("initial.tip_displacement", displacement, reason)
     if initial.mode is not None and motion.is_free:
         raise problem("initial.mode", initial.mode, 'needs a speed that is prescribed, not motion.type = "torque"')

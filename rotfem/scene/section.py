@@ -105,30 +105,30 @@ class Section(SceneModel):
         """Places of all rows of tapers (m), and the root."""
         return sorted({0.0, *(x for taper in self.tapers.values() for x, _ in taper)})
 
-    def _at(self, name: str, x: Array) -> Array:
-        """Return the profile of that name at x, or zeros where it may be missing and is."""
+    def profile(self, name: str, x: npt.ArrayLike) -> Array:
+        """Return the profile of a key at places x (m) along the beam, zeros where it is not given."""
         return evaluate(getattr(self, name) or 0.0, x)
 
     def _dimensions(self, x: Array) -> dict[str, Array]:
         """Return the dimensions of the shape at x; the caller knows from `way` that there is one."""
-        return {name: self._at(name, x) for name in self.way.required if name not in MATERIAL_AND_SHAPE}
+        return {name: self.profile(name, x) for name in self.way.required if name not in MATERIAL_AND_SHAPE}
 
     def _geometry(self, x: Array) -> Geometry:
         """Return the geometry of the shape, or as it is given with a material."""
         if self.shape is not None:
             shape: Shape = registry.shapes[self.shape]
-            return shape.geometry(self._at("nu", x), **self._dimensions(x))
+            return shape.geometry(self.profile("nu", x), **self._dimensions(x))
         names = ["second_moment2", "second_moment3", "torsion_constant"]
         if "second_moment" in type(self).model_fields:
             names = ["second_moment"] * 3
-        I2, I3, J = (self._at(name, x) for name in names)
-        return Geometry(self._at("area", x), I2, I3, J, np.full(x.shape, 5.0 / 6.0))
+        I2, I3, J = (self.profile(name, x) for name in names)
+        return Geometry(self.profile("area", x), I2, I3, J, np.full(x.shape, 5.0 / 6.0))
 
     def _of_material(self, x: Array) -> tuple[Array, ...]:
         """Return EA, kGA (N), GJ, EI₂, EI₃ (N·m²), ρA (kg/m), ρI₂ and ρI₃ (kg·m) of a material with a geometry."""
-        g, E, rho = self._geometry(x), self._at("E", x), self._at("rho", x)
-        k = g.shear_correction if self.shear_correction is None else self._at("shear_correction", x)
-        G = E / (2.0 * (1.0 + self._at("nu", x)))
+        g, E, rho = self._geometry(x), self.profile("E", x), self.profile("rho", x)
+        k = g.shear_correction if self.shear_correction is None else self.profile("shear_correction", x)
+        G = E / (2.0 * (1.0 + self.profile("nu", x)))
         I2, I3 = g.second_moment2, g.second_moment3
         return E * g.area, k * G * g.area, G * g.torsion_constant, E * I2, E * I3, rho * g.area, rho * I2, rho * I3
 
@@ -188,7 +188,7 @@ class PlanarSection(Section):
         x = np.asarray(x, dtype=np.float64)
         names = ("EA", "GA", "EI", "mass_per_length", "rotary_inertia")
         if self.way.name == "stiffness":
-            return {name: self._at(name, x) for name in names}
+            return {name: self.profile(name, x) for name in names}
         EA, GA, _, EI, _, mass, rotary_inertia, _ = self._of_material(x)
         return dict(zip(names, (EA, GA, EI, mass, rotary_inertia), strict=True))
 
@@ -300,9 +300,9 @@ class SpatialSection(Section):
         stiffnesses = np.stack([central[key] for key in _STIFFNESSES], axis=-1)
         m, J2, J3 = (central[key] for key in _INERTIAS)
         mass_center = self.center("mass_center", x)
-        turned = np.swapaxes(_turn(self.angle_at(x)), -1, -2)
-        B = turned @ _offset(axial=self.center("tension_center", x), transverse=self.center("shear_center", x))
-        B_mass = turned @ _offset(axial=mass_center, transverse=mass_center)
+        turned = np.swapaxes(about_axis(self.profile("principal_angle", x)), -1, -2)
+        B = turned @ shifted(axial=self.center("tension_center", x), transverse=self.center("shear_center", x))
+        B_mass = turned @ shifted(axial=mass_center, transverse=mass_center)
         masses = np.stack([m, m, m, J2 + J3, J2, J3], axis=-1)
         return {
             "stiffness": np.swapaxes(B, -1, -2) @ (stiffnesses[..., None] * B),
@@ -317,7 +317,7 @@ class SpatialSection(Section):
         """
         x, names = np.asarray(x, dtype=np.float64), (*_STIFFNESSES, *_INERTIAS)
         if self.way.name == "stiffness":
-            return {name: self._at(name, x) for name in names}
+            return {name: self.profile(name, x) for name in names}
         EA, GA, *rest = self._of_material(x)
         return dict(zip(names, (EA, GA, GA, *rest), strict=True))
 
@@ -338,38 +338,23 @@ class SpatialSection(Section):
         found = geometry.shear_center if name == "shear_center" else geometry.centroid
         return None if found is None else np.stack([np.broadcast_to(c, x.shape) for c in found], axis=-1)
 
-    def angle_at(self, x: npt.ArrayLike) -> Array:
-        """Return the principal angle (rad) at positions along the beam (m)."""
-        return self._at("principal_angle", np.asarray(x, dtype=np.float64))
 
-    def polar_radius_at(self, x: npt.ArrayLike) -> Array:
-        """Return the polar radius (m) at positions along the beam (m); only where it is given."""
-        return self._at("polar_radius", np.asarray(x, dtype=np.float64))
-
-    @property
-    def has_material(self) -> bool:
-        """Whether it is given by a material, of which E/G is known."""
-        return self.nu is not None
-
-    def modular_ratio(self, x: npt.ArrayLike) -> Array:
-        """Return E/G of the material at positions along the beam (m); only where it is given."""
-        return 2.0 * (1.0 + self._at("nu", np.asarray(x, dtype=np.float64)))
-
-
-def _turn(angle: Array) -> Array:
+def about_axis(angle: npt.ArrayLike) -> Array:
     """Return R (…, 6, 6): components along the section axes from those along axes turned by an angle (rad) about 1."""
     c, s = np.cos(angle), np.sin(angle)
-    R = np.broadcast_to(np.eye(6), (*angle.shape, 6, 6)).copy()
+    R = np.broadcast_to(np.eye(6), (*np.shape(angle), 6, 6)).copy()
     for i in (1, 4):
         R[..., i, i], R[..., i, i + 1], R[..., i + 1, i], R[..., i + 1, i + 1] = c, -s, s, c
     return R
 
 
-def _offset(axial: Array, transverse: Array) -> Array:
-    """Return B (…, 6, 6): motion (v, ω) of the reference axis ↦ axial motion at one centre, transverse at another.
+def shifted(axial: npt.ArrayLike, transverse: npt.ArrayLike) -> Array:
+    """Return B (…, 6, 6): strains on the reference axis ↦ axial strain at one centre, shear strains at another.
 
-    It is v + ω×(0, y, z) row by row, with (y, z), (…, 2) in m, of each; strains have the same map, (Γ, K) for (v, ω).
+    With (y, z), (…, 2) in m, of each centre these are Γ₁ + z K₂ − y K₃, Γ₂ − z K₁, Γ₃ + y K₁, and the curvatures
+    themselves; motions have the same map, (v, ω) for (Γ, K).
     """
+    axial, transverse = np.asarray(axial), np.asarray(transverse)
     B = np.broadcast_to(np.eye(6), (*axial.shape[:-1], 6, 6)).copy()
     B[..., 0, 4], B[..., 0, 5] = axial[..., 1], -axial[..., 0]
     B[..., 1, 3], B[..., 2, 3] = -transverse[..., 1], transverse[..., 0]

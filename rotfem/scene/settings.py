@@ -12,15 +12,7 @@ from pydantic import ConfigDict, Field, PlainValidator, ValidationInfo, model_va
 from rotfem import registry
 from rotfem.errors import show
 from rotfem.scene.files import as_table
-from rotfem.scene.table import (
-    SceneModel,
-    as_name,
-    as_names,
-    check_parameters,
-    parameters_of,
-    problem,
-    with_parameters,
-)
+from rotfem.scene.table import SceneModel, as_name, as_names, check_parameters, parameters_of, problem, with_parameters
 from rotfem.scene.units import AngularUnit
 from rotfem.scene.values import Bounds, Count, Matrix, Number, Positive, as_increasing_rows
 from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS

@@ -12,7 +12,7 @@ from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
 from rotfem.scene.files import as_time_table
 from rotfem.scene.table import SceneModel, problem
-from rotfem.scene.values import Array, Matrix, Number, Positive, as_padded_vector3
+from rotfem.scene.values import Array, Matrix, Number, Positive, as_padded_vector3, such
 
 
 def arguments(function: Callable[..., Any]) -> int:
@@ -25,12 +25,14 @@ def arguments(function: Callable[..., Any]) -> int:
     return needed or int(any(p.kind is p.VAR_POSITIONAL for p in parameters))
 
 
-def as_function(value: Any) -> Callable[[float], Any]:
-    """Return the value; raise if it is no function of one argument."""
-    if not callable(value) or arguments(value) != 1:
-        raise problem("", value, "must be a Python function of the time t (s)")
-    function: Callable[[float], Any] = value
-    return function
+def function_of(what: str, count: int = 1) -> PlainValidator:
+    """Return the validator of a Python function of so many arguments; `what` says which."""
+    return such(lambda f: f, lambda f: callable(f) and arguments(f) == count, f"must be a Python function of {what}")
+
+
+def time_table(column: str) -> PlainValidator:
+    """Return the validator of a table [[t, column], …], rows or the path of a CSV file."""
+    return PlainValidator(lambda value, info: as_time_table(value, info, (2,), f"a table [[t, {column}], …]"))
 
 
 def _as_rows4(value: Any, info: ValidationInfo) -> Matrix:
@@ -39,7 +41,7 @@ def _as_rows4(value: Any, info: ValidationInfo) -> Matrix:
     return tuple((*row, 0.0)[:4] for row in rows)
 
 
-TimeFunction = Annotated[Callable[[float], Any], PlainValidator(as_function)]
+TimeFunction = Annotated[Callable[[float], Any], function_of("the time t (s)")]
 
 
 class Harmonic(SceneModel):

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from inspect import Parameter, signature
-from typing import Annotated, Any, ClassVar, NamedTuple, TypeAlias
+from typing import Annotated, Any, ClassVar, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import ConfigDict, PlainValidator
 
 from rotfem.errors import SceneError, show
 from rotfem.registry import Registry, damping_models, register, structures
 from rotfem.scene.table import SceneModel, did_you_mean, problem, problems_at
-from rotfem.scene.values import Array, Bounds, NonNegative, as_vector
+from rotfem.scene.values import Bounds, NonNegative, as_vector, such
 
 
 @dataclass(frozen=True)
@@ -87,11 +86,7 @@ Ratios: TypeAlias = float | tuple[float, ...] | dict[str, tuple[float, ...]]
 _RATIO = Bounds(ge=0.0, lt=1.0)
 
 
-def _as_rayleigh(value: Any) -> tuple[float, float]:
-    a0, a1 = as_vector(value, (2,))
-    if a0 < 0.0 or a1 < 0.0:
-        raise problem("", value, "must be [a0, a1], both at least 0")
-    return a0, a1
+Rayleigh = such(lambda value: as_vector(value, (2,)), lambda a: min(a) >= 0.0, "must be [a0, a1], both at least 0")
 
 
 def _as_modal(value: Any) -> Ratios:
@@ -124,7 +119,7 @@ class Damping(SceneModel):
     __pydantic_extra__: dict[str, NonNegative]
 
     kelvin_voigt: NonNegative = 0.0
-    rayleigh: Annotated[tuple[float, float], PlainValidator(_as_rayleigh)] = (0.0, 0.0)
+    rayleigh: Annotated[tuple[float, float], Rayleigh] = (0.0, 0.0)
     modal: Annotated[Ratios, PlainValidator(_as_modal)] = 0.0
 
     @classmethod
@@ -174,29 +169,6 @@ class Damping(SceneModel):
 SAME_PLACE = 1e-7
 
 
-class MeanBeam(NamedTuple):
-    """The uniform beam that a structure is, roughly.
-
-    Attributes:
-        length: L (m).
-        hub_radius: distance of the clamp from the axis of rotation (m).
-        EA: axial stiffness (N).
-        mass_per_length: kg/m, with the tip mass spread over the length.
-        bending: family of modes ↦ bending stiffness EI (N·m²), and 1 across the plane of rotation, 0 in it.
-    """
-
-    length: float
-    hub_radius: float
-    EA: float
-    mass_per_length: float
-    bending: dict[str, tuple[float, float]]
-
-
-def means(properties: Callable[[npt.ArrayLike], dict[str, Array]], length: float) -> dict[str, float]:
-    """Return the means of section properties, a function of the places (m), at 33 of them over a length (m)."""
-    return {name: float(np.mean(values)) for name, values in properties(np.linspace(0.0, length, 33)).items()}
-
-
 def apart(places: Collection[float], length: float) -> tuple[float, ...]:
     """Return places along a beam (m) in order, but one of those that only round-off keeps apart, and no end."""
     out = [0.0]
@@ -215,11 +187,6 @@ class StructureTable(SceneModel):
     def is_planar(self) -> bool:
         """Whether it moves in the plane (1, 2) of the frame only, and has rotations about axis 3 only."""
         return False
-
-    @property
-    def root_position(self) -> tuple[float, float, float]:
-        """Position of the root in the frame (m)."""
-        raise NotImplementedError
 
     @property
     def knots(self) -> tuple[float, ...]:
@@ -249,15 +216,6 @@ class StructureTable(SceneModel):
     @property
     def mesh_file(self) -> str | None:
         """Absolute path of the file that its mesh is in, None if [mesh] has numbers of elements."""
-        return None
-
-    @property
-    def release_limit(self) -> float | None:
-        """Size (m) that a displacement of the tip must stay below to be released from; None if it cannot be."""
-        return None
-
-    def mean_beam(self) -> MeanBeam | None:
-        """Return the uniform beam that it is, roughly; None if it is like none, or that is not known."""
         return None
 
 

@@ -128,6 +128,18 @@ def as_number(value: Any) -> float:
     return number
 
 
+def such(read: Callable[[Any], Any], holds: Callable[[Any], Any], allowed: str) -> PlainValidator:
+    """Return the validator of what `read` makes of a value; `allowed` says what must hold of it."""
+
+    def validated(value: Any) -> Any:
+        read_value = read(value)
+        if not holds(read_value):
+            raise problem("", value, allowed)
+        return read_value
+
+    return PlainValidator(validated)
+
+
 def are_numbers(table: Array) -> bool:
     """Return whether all numbers are 0 or of a size that is allowed."""
     size = np.abs(table)

@@ -129,7 +129,7 @@ class SectionForms:
     def __init__(self, beam: Beam, section: Any):
         self._beam, self._data = beam, section
         if section.polar_radius is not None:
-            beam.section["polar_radius"] = beam.profile("polar_radius", section.polar_radius_at)
+            beam.section["polar_radius"] = beam.profile("polar_radius", partial(section.profile, "polar_radius"))
         if section.stiffness is None:
             self._read_central()
             return
@@ -144,7 +144,9 @@ class SectionForms:
         self.mass_center = (0, *self._center("mass_center"))
         self._turned = None
         if data.principal_angle is not None:
-            angle = beam.section["principal_angle"] = beam.profile("principal_angle", data.angle_at, None)
+            angle = beam.section["principal_angle"] = beam.profile(
+                "principal_angle", partial(data.profile, "principal_angle"), None
+            )
             self._turned = ufl.cos(angle), ufl.sin(angle)
         self.directors = [
             ((0, *self._principal(1, 0)), beam.section["rotary_inertia3"]),
@@ -256,9 +258,9 @@ class SectionForms:
     @cached_property
     def _warping(self) -> Any:
         """J/A = GJ/EA · E/G (m²); the number 0 where E/G is not known."""
-        if not self._data.has_material:
+        if self._data.nu is None:
             return 0
-        ratio = self._beam.profile("modular_ratio", self._data.modular_ratio)
+        ratio = self._beam.profile("modular_ratio", lambda x: 2.0 * (1.0 + self._data.profile("nu", x)))
         return ratio * self._beam.section["GJ"] / self._beam.section["EA"]
 
     @cached_property

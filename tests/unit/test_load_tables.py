@@ -105,7 +105,7 @@ def raises(x: float, t: float) -> tuple[float, float]:
     ("function", "words"),
     [
         (raises, "raised RuntimeError: no data"),
-        (lambda x, t: (1, 2, 3, 4), "so many numbers: 4; must be 3"),
+        (lambda x, t: (1, 2, 3, 4), "must return 3 numbers, not 4"),
         (lambda x, t: (0.0, np.nan), "finite"),
         (lambda x, t: "much", "must return 3 numbers"),
         (lambda x, t: (0.0, 1.0, 1.0), "third component"),

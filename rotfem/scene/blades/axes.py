@@ -46,23 +46,6 @@ def rows_over(x: npt.ArrayLike, values: npt.ArrayLike) -> list[list[Any]]:
     return [[float(place), value.tolist()] for place, value in zip(np.asarray(x), np.asarray(values), strict=True)]
 
 
-def shifted(axial: npt.ArrayLike, transverse: npt.ArrayLike) -> Array:
-    """Return B (6, 6): strains on the reference line ↦ axial strain at one point (y, z), shear strains at another.
-
-    It is Γ₁ + z K₂ − y K₃, Γ₂ − z K₁, Γ₃ + y K₁, and the curvatures themselves.
-    """
-    (y, z), (a, b) = np.asarray(axial), np.asarray(transverse)
-    B = np.eye(6)
-    B[0, 4], B[0, 5], B[1, 3], B[2, 3] = z, -y, -b, a
-    return B
-
-
-def about_axis(angle: float) -> Array:
-    """Return the 6×6 rotation by an angle (rad) about axis 1: components along fixed axes from those along turned."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.kron(np.eye(2), np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]]))
-
-
 def iec_pretwist(tangent: Array, twist: Array) -> Array:
     """Return the pretwist (n,), rad, of a twist (n,) about −z from axes whose x has no part along y, as in BeamDyn.
 

@@ -24,9 +24,10 @@ import numpy as np
 
 from rotfem.errors import show
 from rotfem.registry import register
-from rotfem.scene.blades.axes import FROM_HAWC2, about_axis, line_of, rows_over, shifted, turned_matrix
+from rotfem.scene.blades.axes import FROM_HAWC2, line_of, rows_over, turned_matrix
 from rotfem.scene.blades.deck import Asked, BladeFormat, Deck, find_file
 from rotfem.scene.files import DEEPEST
+from rotfem.scene.section import about_axis, shifted
 from rotfem.scene.table import problem
 from rotfem.scene.values import DIGITS, Array, is_positive
 

@@ -192,11 +192,7 @@ def _primary(deck: Deck, asked: Asked) -> dict[str, Any]:
     if len(at) != count:
         deck.fail("two key points are the same", first)
     pretwist = iec_pretwist(through.at(at)[1], np.radians(points[:, 3]))
-    return {
-        "line": rows,
-        "pretwist": rows_over(at, pretwist),
-        **_matrices(deck.file("BldFile"), asked, through.length),
-    }
+    return {"line": rows, "pretwist": rows_over(at, pretwist), **_matrices(deck.file("BldFile"), asked, through.length)}
 
 
 def _matrices(deck: Deck, asked: Asked, length: float) -> dict[str, Any]:
