@@ -26,7 +26,6 @@ from rotfem.analysis.load_steps import Growth, balance
 from rotfem.analysis.modal import GROWTH
 from rotfem.equations.compiled import with_all_unknowns
 from rotfem.errors import ComputationError
-from rotfem.mechanics.loads import named
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.eigenproblem import SAME, ZERO, Eigenpairs, Pencil
 from rotfem.numerics.inertia import negative_eigenvalues, surely_negative, symmetric
@@ -211,14 +210,14 @@ def _energies(pencil: Pencil, pairs: Eigenpairs) -> Array:
 
 def are_constant(problem: Problem) -> bool:
     """Return whether speed, base acceleration, loads and gravity are constant in a frame that turns with the hub."""
-    motion, applied = problem.motion, named(problem.loads).values()
+    motion, applied = problem.motion, problem.loads.named.values()
     turning = problem.frame == "rotating" and motion.hub is None
     return turning and motion.constant and all(load.constant for load in applied) and not gravity_turns(problem)
 
 
 def act_at_start(problem: Problem) -> bool:
     """Return whether the hub spins, or is accelerated, or a load acts, at t = 0."""
-    motion, applied = problem.motion, [load for load in named(problem.loads).values() if not load.is_zero]
+    motion, applied = problem.motion, [load for load in problem.loads.named.values() if not load.is_zero]
     forces = [np.asarray(problem.loads.gravity), motion.base_acceleration(0.0), *(load.at(0.0) for load in applied)]
     return motion.speed(0.0) != 0.0 or any(force.any() for force in forces)
 

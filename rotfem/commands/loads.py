@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.equilibrium import gravity_turns
 from rotfem.errors import InputError
-from rotfem.mechanics.loads import WHOLE, AnyLoad, Load, Loads, PlaceLoad, PointLoads, Shapes, Term, named, replaced
+from rotfem.mechanics.loads import WHOLE, AnyLoad, Load, Loads, PlaceLoad, PointLoads, Shapes, Term
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
 from rotfem.scene import Scene
@@ -90,7 +90,7 @@ def _probes(structure: Any) -> tuple[Any, ...]:
 
 def frozen_inputs(problem: Problem) -> list[str]:
     """Return warnings where what is computed at one time, as modes are, has pitch, gravity and loads as at t = 0."""
-    given = {name: load.unpitched or load for name, load in named(problem.loads).items()}
+    given = {name: load.unpitched or load for name, load in problem.loads.named.items()}
     names = [f"loads.{name}" for name, load in given.items() if not (load.constant or load.is_zero)]
     said = [f"{', '.join(names)} {'change' if len(names) > 1 else 'changes'} with time: taken as at t = 0"]
     return [*frozen_in_frame(problem), *(said if names else [])]
@@ -118,7 +118,7 @@ def swept_loads(scene: Scene, motion: Motion) -> Loads:
         InputError: there is no harmonic load, or one that changes with time in another way.
     """
     made = loads_of(scene, motion)
-    changing = {name: load for name, load in named(made).items() if not load.constant}
+    changing = {name: load for name, load in made.named.items() if not load.constant}
     if not any(term.phase is not None for load in changing.values() for term in getattr(load, "terms", ())):
         why = "a frequency response needs a harmonic load, such as loads.tip_force.harmonic = "
         raise InputError("loads", None, why + "{ amplitude = [0, 1], frequency = 1 }; its frequency is swept")
@@ -127,7 +127,7 @@ def swept_loads(scene: Scene, motion: Motion) -> Loads:
         if isinstance(load, PlaceLoad) or any(t.amplitudes is not None and t.phase is None for t in load.terms):
             raise InputError(f"loads.{name}", None, "must be constant or harmonic in a frequency response")
         swept[name] = replace(load, terms=tuple(map(_swept, load.terms)))
-    return replaced(made, swept)
+    return made.replaced(swept)
 
 
 def _swept(term: Term) -> Term:

@@ -21,7 +21,6 @@ from rotfem.equations.compiled import compile_system
 from rotfem.errors import InputError, SceneError, input_of
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.free_hub import ControlledTorque, FreeHub, Torque
-from rotfem.mechanics.loads import pitched
 from rotfem.mechanics.motion import Motion, no_acceleration
 from rotfem.mechanics.pitch import Pitch, Scalar, constant_pitch, differentiated, harmonic_pitch, tabulated_pitch
 from rotfem.mechanics.problem import Functional, Output
@@ -70,7 +69,7 @@ class Problem(ProblemData):
                 mesh=scene.mesh,
                 theory=scene.model.theory,
                 effects=None if scene.model.effects == "auto" else tuple(scene.model.effects),
-                loads=pitched(loads_of(scene, motion), motion.pitch),
+                loads=loads_of(scene, motion).pitched(motion.pitch),
                 frame=scene.model.frame,
                 prestress=scene.model.prestress,
                 terms=terms or {},

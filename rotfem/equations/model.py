@@ -20,7 +20,6 @@ from rotfem.mechanics import work
 from rotfem.mechanics.bodies import Strain
 from rotfem.mechanics.effects import INERTIA, INTERNAL, LOADS, Effect
 from rotfem.mechanics.frame import Frame
-from rotfem.mechanics.loads import named
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.work import Mechanics, RigidTurn, Variation
@@ -274,7 +273,7 @@ class Model:
         """Whether nothing gives energy to the structure, so that its Jacobi integral stays, or falls by damping."""
         motion, gravity = self.motion, np.asarray(self.problem.loads.gravity)
         turning = motion.is_spinning and bool(np.any(np.cross(gravity, motion.axis)))
-        steady = all(load.is_zero or load.constant for load in named(self.problem.loads).values())
+        steady = all(load.is_zero or load.constant for load in self.problem.loads.named.values())
         dead = all(load.dead and load.conservative for load in self.mechanics.loads)
         known = all(
             effect.work is None or effect.momentum or effect.passive or effect.potential is not None
@@ -287,7 +286,7 @@ class Model:
     def driven_by_hub(self) -> bool:
         """Whether nothing but torque and brake of a free hub gives energy to it and the structure, which feels it."""
         loads, motion = self.problem.loads, self.motion
-        none = all(load.is_zero for load in named(loads).values()) and not np.any(loads.gravity)
+        none = all(load.is_zero for load in loads.named.values()) and not np.any(loads.gravity)
         known = all(
             effect.work is None or effect.momentum or effect.passive or (effect.potential and not effect.internal)
             for effect in self.acting.values()

@@ -204,19 +204,10 @@ class NonlinearSystem(System):
         name = "f" if name == "F" else name
         return self._derived[0][name], self._parts[name]
 
-    @property
-    def residual_forms(self) -> tuple[str, ...]:
-        """Names of the forms that F is the sum of."""
-        return tuple(f"F{i}" for i in range(len(self._F))) if self.moving else ("F",)
-
     def tangent_forms(self, kind: str) -> tuple[tuple[str, ...], tuple[float, ...]]:
         """Return the names of the forms that M, C or K is the sum of, and the shifts to be set before."""
         if self.moving:
-            return tuple(f"J{i}" for i in range(len(self._J))), (
-                float(kind == "K"),
-                float(kind == "C"),
-                float(kind == "M"),
-            )
+            return tuple(f"J{i}" for i in range(len(self._J))), tuple(float(kind == name) for name in "KCM")
         return () if self._parts[kind] is None else (kind,), tuple(self._shift_values)
 
     @property

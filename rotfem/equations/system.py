@@ -169,11 +169,6 @@ class System(Solutions, ABC):
         """Return c_v ∂F/∂Omega + c_m ∂F/∂Omega' at the state: the speed along the axis varies; a PETSc vector."""
 
     @property
-    def residual_forms(self) -> tuple[str, ...]:
-        """Names of the forms that F, of a linear theory F at rest, is the sum of."""
-        return ("F",)
-
-    @property
     @abstractmethod
     def integrals(self) -> dict[str, int]:
         """Number of integrals in F and J."""

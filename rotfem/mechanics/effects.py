@@ -108,6 +108,11 @@ def hinges_of(problem: Any) -> list[Any]:
     return list(getattr(problem.structure, "hinges", {}).values())
 
 
+def supports_of(problem: Any) -> Any:
+    """Return the supports of a problem's structure."""
+    return getattr(problem.structure, "supports", ())
+
+
 def pitches(problem: Any) -> bool:
     """Return whether the frame of a scene or problem turns with a pitch over time too."""
     return getattr(problem.structure, "pitches", False) or getattr(problem.motion, "pitch", None) is not None
@@ -128,35 +133,20 @@ INTERNAL = Effect("internal", _work("internal"), constants=(), internal=True, pa
 INERTIA = Effect("inertia", _work("inertia"), constants=(), momentum=True)
 LOADS = Effect("loads", _work("loads"), constants=("loads",), potential=_work("potential_of_loads"))
 
+_SPINS = ("the structure spins", "nothing spins")
+_OF_ROTATION: dict[str, Any] = {"of_rotation": True, "momentum": True}
+_AT_ROOT: dict[str, Any] = {"constants": (), "internal": True, "passive": True, "at_root": True}
+
 for _effect in (
-    Effect(
-        "coriolis",
-        _work("coriolis"),
-        turns,
-        ("the structure spins", "nothing spins"),
-        ("w",),
-        of_rotation=True,
-        momentum=True,
-        kinetic="T1",
-    ),
-    Effect(
-        "centrifugal",
-        _work("centrifugal"),
-        turns,
-        ("the structure spins", "nothing spins"),
-        ("w", "w"),
-        of_rotation=True,
-        momentum=True,
-        kinetic="T0",
-    ),
+    Effect("coriolis", _work("coriolis"), turns, _SPINS, ("w",), kinetic="T1", **_OF_ROTATION),
+    Effect("centrifugal", _work("centrifugal"), turns, _SPINS, ("w", "w"), kinetic="T0", **_OF_ROTATION),
     Effect(
         "euler",
         _work("euler"),
         lambda problem: problem.motion.changes_speed or pitches(problem),
         ("the speed or the pitch changes", "the speed is constant"),
         ("dw",),
-        of_rotation=True,
-        momentum=True,
+        **_OF_ROTATION,
     ),
     Effect(
         "rotary_inertia",
@@ -193,26 +183,20 @@ for _effect in (
         _work("root_springs"),
         lambda problem: bool(hinges_of(problem)),
         ("the root has hinges or springs", "the root is rigid"),
-        (),
-        internal=True,
-        passive=True,
-        at_root=True,
         potential=_work("potential_of_root_springs"),
+        **_AT_ROOT,
     ),
     Effect(
         "root_dampers",
         _work("root_dampers"),
         lambda problem: any(hinge.damping > 0.0 for hinge in hinges_of(problem)),
         ("the root has dampers", "the root has no dampers"),
-        (),
-        internal=True,
-        passive=True,
-        at_root=True,
+        **_AT_ROOT,
     ),
     Effect(
         "supports",
         _work("supports"),
-        lambda problem: bool(getattr(problem.structure, "supports", ())),
+        lambda problem: bool(supports_of(problem)),
         ("a shaft has supports", "no supports"),
         (),
         passive=True,
@@ -221,10 +205,7 @@ for _effect in (
     Effect(
         "support_dampers",
         _work("support_dampers"),
-        lambda problem: any(
-            np.any(support.damping) or support.isotropic[0][1] != 0.0
-            for support in getattr(problem.structure, "supports", ())
-        ),
+        lambda problem: any(np.any(s.damping) or s.isotropic[0][1] != 0.0 for s in supports_of(problem)),
         ("supports have dampers or cross-coupling", "supports have no dampers"),
     ),
     Effect(

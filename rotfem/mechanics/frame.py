@@ -51,36 +51,20 @@ class Frame:
             self._entries[name] = self.constants[name].value
         return self.constants[name]
 
-    def _spin(self, name: str) -> Any:
-        if self.planar:
+    def _vector(self, name: str) -> Any:
+        """Return a vector of the frame; in the plane w and dw have component 3 alone, the others lack it."""
+        if not self.planar:
+            return self._constant(name, 3)
+        if name in ("w", "dw"):
             return ufl.as_vector((0, 0, self._constant(name, 1)[0]))
-        return self._constant(name, 3)
+        c = self._constant(name, 2)
+        return ufl.as_vector((c[0], c[1], 0))
 
-    def _translation(self, name: str) -> Any:
-        if self.planar:
-            c = self._constant(name, 2)
-            return ufl.as_vector((c[0], c[1], 0))
-        return self._constant(name, 3)
-
-    @property
-    def w(self) -> Any:
-        """Angular velocity, rad/s."""
-        return self._spin("w")
-
-    @property
-    def dw(self) -> Any:
-        """Rate of the angular velocity, rad/s^2."""
-        return self._spin("dw")
-
-    @property
-    def a_o(self) -> Any:
-        """Absolute acceleration of the origin, m/s^2."""
-        return self._translation("a_o")
-
-    @property
-    def v_o(self) -> Any:
-        """Velocity of the origin, m/s, by a pitch whose axis it is not on."""
-        return self._translation("v_o")
+    w = property(lambda self: self._vector("w"), doc="Angular velocity, rad/s.")
+    dw = property(lambda self: self._vector("dw"), doc="Rate of the angular velocity, rad/s².")
+    a_o = property(lambda self: self._vector("a_o"), doc="Absolute acceleration of the origin, m/s².")
+    v_o = property(lambda self: self._vector("v_o"), doc="Velocity of the origin, m/s, by a pitch about another axis.")
+    gravity = property(lambda self: self._vector("gravity"), doc="Acceleration of gravity, m/s².")
 
     @property
     def psi(self) -> Any:
@@ -98,11 +82,6 @@ class Frame:
         """Their rates, 1/s."""
         c = self._constant("pitch_rate", 2)
         return c[0], c[1]
-
-    @property
-    def gravity(self) -> Any:
-        """Acceleration of gravity, m/s^2."""
-        return self._translation("gravity")
 
     def values(self, motion: Motion, t: float) -> dict[str, Array]:
         """Return the value of every constant in use at time t (s), as arrays of the constants' sizes."""

@@ -272,6 +272,10 @@ class PointLoads:
     moment: AnyLoad | None = None
 
 
+#: Loads of the whole structure and of its tip.
+WHOLE = ("tip_force", "tip_moment", "distributed", "distributed_moment", "pressure")
+
+
 @dataclass(frozen=True)
 class Loads:
     """Gravity and the loads on a structure; none by default.
@@ -298,61 +302,53 @@ class Loads:
     def __post_init__(self) -> None:
         object.__setattr__(self, "gravity", tuple(si(g, "m/s**2", "loads.gravity") for g in self.gravity))
 
+    @property
+    def named(self) -> dict[str, AnyLoad]:
+        """Name ↦ load of all that are given, zero ones too: "tip_force", …, "at.0.force", "at.0.moment"."""
+        out = {name: getattr(self, name) for name in WHOLE}
+        for i, point in enumerate(self.at):
+            out |= {f"at.{i}.force": point.force, f"at.{i}.moment": point.moment}
+        return {name: load for name, load in out.items() if load is not None}
 
-#: Loads of the whole structure and of its tip.
-WHOLE = ("tip_force", "tip_moment", "distributed", "distributed_moment", "pressure")
+    @property
+    def stations(self) -> set[float]:
+        """Places along the structure (m) at which loads have kinks or jumps, or work at a point."""
+        return {x for load in self.named.values() for x in load.stations} | self.jumps
 
+    @property
+    def jumps(self) -> set[float]:
+        """Those of them at which loads jump or work at a point."""
+        return {x for load in self.named.values() for x in load.jumps} | {p.x[0] for p in self.at if len(p.x) == 1}
 
-def named(loads: Loads) -> dict[str, AnyLoad]:
-    """Return name ↦ load of all that are given, zero ones too: "tip_force", …, "at.0.force", "at.0.moment"."""
-    out = {name: getattr(loads, name) for name in WHOLE}
-    for i, point in enumerate(loads.at):
-        out |= {f"at.{i}.force": point.force, f"at.{i}.moment": point.moment}
-    return {name: load for name, load in out.items() if load is not None}
+    def replaced(self, changed: Mapping[str, AnyLoad]) -> Loads:
+        """Return the loads with other ones in the place of those of some names (see `named`)."""
+        points = tuple(
+            replace(p, **{part: changed.get(f"at.{i}.{part}", getattr(p, part)) for part in ("force", "moment")})
+            for i, p in enumerate(self.at)
+        )
+        whole: dict[str, Any] = {name: load for name, load in changed.items() if name in WHOLE}
+        return replace(self, at=points, **whole)
 
+    def pitched(self, pitch: Pitch | None) -> Loads:
+        """Return the loads in the frame of a blade that pitches; the same without a pitch over time.
 
-def stations(loads: Loads) -> set[float]:
-    """Return the places along the structure (m) at which loads have kinks or jumps, or work at a point."""
-    return {x for load in named(loads).values() for x in load.stations} | jumps(loads)
+        Dead loads keep their direction in the frame of the hub. With φ, e of `rotfem.mechanics.pitch` a vector f of it
+        is
 
+            Rᵀ f = e (e·f) + cos φ (f − e (e·f)) − sin φ e×f
 
-def jumps(loads: Loads) -> set[float]:
-    """Return those of them at which loads jump or work at a point."""
-    return {x for load in named(loads).values() for x in load.jumps} | {p.x[0] for p in loads.at if len(p.x) == 1}
+        in that of the blade: three linear maps of the shapes with the amplitudes 1, cos φ and −sin φ. Followers turn
+        with the blade.
+        """
+        if pitch is None:
+            return self
+        dead = {name: load for name, load in self.named.items() if load.kind == "dead" and not load.is_zero}
+        return self.replaced({name: _in_blade(load, pitch) for name, load in dead.items()})
 
 
 def is_moment(name: str) -> bool:
     """Return whether a named load is a moment."""
     return name.endswith("moment")
-
-
-def replaced(loads: Loads, changed: Mapping[str, AnyLoad]) -> Loads:
-    """Return the loads with other ones in the place of those of some names (see `named`)."""
-    points = tuple(
-        replace(p, **{part: changed.get(f"at.{i}.{part}", getattr(p, part)) for part in ("force", "moment")})
-        for i, p in enumerate(loads.at)
-    )
-    whole: dict[str, Any] = {name: load for name, load in changed.items() if name in WHOLE}
-    return replace(loads, at=points, **whole)
-
-
-# --- a blade that pitches -------------------------------------------------------------------------------------------
-
-
-def pitched(loads: Loads, pitch: Pitch | None) -> Loads:
-    """Return the loads in the frame of a blade that pitches; the same without a pitch over time.
-
-    Dead loads keep their direction in the frame of the hub. With φ, e of `rotfem.mechanics.pitch` a vector f of it is
-
-        Rᵀ f = e (e·f) + cos φ (f − e (e·f)) − sin φ e×f
-
-    in that of the blade: three linear maps of the shapes with the amplitudes 1, cos φ and −sin φ. Followers turn with
-    the blade.
-    """
-    if pitch is None:
-        return loads
-    dead = {name: load for name, load in named(loads).items() if load.kind == "dead" and not load.is_zero}
-    return replaced(loads, {name: _in_blade(load, pitch) for name, load in dead.items()})
 
 
 def _in_blade(load: AnyLoad, pitch: Pitch) -> AnyLoad:
@@ -371,14 +367,8 @@ def _turned(term: Term, pitch: Pitch, knots: tuple[float, ...]) -> Iterator[Term
     e = pitch.axis
     along = np.outer(e, e)
     maps = (along, np.eye(3) - along, np.cross(e, np.eye(3)).T)
-
-    def cosine(phi: Array) -> Array:
-        return np.cos(phi)
-
-    def minus_sine(phi: Array) -> Array:
-        return -np.sin(phi)
-
-    for matrix, factor in zip(maps, (None, cosine, minus_sine), strict=True):
+    factors: tuple[Callable[[Array], Array] | None, ...] = (None, np.cos, lambda phi: -np.sin(phi))
+    for matrix, factor in zip(maps, factors, strict=True):
         shapes = replace(term.shapes, values=term.shapes.values @ matrix.T)
         if factor is None:
             yield replace(term, shapes=shapes, phase=None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, ClassVar, Self, cast, overload
+from typing import Any, ClassVar, Self
 
 from rotfem.errors import InputError
 from rotfem.mechanics.effects import INERTIA, INTERNAL, LOADS, Effect, Work, present_effects
@@ -37,26 +37,6 @@ class Output:
     unit: str = ""
 
 
-class TheoryByName:
-    """An attribute that is given as a theory or by the name of a registered one, and read as a theory."""
-
-    @overload
-    def __get__(self, problem: None, owner: type) -> str: ...
-
-    @overload
-    def __get__(self, problem: object, owner: type) -> Theory: ...
-
-    def __get__(self, problem: object | None, owner: type) -> str | Theory:
-        """Return the theory of a problem; of the class its default."""
-        return "reissner" if problem is None else cast(Theory, vars(problem)["theory"])
-
-    def __set__(self, problem: object, given: str | Theory) -> None:
-        """Set the theory of a problem."""
-        if isinstance(given, str) and given not in Theory.registry:
-            raise InputError("model.theory", given, f"allowed: {', '.join(Theory.registry.names)}")
-        vars(problem)["theory"] = Theory.registry[given] if isinstance(given, str) else given
-
-
 @dataclass(frozen=True, kw_only=True)
 class Problem:
     """A structure with a theory, effects, a motion, and loads. Immutable; `replace` makes variants.
@@ -65,7 +45,7 @@ class Problem:
         structure: what moves: its type, dimensions, section and damping (`PlanarBeam`, `SpatialBeam`, `Plate`).
         motion: how the frame turns and moves.
         mesh: elements, degree and integration.
-        theory: strain measures; a name of the registry or a `Theory`.
+        theory: strain measures, a `Theory`; may be given by its name in the registry.
         effects: names of the effects that may be in; None for all. Those without data are left out.
         loads: gravity and applied loads.
         frame: "rotating", or "inertial" (translates with the hub, does not rotate).
@@ -79,7 +59,7 @@ class Problem:
     structure: Any
     motion: Motion
     mesh: Any
-    theory: TheoryByName = TheoryByName()
+    theory: Any = "reissner"
     effects: tuple[str, ...] | None = None
     loads: Loads = field(default_factory=Loads)
     frame: str = "rotating"
@@ -90,6 +70,10 @@ class Problem:
     __repr__ = short_fields
 
     def __post_init__(self) -> None:
+        if isinstance(self.theory, str):
+            if self.theory not in Theory.registry:
+                raise InputError("model.theory", self.theory, f"allowed: {', '.join(Theory.registry.names)}")
+            object.__setattr__(self, "theory", Theory.registry[self.theory])
         for name in ("terms", "outputs"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
         object.__setattr__(self, "mesh", self.mesh.suited(self.structure))

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.mechanics.free_hub import FreeHub, Torque
-from rotfem.mechanics.loads import AnyLoad, PlaceLoad, named, replaced
+from rotfem.mechanics.loads import AnyLoad, PlaceLoad
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.pitch import Pitch
 from rotfem.mechanics.problem import Problem
@@ -120,9 +120,9 @@ def watched(problem: Problem, view: View) -> tuple[Problem, list[TimeSignal]]:
         return signal.seen(view)
 
     motion = _watched_motion(problem.motion, see)
-    changing = {name: load for name, load in named(problem.loads).items() if not load.constant}
+    changing = {name: load for name, load in problem.loads.named.items() if not load.constant}
     seen = {name: _watched_load(f"loads.{name}", load, see, view) for name, load in changing.items()}
-    return problem.replace(motion=motion, loads=replaced(problem.loads, seen)), signals
+    return problem.replace(motion=motion, loads=problem.loads.replaced(seen)), signals
 
 
 def _watched_load(name: str, load: AnyLoad, see: Callable[[TimeSignal], Callable[[float], Any]], view: View) -> AnyLoad:

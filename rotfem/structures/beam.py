@@ -12,7 +12,6 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 from rotfem.mechanics.bodies import RootSpring, Strain
-from rotfem.mechanics.loads import jumps, stations
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.forms import quadrature_points
 from rotfem.structures.memory import check_memory
@@ -54,8 +53,8 @@ class Beam(Structure):
         self.length, self.hub_radius, self._section = s.length, root[0], s.section
         check_memory("mesh.elements", grid.elements, grid.elements * grid.degree + 1, self.size, 1, comm)
         #: Places along the beam where section, axis, loads or forces may change at once, m.
-        places = apart((*nodes, *jumps(problem.loads)), self.length)
-        self.knots = apart((*rows, *places, *stations(problem.loads)), self.length)
+        places = apart((*nodes, *problem.loads.jumps), self.length)
+        self.knots = apart((*rows, *places, *problem.loads.stations), self.length)
         if len(self.knots) >= grid.elements:  # properties and loads are projected (`rotfem.structures.section_fields`)
             self.inner_rows = np.array([x for x in self.knots if x not in places])
         ends = beam_nodes(self.length, grid.elements, places if len(self.inner_rows) else self.knots)

@@ -36,18 +36,18 @@ def locate(domain: Any, point: Sequence[float]) -> PointPlace | None:
     candidates = geometry.compute_collisions_points(tree, x)
     hits = geometry.compute_colliding_cells(domain, candidates, x).links(0)
     mine = [int(c) for c in hits if c < owned]
-    first = comm.allreduce((not mine, comm.rank), op=_least)
-    if first[0]:
+    nowhere, owner = min(comm.allgather((not mine, comm.rank)))
+    if nowhere:
         return None
     cells: npt.NDArray[np.int32] = np.empty(0, dtype=np.int32)
     where: npt.NDArray[np.float64] | None = None
-    if comm.rank == first[1]:
+    if comm.rank == owner:
         cells = np.array(mine[:1], dtype=np.int32)
         corners = domain.geometry.x[domain.geometry.dofmap[cells[0]]]
         where = domain.geometry.cmap.pull_back(x[:, :tdim], corners[:, :tdim])
         if tdim == 1:  # a node, and all nodes are to have one form
             where = np.round(where, NODE) + 0.0
-    where = comm.bcast(where, root=first[1])
+    where = comm.bcast(where, root=owner)
     return PointPlace(cells, where)
 
 
@@ -69,10 +69,6 @@ def point_measure(domain: Any, subdomains: Any, tag: int, place: PointPlace) -> 
     }
     measure = ufl.Measure("dx", domain=domain, subdomain_data=subdomains, subdomain_id=tag, metadata=rule)
     return _AtPoint(measure, 1 / abs(ufl.JacobianDeterminant(domain)))
-
-
-def _least(a: tuple[bool, int], b: tuple[bool, int]) -> tuple[bool, int]:
-    return min(a, b)
 
 
 class Points:

@@ -10,7 +10,7 @@ known, exactly, at the nodes of the unknowns too. A beam also keeps the curvatur
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from inspect import signature
@@ -62,7 +62,7 @@ class Discretised(Protocol):
     size: int
 
 
-class Turns(ABC):
+class Turns:
     """The rotations of a structure, and the reference they are counted from.
 
     Args:
@@ -82,6 +82,14 @@ class Turns(ABC):
     #: Largest rotation (rad) that may be reached, and up to which a step may start.
     limit: ClassVar[float]
     enough: ClassVar[float]
+    #: Rotations (n, …) ↦ how far they have come, (n,) in rad, to be compared with the limit.
+    _reach: Callable[[Array], Array]
+    #: Rotations (…, 3 or 2) counted from R, and R ↦ the orientation (…, 3, 3) that they stand for.
+    _orientation: Callable[[Array, Array], Array]
+    #: Orientation, guess ↦ the rotations that it is from the undeformed structure, of all those nearest the guess.
+    _from_rest: Callable[[Array, Array], Array]
+    #: Rotations, rates, second rates ↦ rates and second rates of rotations counted from the present shape.
+    _rates: Callable[[Array, Array, Array], tuple[Array, Array]]
 
     def __init__(self, structure: Discretised):
         self._structure = structure
@@ -95,25 +103,6 @@ class Turns(ABC):
         """Return the rotations of a structure; None in a theory whose strains do not allow a reference."""
         return cls(structure) if structure.problem.theory.exact else None
 
-    # --- what sections and directors differ in ---------------------------------------------------------------------
-
-    @abstractmethod
-    def _reach(self, rotations: Array) -> Array:
-        """Return how far rotations (n, …) have come, (n,) in rad, to be compared with the limit."""
-
-    @abstractmethod
-    def _orientation(self, rotations: Array, R: Array) -> Array:
-        """Return the orientation (…, 3, 3) that rotations (…, 3 or 2) counted from R stand for."""
-
-    @abstractmethod
-    def _from_rest(self, orientation: Array, guess: Array) -> Array:
-        """Return the rotations that an orientation is from the undeformed structure, of all those nearest a guess."""
-
-    @abstractmethod
-    def _rates(self, rotations: Array, v: Array, a: Array) -> tuple[Array, Array]:
-        """Return rates and second rates of rotations that are counted from the present shape."""
-
-    @abstractmethod
     def _curvature(self, reference: ReferenceRotation, rotations: Array, nodal: Array) -> Array:
         """Return the curvature of the next reference at the points of the polynomials.
 
@@ -122,6 +111,7 @@ class Turns(ABC):
             rotations: at the points, (cells, points, 3 or 2).
             nodal: at the nodes of the unknowns, cell by cell, (cells, nodes of a cell, 3 or 2).
         """
+        raise NotImplementedError
 
     # --- range ------------------------------------------------------------------------------------------------------
 
@@ -244,18 +234,10 @@ class SectionTurns(Turns):
     finer = 8
     limit = turned.FULL_TURN
     enough = 1.75 * np.pi
-
-    def _reach(self, rotations: Array) -> Array:
-        return np.asarray(np.linalg.norm(rotations, axis=-1))
-
-    def _orientation(self, rotations: Array, R: Array) -> Array:
-        return turned.rotations(rotations) @ R
-
-    def _from_rest(self, orientation: Array, guess: Array) -> Array:
-        return turned.rotation_vectors(orientation, guess)
-
-    def _rates(self, rotations: Array, v: Array, a: Array) -> tuple[Array, Array]:
-        return turned.spins(rotations, v, a)
+    _reach = staticmethod(lambda rotations: np.linalg.norm(rotations, axis=-1))
+    _orientation = staticmethod(lambda rotations, R: turned.rotations(rotations) @ R)
+    _from_rest = staticmethod(turned.rotation_vectors)
+    _rates = staticmethod(turned.spins)
 
     def _curvature(self, reference: ReferenceRotation, rotations: Array, nodal: Array) -> Array:
         """Return Rᵀ T(θ) θ' + axial(Rᵀ R')."""
@@ -273,6 +255,10 @@ class DirectorTurns(Turns):
     finer = 6
     limit = 1.5  # of alpha_2, whose pole is at π/2; alpha_1 may go round
     enough = 1.1
+    _reach = staticmethod(lambda rotations: np.abs(rotations[..., 1]))
+    _orientation = staticmethod(lambda rotations, R: R @ turned.triads(rotations))
+    _from_rest = staticmethod(lambda orientation, guess: turned.tilt_angles(orientation[..., 2], guess))
+    _rates = staticmethod(turned.tilts)
 
     @classmethod
     def of(cls, structure: Discretised) -> Self | None:
@@ -280,18 +266,6 @@ class DirectorTurns(Turns):
         theory = structure.problem.theory
         takes_director = len(signature(theory.measures(structure.type)).parameters) > 1
         return cls(structure) if theory.exact and takes_director else None
-
-    def _reach(self, rotations: Array) -> Array:
-        return np.abs(rotations[..., 1])
-
-    def _orientation(self, rotations: Array, R: Array) -> Array:
-        return R @ turned.triads(rotations)
-
-    def _from_rest(self, orientation: Array, guess: Array) -> Array:
-        return turned.tilt_angles(orientation[..., 2], guess)
-
-    def _rates(self, rotations: Array, v: Array, a: Array) -> tuple[Array, Array]:
-        return turned.tilts(rotations, v, a)
 
     def _curvature(self, reference: ReferenceRotation, rotations: Array, nodal: Array) -> Array:
         """Return zeros: what bends a plate are the derivatives of its director, which the polynomials of R have."""

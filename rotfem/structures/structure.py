@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 from rotfem.errors import InputError, shown
 from rotfem.mechanics.bodies import AppliedLoad, Body, Damping, Kinematics, RootSpring, Strain, Support
-from rotfem.mechanics.loads import AnyLoad, PlaceLoad, PointLoads, is_moment, named
+from rotfem.mechanics.loads import AnyLoad, PlaceLoad, PointLoads, is_moment
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import forms
 from rotfem.structures.applied_loads import Amplitude, SpanField, first
@@ -43,8 +43,7 @@ class TipValues:
         owned = V.dofmap.index_map.size_local
         distance = np.linalg.norm(V.tabulate_dof_coordinates()[:owned] - np.asarray(point), axis=1)
         nearest = float(distance.min()) if owned else np.inf
-        self.owner: int
-        _, self.owner = self._comm.allreduce((nearest, self._comm.rank), op=_closest)
+        self.owner = min(self._comm.allgather((nearest, self._comm.rank)))[1]
         node = int(distance.argmin()) if owned else 0
         self.dofs = slice(node * self.size, (node + 1) * self.size)
 
@@ -55,10 +54,6 @@ class TipValues:
         here = values[self.dofs].copy() if self._comm.rank == self.owner else np.empty(self.size)
         self._comm.Bcast(here, root=self.owner)
         return here
-
-
-def _closest(a: tuple[float, int], b: tuple[float, int]) -> tuple[float, int]:
-    return min(a, b)
 
 
 class Structure:
@@ -291,7 +286,7 @@ class Structure:
         Raises:
             InputError: the structure lacks what one of them works on.
         """
-        given = sorted(named(self.problem.loads).items(), key=lambda item: is_moment(item[0]))
+        given = sorted(self.problem.loads.named.items(), key=lambda item: is_moment(item[0]))
         return [work for name, load in given if not load.is_zero for work in self.applied(name, load)]
 
     def applied(self, name: str, load: AnyLoad) -> list[AppliedLoad]:

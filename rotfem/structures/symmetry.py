@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.mechanics.effects import Effect
-from rotfem.mechanics.loads import AnyLoad, is_moment, named
+from rotfem.mechanics.loads import AnyLoad, is_moment
 from rotfem.mechanics.problem import Problem
 from rotfem.registry import damping_models, resolved, structures
 
@@ -65,7 +65,7 @@ def _is_built_in(problem: Problem) -> bool:
 def _bends_only(problem: Problem) -> bool:
     """Return whether nothing but forces across a plate could stretch it: no spin, no second order, no follower."""
     at_rest = not (problem.motion.is_spinning or problem.motion.hub is not None)
-    dead = all(load.is_zero or load.kind == "dead" for load in named(problem.loads).values())
+    dead = all(load.is_zero or load.kind == "dead" for load in problem.loads.named.values())
     return problem.theory.linear and problem.prestress != "all" and at_rest and dead
 
 
@@ -79,7 +79,7 @@ def directions(problem: Problem) -> tuple[Array, Array]:
     moved = motion.is_spinning or motion.hub is not None
     polar = (_of_base(motion) != 0.0) | (np.array((*loads.gravity, 0.0, 0.0)[:3]) != 0.0)
     axial = (np.asarray(motion.axis) != 0.0) & moved
-    for name, load in named(loads).items():
+    for name, load in loads.named.items():
         which = _of_load(load) != 0.0
         polar, axial = (polar, axial | which) if is_moment(name) else (polar | which, axial)
     return polar, axial

@@ -219,8 +219,6 @@ def test_an_effect_is_in_a_scene_that_has_data_for_it(add: Add) -> None:
     add(Effect("lift", present=lambda problem: problem.motion.is_spinning and problem.structure.length > 5))
     assert scene().effective_effects() == ("coriolis", "centrifugal", "lift")
     assert scene(motion={"type": "constant", "speed": 0.0}).effective_effects() == ()
-    at_rest = scene(motion={"type": "constant", "speed": 0.0})
-    assert at_rest.effective_effects(spinning=True) == ("coriolis", "centrifugal", "lift")
     assert scene(model={"effects": ["coriolis"]}).effective_effects() == ("coriolis",)
     assert scene(model={"effects": ["lift", "gravity"]}).effective_effects() == ("lift",)
 

@@ -283,10 +283,6 @@ def test_effective_effects(changes: dict[str, Any], expected: set[str]) -> None:
     assert list(effects) == [name for name in rotfem.registry.effects.names if name in expected]
 
 
-def test_a_speed_sweep_spins_even_a_scene_at_rest() -> None:
-    assert scene(motion__speed=0).effective_effects(spinning=True)[:2] == ("coriolis", "centrifugal")
-
-
 def test_point_masses_are_tip_masses() -> None:
     assert "tip_mass" in scene("plate", structure__point_masses=[[1.0, 0.5, 2.0]]).effective_effects()
 

@@ -14,7 +14,6 @@ from dolfinx import mesh
 from mpi4py import MPI
 
 from rotfem.errors import InputError, shown
-from rotfem.mechanics.loads import stations
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics import compat
 from rotfem.structures.meshes.gmsh_file import BadMesh, read
@@ -86,7 +85,7 @@ def plate_grid(problem: Problem, comm: MPI.Comm) -> PlateGrid:
     """
     data = problem.structure
     if data.mesh is None:
-        return rectangle(data, problem.mesh, comm, stations(problem.loads))
+        return rectangle(data, problem.mesh, comm, problem.loads.stations)
     wanted = tuple(data.thickness) if isinstance(data.thickness, dict) else ()
     return from_file(Path(data.mesh), wanted, comm)
 
