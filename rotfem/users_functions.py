@@ -14,9 +14,6 @@ from rotfem.errors import InputError
 
 Array = npt.NDArray[np.float64]
 
-#: Arguments of a smaller size are shown as 0.
-TINY = 1e-300
-
 
 @contextmanager
 def called(key: str, what: str) -> Iterator[None]:
@@ -93,4 +90,4 @@ def _shown(argument: Any) -> str:
         return f"({', '.join(map(_shown, argument))})"
     if isinstance(argument, Mapping):
         return "{" + ", ".join(f"{name}: {_shown(value)}" for name, value in argument.items()) + "}"
-    return f"{argument if abs(argument) > TINY else 0.0:g}"
+    return f"{argument if abs(argument) > 1e-300 else 0.0:g}"

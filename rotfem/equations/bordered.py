@@ -20,8 +20,8 @@ import numpy.typing as npt
 import ufl
 from petsc4py import PETSc
 
-from rotfem.equations.linearised import BorderedLinearised
 from rotfem.equations.nonlinear import BySpin, assembled
+from rotfem.equations.solutions import BorderedLinearised
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics import work

@@ -35,9 +35,6 @@ from rotfem.numerics import compat, forms
 
 Array = npt.NDArray[np.float64]
 
-#: Part of the energy that a step must move to have its balance put right: in less the digits of H are lost.
-MOVED = 1e-10
-
 #: Part of the energy a step moves by which it may make up for what the steps before have left.
 MADE_UP = 1e-3
 
@@ -211,7 +208,7 @@ class EnergyBalance(Solutions):
         self.system.set_state(q, v, a)
         moved = size / (self._t_1 - self._t_0) ** 2
         due = np.clip(self._due, -MADE_UP * moved, MADE_UP * moved)
-        enough = moved > MOVED * max(abs(self._H_0), abs(H_1))
+        enough = moved > 1e-10 * max(abs(self._H_0), abs(H_1))  # in less the digits of H are lost
         self._factor = (H_1 - self._H_0 - due - work) / size if enough else 0.0
         b[self._owned] += self._factor * self._inertia.array
 

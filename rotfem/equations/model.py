@@ -30,6 +30,12 @@ from rotfem.structures import build
 from rotfem.structures.structure import Structure
 from rotfem.users_functions import called
 
+#: Name ↦ UFL form (or what stands for it, see `rotfem.numerics.forms.drawn`), and name ↦ compiled form.
+Both = tuple[dict[str, Any], dict[str, Any]]
+
+#: Purpose and signature of a residual ↦ sketches of the forms that follow from it; the latest ones.
+_KNOWN: dict[tuple[str, str], dict[str, Any]] = {}
+
 
 class HubAngle:
     """psi, psi' and psi'' of a free hub, and the motion of the frame that they make.
@@ -208,6 +214,33 @@ class Model:
     def residual(self) -> Any:
         """F(q, v, a; δq), a UFL form."""
         return added(self.terms.values())
+
+    def derived_forms(self, purpose: str, make: Callable[[], Both], more: tuple[Any, ...] = ()) -> Both:
+        """Return forms that follow from the residual and their purpose alone; once made, they serve other meshes too.
+
+        UFL takes longer to derive them than to compute with them on a small mesh. Which they are follows from the
+        signature of the residual, in which coefficients and constants stand for their places.
+
+        Args:
+            purpose: which forms.
+            make: derives and compiles them.
+            more: functions and constants that they can have beyond those of the residual, always in one order.
+        """
+        residual = self.residual
+        constants = [*residual.constants(), *(x for x in more if isinstance(x, ufl.Constant))]
+        functions = [*residual.coefficients(), *(x for x in more if isinstance(x, ufl.Coefficient))]
+        key, whole = (purpose, residual.signature()), (functions, constants)
+        if key in _KNOWN:
+            (data,) = residual.subdomain_data().values()
+            both = {name: forms.drawn(known, whole, self.structure.V, data) for name, known in _KNOWN[key].items()}
+            return {name: f for name, (f, _) in both.items()}, {name: compiled for name, (_, compiled) in both.items()}
+        derived, compiled = make()
+        sketches = {name: forms.sketch(f, compiled[name], whole) for name, f in derived.items()}
+        if None not in sketches.values():
+            _KNOWN[key] = sketches
+            if len(_KNOWN) > 32:
+                del _KNOWN[next(iter(_KNOWN))]
+        return derived, compiled
 
     def by_strains(self) -> list[Any]:
         """Return the residual in two parts, the first with all terms that have strains; UFL forms."""

@@ -15,8 +15,7 @@ from ufl.algorithms.analysis import extract_constants
 
 from rotfem.equations.clamp import ClampWork
 from rotfem.equations.energy_balance import EnergyBalance
-from rotfem.equations.known_forms import Both, derived_forms
-from rotfem.equations.model import Model
+from rotfem.equations.model import Both, Model
 from rotfem.equations.system import System
 from rotfem.mechanics.work import Mechanics
 from rotfem.numerics import compat, forms
@@ -185,7 +184,7 @@ class NonlinearSystem(System):
 
     @cached_property
     def _derived(self) -> Both:
-        return derived_forms(self.model, "at rest", self._made)
+        return self.model.derived_forms("at rest", self._made)
 
     def _made(self) -> Both:
         derived = {name: form for name, form in self._at_rest.items() if not form.empty()}

@@ -25,16 +25,12 @@ from ufl.algorithms.analysis import extract_constants
 
 from rotfem.equations.clamp import AtClamp
 from rotfem.equations.geometric import geometric_stiffness
-from rotfem.equations.known_forms import derived_forms
 from rotfem.equations.model import Model
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import SAME, Assembler
 from rotfem.numerics.linear import SMALL, DirectSolver, restrained, set_diagonal
 from rotfem.structures.root_reaction import RootReaction
-
-#: Pieces of one load from which on it is seen first whether they make any geometric stiffness.
-MANY = 8
 
 
 def geometric_pieces(pieces: Pieces) -> list[tuple[Piece, Any, frozenset[str]]]:
@@ -82,7 +78,7 @@ def _stressing(pieces: Pieces, compiled: Any) -> list[Piece]:
         of.setdefault(p.key[0][0] if p.key else "", []).append(p)
     out, random, material = list[Any](), np.random.default_rng(1), pieces.material
     for group in of.values():
-        if len(group) > MANY:
+        if len(group) > 8:  # first it is seen whether they make any
             mixed = group[0].operator.duplicate()
             mixed.zeroEntries()
             for p, factor in zip(group, random.uniform(0.5, 1.5, len(group)), strict=True):
@@ -115,9 +111,6 @@ Key = tuple[tuple[str, int], ...]
 
 #: What the pieces of the geometric stiffness are marked with; without them a prestressed theory is the linear one.
 PRESTRESS = "prestress"
-
-#: Part of a term by which round-off, of sums of some hundred numbers, may change it.
-ROUND_OFF = 1e-10
 
 
 @dataclass
@@ -164,7 +157,7 @@ class PolynomialCheck:
     @property
     def failed(self) -> bool:
         """Whether something is left, or not finite: the term is no polynomial of second degree."""
-        return not self._left.norm() <= ROUND_OFF * self._size
+        return not self._left.norm() <= 1e-10 * self._size  # round-off of sums of some hundred numbers
 
 
 class Pieces:
@@ -203,7 +196,7 @@ class Pieces:
         loads = {name: constant for name, (constant, _) in self.structure.load_constants.items()}
         self.constants: dict[str, Any] = {**model.frame.constants, **loads}
         self.axis: Array = model.motion.axis[2:] if self.structure.planar else model.motion.axis
-        self.at_rest, self._forms = derived_forms(model, "pieces", self._made)
+        self.at_rest, self._forms = model.derived_forms("pieces", self._made)
         self._assembled = Assembler(self._forms["K"], self.bcs)
         self.pattern = self._assembled.pattern
         self.all: list[Piece] = []
@@ -215,7 +208,7 @@ class Pieces:
             model.check_smooth()
         symbols = self.structure.section | self.structure.scalars | model.switches
         purpose = " ".join(("geometric", model.theory.name, *model.effects, *symbols))
-        known, compiled = derived_forms(model, purpose, self._made_geometric, (self.prestressed, *symbols.values()))
+        known, compiled = model.derived_forms(purpose, self._made_geometric, (self.prestressed, *symbols.values()))
         self._geometric = known.get("G", 0)
         if compiled:
             self._forms |= compiled

@@ -16,7 +16,7 @@ import numpy.typing as npt
 import ufl
 from dolfinx import la
 
-from rotfem.equations.damped_stress import DampedStress
+from rotfem.equations.stations import DampedStress
 from rotfem.numerics import forms
 from rotfem.section_quantities import RESULTANTS
 
@@ -65,21 +65,15 @@ class PlateResultants:
         at_points, at_nodes = (lower.tabulate(0, x)[0, :, :, 0] for x in (self._points, element.points))
         self._carry = at_nodes @ np.linalg.pinv(at_points)
         self._sum = la.vector(self.V.dofmap.index_map, len(self.names) + 1)
-        self._compiled: tuple[int, Any] | None = None
         self._damped = DampedStress(system)
 
     def _expression(self) -> Any:
-        """Return resultants and thickness as a compiled expression, anew where rotations are counted otherwise."""
-        if self._compiled is None or self._compiled[0] != self.system.compilations:
-            m = self.system.model.mechanics
-            parts: list[Any] = []
-            for name in STRAINS:
-                strain = next(s for s in m.strains if s.name == name)
-                force = self._damped.of(strain.force(strain.value))
-                parts += [force[i] for i in range(ufl.as_ufl(force).ufl_shape[0])]
-            both = ufl.as_vector([*parts, self.system.structure.section["thickness"]])
-            self._compiled = self.system.compilations, forms.expression(both, self._points, self.system.comm)
-        return self._compiled[1]
+        """Return resultants and thickness as one UFL vector."""
+        parts: list[Any] = []
+        for name in STRAINS:
+            force = self._damped.of(self.system.model.mechanics.resultant(name))
+            parts += [force[i] for i in range(ufl.as_ufl(force).ufl_shape[0])]
+        return ufl.as_vector([*parts, self.system.structure.section["thickness"]])
 
     def __call__(self) -> Array:
         """Return all quantities at all nodes in the order of `structure.nodes`, (n, names), on every rank."""
@@ -87,7 +81,8 @@ class PlateResultants:
         total[:] = 0.0
         self._damped.update(self.system.v.x.array)
         if len(self._cells):
-            found = self._expression().eval(self.V.mesh, self._cells).reshape(len(self._cells), len(self._points), -1)
+            found = self._damped.compiled(self._expression, self._points).eval(self.V.mesh, self._cells)
+            found = found.reshape(len(self._cells), len(self._points), -1)
             nodal = np.einsum("np,cpj->cnj", self._carry, found)
             stress = von_mises(nodal[..., : width - 1], nodal[..., -1])
             values = np.concatenate([nodal[..., :-1], stress[..., None], np.ones_like(stress)[..., None]], axis=-1)

@@ -13,6 +13,7 @@ root of an undeformed beam they are −f and −m of the hub (`rotfem.structures
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -22,7 +23,6 @@ import ufl
 from dolfinx import fem
 from ufl.algorithms import expand_derivatives
 
-from rotfem.equations.damped_stress import DampedStress
 from rotfem.numerics import forms
 from rotfem.section_quantities import FORCES, STRAINS
 from rotfem.structures.beam import Beam
@@ -37,6 +37,58 @@ def weights(points: Array, x: float) -> Array:
     """Return the values at x of the Lagrange polynomials through points (n,)."""
     others = [np.delete(points, i) for i in range(len(points))]
     return np.array([np.prod((x - rest) / (p - rest)) for p, rest in zip(points, others, strict=True)])
+
+
+class DampedStress:
+    """Adds to stress resultants what damping makes of them, where a state is written into a system.
+
+    Kelvin–Voigt and the stiffness part of Rayleigh damping are stresses, η C Γ̇. Damping by mode is one of modes of the
+    structure at rest, and so carried by the stresses that it has when it is displaced by
+
+        w = Σ_j (2 ζ_j/ω_j) φ_j (φ_jᵀ M v),    for K φ_j = ω_j² M φ_j makes K w = C v
+
+    (see `rotfem.equations.modal_damping`). The mass part of Rayleigh damping is no stress.
+
+    Args:
+        system: equations of motion of a structure, the hub held.
+    """
+
+    def __init__(self, system: Any):
+        self._system = system
+        self._displaced = None if system.by_mode is None else fem.Function(system.V)
+        self._compiled: tuple[int, Any] | None = None
+
+    def compiled(self, expression: Callable[[], Any], points: Array) -> Any:
+        """Return an expression, compiled at points of the cells, made anew where rotations are counted otherwise."""
+        if self._compiled is None or self._compiled[0] != self._system.compilations:
+            made = forms.expression(expression(), points, self._system.comm)
+            self._compiled = self._system.compilations, made
+        return self._compiled[1]
+
+    def of(self, force: Any) -> Any:
+        """Return a resultant, a UFL expression of the unknowns, with damping."""
+        return sum(self._parts(force, self._system.v), start=force)
+
+    def change(self, force: Any, dq: Any, dv: Any) -> Any:
+        """Return what small q and v about a state at rest, two functions, add to a resultant with damping."""
+        return sum(self._parts(force, dv), start=ufl.derivative(force, self._system.q, dq))
+
+    def _parts(self, force: Any, v: Any) -> list[Any]:
+        """Return what damping adds to a resultant at velocities v, a function, and those of `update`."""
+        viscosity, q, out = self._system.model.mechanics.damping.stiffness, self._system.q, list[Any]()
+        if viscosity is not None:
+            out.append(viscosity * ufl.derivative(force, q, v))
+        if self._displaced is not None:
+            at_rest = forms.first_branches(force)  # at rest the other branches of its rotations divide by zero
+            out.append(forms.without(ufl.derivative(at_rest, q, self._displaced), q))
+        return out
+
+    def update(self, v: Array) -> None:
+        """Take the velocities of the owned unknowns; all processes come here together."""
+        if self._displaced is not None:
+            w, part = self._displaced.x, self._system.by_mode
+            w.array[: len(part.B)] = part.displaced(v[: len(part.B)])
+            w.scatter_forward()
 
 
 class Stations:
@@ -56,7 +108,6 @@ class Stations:
         self.comm, self.degree = system.comm, system.V.element.basix_element.degree
         self.names = (*FORCES[self.beam.type], *STRAINS[self.beam.type], *self.beam.components)
         self._points = forms.quadrature_points(self.beam.mesh, self.degree)
-        self._compiled: tuple[int, Any] | None = None
         self._damped = DampedStress(system)
         self._place()
 
@@ -132,11 +183,8 @@ class Stations:
         return slice(0, len(FORCES[self.beam.type]) + len(STRAINS[self.beam.type]))
 
     def _expression(self) -> Any:
-        """Return forces and strains as a compiled expression, made anew where rotations are counted otherwise."""
-        if self._compiled is None or self._compiled[0] != self.system.compilations:
-            both = ufl.as_vector([part[i] for part in self._quantities() for i in range(part.ufl_shape[0])])
-            self._compiled = self.system.compilations, forms.expression(both, self._points, self.comm)
-        return self._compiled[1]
+        """Return forces and strains as one UFL vector."""
+        return ufl.as_vector([part[i] for part in self._quantities() for i in range(part.ufl_shape[0])])
 
     def _quantities(self) -> tuple[Any, Any]:
         """Return forces and strains as UFL vectors."""
@@ -162,7 +210,7 @@ class Stations:
         self._damped.update(v)
         values: Array = np.zeros((*self._shape, self._order.stop))
         if len(self._cells):
-            found = self._expression().eval(self.beam.mesh, self._cells)
+            found = self._damped.compiled(self._expression, self._points).eval(self.beam.mesh, self._cells)
             values[self._rows] = found.reshape(len(self._cells), self.degree, -1)
         out: Array = np.zeros((len(self.positions), len(self.names)))
         out[:, self._order] = np.tensordot(self._stress, values, 2)

@@ -33,15 +33,6 @@ NODES = (0.0, -(GOLDEN**2), GOLDEN**2, -GOLDEN, GOLDEN, -1.0, 1.0)
 #: Length of a cell of time (s) where no time grid says it, and halvings of it down to the shortest h.
 CELL, HALVINGS = 0.1, 16
 
-#: Points of a cell, as parts of it, at which steps are compared: none is special to a function that a user may give.
-PROBES = (GOLDEN**4, GOLDEN**2, GOLDEN)
-
-#: Growth of E, compared with that of its cell, from which a time has a step of its own: a burst between the probes.
-BURST = 10.0
-
-#: Errors of two derivatives, added up, by which they may differ.
-AGREE = 4.0
-
 #: Relative round-off of a value.
 EPS = float(np.finfo(float).eps)
 
@@ -85,11 +76,11 @@ class Derivative:
         piece, cell = int(np.searchsorted(self._pieces, t, side="right")), floor(t / self._cell)
         limits = float(self._pieces[piece - 1]), float(np.nextafter(self._pieces[piece], -np.inf))
         if (piece, cell) not in self._steps:
-            probes = [min(max((cell + x) * self._cell, limits[0]), limits[1]) for x in PROBES]
+            probes = [min(max((cell + x) * self._cell, limits[0]), limits[1]) for x in (GOLDEN**4, GOLDEN**2, GOLDEN)]
             self._steps[piece, cell] = self._best(probes, limits)
         h, error = self._steps[piece, cell]
         value, here, _ = self._at(t, h, limits)
-        if here > BURST * error:
+        if here > 10 * error:  # a burst between the probes: the time has a step of its own
             value = self._at(t, self._best([t], limits)[0], limits)[0]
         self._last = t, value
         return value
@@ -109,7 +100,7 @@ class Derivative:
                 continue
             floor = max(floor / 2**self._order, *(error for _, error, _ in found))
             values = [D for D, _, _ in found]
-            if any(np.max(np.abs(np.subtract(values, others))) > AGREE * (floor + bound) for others, bound in seen):
+            if any(np.max(np.abs(np.subtract(values, others))) > 4 * (floor + bound) for others, bound in seen):
                 break
             seen.append((values, floor))
             if floor <= least:

@@ -32,9 +32,6 @@ Array = npt.NDArray[np.float64]
 #: A quantity over time and its two rates.
 TimeSignal = tuple[Scalar, Scalar, Scalar]
 
-#: Distance of the hub's center from the axis of the pitch, relative to that of the root, below which it is none.
-ON_AXIS = 1e-12
-
 
 def turn_about(axis: Array, angle: float) -> Array:
     """Return the matrix (3, 3) of the turn by an angle (rad) about a unit vector (Rodrigues' formula)."""
@@ -45,7 +42,7 @@ def turn_about(axis: Array, angle: float) -> Array:
 def is_beside(root: npt.ArrayLike, axis: npt.ArrayLike) -> bool:
     """Return whether the line through the root (m) along an axis misses the origin."""
     arm, along = np.asarray(root, dtype=float), np.asarray(axis, dtype=float)
-    return bool(np.linalg.norm(np.cross(arm, along)) > ON_AXIS * np.linalg.norm(arm))
+    return bool(np.linalg.norm(np.cross(arm, along)) > 1e-12 * np.linalg.norm(arm))
 
 
 @dataclass(frozen=True)

@@ -96,9 +96,6 @@ class Turn:
 
 Array = npt.NDArray[np.float64]
 
-#: Sine of the angle from the pole of a plate's angles below which the first of them is that of the guess.
-AT_POLE = 1e-8
-
 #: |θ| below which a rotation vector has the direction of the guess.
 NO_TURN = 1e-12
 
@@ -227,7 +224,7 @@ def tilts(alpha: Array, v: Array, a: Array) -> tuple[Array, Array]:
 def tilt_angles(t: Array, guess: Array) -> Array:
     """Return the angles (…, 2), rad, of directors (…, 3): of all that they have those nearest to a guess."""
     across = np.hypot(t[..., 0], t[..., 2])
-    first = np.where(across > AT_POLE, np.arctan2(-t[..., 0], t[..., 2]), guess[..., 0])
+    first = np.where(across > 1e-8, np.arctan2(-t[..., 0], t[..., 2]), guess[..., 0])
     second = np.arctan2(-t[..., 1], across)
     pairs = np.stack([np.stack([first, second], -1), np.stack([first + np.pi, np.pi - second], -1)])
     pairs = pairs + 2 * np.pi * np.round((guess - pairs) / (2 * np.pi))

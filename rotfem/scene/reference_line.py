@@ -16,13 +16,6 @@ from rotfem.scene.values import Array, Matrix, as_rows
 #: Gauss points for the arc length between two points: the speed along a cubic is smooth there.
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(12)
 
-#: Cosine of the smallest angle to direction 3 that the line may have: section axis 2 is across both.
-STEEPEST = 1 - 1e-6
-
-#: Smallest speed that a spline may have over the lengths of its chords, and samples between two points: near 1 where
-#: they follow each other, 0.7 at a corner of 90° without a kink, through 0 where the line turns back.
-SLOWEST, SAMPLES = 0.05, 64
-
 
 def as_line(value: Any) -> Matrix:
     """Return points (x, y, z) in m, the first of them the clamp (0, 0, 0); raise on anything else.
@@ -39,11 +32,12 @@ def as_line(value: Any) -> Matrix:
             raise problem("", list(a), f"rows {number} to {number + 2} are the same; two equal rows are a kink")
     line = ReferenceLine(rows)
     with np.errstate(all="ignore"):  # points whose distances are no numbers have no speed
-        if not line.slowest > SLOWEST:
+        # Near 1 where points follow each other, 0.7 at a corner of 90° without a kink, 0 where the line turns back.
+        if not line.slowest > 0.05:
             why = "the line turns back on itself between two points; they must follow each other along it"
             raise problem("", None, why)
     along = np.linspace(0.0, line.length, 8 * len(rows) + 1)
-    if np.max(np.abs(line.at(along)[1][:, 2])) > STEEPEST:
+    if np.max(np.abs(line.at(along)[1][:, 2])) > 1 - 1e-6:
         reason = "runs along direction 3 somewhere, which leaves section axis 2 no direction; choose other axes"
         raise problem("", None, f"the line {reason}")
     return rows
@@ -103,7 +97,7 @@ class ReferenceLine:
         """Smallest speed |dr/ds| of the splines over the lengths s of their chords, sampled between all points."""
         speeds = []
         for _, spline in self._pieces:
-            samples = np.linspace(spline.x[:-1], spline.x[1:], SAMPLES + 1)
+            samples = np.linspace(spline.x[:-1], spline.x[1:], 65)
             speeds.append(np.min(np.linalg.norm(spline(samples, 1), axis=-1)))
         return float(np.min(speeds))
 

@@ -29,9 +29,6 @@ from rotfem.scene.units import in_si, with_shown, with_shown_speed
 from rotfem.scene.values import ROUND_OFF, Bounds, Limits, Matrix, limits_of
 from rotfem.short import short
 
-#: Rows up to which a summary repeats a table.
-LONGEST = 1000
-
 
 def abridged(value: Any, given: Any) -> Any:
     """Return the tables of a validated scene with long tables of numbers replaced by what identifies them.
@@ -43,7 +40,7 @@ def abridged(value: Any, given: Any) -> Any:
         # A load may be given as the path of its table, without the table around it.
         below = given if isinstance(given, Mapping) else dict.fromkeys(value, given)
         return {key: abridged(entry, below.get(key)) for key, entry in value.items()}
-    if not isinstance(value, list) or len(value) <= LONGEST or not isinstance(value[0], list):
+    if not isinstance(value, list) or len(value) <= 1000 or not isinstance(value[0], list):
         return value
     table = np.array([np.concatenate([np.ravel(entry) for entry in row]) for row in value], dtype="<f8")
     note = {"rows": len(table), "columns": table.shape[1], "sha256": hashlib.sha256(table.tobytes()).hexdigest()}

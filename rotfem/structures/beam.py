@@ -21,12 +21,6 @@ from rotfem.structures.points import Points
 from rotfem.structures.section_fields import SectionField, Valid, not_negative
 from rotfem.structures.structure import Array, Structure, TipValues
 
-#: Polynomial degree that holds any section property of linearly tapered dimensions (I of a tube: fourth degree).
-TAPER_DEGREE = 4
-
-#: Rotation (rad) and slope far below those that turn a beam inside out, and what rotations may change over a length.
-SMALL, TURNS = 0.4, 10.0
-
 
 class Beam(Structure):
     """A discretised beam clamped at X = 0.
@@ -124,9 +118,9 @@ class Beam(Structure):
         moves = np.array([name.startswith("u") for name in self.unknowns])
         largest = (
             float(np.linalg.norm(x, axis=2).max(initial=0.0))
-            for x in (values[..., ~moves], slopes[..., moves], self.length * slopes[..., ~moves] / TURNS)
+            for x in (values[..., ~moves], slopes[..., moves], self.length * slopes[..., ~moves] / 10)
         )
-        return all(size < SMALL for size in largest)
+        return all(size < 0.4 for size in largest)  # rad and slope, far below what turns a beam inside out
 
     def section_strains(self, measures: Callable[..., tuple[Any, ...]]) -> Any:
         """Return the strains of a section as one vector, in the order of `rotfem.section_quantities.STRAINS`."""
@@ -140,7 +134,7 @@ class Beam(Structure):
         """Return at(X) as a constant where the section is uniform, else as a field."""
         if self._section.uniform:
             return self.constant(at(np.zeros(1))[0])
-        return self.field(name, lambda x, _: at(x), TAPER_DEGREE, valid=valid)
+        return self.field(name, lambda x, _: at(x), 4, valid=valid)  # that of I where dimensions taper
 
     def linear_field(self, name: str, at: Callable[[Array], Array], size: int, valid: Valid | None = None) -> Any:
         """Return the field of at(X), (n, size), that is linear between rows; of values (n,) where the size is 0."""

@@ -11,12 +11,6 @@ import numpy.typing as npt
 import ufl
 from dolfinx import geometry
 
-#: Distance from a cell, relative to the size of the mesh, at which a point still counts as in it.
-NEAR = 1e-9
-
-#: Digits of the place of a point in a cell of a line.
-NODE = 9
-
 
 @dataclass(frozen=True)
 class PointPlace:
@@ -31,7 +25,7 @@ def locate(domain: Any, point: Sequence[float]) -> PointPlace | None:
     comm, tdim = domain.comm, domain.topology.dim
     owned = domain.topology.index_map(tdim).size_local
     x = np.array([(*point, 0.0, 0.0)[:3]])
-    spread = NEAR * float(np.max(np.ptp(domain.geometry.x, axis=0), initial=0.0))
+    spread = 1e-9 * float(np.max(np.ptp(domain.geometry.x, axis=0), initial=0.0))
     tree = geometry.bb_tree(domain, tdim, padding=spread)
     candidates = geometry.compute_collisions_points(tree, x)
     hits = geometry.compute_colliding_cells(domain, candidates, x).links(0)
@@ -46,7 +40,7 @@ def locate(domain: Any, point: Sequence[float]) -> PointPlace | None:
         corners = domain.geometry.x[domain.geometry.dofmap[cells[0]]]
         where = domain.geometry.cmap.pull_back(x[:, :tdim], corners[:, :tdim])
         if tdim == 1:  # a node, and all nodes are to have one form
-            where = np.round(where, NODE) + 0.0
+            where = np.round(where, 9) + 0.0
     where = comm.bcast(where, root=owner)
     return PointPlace(cells, where)
 

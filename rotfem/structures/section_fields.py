@@ -30,12 +30,6 @@ Array = npt.NDArray[np.float64]
 #: Whether values (n, …) at points of an element can be those of a property.
 Valid = Callable[[Array], bool]
 
-#: Gauss points from row to row; exact for the fourth degree of a taper times the fifth of polynomials.
-POINTS = 5
-
-#: Least eigenvalue of a semidefinite matrix with ones on its diagonal, to round-off.
-SEMIDEFINITE = 1e-12
-
 #: Points and weights of the Gauss rule with so many points on −1 … 1.
 leggauss = cache(legendre.leggauss)
 
@@ -78,7 +72,7 @@ class SectionField:
 
     def _projected(self, ends: Array, inner: Array, x: Array) -> Array:
         """Return the projection at places x (n,) of the element between two ends with rows inside."""
-        (a, b), (xi, w) = ends, leggauss(POINTS)
+        (a, b), (xi, w) = ends, leggauss(5)  # exact for a taper of fourth degree times the fifth of polynomials
         cuts = np.array([a, *inner, b])
         half = np.diff(cuts)[:, None] / 2
         places = (cuts[:-1, None] + half * (1.0 + xi)).ravel()
@@ -111,6 +105,6 @@ def positive_matrices(definite: bool) -> Valid:
         diagonal = np.abs(np.einsum("nii->i", M)) / len(M)
         scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
         least = np.linalg.eigvalsh(M / np.outer(scale, scale))[:, 0]
-        return bool(np.all(least > 0.0 if definite else least > -SEMIDEFINITE))
+        return bool(np.all(least > 0.0 if definite else least > -1e-12))
 
     return valid

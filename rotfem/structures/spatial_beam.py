@@ -42,9 +42,6 @@ from rotfem.structures.structure import Array
 #: Degree of the polynomials the axis of an arc is held in; strains see its exact angle, only inertia sees these.
 AXIS_DEGREE = 5
 
-#: Distance of a shaft from the axis of spin, in lengths of it, that is none: round-off of its directions.
-ON_AXIS = 1e-9
-
 
 def swept_axis(beam: Beam, sweep: Any, line: Any) -> tuple[Any, Any, Any]:
     """Return (χ, ∫ cos χ dX, ∫ sin χ dX) of a sweep profile: angle (rad) and position of the axis (m) over X.
@@ -320,7 +317,7 @@ class SpatialBeam(Beam):
     def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:
         """Return the whirl of a mode where the beam is a shaft: its undeformed axis is that of the spin."""
         off = np.linalg.norm(np.cross(self.places(coordinates), axis), axis=1)
-        if np.max(off) > ON_AXIS * self.length:
+        if np.max(off) > 1e-9 * self.length:  # round-off of its directions
             return None
         return shaft_wave(values[:, :3], self.length * values[:, 3:], axis)
 

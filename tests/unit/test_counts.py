@@ -22,7 +22,7 @@ import pytest
 
 import rotfem
 from rotfem.commands.problem import Problem
-from rotfem.equations import known_forms
+from rotfem.equations import model as model_module
 from rotfem.numerics import eigenproblem, forms
 
 TABLE = Path(__file__).with_name("counts.json")
@@ -74,7 +74,7 @@ def counted() -> Iterator[Counter[str]]:
         return found
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(known_forms, "_KNOWN", {})  # of tests before this one
+        patch.setattr(model_module, "_KNOWN", {})  # of tests before this one
         patched(forms, "_compiled", "forms_compiled", lambda _, several, *__: len(several))
         patched(forms.Assembler, "__call__", "matrices_assembled")
         real_found = eigenproblem.Pencil._found

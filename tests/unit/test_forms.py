@@ -18,7 +18,7 @@ from ufl.utils.counted import Counted
 
 import rotfem
 from rotfem.commands.problem import Problem
-from rotfem.equations import known_forms
+from rotfem.equations import model as model_module
 from rotfem.equations.compiled import compile_system
 from rotfem.equations.functionals import Functionals
 from rotfem.numerics import forms, traversal
@@ -161,10 +161,10 @@ def test_known_forms_are_those_made_anew(theory: str, monkeypatch: pytest.Monkey
         system.set_state(1e-3 * np.arange(len(system.zeros())))
         return [A.getValuesCSR()[2] for A in system.mass_damping_stiffness()] + [system.residual().array.copy()]
 
-    monkeypatch.setattr(known_forms, "_KNOWN", {})
+    monkeypatch.setattr(model_module, "_KNOWN", {})
     matrices(3, 5.0)
-    assert len(known_forms._KNOWN) == (2 if theory == "consistent_linear" else 1)  # the stress stiffness apart
+    assert len(model_module._KNOWN) == (2 if theory == "consistent_linear" else 1)  # the stress stiffness apart
     shared = matrices(5, 7.0)
-    monkeypatch.setattr(known_forms, "_KNOWN", {})
+    monkeypatch.setattr(model_module, "_KNOWN", {})
     for known, made in zip(shared, matrices(5, 7.0), strict=True):
         np.testing.assert_array_equal(known, made)

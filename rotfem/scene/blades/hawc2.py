@@ -42,10 +42,6 @@ FULL += [f"K{i + 1}{j + 1}" for i, j in zip(*np.triu_indices(6), strict=True)]
 #: Columns that must be greater than 0: sizes of a section, and the diagonal of a matrix.
 POSITIVE = {"m", "ri_x", "ri_y", "E", "G", "I_x", "I_y", "I_p", "k_x", "k_y", "A", *(f"K{i}{i}" for i in range(1, 7))}
 
-#: Part by which the last r may differ from the arc length of the line. Both describe one blade; r often counts along
-#: its straight axis, which is shorter than a prebent line.
-LONGER = 1e-2
-
 #: Part of its middle value by which a product of columns may be off between rows: a frequency goes with its root.
 PRODUCT = 1e-4
 
@@ -93,7 +89,7 @@ def _body(deck: Deck, asked: Asked) -> dict[str, Any]:
     which, full = beam.command("set"), beam.find("fpm")
     st = _named_file(beam.command("filename"), deck)
     table = _table(st, [which.whole(2), which.whole(3)], None if full is None else bool(full.whole(2)))
-    if abs(table["r"][-1] / through.length - 1.0) > LONGER:
+    if abs(table["r"][-1] / through.length - 1.0) > 1e-2:  # r often counts along a straight axis
         which.fail(f"its sections end at r = {table['r'][-1]:g} m, and the line of c2_def at {through.length:g} m")
     if abs(table["r"][-1] / through.length - 1.0) > DIGITS:
         asked.hints.append(
