@@ -14,17 +14,16 @@ With y = G_K q + G_C q̇ + G_M q̈ + d f of small motions x e^{st}, the complex 
 
     ŷ = (G_K + s G_C + s² G_M) x + d f̂.
 
-Outputs are called for the first part, of a forced motion with s = iω, of a mode with s = λ; the second is `given`.
+Outputs `read` the first part, of a forced motion with s = iω, of a mode with s = λ; the second is `given`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from mpi4py import MPI
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.equations.stations import StationChanges
@@ -32,55 +31,6 @@ from rotfem.errors import ComputationError
 from rotfem.numerics.linear import ComplexSolver
 from rotfem.numerics.projection import summed
 from rotfem.structures.root_reaction import along_axis
-
-Complex = npt.NDArray[np.complex128]
-
-#: Correction, relative to the solution, that ends the rounds; one that is good enough where they end; most rounds.
-DONE, GOOD, ROUNDS = 1e-13, 1e-8, 60
-
-
-def solve_by_nearby(
-    times: Callable[[Complex], Complex], nearby: Callable[[Complex], Complex], b: Complex, comm: MPI.Comm
-) -> Complex:
-    """Return x of A x = b, owned rows.
-
-    Args:
-        times: x ↦ A x.
-        nearby: b ↦ N⁻¹ b of an N that is nearly A.
-        b: right-hand side.
-        comm: communicator that the rows are distributed over.
-
-    Raises:
-        ComputationError: A is singular to working precision.
-    """
-
-    def dot(x: Complex, y: Complex) -> Any:
-        return summed(comm, complex(np.vdot(x, y)))
-
-    def size(x: Complex) -> float:
-        return float(np.sqrt(abs(dot(x, x))))
-
-    x: Complex = np.zeros_like(b)
-    left = nearby(b)
-    directions: list[tuple[Complex, Complex]] = []
-    for _ in range(ROUNDS):
-        z, w = left, nearby(times(left))
-        for old, image in directions:
-            share = dot(image, w)
-            z, w = z - share * old, w - share * image
-        length = size(w)
-        if length == 0.0:
-            break
-        z, w = z / length, w / length
-        directions.append((z, w))
-        step = dot(w, left)
-        x, left = x + step * z, left - step * w
-        if size(left) <= DONE * size(x):
-            break
-    if not size(left) <= GOOD * size(x):
-        raise ComputationError("the matrix is singular: its solution was not found")
-    return x
-
 
 Array = npt.NDArray[Any]
 
@@ -92,11 +42,26 @@ UNDAMPED = 1e-8
 BESIDE = 1e-3
 
 #: Part of the inertia that brakes the motion in a matrix near by, where the damping of low rank is none of what is
-#: factorised: that of the structure alone would be singular at its resonances.
-BRAKED = 0.05
+#: factorised: that of the structure alone would be singular at its resonances. Corrections, relative to the solution,
+#: that end the refinement, and that are good enough after so many rounds.
+BRAKED, DONE, GOOD, ROUNDS = 1e-6, 1e-12, 1e-8, 40
 
 #: Frequencies, as parts of the lowest one of a free hub's vibrating modes, at which its rigid turn is reported.
 BELOW = np.array([0.2, 0.4, 0.6])
+
+
+class Output(NamedTuple):
+    """What is read of a motion x e^{st}.
+
+    Attributes:
+        names: of the outputs.
+        read: (x of the owned unknowns, s) ↦ amplitudes.
+        given: d f̂ (see `rotfem.analysis.frequency_response`).
+    """
+
+    names: tuple[str, ...]
+    read: Callable[[Array, complex], Array]
+    given: Any = 0.0
 
 
 class FrequencyResponse:
@@ -112,10 +77,10 @@ class FrequencyResponse:
         names: of the outputs.
     """
 
-    def __init__(self, analysis: ModalAnalysis, spinning: Spinning, force: Array, outputs: Sequence[Any]):
+    def __init__(self, analysis: ModalAnalysis, spinning: Spinning, force: Array, outputs: Sequence[Output]):
         self.analysis, self.spinning, self._outputs = analysis, spinning, outputs
         self.names = [name for output in outputs for name in output.names]
-        self._given = np.concatenate([output.given for output in outputs])
+        self._given = np.concatenate([output.given + np.zeros(len(output.names)) for output in outputs])
         self.force = np.array(force, dtype=np.complex128)
         self.force[analysis.system.held.clamped] = 0.0
         pencil = spinning.pencil
@@ -130,7 +95,7 @@ class FrequencyResponse:
         return np.asarray(self._read(self._solved(omega), 1j * omega) + self._given)
 
     def _read(self, x: Array, s: complex) -> Array:
-        return np.concatenate([output(x, s) for output in self._outputs])
+        return np.concatenate([output.read(x, s) for output in self._outputs])
 
     def _solved(self, omega: float) -> Array:
         """Return q̂ of the owned unknowns."""
@@ -138,9 +103,16 @@ class FrequencyResponse:
             self._solver.factor((1.0, 1j * omega, -(omega**2)))
             return np.asarray(self._solver.solve(self.force))
         self._solver.factor((1.0, 1j * omega, -(1 - 1j * BRAKED) * omega**2))
-        return np.asarray(
-            solve_by_nearby(lambda x: self._times(omega, x), self._solver.solve, self.force, self.analysis.comm)
-        )
+        x, left = np.zeros_like(self.force), self.force
+        for _ in range(ROUNDS):  # iterative refinement
+            step = self._solver.solve(left)
+            x, sizes = x + step, self._summed(np.array([np.vdot(step, step), np.vdot(x + step, x + step)])).real
+            left = self.force - self._times(omega, x)
+            if sizes[0] <= DONE**2 * sizes[1]:
+                break
+        if not sizes[0] <= GOOD**2 * sizes[1]:
+            raise ComputationError("the matrix is singular: its solution was not found")
+        return np.asarray(x)
 
     def _times(self, omega: float, x: Array) -> Array:
         """Return (K + iω C − ω² M) x."""
@@ -203,136 +175,103 @@ class FrequencyResponse:
         return points[(points >= low) & (points <= high)], undamped
 
     def _summed(self, local: Array) -> Array:
-        comm = self.analysis.comm
-        return np.asarray(comm.allreduce(local) if comm.size > 1 else local)
+        return np.asarray(summed(self.analysis.comm, local))
 
 
-class TipOutput:
-    """The unknowns at the tip.
+def tip_output(system: Any) -> Output:
+    """Return the unknowns at the tip.
 
     Args:
         system: equations of motion of the structure, the hub held.
     """
+    values, n = system.structure.tip_values, len(system.root.weights)  # without the angle of a free hub
 
-    def __init__(self, system: Any):
-        self._system = system
-        self.names = [f"tip_{name}" for name in system.structure.components]
-        self.given: Array = np.zeros(len(self.names))
-
-    def __call__(self, x: Array, s: complex) -> Array:
-        """Return the amplitudes of a motion x e^{st} of the owned unknowns."""
-        read, full = self._system.structure.tip_values, np.zeros(len(self._system.zeros()), dtype=np.complex128)
-        n = len(self._system.root.weights)  # without the angle of a free hub
+    def read(x: Array, s: complex) -> Array:
+        full = np.zeros(len(system.zeros()), dtype=np.complex128)
         full[:n] = x[:n]
-        return np.asarray(read(full.real) + 1j * read(full.imag))
+        return np.asarray(values(full.real) + 1j * values(full.imag))
+
+    return Output(tuple(f"tip_{name}" for name in system.structure.components), read)
 
 
-class RootOutput:
-    """Force and moment of the hub on the structure; what is at the state in the system is the equilibrium.
+def root_output(system: Any, push: Array) -> Output:
+    """Return force and moment of the hub on the structure; what is at the state in the system is the equilibrium.
 
     Args:
         system: equations of motion of the structure, the hub held.
         push: part of this process in what the harmonic loads add to the forces of the clamp, (motions,).
     """
+    K, C, M = system.clamp_tangents()
 
-    def __init__(self, system: Any, push: Array):
-        self._comm = system.comm
-        self.names = [f"root_{name}" for name in system.root.names]
-        self._tangents = system.clamp_tangents()
-        self.given: Array = np.asarray(push if system.comm.size == 1 else system.comm.allreduce(push))
-
-    def __call__(self, x: Array, s: complex) -> Array:
-        """Return the amplitudes of a motion x e^{st} of the owned unknowns."""
-        here = self._part(x, s)
-        return np.asarray(here if self._comm.size == 1 else self._comm.allreduce(here))
-
-    def _part(self, x: Array, s: complex) -> Array:
-        """Return the part of this process."""
-        K, C, M = self._tangents
+    def read(x: Array, s: complex) -> Array:
         x = x[: len(K)]
-        return np.asarray(x @ K + s * (x @ C) + s**2 * (x @ M))
+        return np.asarray(summed(system.comm, x @ K + s * (x @ C) + s**2 * (x @ M)))
+
+    return Output(tuple(f"root_{name}" for name in system.root.names), read, np.asarray(summed(system.comm, push)))
 
 
-class HubOutput:
-    """The angle of a free hub.
+def hub_output(system: Any) -> Output:
+    """Return the angle (rad) of a free hub, the last unknown on the last process.
 
     Args:
         system: equations of motion of hub and structure.
     """
+    last = system.comm.size - 1
 
-    names = ("psi",)
+    def read(x: Array, s: complex) -> Array:
+        psi = x[-1] if system.comm.rank == last else 0.0
+        return np.array([psi if last == 0 else system.comm.bcast(psi, last)])
 
-    def __init__(self, system: Any):
-        self._comm = system.comm
-        self.given: Array = np.zeros(1)
-
-    def __call__(self, x: Array, s: complex) -> Array:
-        """Return the amplitude (rad) of owned unknowns x, the angle last on the last process."""
-        last = self._comm.size - 1
-        psi = x[-1] if self._comm.rank == last else 0.0
-        return np.array([psi if last == 0 else self._comm.bcast(psi, last)])
+    return Output(("psi",), read)
 
 
-class RootOfFreeHub(RootOutput):
-    """The same where the hub is free, in balance with its equation (see `BorderedSystem.root_reaction`).
+def root_of_free_hub(system: Any, push: Array, speed: float) -> Output:
+    """Return the same as `root_output` where the hub is free, in balance with its equation.
 
     Args:
-        system: equations of motion of hub and structure.
-        push: see `RootOutput`.
+        system: equations of motion of hub and structure (see `BorderedSystem.root_reaction`).
+        push: see `root_output`.
         speed: of the equilibrium, rad/s.
     """
+    plain, angle, hub, held = root_output(system.held, push), hub_output(system), system.hub, system.held
 
-    def __init__(self, system: Any, push: Array, speed: float):
-        super().__init__(system.held, push)
-        self._system, self._angle = system, HubOutput(system)
-        self.given = self._in_balance(self.given, 0.0)
+    def forces(speed: float, rate: float) -> Array:
+        system.angle.values[:] = 0.0, speed, rate
+        held.set_time(held.time)
+        return np.asarray(summed(system.comm, held.clamp_forces()))
 
-        def forces(speed: float, rate: float) -> Array:
-            system.angle.values[:] = 0.0, speed, rate
-            system.held.set_time(system.held.time)
-            return np.asarray(system.held.clamp_forces())
+    # Of the second degree in the speed and linear in its rate: these differences are exact.
+    by_speed = (forces(speed + 1.0, 0.0) - forces(speed - 1.0, 0.0)) / 2
+    by_rate = forces(speed, 1.0) - forces(speed, 0.0)
 
-        # Of the second degree in the speed and linear in its rate: these differences are exact.
-        self._by_speed = (forces(speed + 1.0, 0.0) - forces(speed - 1.0, 0.0)) / 2
-        self._by_rate = forces(speed, 1.0) - forces(speed, 0.0)
-
-    def __call__(self, x: Array, s: complex) -> Array:
-        """Return the amplitudes of a motion x e^{st} of the owned unknowns."""
-        (psi,) = self._angle(x, s)
-        here = self._part(x, s) + psi * (s * self._by_speed + s**2 * self._by_rate)
-        hub = self._system.hub
-        about_axis = -(s**2 * hub.inertia + s * hub.damping) * psi
-        return self._in_balance(here if self._comm.size == 1 else self._comm.allreduce(here), about_axis)
-
-    def _in_balance(self, values: Array, about_axis: complex) -> Array:
+    def in_balance(values: Array, about_axis: complex) -> Array:
         """Return force and moment with that moment about the axis, of a hub that feels the structure."""
-        system = self._system
         if not system.row.coupled:
-            return np.asarray(values)
-        root = system.held.root
-        arms, turn = along_axis(root.names, root.place, system.held.motion.axis)
+            return values
+        arms, turn = along_axis(held.root.names, held.root.place, held.motion.axis)
         return np.asarray(values + (about_axis - arms @ values) * turn)
 
+    def read(x: Array, s: complex) -> Array:
+        (psi,) = angle.read(x, s)
+        about_axis = -(s**2 * hub.inertia + s * hub.damping) * psi
+        return in_balance(plain.read(x, s) + psi * (s * by_speed + s**2 * by_rate), about_axis)
 
-class StationOutput:
-    """Section forces, strains and unknowns at stations along a beam; the equilibrium is written into the system.
+    return Output(plain.names, read, in_balance(plain.given, 0.0))
+
+
+def station_output(system: Any, positions: tuple[float, ...], names: tuple[str, ...]) -> Output:
+    """Return section forces, strains and unknowns at stations of a beam; the equilibrium is written into the system.
 
     Args:
         system: equations of motion of the beam, the hub held.
         positions: of the stations, m.
         names: of the quantities that are wanted.
     """
+    changes, owned = StationChanges(system, positions), len(system.root.weights)
+    columns = [changes.names.index(name) for name in names]
 
-    def __init__(self, system: Any, positions: tuple[float, ...], names: tuple[str, ...]):
-        self._changes = StationChanges(system, positions)
-        self._owned = len(system.root.weights)
-        self._columns = [self._changes.names.index(name) for name in names]
-        self.names = [f"{name}@{x:g}" for x in positions for name in names]
-        self.given: Array = np.zeros(len(self.names))
+    def read(x: Array, s: complex) -> Array:
+        x, v = x[:owned], s * x[:owned]
+        return np.asarray(changes.of(x.real, v.real) + 1j * changes.of(x.imag, v.imag))[:, columns].ravel()
 
-    def __call__(self, x: Array, s: complex) -> Array:
-        """Return the amplitudes of a motion x e^{st} of the owned unknowns."""
-        x = x[: self._owned]
-        v = s * x
-        real, imaginary = self._changes.of(x.real, v.real), self._changes.of(x.imag, v.imag)
-        return np.asarray(real + 1j * imaginary)[:, self._columns].ravel()
+    return Output(tuple(f"{name}@{x:g}" for x in positions for name in names), read)

@@ -19,11 +19,12 @@ from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.fixed_frame import check_rotating
 from rotfem.analysis.frequency_response import (
     FrequencyResponse,
-    HubOutput,
-    RootOfFreeHub,
-    RootOutput,
-    StationOutput,
-    TipOutput,
+    Output,
+    hub_output,
+    root_of_free_hub,
+    root_output,
+    station_output,
+    tip_output,
 )
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.analysis.stability import stability_of_pencil
@@ -102,7 +103,7 @@ def response(
         return result_of(scene, answers, (asked, peaks, undamped), (direct, modal), started)
 
 
-def loaded(scene: Scene, analysis: ModalAnalysis, spinning: Spinning) -> tuple[Array, list[Any]]:
+def loaded(scene: Scene, analysis: ModalAnalysis, spinning: Spinning) -> tuple[Array, list[Output]]:
     """Return f̂ of the harmonic loads at an equilibrium, what they add to the forces on the owned unknowns, and outputs.
 
     The equilibrium is left in the system.
@@ -118,14 +119,14 @@ def loaded(scene: Scene, analysis: ModalAnalysis, spinning: Spinning) -> tuple[A
         held.append(system.clamp_forces())
         moments.append(-analysis.system.row.work() if analysis.free else 0.0)
     force, push, moment = (parts[1] - parts[0] + 1j * (parts[2] - parts[0]) for parts in (forces, held, moments))
-    outputs: list[Any] = [TipOutput(system), RootOutput(system, push)]
+    outputs = [tip_output(system), root_output(system, push)]
     if analysis.free:
-        outputs[1:] = [RootOfFreeHub(analysis.system, push, spinning.speed), HubOutput(analysis.system)]
+        outputs[1:] = [root_of_free_hub(analysis.system, push, spinning.speed), hub_output(analysis.system)]
         force = np.append(force, [moment] if analysis.comm.rank == analysis.comm.size - 1 else [])
     if scene.output.stations is not None:
         beam = system.structure
         names = (*scene.output.sections(beam.type), *beam.components)
-        outputs.append(StationOutput(system, scene.output.positions(beam.length), names))
+        outputs.append(station_output(system, scene.output.positions(beam.length), names))
     return np.asarray(force), outputs
 
 
