@@ -19,11 +19,31 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar
+
+import numpy as np
 
 from rotfem.analysis.schemes import Array, Scheme, Span, Stage, State
 from rotfem.registry import register
+
+
+@lru_cache(maxsize=8)
+def update_maps(coefficients: tuple[float, float, float, float], h: float) -> tuple[Array, float, float]:
+    """Return maps of a step of h (s), and ∂v/∂q and ∂a/∂q in it.
+
+    The maps (3, 4) take q, v, q̈ and â at its start to q and v at its end where q̈ stays, and to the part of â there that
+    does not change with q̈.
+    """
+    alpha_m, alpha_f, beta, gamma = coefficients
+    kept, moved = (alpha_f / (1 - alpha_m), -alpha_m / (1 - alpha_m)), np.array([1.0, -alpha_m]) / (1 - alpha_m)
+    q, v = (np.array([0.0, 0.5 - beta]) + beta * moved) * h * h, (np.array([0.0, 1 - gamma]) + gamma * moved) * h
+    c_a = 1 / (beta * h * h)
+    return (
+        np.array([[1.0, h, *q], [0.0, 1.0, *v], [0.0, 0.0, *kept]]),
+        gamma * h * c_a,
+        (1 - alpha_m) / (1 - alpha_f) * c_a,
+    )
 
 
 class AlphaFamily(Scheme):
@@ -50,28 +70,15 @@ class AlphaFamily(Scheme):
 
     def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
         """Return the step that keeps q̈, which is free of residual when the acceleration is constant."""
-        alpha_m, alpha_f, beta, gamma = self.coefficients
-        old = state.memory
-        a = state.a - alpha_m * old
-        a /= 1 - alpha_m
-        q, v = (0.5 - beta) * old, (1 - gamma) * old
-        q += beta * a
-        q *= h * h
-        q += state.q + h * state.v
-        v += gamma * a
-        v *= h
-        v += state.v
-        c_a = 1 / (beta * h * h)
-        return Stage(end, q, v, state.a.copy(), gamma * h * c_a, (1 - alpha_m) / (1 - alpha_f) * c_a)
+        maps, c_v, c_a = update_maps(self.coefficients, h)
+        q, v, carried = maps @ np.array((state.q, state.v, state.a, state.memory))
+        return Stage(end, q, v, state.a.copy(), c_v, c_a, carried=carried)
 
     def finish(self, state: State, h: float, done: Sequence[Stage]) -> State:
         """Return the state of the one stage; the auxiliary acceleration follows from its definition."""
         s, (alpha_m, alpha_f, _, _) = done[0], self.coefficients
-        memory = (1 - alpha_f) * s.a
-        memory += alpha_f * state.a
-        memory -= alpha_m * state.memory
-        memory /= 1 - alpha_m
-        return State(s.t, s.q, s.v, s.a, memory)
+        s.carried += (1 - alpha_f) / (1 - alpha_m) * s.a
+        return State(s.t, s.q, s.v, s.a, s.carried)
 
     def local_error(self, new: State, old: State) -> Array:
         """Return |β − 1/6| h² |a_{n+1} − a_n|.

@@ -104,6 +104,7 @@ class Stage:
         over: the step that the stage is the middle of, where the balance of energy over it is to be kept; its end is
             at 2q − q_n, 2v − v_n then.
         memory: what the balance leaves to the next step.
+        carried: part of the scheme's own memory that does not change with the solution.
     """
 
     t: float
@@ -114,6 +115,7 @@ class Stage:
     c_a: float
     over: Span | None = None
     memory: Any = None
+    carried: Any = None
     shifts: Shifts = field(init=False)
 
     def __post_init__(self) -> None:

@@ -87,14 +87,14 @@ class TimeGrid:
         """Yield the legs of all steps."""
         close = CLOSE * self.step
         before, after = (np.searchsorted(self.knots, self.times + side * close) for side in (-1, 1))
-        ends = [float(t) for t in self.times]
+        ends, knots = [float(t) for t in self.times], after[1:] > after[:-1]
         begin, length = ends[0], self.step
         for i, end in enumerate(ends[1:]):
-            inside: list[float] = self.knots[after[i] : before[i + 1]].tolist()
-            lands = bool(before[i + 1] < after[i + 1])
+            inside: list[float] = self.knots[after[i] : before[i + 1]].tolist() if knots[i] else []
+            lands = bool(knots[i] and before[i + 1] < after[i + 1])
             last = float(self.knots[before[i + 1]]) if lands else end
             stops = [*inside, last] if self.lands and len(inside) <= FEW else [last]
-            if min(b - a for a, b in pairwise([begin, *stops])) < SHORT * self.step:
+            if len(stops) > 1 and min(b - a for a, b in pairwise([begin, *stops])) < SHORT * self.step:
                 stops = [last]
             lined = len(stops) <= len(inside)
             for stop in stops:

@@ -94,15 +94,18 @@ class Term:
     @classmethod
     def table(cls, rows: npt.ArrayLike, shapes: Shapes) -> Term:
         """Return amplitudes that are given by rows (t, a…), linear between them and constant outside."""
-        t, *columns = np.ascontiguousarray(np.asarray(rows, dtype=float).T)  # or interp copies them at every call
-        if not np.any(np.ptp(columns, axis=1)):
-            values = np.einsum("k,ksc->sc", np.array([column[0] for column in columns]), shapes.values)
-            return cls(replace(shapes, values=values[None]), knots=tuple(t))
+        table = np.asarray(rows, dtype=float)
+        t, values = np.ascontiguousarray(table[:, 0]), np.ascontiguousarray(table[:, 1:])
+        if not np.any(np.ptp(values, axis=0)):
+            return cls(replace(shapes, values=np.einsum("k,ksc->sc", values[0], shapes.values)[None]), knots=tuple(t))
+        lengths = np.where(np.diff(t) > 0.0, np.diff(t), 1.0)
 
         def amplitudes(s: Array) -> Array:
-            return np.stack([np.interp(s, t, column) for column in columns], axis=1)
+            i = np.clip(np.searchsorted(t, s, side="right") - 1, 0, len(lengths) - 1)
+            share = np.clip((s - t[i]) / lengths[i], 0.0, 1.0)[:, None]
+            return np.asarray((1.0 - share) * values[i] + share * values[i + 1])
 
-        return cls(shapes, amplitudes, tuple(t), largest=np.abs(columns).max(axis=1))
+        return cls(shapes, amplitudes, tuple(t), largest=np.abs(values).max(axis=0))
 
     @classmethod
     def both(cls, rows: npt.ArrayLike) -> Term:
