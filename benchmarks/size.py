@@ -35,7 +35,7 @@ CAPABILITIES = {
         analysis.time analysis.march analysis.alpha_family analysis.dense_output
         analysis.dense_output analysis.energy_conserving analysis.esdirk analysis.first_motion
         analysis.march analysis.stepper analysis.time_grid
-        analysis.radau analysis.roots analysis.schemes analysis.stepper analysis.stepper
+        analysis.radau analysis.schemes
         analysis.turning mechanics.courses
     """,
     "loads": """

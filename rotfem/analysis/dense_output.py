@@ -19,9 +19,6 @@ import numpy as np
 
 from rotfem.analysis.schemes import Array, Observer, State
 
-#: Order of a scheme up to which accelerations are left out.
-LOW = 2
-
 #: Part of the cubic's accelerations by which those of a state may differ from them, and from which on neither counts.
 KNOWN, BEYOND = 0.5, 20.0
 
@@ -73,7 +70,7 @@ def between(old: State, new: State, times: list[float], order: int) -> list[Stat
     """
     if not times:
         return []
-    h, known = new.t - old.t, [[s.q, s.v] for s in (old, new)] if order <= LOW else resolved(old, new)
+    h, known = new.t - old.t, [[s.q, s.v] for s in (old, new)] if order <= 2 else resolved(old, new)
     shares = (np.array(times, dtype=np.float64) - old.t) / np.float64(h)
     data = np.array([h**k * x for end in known for k, x in enumerate(end)])
     moved = [values @ data / h**k for k, values in enumerate(hermite(shares, len(known[0])))]

@@ -23,9 +23,6 @@ Array = npt.NDArray[np.float64]
 #: is prescribed. What is less follows the others, as the stretch that the Coriolis force makes of bending.
 PRESCRIBED = 1e-2
 
-#: Part of its largest displacement below which the tip does not take part in a mode.
-STILL = 1e-6
-
 
 @dataclass(frozen=True, kw_only=True)
 class FirstMotion:
@@ -89,7 +86,7 @@ class FirstMotion:
         moves = [i for i, name in enumerate(structure.unknowns) if name.startswith("u")]
         tip = (structure.tip_values(whole.real) + 1j * structure.tip_values(whole.imag))[moves]
         largest = tip[np.argmax(np.abs(tip))]
-        if abs(largest) <= STILL * system.size(np.abs(whole)) * structure.length:
+        if abs(largest) <= 1e-6 * system.size(np.abs(whole)) * structure.length:  # it does not take part
             raise InputError("initial.mode", number, "does not move the tip, which initial.amplitude is of")
         factor = self.amplitude * np.exp(1j * self.phase)
         signal = np.array([(value**k * factor * whole / largest).real for k in range(4)])

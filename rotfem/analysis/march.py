@@ -17,9 +17,6 @@ from rotfem.errors import ComputationError
 from rotfem.mechanics.time_signals import SAME, View
 from rotfem.numerics.newton import Newton
 
-#: Order of a scheme up to which straight lines do for what is prescribed in a step with knots.
-LINES = 2
-
 
 @dataclass(frozen=True)
 class Steps:
@@ -54,7 +51,7 @@ def fixed_steps(stepper: Stepper, state: State, steps: Steps) -> Iterator[State]
     """
     reached, time_grid = (
         state.t,
-        TimeGrid(stepper.system.signals, *grid(steps), steps.breakpoints, lands=stepper.scheme.order > LINES),
+        TimeGrid(stepper.system.signals, *grid(steps), steps.breakpoints, lands=stepper.scheme.order > 2),
     )
     legs = (leg for leg in time_grid if leg.end > reached)
     leg = next(legs, None)
@@ -152,24 +149,16 @@ class March:
         yield from steps(self.stepper, state, self.steps)
 
 
-#: Safety factor, smallest change of a step, smallest largest displacement (scaled).
-SAFETY, SHRINK, FLOOR = 0.9, 0.2, 1e-6
+#: Safety factor, and smallest change of a step.
+SAFETY, SHRINK = 0.9, 0.2
 
-#: Both gains of the controller H211PI: h' = h (r_n r_{n−1})^(−GAIN/k) with errors r ∝ hᵏ, parts of what is allowed. It
-#: filters what vibrations make of them (Söderlind, ACM Trans. Math. Softw. 29 (2003) 1, table 1). No step grows after
-#: one that was taken back (Hairer, Nørsett & Wanner 1993, section II.4).
-GAIN = 1 / 6
+#: Local errors are estimates: the tolerance is divided by this.
+MARGIN = 7.0
 
-#: Local errors are estimates: the tolerance is divided by MARGIN. NOISE: errors in units of Newton's tolerance.
-MARGIN, NOISE = 7.0, 10.0
+#: Cells of the time grid, as parts of the end.
+CELL = 5e-4
 
-#: The first step, the longest and the shortest, and the cells of the time grid, as parts of the end.
-FIRST, LONGEST, SHORTEST, CELL = 1e-4, 1 / 20, 1e-9, 1 / 2000
-
-#: Error, as a part of what is allowed, of a step that could not be solved, and halvings of one that is short already.
-FAILED, HALVINGS = 100.0, 5
-
-#: Steps, with those taken back, after which a march is given up; or after so many if ten times as many would not do.
+#: Steps, with those taken back, after which a march is given up; steps over which its pace is measured.
 MOST_STEPS, PACE = 500_000, 5000
 
 #: What to do then.
@@ -181,6 +170,10 @@ QUICKER = (
 
 class AdaptiveSteps:
     """States whose local errors add up to a tolerance, relative to the largest displacement so far.
+
+    The controller is H211PI: h' = h (r_n r_{n−1})^(−1/6k) with errors r ∝ hᵏ, parts of what is allowed. It filters what
+    vibrations make of them (Söderlind, ACM Trans. Math. Softw. 29 (2003) 1, table 1). No step grows after one that was
+    taken back (Hairer, Nørsett & Wanner 1993, section II.4).
 
     Steps land on the knots of what is prescribed. Where a cell of the time grid has more than a few of them, signals
     are straight lines over it.
@@ -194,16 +187,16 @@ class AdaptiveSteps:
     def __init__(self, stepper: Stepper, state: State, steps: Any):
         self.stepper, self.state, self.end = stepper, state, float(steps.end)
         self.tolerance = float(steps.tolerance)
-        self.longest = steps.max_step or LONGEST * self.end
-        self.shortest = steps.min_step or SHORTEST * self.end
+        self.longest = steps.max_step or self.end / 20
+        self.shortest = steps.min_step or 1e-9 * self.end
         self.measure = ErrorMeasure(stepper.system, stepper.scheme, self.end)
-        self.cell, self.least = CELL * self.end, NOISE * stepper.newton.tolerance
+        self.cell, self.least = CELL * self.end, 10 * stepper.newton.tolerance  # of which errors are noise
         cells = np.append(np.arange(round(1 / CELL)) * self.cell, self.end)
         legs = list(TimeGrid(stepper.system.signals, cells, self.cell, steps.breakpoints))
         self.lines = np.array([leg.line for leg in legs if leg.line]).reshape(-1, 2)
         landings = np.unique([*(leg.end for leg in legs if leg.lands), *self.lines.ravel(), self.end])
         self.landings = landings[landings > 0.0]
-        self.wanted, self.before, self.largest = min(self.longest, FIRST * self.end), 1.0, FLOOR
+        self.wanted, self.before, self.largest = min(self.longest, 1e-4 * self.end), 1.0, 1e-6
         if stepper.pace is not None:
             self.wanted, self.largest, self.before = stepper.pace
 
@@ -232,7 +225,7 @@ class AdaptiveSteps:
                 wanted, most = self._shorter(state.t, leg.length * max(SAFETY * ratio ** (-1 / order), SHRINK)), 1.0
                 continue
             ratio = max(ratio / SAFETY**order, 1e-12)
-            factor = float(np.clip((ratio * before) ** (-GAIN / order), SHRINK, most))
+            factor = float(np.clip((ratio * before) ** (-1 / (6 * order)), SHRINK, most))
             most = stepper.scheme.growth
             if leg.length >= wanted or factor < 1.0:
                 wanted, before = min(self.longest, leg.length * factor), ratio
@@ -262,11 +255,11 @@ class AdaptiveSteps:
         short = leg.length <= SHORT * self.longest
         with seen(stepper.system, leg.finish):
             try:
-                new = stepper.advance(start, leg.length, leg.end, HALVINGS if short else 0)
+                new = stepper.advance(start, leg.length, leg.end, 5 if short else 0)
             except ComputationError:
                 if short:
                     raise
-                return start, FAILED
+                return start, np.inf
         local = stepper.scheme.local_error(new, start)
         self.largest = max(self.largest, self.measure.displacement(new))
         if local is None:  # a fallback has taken it

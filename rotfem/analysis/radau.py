@@ -51,13 +51,6 @@ MOST, LONG = 10, 5
 #: from their start, in the units of the unknowns.
 FRESH, REACH = 3, 0.5
 
-#: Part of Newton's tolerance that the error of an iteration may leave: it adds up over the steps.
-LEFT = 1e-2
-
-#: Local error of q in units of h⁶ q⁽⁶⁾ (of a vibration, |R(iωh) − e^{iωh}|), and, where there is no step before, what
-#: stands for it in units of h⁵ q⁽⁵⁾.
-ERROR, FIRST_ERROR = 1 / 14400, 5e-4
-
 
 @dataclass(frozen=True, eq=False)
 class Before:
@@ -112,7 +105,7 @@ class RadauIIA(Scheme):
     name: ClassVar[str] = "radau5"
     order: ClassVar[int] = 5
     stages: ClassVar[int] = 3
-    estimate: ClassVar[tuple[float, int, float]] = (ERROR, 6, 0.2)
+    estimate: ClassVar[tuple[float, int, float]] = (1 / 14400, 6, 0.2)
     growth: ClassVar[float] = 5.0
     remembers: ClassVar[type] = Before
 
@@ -178,7 +171,7 @@ def iterate(stages: Together, h: float, equations: Equations, linearised: Any, l
     """
     linearised.take((REAL / h, ABOVE / h))
     newton, previous, size = equations.newton, np.inf, np.inf
-    enough = LEFT * newton.tolerance
+    enough = 0.01 * newton.tolerance  # what it leaves adds up over the steps
     for k in range(1, MOST + 1):
         residuals = np.array([equations.imbalance(s) for s in stages])
         real, above = linearised.solve(ROWS[0].real @ residuals, ROWS[1] @ residuals)
@@ -208,13 +201,16 @@ def weights(ratio: float) -> Array:
 
 
 def local_error(state: State, h: float, accelerations: Sequence[Array]) -> Array:
-    """Return the local error of q, of a step with one before it by fourth differences of q̈, of others by third ones."""
+    """Return the local error of q, of a step with one before it by fourth differences of q̈, h⁶ q⁽⁶⁾/14400.
+
+    That of a vibration is |R(iωh) − e^{iωh}|. Of others it is estimated by third differences, 5e-4 h⁵ q⁽⁵⁾.
+    """
     before = state.memory
     points, values = [0.0, *(C * h)], [state.a, *accelerations]
     if before is None:
-        return np.asarray(6 * FIRST_ERROR * h**5 * divided_difference(points, values))
+        return np.asarray(6 * 5e-4 * h**5 * divided_difference(points, values))
     points, values = [(C[1] - 1) * before.h, *points], [before.accelerations[1], *values]
-    return np.asarray(24 * ERROR * h**6 * divided_difference(points, values))
+    return np.asarray(24 * RadauIIA.estimate[0] * h**6 * divided_difference(points, values))
 
 
 register(RadauIIA)

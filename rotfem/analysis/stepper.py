@@ -10,18 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from rotfem.analysis.roots import came_true, check_root, energy_gain, turned_with_clamp
 from rotfem.analysis.schemes import Array, Observer, Scheme, Shifts, Stage, State
 from rotfem.errors import ComputationError
 from rotfem.mechanics.time_signals import View
 from rotfem.numerics.newton import REACH, Newton, OldFactor
 
-#: Failures in a row after which the time that passes before the next attempt grows no more.
-MOST = 5
-
 
 class BackOff:
-    """Attempts at something that pays where it works: after k failures in a row 2^k chances pass without one."""
+    """Attempts at something that pays where it works: after k failures in a row, up to 5, 2^k chances pass."""
 
     def __init__(self) -> None:
         self._failures = self._passing = 0
@@ -35,7 +31,7 @@ class BackOff:
 
     def failed(self) -> None:
         """Take note of a failure: the chance that it was counts as the first of those that pass."""
-        self._failures = min(self._failures + 1, MOST)
+        self._failures = min(self._failures + 1, 5)
         self._passing = 2**self._failures - 1
 
     def worked(self) -> None:
@@ -43,8 +39,8 @@ class BackOff:
         self._failures = 0
 
 
-#: Iterations with an old factor after which the next step gets a new one, of a linear and of a nonlinear system.
-LONG, NONLINEAR = 5, 8
+#: Iterations with an old factor after which the next step gets a new one.
+LONG = 8
 
 #: Newton iterations after which a way is long.
 SOON = 6
@@ -82,14 +78,11 @@ def keep_rotations_small(system: Any, scheme: Scheme, state: State, h: float) ->
     return True
 
 
-#: Halvings left with which a step is taken though it feeds the motion.
-STUBBORN = 3
+#: Part of the kinetic and strain energy by which a root that Newton strayed to may exceed the energy there was.
+MORE_ENERGY = 0.03
 
-#: Parts in which another scheme takes a step that the scheme cannot: it is of lower order.
-PARTS = 2
-
-#: Relative jump of what is prescribed that is none.
-STEADY = 1e-7
+#: Energy above that of the start, relative to what is exchanged, from which steps that add to it are made in parts.
+GAIN = 0.003
 
 
 @contextmanager
@@ -168,7 +161,7 @@ class Stepper:
         with seen(s, before):
             old = s.driven(t)
         with seen(s, after):
-            if np.allclose(s.driven(t), old, rtol=STEADY, atol=0.0):
+            if np.allclose(s.driven(t), old, rtol=1e-7, atol=0.0):
                 return self.scheme.kinked(state)
         return self._accelerated(state, after)
 
@@ -247,7 +240,9 @@ class Stepper:
                 self.scheme_back_off.failed()
             else:
                 self.scheme_back_off.worked()
-                gains = halvings > STUBBORN and self._gains_energy(new, state)
+                gains = halvings > 3 and self._gains_energy(
+                    new, state
+                )  # at last it is taken though it feeds the motion
                 if not gains:
                     return new
         if halvings > 0 and not gains and (stood := self._substituted(others, state, h, end)) is not None:
@@ -259,14 +254,13 @@ class Stepper:
         return self.advance(middle, h / 2, state.t + h if end is None else end, halvings - 1).after(middle)
 
     def _substituted(self, others: Sequence[Scheme], state: State, h: float, end: float | None) -> State | None:
-        """Return the state at the end of a step that one of other schemes takes, in parts; None if none can."""
+        """Return the state at the end of a step that one of other schemes takes in two; None if none can."""
         for scheme in others:
             other = Stepper(self.system, scheme, self.newton)
             now, last = scheme.start(state), state.t + h if end is None else end
             try:
-                for part in range(1, PARTS + 1):
-                    new = other.advance(now, h / PARTS, last if part == PARTS else None)
-                    now = new.after(now) if part > 1 else new
+                middle = other.advance(now, h / 2)
+                now = other.advance(middle, h / 2, last).after(middle)
             except ComputationError:
                 continue
             self.substituted[scheme.name] = self.substituted.get(scheme.name, 0) + 1
@@ -420,7 +414,7 @@ class Stepper:
         except ComputationError as error:
             raise ComputationError(error.what, time=stage.t, advice=error.advice) from None
         used = 0 if factor is None else factor.used
-        self._factored = stage.shifts if s.keeps_factor and used <= (LONG if s.linear else NONLINEAR) else None
+        self._factored = stage.shifts if s.keeps_factor and used <= LONG else None
         self._far = iterations > SOON if factor is None else factor.made > MANY
         if span is not None:
             stage.memory = s.finish(stage)
@@ -455,3 +449,78 @@ def _cut_down(error: ComputationError, h: float) -> ComputationError:
         time=error.time,
         advice='a smaller time.step, time.scheme = "energy_conserving", or a look at load and speed then',
     )
+
+
+def check_root(system: Any, stage: Stage, state: State) -> None:
+    """Refuse a root of a stage that is not the motion's.
+
+    Args:
+        system: one that is solved by Newton's method, at the time of the stage.
+        stage: solved.
+        state: where the step started.
+
+    Raises:
+        ComputationError: it is turned inside out, or has energy that nothing has given it.
+    """
+    system.set_state(stage.q, stage.v, stage.a)
+    if not system.linear and system.model.inside_out():
+        raise ComputationError("Newton met a state turned inside out (an axial strain below −1)", time=stage.t)
+    if not system.model.closed or stage.over is not None:
+        return
+    new = system.energies()
+    system.set_state(state.q, state.v, state.a)
+    old = system.energies()
+    grown, there = new["jacobi"] - old["jacobi"], max(e["kinetic"] + e["strain"] for e in (old, new))
+    if grown > MORE_ENERGY * there:
+        what = f"Newton met a state with {grown:.2g} J more than there were, of {there:.2g} J"
+        raise ComputationError(what, time=stage.t)
+
+
+def energy_gain(
+    system: Any, new: State, state: State, known: tuple[float, ...] | None
+) -> tuple[tuple[float, ...], bool]:
+    """Return what is known of the energies, and whether a step raised an energy that is above what there can be.
+
+    Nothing gives the motion energy. A scheme that does not resolve it may, a little in each step, which Newton's method
+    does not notice until the motion is lost; shorter steps give less, and take some back.
+
+    Args:
+        system: nonlinear, and closed.
+        new: end of the step.
+        state: its start.
+        known: Jacobi integral at the start, least and largest kinetic and strain energy since (J); None at first.
+    """
+
+    def energies(at: State) -> dict[str, float]:
+        system.set_time(at.t)
+        system.set_state(at.q, at.v, at.a)
+        return dict(system.energies())
+
+    first = None if known is not None else energies(state)
+    if first is not None:
+        known = (first["jacobi"], *2 * (first["kinetic"],), *2 * (first["strain"],))
+    assert known is not None
+    now = energies(new)
+    reference, low_t, high_t, low_w, high_w = known
+    low_t, high_t = min(low_t, now["kinetic"]), max(high_t, now["kinetic"])
+    low_w, high_w = min(low_w, now["strain"]), max(high_w, now["strain"])
+    too_much = now["jacobi"] - reference > GAIN * max(high_t - low_t, high_w - low_w)
+    gains = too_much and now["jacobi"] > (first or energies(state))["jacobi"]
+    return (reference, low_t, high_t, low_w, high_w), gains
+
+
+def turned_with_clamp(clamp: Any, state: State, stage: Stage) -> Array:
+    """Return q of a stage predicted by a turn with the clamp and the velocity relative to it."""
+    if stage.over is None:
+        return np.asarray(clamp.turned(state.q, state.v, state.t, stage.t))
+    return np.asarray((state.q + clamp.turned(state.q, state.v, state.t, stage.over.end)) / 2)
+
+
+def came_true(system: Any, move: Array, predicted: Array) -> float:
+    """Return the share of a predicted move that makes it closest to the one that came, between 0 and 1.
+
+    Where the motion is smooth it is 1. Where vibrations are faster than the steps resolve a prediction of constant
+    acceleration is worse than none: they are elsewhere after every step, and h²q̈ is much larger than they are.
+    """
+    length = system.product(predicted, predicted)
+    return float(np.clip(system.product(move, predicted) / length, 0.0, 1.0)) if length > 0.0 else 1.0

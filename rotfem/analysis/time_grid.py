@@ -24,9 +24,8 @@ Array = npt.NDArray[np.float64]
 #: Most knots in a step that are landed on; shortest leg of a step, and part of a step that is one instant.
 FEW, SHORT, CLOSE = 4, 1e-3, 1e-9
 
-#: Jump, as a part of the largest value, that is located; halvings that locate it, and those after which it is none if
-#: less of it is left than the last number.
-JUMP, HALVINGS, SURE, LEFT = 1e-3, 52, 10, 0.5
+#: Jump, as a part of the largest value, that is located, and halvings after which it is one if half of it is left.
+JUMP, SURE = 1e-3, 10
 
 
 @dataclass(slots=True)
@@ -123,18 +122,16 @@ def find_jumps(signal: TimeSignal, times: Array, breakpoints: Sequence[float] = 
     values, size = np.stack([f[:-1], f[1:]]), float(np.abs(f).max())
     change = np.linalg.norm(values[1] - values[0], axis=1)
     left, halvings = np.flatnonzero(change > JUMP * size), np.zeros(len(change), dtype=int)
-    for number in range(1, HALVINGS + 1):
+    while len(left):
         middle = 0.5 * (edges[0, left] + edges[1, left])
-        apart = (edges[0, left] < middle) & (middle < edges[1, left])
-        halvings[left[~apart]] = HALVINGS
-        left, middle = left[apart], middle[apart]
-        if not len(left):
-            break
         f = signal.values(middle)
-        upper = np.linalg.norm(f - values[0, left], axis=1) >= np.linalg.norm(values[1, left] - f, axis=1)
-        edges[upper.astype(int), left], values[upper.astype(int), left] = middle, f
-        left = left[np.linalg.norm(values[1, left] - values[0, left], axis=1) > LEFT * change[left]]
-        halvings[left] = number
+        upper = (np.linalg.norm(f - values[0, left], axis=1) >= np.linalg.norm(values[1, left] - f, axis=1)).astype(int)
+        ends = edges[upper, left] == middle  # two neighbouring numbers
+        edges[upper, left], values[upper, left] = middle, f
+        jumps = np.linalg.norm(values[1, left] - values[0, left], axis=1) > 0.5 * change[left]
+        halvings[left[jumps]] += 1
+        halvings[left[jumps & ends]] += SURE
+        left = left[jumps & ~ends]
     knots = edges[1, halvings >= SURE]
     if len(knots) and signal.continuous:
         what = f"jumps at t = {knots[0]:.9g} s, which takes a force without bound: give a ramp or round it off"

@@ -16,8 +16,8 @@ from scipy.optimize import brentq
 
 from rotfem import ComputationError, run
 from rotfem.analysis.equilibrium import static_tip_shape
-from rotfem.analysis.roots import check_root
 from rotfem.analysis.schemes import Stage, State
+from rotfem.analysis.stepper import check_root
 from rotfem.commands.problem import Problem
 from rotfem.equations.compiled import compile_system
 from rotfem.numerics import forms
