@@ -155,8 +155,8 @@ SAFETY, SHRINK = 0.9, 0.2
 #: Local errors are estimates: the tolerance is divided by this.
 MARGIN = 7.0
 
-#: Cells of the time grid, as parts of the end.
-CELL = 5e-4
+#: The longest step, and the cells of the time grid, as parts of the end.
+LONGEST, CELL = 0.05, 5e-4
 
 #: Steps, with those taken back, after which a march is given up; steps over which its pace is measured.
 MOST_STEPS, PACE = 500_000, 5000
@@ -187,7 +187,7 @@ class AdaptiveSteps:
     def __init__(self, stepper: Stepper, state: State, steps: Any):
         self.stepper, self.state, self.end = stepper, state, float(steps.end)
         self.tolerance = float(steps.tolerance)
-        self.longest = steps.max_step or self.end / 20
+        self.longest = steps.max_step or LONGEST * self.end
         self.shortest = steps.min_step or 1e-9 * self.end
         self.measure = ErrorMeasure(stepper.system, stepper.scheme, self.end)
         self.cell, self.least = CELL * self.end, 10 * stepper.newton.tolerance  # of which errors are noise
