@@ -1,10 +1,12 @@
 """States between steps: rows of a history at equal distances, wherever the steps of a march end.
 
-Between two states the unknowns are the polynomial through what is known at both: through q and q̇ a cubic, of order 4,
-and through q, q̇ and q̈ a quintic, of order 6 (Hermite). So what is between is as good as the ends are: the cubic for
-schemes up to order 2, whose accelerations of vibrations that they do not resolve are noise, the quintic above. There
-too an acceleration that the cubic knows nothing of is that of such a vibration, as of a rod that is spun at once, which
-would throw the quintic far off: it gives way to the cubic's, and where it is beyond all that, both to a straight line.
+Between two states all unknowns are the polynomials through what is known at both: through q and q̇ cubics, of order 4,
+and through q, q̇ and q̈ quintics, of order 6 (Hermite). So what is between is as good as the ends are. Cubics are those
+of schemes up to order 2, whose accelerations of vibrations that they do not resolve are noise. Of other schemes they
+take the place of quintics where the accelerations are such noise, as those of a rod that is spun at once.
+
+All unknowns have the same weights: what holds linearly between unknowns at both ends, as that a thin plate has no shear
+strain, holds in between. Otherwise small differences would be large forces there.
 
 The acceleration at the end of a march solves M δa = −F(q, v, a), with the factor of M at rest where that converges
 quickly: M of a structure changes little with its deflection.
@@ -19,8 +21,8 @@ import numpy as np
 
 from rotfem.analysis.schemes import Array, Observer, State
 
-#: Part of the cubic's accelerations by which those of a state may differ from them, and from which on neither counts.
-KNOWN, BEYOND = 0.5, 20.0
+#: Part of the cubic's largest acceleration by which those of the states may differ from its own.
+KNOWN = 0.5
 
 #: Distance of two instants, as a part of the interval between rows, at which they are one.
 CLOSE = 1e-9
@@ -70,10 +72,9 @@ def between(old: State, new: State, times: list[float], order: int) -> list[Stat
     """
     if not times:
         return []
-    h, known = new.t - old.t, [[s.q, s.v] for s in (old, new)] if order <= 2 else resolved(old, new)
+    h, curve = new.t - old.t, polynomial(old, new, order)
     shares = (np.array(times, dtype=np.float64) - old.t) / np.float64(h)
-    data = np.array([h**k * x for end in known for k, x in enumerate(end)])
-    moved = [values @ data / h**k for k, values in enumerate(hermite(shares, len(known[0])))]
+    moved = [monomials(shares, len(curve), k) @ curve / h**k for k in range(3)]
     out = []
     for t, share, q, v, a in zip(times, shares, *moved, strict=True):
         given = None
@@ -83,22 +84,27 @@ def between(old: State, new: State, times: list[float], order: int) -> list[Stat
     return out
 
 
-def hermite(shares: Array, known: int) -> list[Array]:
-    """Return values and two derivatives of the polynomials that are 1 in one datum of two ends and 0 in the others.
+def polynomial(old: State, new: State, order: int) -> Array:
+    """Return the coefficients of q in a step, by powers of the share of it that has passed, (powers, unknowns).
 
     Args:
-        shares: where, from 0 to 1, (n,).
-        known: data of an end: value, first derivative, ….
-
-    Returns:
-        Three arrays (n, 2 known), the columns those of the first end, then those of the second.
+        old: state that the step starts from.
+        new: state that it ends in.
+        order: of the scheme that made it.
     """
-    return [monomials(shares, 2 * known, k) @ _coefficients(known) for k in range(3)]
+    h, mean = new.t - old.t, (new.q - old.q) / (new.t - old.t)
+    known = [[s.q, h * s.v] for s in (old, new)]
+    if order > 2:
+        cubic = np.array([6 * mean - 4 * old.v - 2 * new.v, 2 * old.v + 4 * new.v - 6 * mean]) / h
+        off = np.abs([old.a, new.a] - cubic)
+        if off.max(initial=0.0) <= KNOWN * np.abs(cubic).max(initial=0.0):
+            known = [[*data, h * h * s.a] for data, s in zip(known, (old, new), strict=True)]
+    return np.asarray(_coefficients(len(known[0])) @ np.array([x for end in known for x in end]))
 
 
 @cache
 def _coefficients(known: int) -> Array:
-    """Return the coefficients of these polynomials, by power and datum."""
+    """Return the coefficients, by power, of the polynomials that are 1 in one datum of two ends and 0 in the others."""
     ends = np.array([0.0, 1.0])
     at = np.stack([monomials(ends, 2 * known, k) for k in range(known)], axis=1)
     return np.asarray(np.linalg.inv(at.reshape(2 * known, 2 * known)), dtype=np.float64)
@@ -109,20 +115,6 @@ def monomials(x: Array, number: int, k: int) -> Array:
     powers = np.arange(number)
     falling = np.prod([powers - i for i in range(k)], axis=0)
     return np.asarray(x[:, None] ** np.maximum(powers - k, 0) * falling)
-
-
-def resolved(old: State, new: State) -> list[list[Array]]:
-    """Return q, v and a of two states, as far as steps resolve the unknowns; those of a cubic or a line elsewhere."""
-    h, mean = new.t - old.t, (new.q - old.q) / (new.t - old.t)
-    cubic = [(6 * mean - 4 * old.v - 2 * new.v) / h, (2 * old.v + 4 * new.v - 6 * mean) / h]
-    most = np.maximum(*np.abs(cubic))
-    off = [np.abs(s.a - c) for s, c in zip((old, new), cubic, strict=True)]
-    line = np.maximum(*off) > BEYOND * most
-    out = []
-    for s, c, o in zip((old, new), cubic, off, strict=True):
-        a = np.where(o <= KNOWN * most, s.a, c)
-        out.append([s.q, np.where(line, mean, s.v), np.where(line, 0.0, a)])
-    return out
 
 
 #: Corrections with the factor at rest, how fast they must shrink, and what may be left, relative to the acceleration.
@@ -144,3 +136,11 @@ def end_acceleration(system: Any, state: State) -> Array:
         before = size
     system.set_state(state.q, state.v, a)
     return a
+
+
+def write_state(system: Any, state: State) -> None:
+    """Write a state into a system whose time is set, with the acceleration that the equations give at it.
+
+    Forces at the root take it; without it they would not balance what the structure is accelerated by.
+    """
+    system.set_state(state.q, state.v, state.a if state.balanced else end_acceleration(system, state))

@@ -46,8 +46,8 @@ OF_LOG, OF_MONITOR = ("steps", "warnings", "resumed"), ("since",)
 _STEPPER = ("system", "newton", "back_off", "scheme", "scheme_back_off", "observer", "_linearised", "_about")
 APART = {
     "Stepper": _STEPPER,
-    "FollowingStepper": (*_STEPPER, "followed", "carried", "differences", "_there"),
-    "Companion": ("system", "followed", "output", "stepper", "further", "state", "waiting"),
+    "FollowingStepper": (*_STEPPER, "followed", "carried", "differences", "_there", "_curves"),
+    "Companion": ("system", "followed", "output", "interval", "stepper", "further", "state", "waiting"),
 }
 
 Tree = dict[str, Any]
@@ -305,8 +305,8 @@ class Memory:
         alike(self._changing(), tree["run"], "run")
         seen = self.packing.unpacked(tree["seen"])
         alike({"farthest": run.monitor.farthest.seen, "stability": None}, {**seen, "stability": None}, "seen")
-        if not suits(seen["stability"], Stability | None):
-            raise TypeError("stability")
+        if not suits(seen["stability"], Stability | None) or len(seen["farthest"]) != len(run.monitor.farthest.seen):
+            raise TypeError("seen")
         for name, kind in (("warnings", str), ("resumed", dict)):
             if not all(isinstance(entry, kind) for entry in tree["run"]["log"][name]):
                 raise TypeError(name)

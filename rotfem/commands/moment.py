@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rotfem.analysis.dense_output import end_acceleration
+from rotfem.analysis.dense_output import write_state
 from rotfem.analysis.schemes import Array, State
 from rotfem.analysis.stability import Stability, stability_of
 from rotfem.errors import InputError
@@ -83,14 +83,6 @@ class Moment:
         self.system.set_time(self.t)
         write_state(self.system, self.state)
         return self.system
-
-
-def write_state(system: Any, state: State) -> None:
-    """Write a state into a system whose time is set, with the acceleration that the equations give at it.
-
-    Forces at the root take it; without it they would not balance what the structure is accelerated by.
-    """
-    system.set_state(state.q, state.v, state.a if state.balanced else end_acceleration(system, state))
 
 
 def hub_values(system: Any, state: State) -> dict[str, float]:

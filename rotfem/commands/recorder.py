@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.analysis.dense_output import write_state
 from rotfem.analysis.schemes import State
 from rotfem.commands.fields import fields_writer, stations_writer
-from rotfem.commands.moment import hub_values, write_state
+from rotfem.commands.moment import hub_values
 from rotfem.commands.monitor import check_finite
 from rotfem.equations.plate_resultants import PlateResultants
 from rotfem.equations.stations import Stations

@@ -165,10 +165,8 @@ class Simulation:
         march = March(self.system, scheme, Steps.of(time), newton, self.start.q, self.start.v)
         self.stepper = march.stepper
         if self._wants_error:
-            output = OUTPUTS[output_of(self.scene)]
-            self.companions = HistoryErrors(
-                self.problem, self.system, scheme, newton, self._start_there, output, richer_problem(self.problem)
-            )
+            of = OUTPUTS[output_of(self.scene)], time.output_step, richer_problem(self.problem)
+            self.companions = HistoryErrors(self.problem, self.system, scheme, newton, self._start_there, *of)
             self.stepper.observer = self.companions
         march.reached = self.store.start(self._parts())
         if time.output_step is not None:

@@ -10,12 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
+from functools import partial
 from math import sqrt
 from typing import Any
 
 import numpy as np
 
-from rotfem.analysis.dense_output import between
+from rotfem.analysis.dense_output import between, polynomial
 from rotfem.analysis.march import started, travel
 from rotfem.analysis.schemes import Array, Scheme, Stage, State
 from rotfem.analysis.stepper import Stepper
@@ -57,10 +58,10 @@ class Followed:
         """Return both as one."""
         return Followed(self.leg.and_then(other.leg), self.steps + other.steps)
 
-    def at(self, t: float, order: int) -> Array:
-        """Return q at a time (s)."""
-        old, new = next((pair for pair in self.steps if t <= pair[1].t), self.steps[-1])
-        return old.q if t <= old.t else new.q if t >= new.t else between(old, new, [t], order)[0].q
+    def state_at(self, t: float, order: int) -> State:
+        """Return the state at a time (s) as a row of a history has it."""
+        old, new = next(pair for pair in self.steps if t <= pair[1].t)
+        return between(old, new, [t], order)[0] if t < new.t else new
 
 
 class FollowingStepper(Stepper):
@@ -79,6 +80,8 @@ class FollowingStepper(Stepper):
         self.differences: list[tuple[float, Array]] = []
         #: q followed, carried to its own mesh, at the end of the step.
         self._there: Array | None = None
+        #: Polynomials of the steps that are followed, by the time at their end.
+        self._curves: dict[float, Array] = {}
 
     def solve(self, stage: Stage, state: State) -> None:
         """Solve a stage by Newton's method alone: what cannot be solved so is not known."""
@@ -94,15 +97,25 @@ class FollowingStepper(Stepper):
             return super().predicted(stage, state)
         there = self._there if stage.t >= step.end.t else None
         t, difference = self.differences[-1]
-        guess = np.add(self.carried(step.at(stage.t, self.scheme.order)) if there is None else there, difference)
+        guess = np.add(self.carried(self._followed_at(stage.t, step)) if there is None else there, difference)
         if len(self.differences) > 1:
             before, other = self.differences[0]
             guess += (stage.t - t) / (t - before) * (difference - other)
         return guess
 
+    def _followed_at(self, t: float, step: Followed) -> Array:
+        """Return q of the motion that is followed at a time in a step of it, s."""
+        old, new = next((pair for pair in step.steps if t <= pair[1].t), step.steps[-1])
+        if not old.t < t < new.t:
+            return old.q if t <= old.t else new.q
+        if new.t not in self._curves:
+            self._curves[new.t] = polynomial(old, new, self.scheme.order)
+        curve, share = self._curves[new.t], (t - old.t) / (new.t - old.t)
+        return np.asarray(share ** np.arange(len(curve)) @ curve)
+
     def follow(self, step: Followed, state: State) -> None:
         """Take a step as the one that is followed from a state."""
-        self.followed = self._there = None
+        self.followed, self._there, self._curves = None, None, {}
         if self.system.solved_at_once or self.carried is None:
             return
         if any(s.reference is not state.reference for pair in step.steps for s in pair):
@@ -130,7 +143,9 @@ class Companion:
         newton: iteration control of the march that is followed.
         doubles: whether it takes two steps as one.
         further: companions that follow this one.
-        output: that the two are compared by.
+        output: that the two are compared by, at the ends of its steps.
+        interval: between rows, s; they are also compared in the row next to the middle of every step. None where rows
+            are ends of steps.
 
     Attributes:
         state: reached; None before `begin`.
@@ -154,15 +169,17 @@ class Companion:
         doubles: bool = True,
         further: Sequence[Companion] = (),
         output: Output = tip,
+        interval: float | None = None,
     ):
         self.system, self.followed, self.doubles, self.output = system, followed, doubles, output
+        self.interval = interval
         system.held.plain = True
         own = Newton(newton.tolerance, newton.max_iterations, foreseeing=True)
         self.stepper = FollowingStepper(system, scheme, own, carrier(followed, system))
-        self.further, self.stepper.observer = list(further), self._passed_on
+        self.further = list(further)
         self.state: State | None = None
         self.difference, self.doubled, self.sound = (0.0, 0.0), 0.0, True
-        self.components: tuple[float, ...] = (0.0,)
+        self.components: tuple[float, ...] = ()
         #: Steps taken note of: those that may be doubled with the next, and those whose way on is not known yet.
         self.waiting: list[Followed | None] = [None, None]
 
@@ -178,12 +195,15 @@ class Companion:
         if v is not None:
             rates[: len(v)] += v
         self.state = self.stepper.start(0.0, start, rates)
+        self.components = (0.0,) * len(self.output(self.system, self.state))
 
     def __call__(self, old: State, new: State, leg: Leg) -> None:
         """Take note of a step of the march that is followed, and take all those whose way on is known by it."""
         if not self.sound:
             return
-        step, (single, _) = Followed(leg, ((copy(old), copy(new)),)), self.waiting
+        if self.followed.held.structure.turns is not None:  # it may count the rotations of these states afresh
+            old, new = copy(old), copy(new)
+        step, (single, _) = Followed(leg, ((old, new),)), self.waiting
         if single is not None:
             self.waiting[0] = None
             if not single.leg.lands:
@@ -206,7 +226,16 @@ class Companion:
         for companion in self.further:
             companion.finish()
 
-    def _passed_on(self, old: State, new: State, leg: Leg) -> None:
+    def _arrived(self, step: Followed, old: State, new: State, leg: Leg) -> None:
+        """Compare the outputs at the end of a step and within it, and pass it on."""
+        self.stepper.arrived(new)
+        self.doubled += leg.length if step.doubled else 0.0
+        self._compare(new, step.end)
+        if self.interval is not None:
+            row = round((old.t + new.t) / (2 * self.interval)) * self.interval
+            if old.t < row < new.t:
+                order = self.stepper.scheme.order
+                self._compare(between(old, new, [row], order)[0], step.state_at(row, order))
         for companion in self.further:
             companion(old, new, leg)
 
@@ -223,6 +252,7 @@ class Companion:
             return
         stepper, start = self.stepper, self.state
         stepper.follow(step, start)
+        stepper.observer = partial(self._arrived, step)
         try:
             if start.t == 0.0:
                 start = started(stepper, start, step.leg)
@@ -230,17 +260,12 @@ class Companion:
                 self.state = travel(stepper, start, step.leg, after)
         except ComputationError:
             self.sound = False
-            return
-        stepper.arrived(self.state)
-        self.doubled += step.leg.length if step.doubled else 0.0
-        self._compare(step.end)
 
-    def _compare(self, there: State) -> None:
-        """Take note of the distance of the outputs."""
-        assert self.state is not None
-        apart = self.output(self.system, self.state) - self.output(self.followed, there)
+    def _compare(self, here: State, there: State) -> None:
+        """Take note of the distance of the outputs at an instant."""
+        apart = self.output(self.system, here) - self.output(self.followed, there)
         size = sqrt(apart @ apart)
-        self.sound = size <= self.limit  # not where it is no number
+        self.sound &= size <= self.limit  # not where it is no number
         self.components = tuple(np.maximum(self.components, np.abs(apart)).tolist())
         if size > self.difference[0]:
             self.difference = size, there.t

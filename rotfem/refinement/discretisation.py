@@ -50,6 +50,7 @@ class HistoryErrors:
         newton: its iteration control.
         start: what it starts from.
         output: whose errors these are.
+        interval: between rows, s; None where they are ends of steps.
         richer: the problem in the theory that its answers are compared with; None for none.
 
     Attributes:
@@ -67,6 +68,7 @@ class HistoryErrors:
         newton: Newton,
         start: Start,
         output: Output = tip,
+        interval: float | None = None,
         richer: Problem | None = None,
     ):
         self.scheme = scheme
@@ -75,13 +77,13 @@ class HistoryErrors:
         self.mesh: Companion | None = None
         self.theory: Companion | None = None
         if self.other is not None:
-            self.mesh = Companion(self.other.system, same, scheme, newton, doubles=False, output=output)
+            self.mesh = Companion(self.other.system, same, scheme, newton, False, output=output, interval=interval)
         if richer is not None:
             self.theory = Companion(
                 compile_system(richer.replace(outputs={}), system.comm), same, scheme, newton, doubles=False
             )
         further = [companion for companion in (self.mesh, self.theory) if companion is not None]
-        self.steps = Companion(same, system, scheme, newton, further=further, output=output)
+        self.steps = Companion(same, system, scheme, newton, True, further, output, interval)
         for companion in self.companions:
             try:
                 companion.begin(*start(companion.system))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rotfem.analysis.dense_output import write_state
 from rotfem.analysis.schemes import Array, State
 
 #: An output of a state of a system.
@@ -24,7 +25,7 @@ def root_moment(system: Any, state: State) -> Array:
     """Return the moment of the hub on the structure at its root, N·m."""
     system.count_rotations_from(state.reference)
     system.set_time(state.t)
-    system.set_state(state.q, state.v, state.a)
+    write_state(system, state)
     return np.array([value for name, value in system.root_reaction().items() if name.startswith("m")])
 
 

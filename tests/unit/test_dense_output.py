@@ -31,6 +31,18 @@ def test_polynomials_are_met_exactly(order: int, degree: int) -> None:
             assert state.given[0] == pytest.approx(state.t)
 
 
+def test_what_holds_linearly_at_the_ends_holds_between() -> None:
+    """q₃ = q₁ + q₂, as shear is a difference of slopes, though the step resolves the accelerations of q₁ alone."""
+    rng = np.random.default_rng(2)
+    p = np.polynomial.Polynomial(rng.uniform(0.5, 1.0, 6))
+    slow = [np.array([p.deriv(k)(t) for k in range(3)]) for t in (1.0, 1.5)]
+    noise = [np.array([0.1, 0.0, 1e3]), np.array([0.2, 0.0, -1e3])]
+    ends = [State(t, *np.array([a, b, a + b]).T) for t, a, b in zip((1.0, 1.5), slow, noise, strict=True)]
+    for state in between(*ends, [1.1, 1.25, 1.4], 4):
+        assert state.q[2] == pytest.approx(state.q[0] + state.q[1], rel=1e-12)
+        assert 0.1 <= state.q[1] <= 0.2
+
+
 def test_rows_are_at_multiples_of_the_interval_and_at_the_end() -> None:
     """Whether steps are longer or shorter; a row at the end of a step is the state itself."""
     p = np.polynomial.Polynomial([0.0, 1.0])
