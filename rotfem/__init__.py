@@ -8,7 +8,9 @@ can build too. `register` adds a `Theory`, `Effect`, `Scheme`, `MotionLaw`, `Dam
 
 from __future__ import annotations
 
+import ast
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotfem.errors import ComputationError, InputError, OutputError, SceneError
@@ -47,41 +49,14 @@ if TYPE_CHECKING:
     from rotfem.scene.section_shapes import Geometry, Shape
     from rotfem.scene.structure import StructureKind
 
-#: Module ↦ public names it has: imported when one is first asked for.
-_HOMES = {
-    "analysis.alpha_family": ("GeneralisedAlpha", "Newmark"),
-    "analysis.esdirk": ("ESDIRK4",),
-    "analysis.schemes": ("Scheme", "Stage", "State"),
-    "commands.campbell": ("campbell",),
-    "commands.check": ("check",),
-    "commands.cost.study": ("cost",),
-    "commands.explain": ("explain",),
-    "commands.import_blade": ("import_blade",),
-    "commands.modes": ("modes",),
-    "commands.problem": ("Problem",),
-    "commands.response": ("response",),
-    "commands.run": ("run",),
-    "commands.sweep": ("sweep",),
-    "mechanics.effects": ("DampingModel", "Effect"),
-    "mechanics.free_hub": ("FreeHub", "Torque"),
-    "mechanics.loads": ("ConstantLoad", "Loads"),
-    "mechanics.motion": ("Motion", "MotionLaw"),
-    "mechanics.problem": ("Output",),
-    "mechanics.theories": ("Theory",),
-    "commands.cost.result": ("CostResult",),
-    "results": ("CampbellResult", "CheckResult", "ExplainResult", "ModesResult", "ResponseResult", "RunResult"),
-    "results.compare": ("CompareResult", "compare"),
-    "results.sweep": ("SweepResult",),
-    "scene": ("BeamMesh", "PlateMesh", "Scene", "load_scene"),
-    "scene.blades.deck": ("Asked", "BladeFormat", "Deck"),
-    "scene.structure": ("StructureKind",),
-    "scene.section_shapes": ("Geometry", "Shape"),
-}
-_LATER = {name: f"rotfem.{module}:{name}" for module, names in _HOMES.items() for name in names}
-_LATER |= {
-    "PlanarBeam": "rotfem.scene.beams:PlanarBeamStructure",
-    "SpatialBeam": "rotfem.scene.beams:SpatialBeamStructure",
-    "Plate": "rotfem.scene.plates:PlateStructure",
+#: Public name ↦ module and name there: what type checkers see above is imported when it is first asked for.
+_LATER = {
+    alias.asname or alias.name: (str(node.module), alias.name)
+    for block in ast.parse(Path(__file__).read_text(encoding="utf-8")).body
+    if isinstance(block, ast.If)
+    for node in block.body
+    if isinstance(node, ast.ImportFrom)
+    for alias in node.names
 }
 
 __all__ = [
@@ -146,7 +121,7 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _LATER:
         raise AttributeError(f"module 'rotfem' has no attribute {name!r}")
-    module, _, attribute = _LATER[name].partition(":")
+    module, attribute = _LATER[name]
     if not module.startswith(("rotfem.scene", "rotfem.results")):
         import_module("rotfem.numerics")  # before dolfinx, which would start PETSc in its own way
     value = globals()[name] = getattr(import_module(module), attribute)

@@ -102,10 +102,7 @@ motion_laws: Registry[Any] = Registry("type of motion", "rotfem.scene.motion")
 damping_models: Registry[Any] = Registry("damping model")
 structures: Registry[Any] = Registry("structure", "rotfem.scene.structure")
 
-ALL: tuple[Registry[Any], ...] = (
-    *(theories, effects, schemes, motion_laws, damping_models),
-    *(structures, shapes, outputs, blade_formats),
-)
+ALL: tuple[Registry[Any], ...] = tuple(registry for registry in globals().values() if isinstance(registry, Registry))
 
 
 def register(entry: Entry | type[Entry]) -> None:

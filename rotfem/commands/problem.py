@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self, cast
 
@@ -219,7 +220,7 @@ def motion_of(scene: Scene) -> Motion:
     if m.type not in _MOTIONS or m.type == "callable":
         more["cell"] = cell_of(scene.time)
     motion: Motion = _MOTIONS.get(m.type, _by_law)(m, {"axis": m.axis, **more})
-    return motion if base is None or base.constant else motion.with_changing_base()
+    return motion if base is None or base.constant else replace(motion, constant=False)
 
 
 def _base_acceleration(base: Any) -> Any:

@@ -215,10 +215,6 @@ class Motion:
         """Return the motion of a frame that pitches over time too."""
         return replace(self, pitch=pitch, constant=False)
 
-    def with_changing_base(self) -> Motion:
-        """Return the motion, known to have an acceleration of its origin that changes with time."""
-        return replace(self, constant=False)
-
     def final_speed(self, end: float) -> float:
         """Return the speed (rad/s) at the end of a history (s), or when the motion has settled if that is later."""
         return self.speed(max(end, self.settled))

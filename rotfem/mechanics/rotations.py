@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import ufl
+from scipy.spatial.transform import Rotation
 from ufl import cross
 
 #: Largest |θ| of the rotation vector, rad; a little beyond, so that a full circle itself can be reached.
@@ -105,9 +106,7 @@ NO_TURN = 1e-12
 
 def rotations(theta: Array) -> Array:
     """Return Λ(θ), shape (…, 3, 3), of rotation vectors (…, 3) in rad."""
-    a, b, *_ = _factors(np.sum(theta * theta, axis=-1))
-    spin = _skew(theta)
-    return np.eye(3) + a[..., None, None] * spin + b[..., None, None] * (spin @ spin)
+    return np.asarray(Rotation.from_rotvec(theta.reshape(-1, 3)).as_matrix().reshape(*theta.shape, 3))
 
 
 def material_curvature(theta: Array, dtheta: Array) -> Array:
@@ -143,15 +142,12 @@ def turned_vectors(theta: Array, turn: Array) -> Array:
 
 def rotation_vectors(Lambda: Array, guess: Array) -> Array:
     """Return rotation vectors (…, 3), rad, of matrices (…, 3, 3): of all that they have those nearest to a guess."""
-    quaternion = _quaternions(Lambda)
-    part = np.linalg.norm(quaternion[..., 1:], axis=-1)
-    angle = 2 * np.arctan2(part, quaternion[..., 0])
-    size = np.linalg.norm(guess, axis=-1)
-    along = np.where(size[..., None] > 0.0, guess / np.where(size, size, 1.0)[..., None], np.eye(3)[0])
-    turned = part > NO_TURN / 2
-    axis = np.where(turned[..., None], quaternion[..., 1:] / np.where(turned, part, 1.0)[..., None], along)
-    whole = np.round((np.sum(axis * guess, axis=-1) - angle) / (2 * np.pi))
-    return np.asarray((angle + 2 * np.pi * whole)[..., None] * axis)
+    vectors = Rotation.from_matrix(Lambda.reshape(-1, 3, 3)).as_rotvec().reshape(guess.shape)
+    angle, size = (np.linalg.norm(x, axis=-1)[..., None] for x in (vectors, guess))
+    along = np.where(size > 0.0, guess / np.where(size, size, 1.0), np.eye(3)[0])
+    axis = np.where(angle > NO_TURN, vectors / np.where(angle > NO_TURN, angle, 1.0), along)
+    whole = np.round((np.sum(axis * guess, axis=-1)[..., None] - angle) / (2 * np.pi))
+    return np.asarray((angle + 2 * np.pi * whole) * axis)
 
 
 def _factors(s: Array) -> tuple[Array, Array, Array, Array, Array]:
@@ -170,31 +166,6 @@ def _factors(s: Array) -> tuple[Array, Array, Array, Array, Array]:
     db = np.where(small, db, (a / 2 - B) / big)
     dc = np.where(small, dc, ((a - cosine) / (2 * big) - C) / big)
     return 1 - s * c, b, c, db, dc
-
-
-def _skew(v: Array) -> Array:
-    """Return the matrices of v×, shape (…, 3, 3)."""
-    out = np.zeros((*v.shape, 3))
-    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
-    return out - np.swapaxes(out, -1, -2)
-
-
-def _quaternions(Lambda: Array) -> Array:
-    """Return unit quaternions (…, 4), the scalar first and not negative; of the four formulas the best conditioned."""
-    d = np.diagonal(Lambda, axis1=-2, axis2=-1)
-    trace = np.sum(d, axis=-1)
-    L = Lambda
-    differences = np.stack([L[..., 2, 1] - L[..., 1, 2], L[..., 0, 2] - L[..., 2, 0], L[..., 1, 0] - L[..., 0, 1]], -1)
-    products = L + np.swapaxes(L, -1, -2) + np.zeros_like(L)
-    for i in range(3):
-        products[..., i, i] = 1 - trace + 2 * d[..., i]
-    candidates = np.empty((*trace.shape, 4, 4))  # each row 4 q_i q
-    candidates[..., 0, 0], candidates[..., 0, 1:] = 1 + trace, differences
-    candidates[..., 1:, 0], candidates[..., 1:, 1:] = differences, products
-    best = np.argmax(np.diagonal(candidates, axis1=-2, axis2=-1), axis=-1)
-    q = np.take_along_axis(candidates, best[..., None, None], axis=-2)[..., 0, :]
-    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
-    return np.where(q[..., :1] < 0, -q, q)
 
 
 # --- the two angles of a plate ----------------------------------------------------------------------------------------

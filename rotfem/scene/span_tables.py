@@ -242,9 +242,9 @@ def _problems_of(key: str, of_file: bool = False) -> Iterator[None]:
     try:
         yield
     except PydanticCustomError as error:
-        context = error.context or {}
+        context: dict[str, Any] = error.context or {"value": None}
         named = context.get("key") if of_file else None
-        raise problem(named or key, context.get("value"), context.get("reason", error.message())) from None
+        raise problem(named or key, context["value"], error.message()) from None
 
 
 def _table_at(path: str, key: str, value: Any, info: ValidationInfo) -> Any:

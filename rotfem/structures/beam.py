@@ -130,6 +130,15 @@ class Beam(Structure):
         """Return the strains, each with its stiffness, that make the stored energy of the strains of a section."""
         raise NotImplementedError
 
+    def read_section(self, at: Callable[[Array], dict[str, Array]]) -> None:
+        """Take the section properties of at(X), name ↦ values, into the forms."""
+        for name in at(np.zeros(1)):
+
+            def values(x: Array, name: str = name) -> Array:
+                return at(x)[name]
+
+            self.section[name] = self.profile(name, values)
+
     def profile(self, name: str, at: Callable[[Array], Array], valid: Valid | None = not_negative) -> Any:
         """Return at(X) as a constant where the section is uniform, else as a field."""
         if self._section.uniform:

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from functools import partial
 from typing import Any, ClassVar
 
-import numpy as np
 import ufl
 from mpi4py import MPI
 
 from rotfem.mechanics.bodies import AppliedLoad, Body, Strain
 from rotfem.mechanics.problem import Problem
 from rotfem.structures.beam import Beam
-from rotfem.structures.structure import Array
 
 
 class PlanarBeam(Beam):
@@ -37,13 +34,8 @@ class PlanarBeam(Beam):
     def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):
         s = problem.structure
         super().__init__(problem, comm, s.knots, s.nodes)
-        for name in s.section.at(np.zeros(1)):
-            self.section[name] = self.profile(name, partial(self._property, name))
+        self.read_section(s.section.at)
         self.scalar("hub_radius", self.hub_radius)
-
-    def _property(self, name: str, x: Array) -> Array:
-        properties: dict[str, Array] = self.data.section.at(x)
-        return properties[name]
 
     # --- kinematics ---------------------------------------------------------------------------------------------
 

@@ -73,18 +73,15 @@ class RootReaction:
         space = structure.V.dofmap
         owned = space.index_map.size_local
         nodes = structure.clamped[structure.clamped < owned]
-        arms = structure.V.tabulate_dof_coordinates()[nodes] - self.point
         components = structure.components
         turns: tuple[int, ...] = (2,) if structure.planar else (0, 1, 2)
         if not any(name in TURNS for name in components):
             turns = ()
-        columns = {f"f{i + 1}": self._moved(arms, np.eye(3)[i]) for i in range(3) if f"u{i + 1}" in components}
-        columns |= {f"m{i + 1}": self._turned(arms, np.eye(3)[i]) for i in turns}
-        self.names = tuple(columns)
-        self.weights: Array = np.zeros((owned * structure.size, len(columns)))
-        rows = nodes[:, None] * structure.size + np.arange(structure.size)
-        for out, values in zip(self.weights.T, columns.values(), strict=True):
-            out[rows] = values
+        forces = (i for i in range(3) if f"u{i + 1}" in components)
+        self.names = (*(f"f{i + 1}" for i in forces), *(f"m{i + 1}" for i in turns))
+        rows = (nodes[:, None] * structure.size + np.arange(structure.size)).ravel()
+        self.weights: Array = np.zeros((owned * structure.size, len(self.names)))
+        self.weights[rows] = self.carried()[rows]
 
     def carried(self, q: Array | None = None) -> Array:
         """Return what all owned unknowns change by in the unit motions if the whole structure goes along.
@@ -135,16 +132,16 @@ class RootReaction:
         parts = {f"u{i + 1}": direction[i] for i in range(3)}
         return np.tile([parts.get(name, 0.0) for name in self._structure.unknowns], (len(arms), 1))
 
-    def _turned(self, arms: Array, axis: Array, theta: Array | None = None) -> Array:
+    def _turned(self, arms: Array, axis: Array, theta: Array) -> Array:
         """Return what they change by in a unit turn about an axis through the point, (nodes, unknowns).
 
         Args:
             arms: of the nodes, from the point, (nodes, 3) in m.
             axis: of the turn, (3,).
-            theta: rotation vectors there, (nodes, 3); zero if None.
+            theta: rotation vectors there, (nodes, 3).
         """
         moved = np.cross(axis, arms)
-        vectors = axis if theta is None else turned_vectors(theta, axis)
+        vectors = turned_vectors(theta, axis)
         out: Array = np.zeros((len(arms), self._structure.size))
         for column, name in zip(out.T, self._structure.unknowns, strict=True):
             if name in TURNS:

@@ -138,8 +138,7 @@ class SectionForms:
 
     def _read_central(self) -> None:
         beam, data = self._beam, self._data
-        for name in data.central(np.zeros(1)):
-            beam.section[name] = beam.profile(name, partial(self._central, name))
+        beam.read_section(data.central)
         self.mass = beam.section["mass_per_length"]
         self.mass_center = (0, *self._center("mass_center"))
         self._turned = None
@@ -159,10 +158,6 @@ class SectionForms:
             return y, z
         c, s = self._turned
         return c * y - s * z, s * y + c * z
-
-    def _central(self, name: str, x: Array) -> Array:
-        central: dict[str, Array] = self._data.central(x)
-        return central[name]
 
     def _center(self, name: str) -> tuple[Any, Any]:
         """Return the components (y, z) of a centre: fields of a table, else constants, or 0 where they vanish."""
