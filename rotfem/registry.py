@@ -84,10 +84,7 @@ class Registry(Generic[E]):
 theories: Registry[Any] = Registry("theory", "rotfem.mechanics.theories")
 effects: Registry[Any] = Registry("effect", "rotfem.mechanics.effects")
 schemes: Registry[Any] = Registry(
-    "scheme",
-    "rotfem.analysis.alpha_family",
-    "rotfem.analysis.esdirk",
-    "rotfem.analysis.radau",
+    "scheme", "rotfem.analysis.alpha_family", "rotfem.analysis.esdirk", "rotfem.analysis.radau"
 )
 shapes: Registry[Any] = Registry("section shape", "rotfem.scene.section_shapes")
 outputs: Registry[Any] = Registry("output", "rotfem.mechanics.problem")

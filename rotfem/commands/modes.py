@@ -145,7 +145,7 @@ def _modes(scene: Scene, problem: ProblemData, comm: MPI.Comm, sensitivities: bo
     )
     if done.shapes:
         done.surface = surface_of(analysis.structure, next(iter(done.shapes.values())))
-        done.fields = modes_writer(analysis, done, found.scaled, scene.output.formats)
+        done.fields = modes_writer(analysis, done, found.scaled, scene.output.fields)
     if sensitivities:
         from rotfem.analysis.sensitivity import sensitivities as derivatives
 

@@ -196,7 +196,7 @@ class Recorder:
         pitch = () if system.motion.pitch is None else ("pitch",)
         columns = ("t", "psi", "psi_dot", *names, *energies, *root, *free, *pitch)
         self._last: State | None = None
-        self.formats = ("xdmf",) if output is None else output.formats
+        self.formats = ("xdmf",) if output is None else output.fields
         self.snapshots = Snapshots() if self.formats else None
         stations = output is not None and output.stations is not None
         self.stations = StationRows(system, output) if stations and output is not None else None

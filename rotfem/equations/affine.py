@@ -212,10 +212,6 @@ class AffineSystem(System):
             return super().mass_damping_stiffness()
         return self._operators["M"], self.with_modes(self._operators["C"], 1.0), self._operators["K"]
 
-    @cached_property
-    def _spun(self) -> Any:
-        return compat.create_vector(self.V)
-
     def spin_derivative(self, c_v: float, c_m: float) -> Any:
         """Return c_v ∂F/∂Omega + c_m ∂F/∂Omega' of the state, a PETSc vector (reused): the speed varies."""
         axis, out = self._decomposed.axis, self._spun

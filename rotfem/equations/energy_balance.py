@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import ufl
-from dolfinx import fem, la
+from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from petsc4py import PETSc
 
@@ -57,8 +57,7 @@ class EnergyBalance(Solutions):
         self._shifts = [system.structure.constant(c) for c in (1.0, 0.0, 0.0)]
         self._F, self._J = forms.form(self._residual), forms.form(self._tangent)
         self.A = fem_petsc.create_matrix(self._J)
-        self._b = la.vector(system.V.dofmap.index_map, system.V.dofmap.index_map_bs)
-        self.b, self._inertia = compat.wrap(self._b), compat.create_vector(system.V)
+        self._inertia = compat.create_vector(system.V)
         self._moved = compat.wrap(self._move.x)
         self._owned = slice(0, system.V.dofmap.index_map.size_local * system.V.dofmap.index_map_bs)
         self._factor = self._due = 0.0
@@ -169,16 +168,8 @@ class EnergyBalance(Solutions):
             force = part.times(self._state[1][self._owned])
             work -= self._product(force, self._move.x.array[self._owned], slice(None))
         if self.system.clamp is not None:
-            work += self._product(self._assembled(), self._move.x.array, self.system.clamped)
+            work += self._product(self.system.sum_of([self._F]), self._move.x.array, self.system.clamped)
         return float(work)
-
-    def _assembled(self) -> Array:
-        self._b.array[:] = 0.0
-        fem.assemble_vector(self._b.array, self._F)
-        if self.comm.size > 1:
-            self._b.scatter_reverse(la.InsertMode.add)
-        b: Array = self._b.array
-        return b
 
     def _product(self, x: Array, y: Array, chosen: Any = None) -> float:
         chosen = self._owned if chosen is None else chosen
@@ -189,14 +180,14 @@ class EnergyBalance(Solutions):
 
     def residual(self) -> Any:
         """Return −(F̄ + λ N Δq) at the state set, zero at clamped unknowns."""
-        b = self._assembled()
+        b = self.system.sum_of([self._F])
         if self.model.hub is None:
             self._balance(b)
         if (part := self.system.by_mode) is not None:
             b[self._owned] += part.times(self._state[1][self._owned])
         np.negative(b, out=b)
         b[self.system.clamped] = 0.0
-        return self.b
+        return self.system.b
 
     def _balance(self, b: Array) -> None:
         """Add λ N Δq to the assembled F̄."""

@@ -308,10 +308,7 @@ class Model:
         turning = motion.is_spinning and bool(np.any(np.cross(gravity, motion.axis)))
         steady = all(load.is_zero or load.constant for load in self.problem.loads.named.values())
         dead = all(load.dead and load.conservative for load in self.mechanics.loads)
-        known = all(
-            effect.work is None or effect.momentum or effect.passive or effect.potential is not None
-            for effect in self.acting.values()
-        )
+        known = all(e.work is None or e.momentum or e.passive or e.potential is not None for e in self.acting.values())
         sprung = self.fixed and bool(self.structure.hinges)  # the hub turns their springs
         return motion.hub is None and motion.constant and not (turning or sprung) and steady and dead and known
 
@@ -320,10 +317,8 @@ class Model:
         """Whether nothing but torque and brake of a free hub gives energy to it and the structure, which feels it."""
         loads, motion = self.problem.loads, self.motion
         none = all(load.is_zero for load in loads.named.values()) and not np.any(loads.gravity)
-        known = all(
-            effect.work is None or effect.momentum or effect.passive or (effect.potential and not effect.internal)
-            for effect in self.acting.values()
-        )
+        passive = (e.momentum or e.passive or (e.potential and not e.internal) for e in self.acting.values() if e.work)
+        known = all(passive)
         whole = "hub_coupling" in self.effects
         return motion.hub is not None and not motion.is_accelerated and none and known and whole
 

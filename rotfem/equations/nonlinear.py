@@ -335,10 +335,6 @@ class NonlinearSystem(System):
     def _by_spin(self) -> BySpin:
         return BySpin(self.model, self._residual_form)
 
-    @cached_property
-    def _spun(self) -> Any:
-        return compat.create_vector(self.V)
-
     def spin_derivative(self, c_v: float, c_m: float) -> Any:
         """Return c_v ∂F/∂Omega + c_m ∂F/∂Omega' at the state, a PETSc vector (reused), zero at clamped unknowns."""
         if self._by_spin.ufl is None:

@@ -81,19 +81,17 @@ class Solutions:
             q, v, a = (x.copy() for x in self._state)
             known = {"t": self.model.time, "q": q, "v": v, "a": a, "shifts": shifts, "before": before}
             self.factored = {**known, "reference": self.reference}
-        assembled = perf_counter()
-        dq = self._dx.solve(self.factor(A, changed), b)
-        self.seconds["assemble"] += assembled - started
-        self.seconds["solve"] += perf_counter() - assembled
-        return dq
+        return self._timed(started, b, A, changed)
 
     def chord(self) -> Array:
         """Return the correction of q at the state with the factor at hand."""
         started = perf_counter()
-        b = self.residual()
+        return self._timed(started, self.residual())
+
+    def _timed(self, started: float, b: Any, A: Any = None, changed: bool = False) -> Array:
+        """Return the solution of A x = b, of the factor at hand without A, and count the time of its two parts."""
         assembled = perf_counter()
-        assert self._solver is not None
-        dq = self._dx.solve(self._solver, b)
+        dq = self._dx.solve(self.factor(A, changed), b)
         self.seconds["assemble"] += assembled - started
         self.seconds["solve"] += perf_counter() - assembled
         return dq

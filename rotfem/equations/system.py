@@ -181,6 +181,10 @@ class System(Solutions, ABC):
         self.model.switch_off(self.left_out)
         self._damped = EFFECT not in effects
 
+    @cached_property
+    def _spun(self) -> Any:
+        return compat.create_vector(self.V)
+
     @property
     def by_mode(self) -> ByMode | None:
         """The part of C that is damping by mode; None without, and where damping is left out."""

@@ -76,11 +76,7 @@ def gradient(t: Any) -> Any:
 def triad(alpha: Any) -> tuple[Any, Any, Any]:
     """Return (t_1, t_2, t): a_1, a_2, a_3 turned by R_2(−alpha_1) R_1(alpha_2)."""
     c1, s1, c2, s2 = ufl.cos(alpha[0]), ufl.sin(alpha[0]), ufl.cos(alpha[1]), ufl.sin(alpha[1])
-    return (
-        ufl.as_vector((c1, 0, s1)),
-        ufl.as_vector((-s1 * s2, c2, c1 * s2)),
-        ufl.as_vector((-s1 * c2, -s2, c1 * c2)),
-    )
+    return (ufl.as_vector((c1, 0, s1)), ufl.as_vector((-s1 * s2, c2, c1 * s2)), ufl.as_vector((-s1 * c2, -s2, c1 * c2)))
 
 
 def director(alpha: Any, exact: bool = True) -> Any:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import Field, PlainValidator, ValidationInfo, model_validator
+from pydantic import Field, PlainValidator, model_validator
 
 from rotfem.scene.files import existing_file
 from rotfem.scene.structure import Damping, StructureTable, check_one_hub
@@ -53,10 +53,6 @@ def _as_point_masses(value: Any) -> Matrix:
     return rows
 
 
-def _as_mesh_file(value: Any, info: ValidationInfo) -> str:
-    return str(existing_file(value, info))
-
-
 #: What a stiffness of a plate is called ↦ the power of the thickness that a modulus is multiplied with.
 _POWERS = {" h": 1, " h³": 3}
 
@@ -94,7 +90,7 @@ class PlateStructure(StructureTable):
     type: Literal["plate"] = "plate"
     length: Positive | None = None
     width: Positive | None = None
-    mesh: Annotated[str, PlainValidator(_as_mesh_file)] | None = None
+    mesh: Annotated[str, PlainValidator(lambda value, info: str(existing_file(value, info)))] | None = None
     thickness: Annotated[float | Taper | dict[str, float], PlainValidator(_as_thickness)] = Field(
         description="a number greater than 0 (m), a taper [[x, thickness], …], or with a mesh a table of regions"
     )

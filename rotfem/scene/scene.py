@@ -349,7 +349,7 @@ def check_planar(motion: Motion, loads: Loads) -> None:
 def check_mesh(structure: Any, mesh: BeamMesh | PlateMesh) -> None:
     """Refuse a mesh that is given both as a file and by numbers of elements, and elements that lock."""
     if structure.mesh_file is None:
-        if (why := mesh.locking) is not None:
+        if isinstance(mesh, PlateMesh) and (why := mesh.locking_on(mesh.cell)) is not None:
             raise problem("mesh.degree", mesh.degree, why)
         return
     for key in ("elements", "cell"):

@@ -11,6 +11,7 @@ axial strain Γ₁ + z K₂ − y K₃; bending about axis 2 is therefore flap i
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Annotated, Any, ClassVar, Self, TypeAlias
 
 import numpy as np
@@ -196,10 +197,6 @@ class PlanarSection(Section):
 # --- spatial beams ----------------------------------------------------------------------------------------------------
 
 
-def _as_stiffness(value: Any) -> Matrix | MatrixTable:
-    return as_matrix_or_table(value, definite=True)
-
-
 def _as_mass(value: Any) -> Matrix | MatrixTable:
     """Return a mass matrix or a table of them; raise on any that no rigid mass has."""
     read = as_matrix_or_table(value, definite=False)
@@ -280,7 +277,7 @@ class SpatialSection(Section):
     tension_center: Center | None = None
     polar_radius: NonNegativeProfile | None = None
     principal_angle: AnyProfile | None = None
-    stiffness: Annotated[Matrix | MatrixTable, PlainValidator(_as_stiffness)] | None = None
+    stiffness: Annotated[Matrix | MatrixTable, PlainValidator(partial(as_matrix_or_table, definite=True))] | None = None
     mass: Annotated[Matrix | MatrixTable, PlainValidator(_as_mass)] | None = None
 
     @property

@@ -21,10 +21,6 @@ from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
 STATIONS = 10_000
 
 
-def _as_theory(value: Any) -> str:
-    return as_name(value, registry.theories)
-
-
 def _as_effects(value: Any) -> str | tuple[str, ...]:
     return "auto" if value == "auto" else as_names(value, registry.effects.names, "an effect", '"auto" or ')
 
@@ -65,7 +61,7 @@ class Model(SceneModel):
         all_unknowns: whether unknowns that are zero by symmetry are unknowns of a history all the same.
     """
 
-    theory: Annotated[str, PlainValidator(_as_theory)] = "reissner"
+    theory: Annotated[str, PlainValidator(lambda value: as_name(value, registry.theories))] = "reissner"
     effects: Annotated[str | tuple[str, ...], PlainValidator(_as_effects)] = "auto"
     frame: Literal["rotating", "inertial"] = "rotating"
     prestress: Literal["axial", "all"] | None = None
@@ -153,11 +149,6 @@ class BeamMesh(SceneModel):
     degree: Degree = 3
     integration: Integration = "reduced"
 
-    @property
-    def locking(self) -> str | None:
-        """Why the elements lock; None, as those of beams are not refused."""
-        return None
-
     def suited(self, structure: Any) -> Self:
         """Return the mesh: the defaults of beams suit all lengths."""
         return self
@@ -178,11 +169,6 @@ class PlateMesh(SceneModel):
     degree: Degree = 2
     cell: Literal["quadrilateral", "triangle"] = "quadrilateral"
     integration: Integration = "reduced"
-
-    @property
-    def locking(self) -> str | None:
-        """Why the elements of a rectangle lock; None if they do not."""
-        return self.locking_on(self.cell)
 
     def suited(self, structure: Any) -> Self:
         """Return the mesh with the counts that suit a rectangle, where none are given."""
@@ -332,8 +318,8 @@ class Time(SceneModel):
 
 def _as_orders(value: Any) -> tuple[int, ...]:
     integer = Bounds(ge=1).integer
-    if not isinstance(value, list | tuple) or len(value) > ORDERS:
-        raise problem("", value, f"must be a list of at most {ORDERS} multiples of the speed, such as [1, 3, 6, 9]")
+    if not isinstance(value, list | tuple) or len(value) > 100:
+        raise problem("", value, "must be a list of at most 100 multiples of the speed, such as [1, 3, 6, 9]")
     return tuple(sorted({integer(k) for k in value}))
 
 
@@ -344,10 +330,6 @@ def _as_speed_range(value: Any) -> tuple[float, float]:
     if not low < high:
         raise problem("", value, "must be two speeds that increase")
     return low, high
-
-
-#: Most lines kΩ of a diagram.
-ORDERS = 100
 
 
 class Modes(SceneModel):
@@ -406,8 +388,7 @@ def _as_stations(value: Any) -> int | tuple[float, ...]:
     return tuple(float(x) for x in value)
 
 
-def _as_formats(value: Any) -> tuple[str, ...]:
-    return as_names(value, ("vtx", "xdmf"), "a format")
+_FIELDS = ("vtx", "xdmf")
 
 
 class OutputTable(SceneModel):
@@ -420,7 +401,7 @@ class OutputTable(SceneModel):
             from end to end.
         every: rows of history.csv from one record of the stations to the next.
         format: of the file that they go to.
-        fields: formats of the files for ParaView, "vtx" and "xdmf"; XDMF if not given.
+        fields: formats of the files for ParaView, "vtx" and "xdmf".
         error: whether the error of what is computed is estimated.
         speed: unit in which speeds are printed and drawn; that of motion.speed if not given.
         frequency: unit in which frequencies of modes are printed and drawn.
@@ -430,7 +411,7 @@ class OutputTable(SceneModel):
     stations: Annotated[int | tuple[float, ...] | None, PlainValidator(_as_stations)] = None
     every: Count = 1
     format: Literal["csv", "hdf5"] = "csv"
-    fields: Annotated[tuple[str, ...] | None, PlainValidator(_as_formats)] = None
+    fields: Annotated[tuple[str, ...], PlainValidator(lambda value: as_names(value, _FIELDS, "a format"))] = ("xdmf",)
     error: bool = True
     speed: AngularUnit = "rad/s"
     frequency: AngularUnit = "rad/s"
@@ -448,11 +429,6 @@ class OutputTable(SceneModel):
         """Return the quantities that a beam of a type is to have recorded at its stations: those named, or all."""
         known = (*FORCES[kind], *STRAINS[kind])
         return tuple(name for name in self.quantities if name in known) or known
-
-    @property
-    def formats(self) -> tuple[str, ...]:
-        """The formats of the files for ParaView."""
-        return ("xdmf",) if self.fields is None else self.fields
 
     def positions(self, length: float) -> tuple[float, ...]:
         """Return the stations along a beam of a length, m; empty if there are none."""

@@ -65,14 +65,7 @@ def radius_of(C: Any) -> Any:
 
 
 #: Strains in the order of the section matrices, and the stiffness of each.
-STRAINS = {
-    "axial": "EA",
-    "shear_2": "GA2",
-    "shear_3": "GA3",
-    "torsion": "GJ",
-    "bending_2": "EI2",
-    "bending_3": "EI3",
-}
+STRAINS = {"axial": "EA", "shear_2": "GA2", "shear_3": "GA3", "torsion": "GJ", "bending_2": "EI2", "bending_3": "EI3"}
 
 #: Part of the largest entry below which an entry of a mass matrix or an inertia tensor counts as zero.
 NEGLIGIBLE = 1e-12
