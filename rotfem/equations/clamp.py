@@ -37,59 +37,6 @@ Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 
 
-class HubDamping:
-    """What these forces of a nonlinear theory make of rigid motions.
-
-    Args:
-        system: equations of motion of the structure, in a rotating frame if there is such damping.
-    """
-
-    def __init__(self, system: Any):
-        self._system = system
-
-    @cached_property
-    def _by_mass(self) -> list[Any]:
-        """The work of a0 M v, compiled; empty without."""
-        model = self._system.model
-        m = model.mechanics
-        if EFFECT not in model.effects or m.damping.mass is None:
-            return []
-        alone = replace(m, damping=replace(m.damping, stiffness=None))
-        return [forms.form(model.switches[EFFECT] * work.damping(alone, Variation(m.k)), once=True)]
-
-    def tangent(self, M: Any) -> Array | float:
-        """Return what small velocities about a state at rest add to it, (owned unknowns, motions); 0 of none.
-
-        Args:
-            M: mass matrix at the state, with the rows of the clamp.
-        """
-        system, by_mode = self._system, self._system.by_mode
-        mass = system.model.mechanics.damping.mass if EFFECT in system.model.effects else None
-        if mass is None and by_mode is None:
-            return 0.0
-        rigid = system.root.carried(system.q.x.array)
-        out: Array = np.zeros_like(rigid)
-        if mass is not None:
-            out += float(mass.value) * times(M, rigid)
-        if by_mode is not None:
-            out += by_mode.times(rigid)
-        return out
-
-    def __call__(self) -> Array | float:
-        """Return the part of this process in their work in the unit motions at the state set, (motions,); 0 of none."""
-        system, by_mode = self._system, self._system.by_mode
-        if not self._by_mass and by_mode is None:
-            return 0.0
-        q, v = system.q.x.array, system.v.x.array
-        owned = len(system.root.weights)
-        force: Array = np.zeros(owned)
-        if self._by_mass:
-            force += system.sum_of(self._by_mass)[:owned]
-        if by_mode is not None:
-            force += by_mode.times(v[:owned])
-        return np.asarray(force @ system.root.carried(q))
-
-
 class ClampWork:
     """The forces that hold the clamped unknowns, in the unit motions of `rotfem.structures.root_reaction`.
 
@@ -103,7 +50,6 @@ class ClampWork:
         fixed[system.clamped] = True
         self._motions: Array = weights[system.clamped]
         self._held, self._turns = np.where(fixed, weights, 0.0), np.where(fixed, 0.0, weights)  # those of hinges
-        self._damping = HubDamping(system)
 
     def __call__(self, residual: Array) -> Array:
         """Return the part of this process in their work at the state set, (motions,), of F with its clamped rows."""
@@ -136,7 +82,47 @@ class ClampWork:
             for part, x in ((K, system.q), (C, system.v)):
                 slope = forms.form(ufl.derivative(terms, x, du), once=True)
                 part -= rows_times(system.whole_of([slope]), self._turns)
-        return K, C - self._damping.tangent(wholes["M"]), M
+        return K, C - self._damping_tangent(wholes["M"]), M
+
+    # --- forces between the hub and all of the structure ----------------------------------------------------------
+
+    @cached_property
+    def _by_mass(self) -> list[Any]:
+        """The work of a0 M v, compiled; empty without."""
+        model = self._system.model
+        m = model.mechanics
+        if EFFECT not in model.effects or m.damping.mass is None:
+            return []
+        alone = replace(m, damping=replace(m.damping, stiffness=None))
+        return [forms.form(model.switches[EFFECT] * work.damping(alone, Variation(m.k)), once=True)]
+
+    def _damping_tangent(self, M: Any) -> Array | float:
+        """Return what small velocities add to them, (owned unknowns, motions), of M with the rows of the clamp."""
+        system, by_mode = self._system, self._system.by_mode
+        mass = system.model.mechanics.damping.mass if EFFECT in system.model.effects else None
+        if mass is None and by_mode is None:
+            return 0.0
+        rigid = system.root.carried(system.q.x.array)
+        out: Array = np.zeros_like(rigid)
+        if mass is not None:
+            out += float(mass.value) * times(M, rigid)
+        if by_mode is not None:
+            out += by_mode.times(rigid)
+        return out
+
+    def _damping(self) -> Array | float:
+        """Return the part of this process in the work of these forces at the state set, (motions,); 0 of none."""
+        system, by_mode = self._system, self._system.by_mode
+        if not self._by_mass and by_mode is None:
+            return 0.0
+        q, v = system.q.x.array, system.v.x.array
+        owned = len(system.root.weights)
+        force: Array = np.zeros(owned)
+        if self._by_mass:
+            force += system.sum_of(self._by_mass)[:owned]
+        if by_mode is not None:
+            force += by_mode.times(v[:owned])
+        return np.asarray(force @ system.root.carried(q))
 
 
 def rows_times(A: Any, columns: Array) -> Array:

@@ -109,40 +109,23 @@ class Mechanics:
 # --- terms of the residual --------------------------------------------------------------------------------------------
 
 
-def _of_acceleration(m: Mechanics, delta: Any, acceleration: Callable[[Body], Any]) -> Any:
-    """Return Σ ∫ ρ a·δx over the bodies that feel an acceleration."""
-    felt = ((body, a) for body in m.bodies if (a := acceleration(body)) is not None)
-    return added(body.density * ufl.inner(a, delta.of(body)) * body.measure for body, a in felt)
+def _work_of(law: str, acceleration: Callable[[Mechanics, Body], Any]) -> Callable[[Mechanics, Any], Any]:
+    """Return the effect Σ ∫ ρ a·δx over the bodies that feel an acceleration a, None of those that do not."""
+
+    def work(m: Mechanics, delta: Any) -> Any:
+        felt = ((body, a) for body in m.bodies if (a := acceleration(m, body)) is not None)
+        return added(body.density * ufl.inner(a, delta.of(body)) * body.measure for body, a in felt)
+
+    work.__doc__ = f"Return the work of {law}."
+    return work
 
 
-def inertia(m: Mechanics, delta: Any) -> Any:
-    """Return the work of ẍ, the acceleration relative to the frame."""
-    return _of_acceleration(m, delta, lambda body: body.second_rate(m.k))
-
-
-def coriolis(m: Mechanics, delta: Any) -> Any:
-    """Return the work of 2 w×ẋ."""
-    return _of_acceleration(m, delta, lambda body: 2 * cross(body.resolve(m.frame.w), body.rate(m.k)))
-
-
-def centrifugal(m: Mechanics, delta: Any) -> Any:
-    """Return the work of w×(w×x)."""
-    return _of_acceleration(m, delta, lambda body: cross(body.resolve(m.frame.w), m.carried(body)))
-
-
-def euler(m: Mechanics, delta: Any) -> Any:
-    """Return the work of ẇ×x."""
-    return _of_acceleration(m, delta, lambda body: cross(body.resolve(m.frame.dw), body.x))
-
-
-def base(m: Mechanics, delta: Any) -> Any:
-    """Return the work of a_o, felt by positions only."""
-    return _of_acceleration(m, delta, lambda body: m.frame.a_o if body.is_position else None)
-
-
-def gravity(m: Mechanics, delta: Any) -> Any:
-    """Return the work of −g, felt by positions only."""
-    return _of_acceleration(m, delta, lambda body: -m.frame.gravity if body.is_position else None)
+inertia = _work_of("ẍ, the acceleration relative to the frame", lambda m, b: b.second_rate(m.k))
+coriolis = _work_of("2 w×ẋ", lambda m, b: 2 * cross(b.resolve(m.frame.w), b.rate(m.k)))
+centrifugal = _work_of("w×(w×x)", lambda m, b: cross(b.resolve(m.frame.w), m.carried(b)))
+euler = _work_of("ẇ×x", lambda m, b: cross(b.resolve(m.frame.dw), b.x))
+base = _work_of("a_o, felt by positions only", lambda m, b: m.frame.a_o if b.is_position else None)
+gravity = _work_of("−g, felt by positions only", lambda m, b: -m.frame.gravity if b.is_position else None)
 
 
 def internal(m: Mechanics, delta: Variation) -> Any:
@@ -233,19 +216,14 @@ def kinetic_parts(m: Mechanics) -> dict[str, Callable[[], Any]]:
     }
 
 
-def _potential_in(m: Mechanics, field: Any) -> Any:
-    """Return −∫ ρ field·x over the positions, field an acceleration (m/s²)."""
-    return added(-b.density * ufl.inner(field, b.x) * b.measure for b in m.bodies if b.is_position)
-
-
 def potential_of_base(m: Mechanics) -> Any:
-    """Return ∫ ρ a_o·x."""
-    return _potential_in(m, -m.frame.a_o)
+    """Return ∫ ρ a_o·x over the positions."""
+    return added(b.density * ufl.inner(m.frame.a_o, b.x) * b.measure for b in m.bodies if b.is_position)
 
 
 def potential_of_gravity(m: Mechanics) -> Any:
-    """Return −∫ ρ g·x."""
-    return _potential_in(m, m.frame.gravity)
+    """Return −∫ ρ g·x over the positions."""
+    return added(-b.density * ufl.inner(m.frame.gravity, b.x) * b.measure for b in m.bodies if b.is_position)
 
 
 def potential_of_root_springs(m: Mechanics) -> Any:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,14 +26,12 @@ class Amplitude:
     """The components of a vector that is the same everywhere: a constant of the forms.
 
     Attributes:
-        spread: whether these are factors of shapes over the span, not the components of a vector.
         follows_nodes: whether these are values at the nodes of the mesh, not amplitudes of the load itself.
         dead: whether it keeps its direction in the frame of the hub.
         value: the amplitudes, the same on every process; what is written there holds after `update`.
         vector: the force in the forms.
     """
 
-    spread: ClassVar[bool] = False
     follows_nodes: bool = False
     dead: bool = True
 
@@ -63,8 +61,6 @@ class SpanField(Amplitude):
         places: number of each local node among all of these, then.
         size: number of amplitudes.
     """
-
-    spread = True
 
     def __init__(self, function: fem.Function, basis: Array | None, places: npt.NDArray[np.int64] | None, size: int):
         self._function, self._basis, self._places = function, basis, places
