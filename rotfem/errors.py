@@ -55,10 +55,7 @@ class InputError(ValueError):
 
 @contextmanager
 def input_of(file: str) -> Iterator[None]:
-    """Say of which scene file an `InputError` is.
-
-    Args:
-        file: name of the file as errors show it.
+    """Say of which scene file, by its name, an `InputError` is.
 
     Raises:
         SceneError: in the place of an `InputError` that names no file.

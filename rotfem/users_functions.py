@@ -19,10 +19,6 @@ Array = npt.NDArray[np.float64]
 def called(key: str, what: str) -> Iterator[None]:
     """Let what a user's function raises be an error of a key.
 
-    Args:
-        key: key of the scene, or argument of a call.
-        what: the function, in words.
-
     Raises:
         InputError: from the error, in its place.
     """

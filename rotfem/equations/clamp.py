@@ -38,11 +38,7 @@ Index = npt.NDArray[np.int64]
 
 
 class ClampWork:
-    """The forces that hold the clamped unknowns, in the unit motions of `rotfem.structures.root_reaction`.
-
-    Args:
-        system: equations of motion of the structure.
-    """
+    """The forces that hold the clamped unknowns, in the unit motions of `rotfem.structures.root_reaction`."""
 
     def __init__(self, system: Any):
         self._system, weights = system, system.root.weights
@@ -141,13 +137,7 @@ def rows_times(A: Any, columns: Array) -> Array:
 
 
 class AtClamp:
-    """Says what an operator, its clamp not held, does in the unit motions of the clamp, of this process.
-
-    Args:
-        model: the terms that operators are of.
-        clamped: local numbers of the clamped unknowns.
-        root: unit motions of the clamp.
-    """
+    """Says what an operator, its clamp not held, does in the unit motions of the clamp, of this process."""
 
     def __init__(self, model: Model, clamped: npt.NDArray[Any], root: RootReaction):
         self._model, self._V = model, model.structure.V
@@ -172,12 +162,7 @@ class AtClamp:
         return np.asarray(b.array[rows.getIndices() - b.getOwnershipRange()[0]] @ motions)
 
     def of_matrix(self, A: Any, of: Collection[str]) -> Array:
-        """Return a row for each owned unknown.
-
-        Args:
-            A: PETSc matrix.
-            of: terms that it is of (see `Piece`).
-        """
+        """Return a row for each owned unknown, of a matrix of some terms (see `Piece`)."""
         if any(self._model.acting[n].at_root for n in of if n in self._model.acting):
             return -self._times(A, self._turns)
         if EFFECT in of and self._others is not None:  # the hub takes up what strains do not (see `hub_damping`)
@@ -198,12 +183,7 @@ class AtClamp:
 
 
 class ClampRows:
-    """Sums of pieces in the unit motions of the clamp (see `rotfem.structures.root_reaction`), of this process.
-
-    Args:
-        pieces: all of them.
-        motions: number of unit motions.
-    """
+    """Sums of pieces in the unit motions of the clamp (see `rotfem.structures.root_reaction`), of this process."""
 
     def __init__(self, pieces: Sequence[Any], motions: int):
         self._motions = motions
@@ -228,12 +208,7 @@ class ClampRows:
         return out[0], out[1], out[2]
 
     def __call__(self, c: Array, state: tuple[Array, ...]) -> Array:
-        """Return the forces of the clamp, (motions,).
-
-        Args:
-            c: factors of all pieces.
-            state: local dof arrays of q, v, a.
-        """
+        """Return the forces of the clamp, (motions,), at factors of all pieces and local arrays of q, v, a."""
         out: Array = c[self._kinds["f"]] @ self._loads
         for kind, x in zip("KCM", state, strict=True):
             near, products = self._near[kind]

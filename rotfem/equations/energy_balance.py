@@ -40,11 +40,7 @@ MADE_UP = 1e-3
 
 
 class EnergyBalance(Solutions):
-    """The equations of a nonlinear system over a step; what it does not say itself is that of the system.
-
-    Args:
-        system: the equations of motion.
-    """
+    """The equations of a nonlinear system over a step; what it does not say itself is that of the system."""
 
     keeps_factor = False
 

@@ -69,13 +69,9 @@ def rigid_body(model: Model) -> RigidBody:
 
 
 class Functionals:
-    """Values of functionals, compiled as one form with a constant in every cell for each of them.
+    """Values of functionals, name ↦ UFL form, compiled as one form with a constant in every cell for each of them.
 
     The unknowns of a cell are read once, and what functionals share is computed once.
-
-    Args:
-        parts: name ↦ UFL form of rank 0.
-        mesh: what they are integrated over.
     """
 
     def __init__(self, parts: dict[str, Any], mesh: Any):

@@ -37,13 +37,7 @@ def geometric_stiffness(model: Model, state: tuple[Any, Any], u: Any, w: Any, th
 
 
 def second_order_work(model: Model, displacements: tuple[Any, Any], test: Any) -> Any:
-    """Return ∫ N(δq)·D²Γ[a, b] at rest, a UFL form, with all exact strains Γ and the forces N of a linear theory.
-
-    Args:
-        model: of a linear theory.
-        displacements: a and b, functions of the unknowns.
-        test: δq.
-    """
+    """Return ∫ N(δq)·D²Γ[a, b] at rest, a UFL form, with all exact strains Γ and the forces N of a linear theory."""
     s, out = model.structure, 0
     q, exact = s.k.functions[0], {strain.name: strain.value for strain in model.strains(richest().measures(s.type))}
     for strain in model.mechanics.strains:
@@ -55,14 +49,7 @@ def second_order_work(model: Model, displacements: tuple[Any, Any], test: Any) -
 
 
 def strain_work(model: Model, q: Any, linear: Any, test: Any) -> Any:
-    """Return ∫ N(δq)·(Γ(q) − Γ'(0) u), a UFL form, with exact strains Γ and the forces N of a linear theory.
-
-    Args:
-        model: of a linear theory.
-        q: a displacement, a function of the unknowns.
-        linear: u, another.
-        test: δq.
-    """
+    """Return ∫ N(δq)·(Γ(q) − Γ'(0) u), a UFL form, with exact strains Γ and the forces N of a linear theory."""
     s, out = model.structure, 0
     own, exact = s.k.functions[0], {strain.name: strain.value for strain in model.strains(richest().measures(s.type))}
     for strain in model.mechanics.strains:

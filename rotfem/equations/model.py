@@ -40,9 +40,6 @@ _KNOWN: dict[tuple[str, str], dict[str, Any]] = {}
 class HubAngle:
     """psi, psi' and psi'' of a free hub, and the motion of the frame that they make.
 
-    Args:
-        motion: what is prescribed: the hub, its axis, the acceleration of its origin.
-
     Attributes:
         values: psi (rad), psi' (rad/s), psi'' (rad/s²).
         hub: inertia, torque, brake.
@@ -167,12 +164,7 @@ class Model:
         return Mechanics(bodies, strains, s.loads(), s.k, self.frame, s.damping(), s)
 
     def strains(self, measures: Callable[..., tuple[Any, ...]], first_order: bool = False) -> list[Strain]:
-        """Return the strains of a theory's measures, with what the effects that are in add to them.
-
-        Args:
-            measures: strain measures of the structure's type.
-            first_order: whether they are of first order in q.
-        """
+        """Return the strains of a theory's measures, of first order in q if that is asked for, with the effects' gains."""
         return self.with_gains(self.structure.strains(measures), first_order)
 
     def with_gains(self, strains: list[Strain], first_order: bool) -> list[Strain]:

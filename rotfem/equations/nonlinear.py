@@ -29,10 +29,6 @@ class BySpin:
 
     The speed along the axis of the motion is varied.
 
-    Args:
-        model: the constants of the frame.
-        form: UFL form; only its integrals with the speed or its rate are differentiated.
-
     Attributes:
         ufl: the derivative, a UFL form; None if the speed is not in the form.
     """

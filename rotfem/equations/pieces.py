@@ -34,11 +34,7 @@ from rotfem.structures.root_reaction import RootReaction
 
 
 def geometric_pieces(pieces: Pieces) -> list[tuple[Piece, Any, frozenset[str]]]:
-    """Return (load piece, its geometric stiffness, which is not zero, the effect that adds it or none) of all.
-
-    Args:
-        pieces: of the loads and of the strains; its switches are all on before and after.
-    """
+    """Return (load piece, its geometric stiffness, which is not zero, the effect that adds it or none) of all."""
     switches = pieces.model.switches
     form, compiled = pieces.known_form("G")
     there = set(form.constants())
@@ -135,11 +131,6 @@ class PolynomialCheck:
 
     The pieces are found with constants that are 0, 1 and −1, which determine a polynomial of second degree by its
     values; c|v|v has values there too, but is none.
-
-    Args:
-        pieces: where the term is assembled; its switches are set.
-        kind: "f", "K", "C" or "M".
-        name: of the term.
     """
 
     def __init__(self, pieces: Pieces, kind: str, name: str):
@@ -166,12 +157,6 @@ class Pieces:
     With a prestressed theory the stiffness gains ∫ N⁰ D²Γ₁[δq, q] where N⁰ is the axial force of the linear structure
     under each load piece (centrifugal, base, gravity, applied) and Γ₁ the axial strain of the theory's second order:
     Simo & Vu-Quoc 1986 eqs. (12), (23) as corrected in docs/theory.md; or that of all its stress resultants.
-
-    Args:
-        model: the terms, of a linear theory.
-        bcs: the clamp.
-        clamped: local numbers of the clamped unknowns.
-        root: unit motions of the clamp.
 
     Attributes:
         at_rest: "f", "K", "C", "M" ↦ UFL form at q = v = a = 0, or what stands for it (`rotfem.numerics.forms.drawn`);
@@ -393,14 +378,7 @@ class Pieces:
         return fem.Function(self.V)
 
     def geometric(self, u: Any, w: Any, base: Any, theory: Theory | None = None) -> Any:
-        """Return ∫ N⁰ D²Γ₁[u, w] with N⁰ of the displacement `base`, a UFL form; 0 where there is no such force.
-
-        Args:
-            u: a displacement, or an argument of the form.
-            w: another.
-            base: what N⁰ is of, likewise.
-            theory: whose second-order strains Γ₁ are taken; those of the model if None.
-        """
+        """Return ∫ N⁰ D²Γ₁[u, w] with N⁰ of the displacement `base`, a UFL form; 0 where there is no such force."""
         theory = theory or self.model.theory
         return geometric_stiffness(self.model, (self.q, base), u, w, theory) if theory.prestress else 0
 

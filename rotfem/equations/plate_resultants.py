@@ -27,12 +27,7 @@ STRAINS = ("membrane", "shear", "bending")
 
 
 def von_mises(values: Array, thickness: Array) -> Array:
-    """Return the largest equivalent stress over the thickness, (…,) in Pa.
-
-    Args:
-        values: n11, n22, n12, q1, q2, m11, m22, m12, (…, 8).
-        thickness: (…,), m.
-    """
+    """Return the largest equivalent stress (…,), Pa, of n, q, m in their order (…, 8) over a thickness (…,), m."""
     h = thickness[..., None]
     n, q, m = values[..., :3] / h, values[..., 3:5] / h, 6 * values[..., 5:] / h**2
 
@@ -45,10 +40,7 @@ def von_mises(values: Array, thickness: Array) -> Array:
 
 
 class PlateResultants:
-    """What a plate carries.
-
-    Args:
-        system: equations of motion of a plate, the hub held.
+    """What a plate carries: the system is that of the plate, its hub held.
 
     Attributes:
         names: of all quantities.

@@ -68,12 +68,7 @@ class Solutions:
         return None
 
     def correction(self, shifts: tuple[float, float, float], before: Array | None = None) -> Array:
-        """Return −(c_k K + c_v C + c_m M)⁻¹ F at the state, Newton's correction of q (a local array, reused).
-
-        Args:
-            shifts: c_k, c_v, c_m.
-            before: q from which a correction has led to the state, if it is known (see `tangent`).
-        """
+        """Return −(c_k K + c_v C + c_m M)⁻¹ F at the state, Newton's correction of q (a local array, reused)."""
         started = perf_counter()
         b = self.residual()
         A, changed = self.tangent(*shifts, before)
@@ -186,9 +181,6 @@ class Linearised:
 
     Schemes whose stages hang together solve for all of them with such matrices, one for each eigenvalue of their
     coefficients, complex ones among them; the matrices serve for as many steps as they are good for, of any length.
-
-    Args:
-        system: equations of motion of a structure.
 
     Attributes:
         reference: what the rotations of the state are counted from.

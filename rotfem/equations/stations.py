@@ -48,9 +48,6 @@ class DampedStress:
         w = Σ_j (2 ζ_j/ω_j) φ_j (φ_jᵀ M v),    for K φ_j = ω_j² M φ_j makes K w = C v
 
     (see `rotfem.equations.modal_damping`). The mass part of Rayleigh damping is no stress.
-
-    Args:
-        system: equations of motion of a structure, the hub held.
     """
 
     def __init__(self, system: Any):
@@ -201,12 +198,7 @@ class Stations:
         return ufl.diff(energy, at), strains
 
     def _read(self, q: Array, v: Array) -> Array:
-        """Return the values of the expression, and those of unknowns (local dof array q), on every rank.
-
-        Args:
-            q: unknowns, counted from the undeformed structure.
-            v: velocities that damping by mode is of.
-        """
+        """Return the values of the expression, and those of unknowns (local dof array q), on every rank; v is for damping."""
         self._damped.update(v)
         values: Array = np.zeros((*self._shape, self._order.stop))
         if len(self._cells):
@@ -227,12 +219,7 @@ class Stations:
 
 
 class StationChanges(Stations):
-    """What small motions about an equilibrium add to what a beam has at its stations.
-
-    Args:
-        system: equations of motion of the beam, the hub held; the equilibrium must be written into it.
-        positions: of the stations, increasing, m.
-    """
+    """What small motions about an equilibrium, written into the system, add to what a beam has at its stations."""
 
     def __init__(self, system: Any, positions: tuple[float, ...]):
         super().__init__(system, positions)

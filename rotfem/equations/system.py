@@ -222,10 +222,7 @@ class System(Solutions, ABC):
     def set_time(self, t: float, motion: Motion | None = None, load_factor: float = 1.0) -> None:
         """Write the frame and load constants of time t (s), for the problem's motion unless another is given.
 
-        Args:
-            t: time, s.
-            motion: another motion than the problem's.
-            load_factor: multiplies loads, gravity and base acceleration (not the spin).
+        The load factor multiplies loads, gravity and base acceleration, not the spin.
         """
         motion = motion or self.motion
         self.model.time = t

@@ -251,12 +251,7 @@ def smooth_spin_up(speed: float, duration: float) -> tuple[Scalar, Scalar, Scala
 
 
 def tabulated(table: npt.ArrayLike, kind: str) -> tuple[Scalar, Scalar, Scalar]:
-    """Return (Omega, dOmega/dt, psi) through the points (t, Omega), held constant outside the table.
-
-    Args:
-        table: rows (t in s, Omega in rad/s), t increasing.
-        kind: "pchip" (monotone, C1), "cubic" (C2 spline) or "linear".
-    """
+    """Return (Omega, dOmega/dt, psi) through rows (t, Omega) by "pchip", "cubic" or "linear", constant outside."""
     from scipy import interpolate  # only a table needs it, and it is slow to load
 
     t, omega = np.asarray(table, dtype=float).T

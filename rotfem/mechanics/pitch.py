@@ -102,12 +102,6 @@ class Pitch:
 
         Beside it "pitch" (cos φ − 1, sin φ) and "pitch_rate", its rate (1/s). Of many times at once all have one more
         dimension, which comes first.
-
-        Args:
-            turn: φ and its two rates (rad, rad/s, rad/s²), each a number or (n,).
-            w: angular velocity of the hub, rad/s, components of its frame, (3,) or (n, 3).
-            dw: its rate, rad/s².
-            a_o: acceleration of the hub's center, m/s², likewise.
         """
         phi, rate, acceleration = (np.asarray(x)[..., None] for x in turn)
         c, s, e, r = np.cos(phi), np.sin(phi), self.axis, self.root

@@ -179,13 +179,7 @@ def triads(alpha: Array) -> Array:
 
 
 def tilts(alpha: Array, v: Array, a: Array) -> tuple[Array, Array]:
-    """Return −t_γ·ṫ (rad/s) and −t_γ·ẗ (rad/s²), (…, 2): rates of angles that are counted from the triad of alpha.
-
-    Args:
-        alpha: angles (…, 2), rad.
-        v: their rates, rad/s.
-        a: their second rates, rad/s².
-    """
+    """Return −t_γ·ṫ (rad/s) and −t_γ·ẗ (rad/s²), (…, 2), of rates v, a: those of angles counted from the triad."""
     c2, s2 = np.cos(alpha[..., 1]), np.sin(alpha[..., 1])
     first = np.stack([c2 * v[..., 0], v[..., 1]], axis=-1)
     second = [c2 * a[..., 0] - 2 * s2 * v[..., 0] * v[..., 1], a[..., 1] + s2 * c2 * v[..., 0] ** 2]

@@ -85,10 +85,6 @@ def compared(theory: Theory, structure: str) -> Theory | None:
     It has the terms whose effect adds up over the time: stress stiffness, which linear theories may lack, and third
     order, which nonlinear ones of moderate rotations lack. None of an exact theory, of a linear one that has stress
     stiffness, and where the richer one has no strains.
-
-    Args:
-        theory: the poorer one.
-        structure: type of the structure.
     """
     if theory.exact or (theory.linear and theory.prestress):
         return None

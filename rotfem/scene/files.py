@@ -241,15 +241,7 @@ def as_time_table(value: Any, info: ValidationInfo, columns: Sequence[int], shap
 
 
 def as_table(value: Any, info: ValidationInfo, columns: Sequence[int], shape: str, read: Reader) -> Matrix:
-    """Return the rows of a table that a reader accepts; messages about a file name the line.
-
-    Args:
-        value: the rows, or the path of a CSV file that holds them.
-        info: of the validation; its context holds the scene's directory.
-        columns: allowed numbers of columns.
-        shape: the expected form in words, for the error message.
-        read: the reader.
-    """
+    """Return the rows of a table, or of the CSV file at a path, that a reader accepts; messages name the line there."""
     limits = limits_in(info)
     if not isinstance(value, str | Path):
         if isinstance(value, list | tuple):

@@ -189,12 +189,7 @@ class Scene(SceneModel):
         return variant
 
     def showing(self, what: str, given: object) -> Self:
-        """Return the scene with speeds, or frequencies, shown in the unit of a text, if it says nothing of that itself.
-
-        Args:
-            what: "speed" or "frequency".
-            given: text such as "0:15:31rpm"; what is no text changes nothing.
-        """
+        """Return the scene with "speed" or "frequency" shown in the unit of a text, if it says nothing of that itself."""
         tables = with_shown(self._tables, what, given)
         return self if tables is self._tables else self.replace({f"output.{what}": tables["output"][what]})
 

@@ -188,12 +188,6 @@ def with_tables(data: Any, info: ValidationInfo, keys: Sequence[str] | None) -> 
     """Return the table [structure] with the rows of files in the place of their paths.
 
     Raise if a file is not there or not such a table, naming line and column, or a key is given twice.
-
-    Args:
-        data: the table as it is given; what is no table is returned as it is.
-        info: validation info; its context holds the scene's directory.
-        keys: of the table itself that may be paths; those of its section all may, but names. None of a planar beam,
-            which no blade file is one of.
     """
     if not isinstance(data, Mapping):
         return data

@@ -67,14 +67,7 @@ def as_name(value: Any, registry: Registry[Any], key: str = "") -> str:
 
 
 def as_names(value: Any, names: Sequence[str], kind: str, others: str = "") -> tuple[str, ...]:
-    """Return a list of names as a tuple; raise if one is not among `names`, or is listed twice.
-
-    Args:
-        value: the list.
-        names: those that there are.
-        kind: what a name stands for, such as "an effect".
-        others: what is allowed instead of a list, for the error message.
-    """
+    """Return a list of names as a tuple; raise if one is not among `names`, or is listed twice."""
     allowed = f"allowed: {others}a list of {', '.join(names)}" if names else "none are registered"
     if not isinstance(value, list | tuple):
         raise problem("", value, allowed)

@@ -39,12 +39,7 @@ MAY_BE_ZERO = ("rotary_inertia", "rotary_inertia2", "rotary_inertia3")
 
 
 def check_magnitudes(values: Callable[[], Mapping[str, Array]], key: str) -> None:
-    """Refuse at a key what a section makes of good numbers: infinite, undefined, or nothing at all.
-
-    Args:
-        values: returns the properties of the section by name, each of any shape.
-        key: where the section is given.
-    """
+    """Refuse at a key what a section makes of good numbers: infinite, undefined, or nothing at all."""
     with np.errstate(all="ignore"):
         try:
             found = values()
@@ -171,14 +166,7 @@ def as_padded_vector3(value: Any) -> Vector3:
 
 
 def as_rows(value: Any, columns: Sequence[int], shape: str, row_name: Callable[[int], str] = "row {}".format) -> Matrix:
-    """Return a rectangular table of numbers as a tuple of rows; raise on anything else.
-
-    Args:
-        value: a sequence of rows.
-        columns: allowed numbers of columns; all rows must have the same.
-        shape: the expected form in words, for the error message.
-        row_name: number of a row, from 1 ↦ what the error message calls it.
-    """
+    """Return a rectangular table of numbers as a tuple of rows; on anything else raise, naming the shape expected."""
     if not isinstance(value, list | tuple) or not value or not all(isinstance(row, list | tuple) for row in value):
         raise problem("", value, f"must be {shape}")
     if len(value[0]) not in columns:

@@ -70,12 +70,7 @@ class Numbering:
         return {"unknowns": unknowns, "unknowns and hub": unknowns + 1, **counts}.get(kind, -1)
 
     def gather(self, x: Array, kind: str) -> Array | None:
-        """Return a local array in the common order, on rank 0.
-
-        Args:
-            x: its first axis goes over the unknowns, nodes or cells of this process, ghosts after its own.
-            kind: over which (see `kind`).
-        """
+        """Return a local array of a kind (see `kind`), ghosts after its own, in the common order, on rank 0."""
         hub = x[-1:] if kind.endswith("hub") else x[:0]
         x = x[: len(x) - len(hub)]
         if kind.startswith("unknowns"):

@@ -60,12 +60,7 @@ def writer(structure: Any, name: str, states: Iterable[tuple[float, Array]]) -> 
 
 
 def size_of_one(W: fem.FunctionSpace, fields: int) -> int:
-    """Return about how many bytes one snapshot of some fields takes, not less: its mesh is written with it.
-
-    Args:
-        W: space of a field.
-        fields: number of fields.
-    """
+    """Return about how many bytes a snapshot of so many fields takes, not less: its mesh is written with it."""
     cells, nodes = W.mesh.topology.index_map(W.mesh.topology.dim), W.dofmap.index_map
     points, cell_count = nodes.size_local + nodes.num_ghosts, cells.size_local + cells.num_ghosts
     here = 8 * (points * (3 * fields + 5) + cell_count * (2 + W.dofmap.dof_layout.num_dofs))

@@ -14,12 +14,7 @@ from rotfem.structures.beam import Beam
 
 
 class PlanarBeam(Beam):
-    """Discretised planar beam; all vectors are in frame components with a zero third one.
-
-    Args:
-        problem: what is to be computed; its structure is a planar beam.
-        comm: communicator the mesh is distributed over.
-    """
+    """Discretised planar beam; all vectors are in frame components with a zero third one."""
 
     type = "planar_beam"
     planar = True

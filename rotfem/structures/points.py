@@ -49,12 +49,6 @@ def point_measure(domain: Any, subdomains: Any, tag: int, place: PointPlace) -> 
     """Return a measure whose integrals are values at a point.
 
     The cell that holds it gets a quadrature rule of one point with the weight 1 in place of the cell's area.
-
-    Args:
-        domain: the mesh.
-        subdomains: list of (tag, cells), the same for all measures of a form.
-        tag: the point's tag there.
-        place: its place.
     """
     rule = {
         "quadrature_rule": "custom",
@@ -66,11 +60,7 @@ def point_measure(domain: Any, subdomains: Any, tag: int, place: PointPlace) -> 
 
 
 class Points:
-    """Points of a mesh, each with a measure.
-
-    Args:
-        domain: the mesh.
-        points: coordinates of the points, m; a point may be there twice.
+    """Points of a mesh (m), each with a measure; a point may be there twice.
 
     Attributes:
         subdomains: what the cell measures of all forms have, list of (tag, cells); None without points.

@@ -65,9 +65,6 @@ class Discretised(Protocol):
 class Turns:
     """The rotations of a structure, and the reference they are counted from.
 
-    Args:
-        structure: it is discretised already.
-
     Attributes:
         reference: None as long as rotations are counted from the undeformed structure.
         rotation, curvature: the functions that hold R and its curvature in the forms; None until there is a reference.
@@ -157,13 +154,7 @@ class Turns:
         return first
 
     def reset(self, q: Array, v: Array, second: list[Array]) -> ReferenceRotation:
-        """Return the shape of q as a reference, and make rotations, their rates and second rates those from there.
-
-        Args:
-            q: local dof array of the unknowns, overwritten.
-            v: of their rates, overwritten.
-            second: arrays of second rates, overwritten.
-        """
+        """Return the shape of q as a reference; q, rates v and second rates are overwritten by those counted from it."""
         rotations, rates = self._of(q).copy(), self._of(v).copy()
         for a in second:
             self._of(v)[:], self._of(a)[:] = self._rates(rotations, rates, self._of(a))

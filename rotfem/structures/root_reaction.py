@@ -56,9 +56,6 @@ def along_axis(names: tuple[str, ...], place: Array, axis: Array) -> tuple[Array
 class RootReaction:
     """The rigid motions of a clamp, in its unknowns.
 
-    Args:
-        structure: it is discretised already.
-
     Attributes:
         names: of the components that the structure has: f1, f2, f3 (N), m1, m2, m3 (N·m).
         point: what moments are about, a place of the undeformed structure on its mesh, (3,) in m.

@@ -218,14 +218,7 @@ class SectionForms:
         return tuple(self._beam.scalar(f"{name}_{i}", c) if c != 0.0 else 0 for i, c in pairs)
 
     def strains(self, Gamma: Any, K: Any, measure: Any, pretwist: Any = 0) -> list[Strain]:
-        """Return the strains that make the stored energy ½ ε·C ε of ε = (Γ, K).
-
-        Args:
-            Gamma: along t_i⁰.
-            K: likewise (1/m).
-            measure: UFL measure.
-            pretwist: rate at which the undeformed section turns about the axis (1/m); the number 0 without.
-        """
+        """Return the strains that make the stored energy ½ ε·C ε of ε = (Γ, K) along t_i⁰, with a pretwist (1/m)."""
         epsilon = [*(Gamma[i] for i in range(3)), *(K[i] for i in range(3))]
         full = self._data.stiffness is not None
         axial, *others = self._full_strains(epsilon, measure) if full else self._central_strains(epsilon, measure)

@@ -28,10 +28,6 @@ Array = npt.NDArray[np.float64]
 class TipValues:
     """Reads a blocked Lagrange function at the node nearest to a point.
 
-    Args:
-        V: blocked function space.
-        point: coordinates (3,), m.
-
     Attributes:
         owner: rank that owns the node.
         dofs: local numbers of its unknowns there.
@@ -202,11 +198,7 @@ class Structure:
         return [place for place, i in enumerate(self.active) if i not in free]
 
     def clamped_unknowns(self, nodes: npt.NDArray[np.int32] | None = None) -> npt.NDArray[np.int32]:
-        """Return the local numbers of the unknowns that the clamp holds, in order.
-
-        Args:
-            nodes: that are clamped; the owned ones if None.
-        """
+        """Return the local numbers of the unknowns that the clamp holds at nodes, the owned clamped ones if None."""
         return self._numbers(nodes, self._clamped_components())
 
     def hinged_unknowns(self) -> npt.NDArray[np.int32]:
@@ -324,11 +316,7 @@ class Structure:
         return made.vector
 
     def update_loads(self, turn: Array | None = None) -> None:
-        """Make the fields of loads over the span of the amplitudes that have been set.
-
-        Args:
-            turn: matrix (3, 3) that turns those of dead loads, in a frame that does not turn with the hub.
-        """
+        """Make the fields of loads over the span of the amplitudes; a matrix (3, 3) turns dead ones in a fixed frame."""
         for amplitude, _ in self.load_constants.values():
             amplitude.update(turn if amplitude.dead else None)
 
@@ -348,11 +336,7 @@ class Structure:
         return np.tile([self.length if name.startswith("u") else 1.0 for name in self.unknowns], nodes)
 
     def gather(self, values: Array) -> tuple[Array, Array]:
-        """Return (x, q): positions (n, 3) in m and values (n, components) at all nodes, on every rank.
-
-        Args:
-            values: local dof array of q (or of the owned part of it).
-        """
+        """Return positions (n, 3) in m and values (n, components) of a local dof array at all nodes, on every rank."""
         owned = self.V.dofmap.index_map.size_local
         x = self.V.tabulate_dof_coordinates()[:owned]
         q = self.whole_values(values[: self.size * owned].reshape(-1, self.size))
@@ -379,13 +363,7 @@ class Structure:
         raise NotImplementedError
 
     def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:
-        """Return how a mode e^{iωt} with a complex shape at the nodes precesses about an axis; None unless a rotor.
-
-        Args:
-            coordinates: of the nodes, by name, m.
-            values: the shape, (n, components).
-            axis: direction of the spin, (3,).
-        """
+        """Return how a mode e^{iωt} with a complex shape at the nodes precesses about an axis; None unless a rotor."""
         return None
 
     def oriented(self, values: Array) -> Array:

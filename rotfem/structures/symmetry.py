@@ -31,9 +31,6 @@ def inactive_unknowns(problem: Problem) -> tuple[str, ...]:
     """Return the names of the unknowns that stay zero at all times of a history; empty where none is known to.
 
     The history starts undeformed, or in balance with what acts at t = 0.
-
-    Args:
-        problem: what is to be computed, all unknowns in it.
     """
     structure: Any = resolved(structures[problem.structure.type].discretised)
     if not _is_built_in(problem) or problem.frame != "rotating" or problem.motion.pitch is not None:

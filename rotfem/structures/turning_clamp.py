@@ -17,12 +17,7 @@ Array = npt.NDArray[np.float64]
 
 
 class TurningClamp:
-    """Prescribed q = (u_1, u_2, alpha) of the clamped node, without alpha in a hinge, and rigid turns of the beam.
-
-    Args:
-        structure: planar beam.
-        motion: prescribed motion of the hub.
-    """
+    """Prescribed q = (u_1, u_2, alpha) of the clamped node, without alpha in a hinge, and rigid turns of the beam."""
 
     def __init__(self, structure: Any, motion: Motion):
         self.motion, self.structure = motion, structure
@@ -46,12 +41,7 @@ class TurningClamp:
         return np.tile(q[held], repeat), np.tile(v[held], repeat), np.tile(a[held], repeat)
 
     def rigid(self, relative: Array, t: float) -> tuple[Array, Array]:
-        """Return (q, q̇) in inertial components of a shape given in the turning frame and at rest there.
-
-        Args:
-            relative: local dof array of (u_1, u_2, alpha) in the turning frame.
-            t: time, s.
-        """
+        """Return (q, q̇) in inertial components of a shape given in the turning frame and at rest there."""
         r = relative.reshape(-1, 3)
         x, y = self._turn(self._x + r[:, 0], r[:, 1], self.angle(t))
         w = float(self.motion.axis[2]) * self.motion.speed(t)
