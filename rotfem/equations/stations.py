@@ -198,7 +198,7 @@ class Stations:
         return ufl.diff(energy, at), strains
 
     def _read(self, q: Array, v: Array) -> Array:
-        """Return the values of the expression, and those of unknowns (local dof array q), on every rank; v is for damping."""
+        """Return the values of the expression and of unknowns (local dof array q) on every rank; v is for damping."""
         self._damped.update(v)
         values: Array = np.zeros((*self._shape, self._order.stop))
         if len(self._cells):

@@ -189,7 +189,7 @@ class Scene(SceneModel):
         return variant
 
     def showing(self, what: str, given: object) -> Self:
-        """Return the scene with "speed" or "frequency" shown in the unit of a text, if it says nothing of that itself."""
+        """Return the scene with "speed" or "frequency" shown in the unit of a text, if it has none itself."""
         tables = with_shown(self._tables, what, given)
         return self if tables is self._tables else self.replace({f"output.{what}": tables["output"][what]})
 

@@ -154,7 +154,7 @@ class Turns:
         return first
 
     def reset(self, q: Array, v: Array, second: list[Array]) -> ReferenceRotation:
-        """Return the shape of q as a reference; q, rates v and second rates are overwritten by those counted from it."""
+        """Return the shape of q as a reference; q, rates v and second rates become those counted from it."""
         rotations, rates = self._of(q).copy(), self._of(v).copy()
         for a in second:
             self._of(v)[:], self._of(a)[:] = self._rates(rotations, rates, self._of(a))

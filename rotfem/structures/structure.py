@@ -316,7 +316,7 @@ class Structure:
         return made.vector
 
     def update_loads(self, turn: Array | None = None) -> None:
-        """Make the fields of loads over the span of the amplitudes; a matrix (3, 3) turns dead ones in a fixed frame."""
+        """Make the fields of loads over the span of the amplitudes; a matrix (3, 3) turns dead loads."""
         for amplitude, _ in self.load_constants.values():
             amplitude.update(turn if amplitude.dead else None)
 
