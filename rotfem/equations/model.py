@@ -164,7 +164,7 @@ class Model:
         return Mechanics(bodies, strains, s.loads(), s.k, self.frame, s.damping(), s)
 
     def strains(self, measures: Callable[..., tuple[Any, ...]], first_order: bool = False) -> list[Strain]:
-        """Return the strains of a theory's measures, of first order in q or whole, with what the effects add to them."""
+        """Return the strains of a theory's measures, of first order in q or whole, with the effects' gains."""
         return self.with_gains(self.structure.strains(measures), first_order)
 
     def with_gains(self, strains: list[Strain], first_order: bool) -> list[Strain]:
