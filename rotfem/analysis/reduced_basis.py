@@ -24,8 +24,8 @@ from rotfem.numerics.projection import orthonormal, summed, times
 
 Array = npt.NDArray[Any]
 
-#: Speeds from which a basis saves time, of so many unknowns and of fewer.
-LARGE, MANY, MANY_OF_SMALL = 8000, 3, 10
+#: Speeds from which a basis saves time: it takes three full solutions at least.
+MANY = 3
 
 #: Accepted relative difference of a frequency from that of the full system; most full solutions in the search for it.
 AGREEMENT, MOST = 1e-6, 9
@@ -44,8 +44,7 @@ def in_basis(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> Mo
     Raises:
         ComputationError: a full solution failed.
     """
-    few = MANY if analysis.system.A.getSize()[0] >= LARGE else MANY_OF_SMALL
-    if not analysis.system.linear or analysis.free or analysis.fixed is not None or len(speeds) < few:
+    if not analysis.system.linear or analysis.free or analysis.fixed is not None or len(speeds) < MANY:
         return analysis
     reduced = ReducedAnalysis(analysis)
     return reduced if reduced.prepare(speeds[0], speeds[-1], count) else analysis
