@@ -51,11 +51,9 @@ class Leg:
         """How it sees at its end what is prescribed."""
         return View(-1 if self.lands else 0, self.line)
 
-    def and_then(self, after: Leg) -> Leg:
-        """Return this leg and the one after it as one; with no knot between them where none is in them."""
-        lines = [line for line in (self.line, after.line) if line]
-        line = (lines[0][0], lines[-1][1]) if lines else None
-        return Leg(after.end, self.length + after.length, after.lands, line, after.whole)
+    def doubles(self, after: Leg) -> bool:
+        """Return whether this leg and the one after it may be taken as one: they have no knot in them or between."""
+        return not (self.lands or self.line or after.line)
 
 
 class TimeGrid:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import sqrt
 from typing import Any
@@ -56,7 +56,8 @@ class Followed:
 
     def and_then(self, other: Followed) -> Followed:
         """Return both as one."""
-        return Followed(self.leg.and_then(other.leg), self.steps + other.steps)
+        leg = replace(other.leg, length=self.leg.length + other.leg.length)
+        return Followed(leg, self.steps + other.steps)
 
     def state_at(self, t: float, order: int) -> State:
         """Return the state at a time (s) as a row of a history has it."""
@@ -206,11 +207,11 @@ class Companion:
         step, (single, _) = Followed(leg, ((old, new),)), self.waiting
         if single is not None:
             self.waiting[0] = None
-            if not single.leg.lands:
+            if single.leg.doubles(leg):
                 self._is_known(single.and_then(step))
                 return
             self._is_known(single)
-        if self.doubles and not leg.lands:
+        if self.doubles and leg.doubles(leg):
             self.waiting[0] = step
         else:
             self._is_known(step)
