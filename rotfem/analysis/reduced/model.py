@@ -169,46 +169,6 @@ class ReducedModel:
         moves = [name.startswith("u") for name in self.system.structure.components]
         return float(np.linalg.norm(tips[:, moves], axis=1).max(initial=0.0))
 
-    def root_forces(self, c: Array, q: Array, v: Array, a: Array) -> Array:
-        """Return what the hub does in the unit motions of the clamp (see `RootReaction`), shape (n, motions).
-
-        Args:
-            c: factors of all pieces, (n, pieces).
-            q: coordinates, (n, m).
-            v: rates.
-            a: accelerations.
-        """
-        pieces, V = self.system.pieces, self.V[self.owned]
-        parts = [pieces[i].at_root for i in self.kinds["f"]]
-        constant = np.array(parts).reshape(len(parts), len(self.system.root.names))
-        out: Array = c[:, self.kinds["f"]] @ np.asarray(summed(self.comm, constant))
-        for kind, x in (("K", q), ("C", v), ("M", a)):
-            for i in self.kinds[kind]:
-                out += c[:, [i]] * (x @ np.asarray(summed(self.comm, V.T @ pieces[i].at_root)))
-        return out
-
-    def energies(self, c: Array, speed: Array, q: Array, v: Array) -> dict[str, Array]:
-        """Return `kinetic` and `strain` energy, `jacobi` integral (n,), J, and angular `momentum`, kg·m²/s.
-
-        Args:
-            c: factors of all pieces, (n, pieces).
-            speed: of the frame about its axis, rad/s.
-            q: coordinates, (n, m).
-            v: rates.
-        """
-        M, _, K, f = self.operators(c)
-        moving = 0.5 * np.einsum("ni,nij,nj->n", v, M, v)
-        jacobi = moving + 0.5 * np.einsum("ni,nij,nj->n", q, K, q) + np.einsum("ni,ni->n", f, q)
-        (load, stiffness), (slope, coupling), inertia = self.of_spin()
-        T0 = inertia - q @ load - 0.5 * np.einsum("ni,ij,nj->n", q, stiffness, q)
-        T1 = v @ slope + np.einsum("ni,ij,nj->n", v, coupling, q)
-        return {
-            "kinetic": moving + speed * T1 + speed**2 * T0,
-            "strain": 0.5 * np.einsum("ni,ni->n", q, q),
-            "jacobi": jacobi - inertia * speed**2,
-            "momentum": 2 * speed * T0 + T1,
-        }
-
     def of_spin(self) -> tuple[tuple[Array, Array], tuple[Array, Array], float]:
         """Return (−∂T0/∂q, −∂²T0/∂q²) and (∂T1/∂v, ∂²T1/∂v∂q) at rest, and T0 undeformed, all at unit speed."""
         names, zero = self.system.model.energies(), (np.zeros(self.size), np.zeros((self.size,) * 2))

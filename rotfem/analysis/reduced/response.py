@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.reduced.equations import Excitation, HeldEquations
-from rotfem.analysis.reduced.hub import FreeHubEquations, rigid_turn
+from rotfem.analysis.reduced.equations import Excitation, FreeHubEquations, HeldEquations, rigid_turn
 from rotfem.analysis.reduced.manifold import Manifold
 from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.analysis.reduced.solution import Solution, States, cut
@@ -77,31 +76,21 @@ class Response:
     foreshortening: float | None = None
 
     @cached_property
-    def _bent(self) -> Array:
-        """Coordinates of the motion on the manifold in all rows, (n, m)."""
-        return np.asarray(self.equations.coordinates(self.bent, self.times)[0])
+    def bent_states(self) -> Array:
+        """Coordinates of the motion on the manifold in all rows, (n, m); of the linear motion without one."""
+        return self.states[0] if self.bent is None else self.equations.coordinates(self.bent, self.times)[0]
 
     @property
     def tips(self) -> Array:
         """The unknowns at the tip in all rows, (n, components)."""
         if self.manifold is not None:
-            return self.manifold.tip(self._bent)
+            return self.manifold.tip(self.bent_states)
         return self.states[0] @ self.model.tips().T
 
     @property
     def turn(self) -> Array:
         """Angle (rad), speed and its rate of the frame in all rows, (n, 3)."""
         return np.asarray(self.equations.turn(self.times, self.solution))
-
-    def factors(self) -> Array:
-        """Return the factors of all pieces in all rows, just after what jumps there, (n, pieces)."""
-        return np.asarray(self.equations.excitation.factors(after(self.times), self.turn))
-
-    def shape(self, i: int) -> Array:
-        """Return the displacement in a row, a local dof array."""
-        if self.manifold is not None:
-            return self.manifold.shape(self._bent[i])
-        return np.asarray(self.model.V @ self.states[0][i])
 
     def summary(self) -> dict[str, Any]:
         """Return what a summary says of it."""
