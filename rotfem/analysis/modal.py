@@ -226,14 +226,17 @@ class ModalAnalysis:
             why = f"must be at most {allowed}, the number of unknowns that are free on this mesh"
             raise InputError("modes.count", count, why)
 
-    def at(self, speed: float, count: int, start: Spinning | None = None, keep: bool = True) -> Spinning:
+    def at(
+        self, speed: float, count: int, start: Spinning | None = None, keep: bool = True, near: Array | None = None
+    ) -> Spinning:
         """Return equilibrium and eigenpairs at a speed (rad/s).
 
         Args:
             speed: Ω, rad/s.
             count: number of pairs, at least.
             start: the structure at a speed nearby, whose equilibrium to continue from.
-            keep: whether the pencil must outlast another call; large systems save memory without.
+            keep: whether the pencil must outlast another call; large systems save memory, and keep a factor, without.
+            near: columns of owned unknowns near the eigenvectors, which a large system begins with.
 
         Raises:
             ComputationError: no equilibrium, or eigenpairs not to be trusted.
@@ -249,6 +252,8 @@ class ModalAnalysis:
         t2 = perf_counter()
         clamped.unit = pencil.unit = self._unit
         pencil.sizes = self.stiffness_sizes(pencil.K)
+        if not self.free:
+            pencil.near, pencil.factor = near, self.system.analysed
         pairs = pencil.solve(count, clamped.scale() if self.free else 0.0)
         self._unit = pencil.unit
         if not self.free:
@@ -260,6 +265,10 @@ class ModalAnalysis:
         spans = {"equilibrium": t1 - t0, "assemble": t2 - t1, "factor": factored, "eigen": t3 - t2 - factored}
         for name, span in spans.items():
             self.seconds[name] += span
+        if not self.free:
+            self.system.analysed = pencil.factor
+        if keep:
+            pencil.factor = None
         # A PETSc matrix must not outlive the mesh it was made on: their communicator goes with the mesh.
         clamped.owner = pencil.owner = self
         finite, reference = massed(clamped.M), self.system.reference

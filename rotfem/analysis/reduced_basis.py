@@ -201,7 +201,9 @@ class ReducedAnalysis(ModalAnalysis):
         self._norms = [float(p.operator.norm()) for p in pieces]
         self._round_off = RoundOff(Pencil(*system.mass_damping_stiffness(keep=False)))
 
-    def at(self, speed: float, count: int, start: Spinning | None = None, keep: bool = True) -> Spinning:
+    def at(
+        self, speed: float, count: int, start: Spinning | None = None, keep: bool = True, near: Array | None = None
+    ) -> Spinning:
         """Return the eigenpairs of the basis at a speed (see `ModalAnalysis.at`), with errors in the full system."""
         system = self.system
         zero = system.zeros()

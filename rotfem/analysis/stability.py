@@ -124,7 +124,8 @@ def stability_of_pencil(pencil: Pencil, clamped: Pencil) -> Stability:
         pencil: with the unknown of a free hub, if there is one.
         clamped: without it.
     """
-    negative = _negative(clamped.K)
+    negative = None if clamped.factor is None else clamped.factor.negative
+    negative = _negative(clamped.K) if negative is None else negative
     if negative == 0:
         return Stability()
     return by_motions(pencil, negative) if pencil is clamped else by_motions(pencil, None, clamped.scale())

@@ -195,18 +195,20 @@ class TheoryCheck:
         largest = np.where(moves, np.max(tips[moves]), np.max(tips[~moves], initial=0.0))
         return np.asarray(tips > RESOLVED * largest)
 
-    def under_load(self, motion: Motion) -> TheoryError:
+    def under_load(self, motion: Motion, factor: DirectSolver | None = None) -> TheoryError:
         """Return the error of the displacements under what is constant, which modes of a linear theory are not about.
 
         Args:
             motion: of the frame, at the speed of the modes.
+            factor: solver with the stiffness there, if there is one.
         """
         system, out = self.system, Increment(self.system.V)
         system.set_time(0.0, motion)
         system.set_state(system.zeros())
         if not self.known:
             return self.of_state(system.zeros())
-        return self.of_state(out.solve(DirectSolver(system.matrix(1.0, 0.0, 0.0, 1.0)), system.residual()).copy())
+        solver = factor or DirectSolver(system.matrix(1.0, 0.0, 0.0, 1.0))
+        return self.of_state(out.solve(solver, system.residual()).copy())
 
     def _as(self, estimate: float, basis: str) -> TheoryError:
         return TheoryError(float(estimate), basis, self.theory.name)

@@ -59,10 +59,12 @@ def mode_tables(analysis: ModalAnalysis, speed: float, count: int, *, keep: bool
     Raises:
         ComputationError: no equilibrium, or eigenpairs that fail the check of their backward error.
     """
-    spinning = analysis.at(speed, count, keep=keep)
+    errors = FrequencyErrors(analysis) if analysis.estimates else None
+    near = None if errors is None else errors.near(speed, count)
+    spinning = analysis.at(speed, count, keep=keep, near=near)
     rigid = int(spinning.rigid)
     spinning = spinning.first(count - rigid)
-    rows = mode_rows(analysis, spinning, FrequencyErrors(analysis)(spinning) if analysis.estimates else None)
+    rows = mode_rows(analysis, spinning, None if errors is None else errors(spinning))
     synchronous = critical(rows, speed, analysis.fixed is not None)
     warnings = [*advice(analysis, speed), *instabilities(rows), *synchronous, *doubtful(rows)]
     rows = [{**row, "mode": row["mode"] + rigid} for row in rows]

@@ -182,7 +182,7 @@ def theory_error(analysis: ModalAnalysis, spinning: Spinning) -> TheoryError | N
     """Return the error of the frequencies at one speed by the theory; None where it is not known, or not wanted."""
     richer, motion = richer_problem(analysis.problem), analysis.system.held.motion.at_speed(spinning.speed)
     if richer is None:
-        return TheoryCheck(analysis.system.held).under_load(motion)
+        return TheoryCheck(analysis.system.held).under_load(motion, spinning.clamped.factor)
     if not analysis.estimates:
         return None
     errors = FrequencyErrors(analysis, richer)

@@ -38,7 +38,8 @@ class AffineSystem(System):
     solved_at_once = True
     pieces: list[Piece]
 
-    def __init__(self, model: Model, moving: bool = True):
+    def __init__(self, model: Model, moving: bool = True, parted: bool = False):
+        self.parted = parted
         super().__init__(model, moving)
         if self._by_mode is not None:  # to those who project the pieces it is one like others
             taken_up = -self._by_mode.B @ self._by_mode.along(self.root.carried())  # by the hub, see `hub_damping`
@@ -47,10 +48,10 @@ class AffineSystem(System):
             self.leave_out(())
 
     def _compile(self) -> Any:
-        self._decomposed = Pieces(self.model, self.bcs, self.clamped, self.root)
+        self._decomposed = Pieces(self.model, self.bcs, self.clamped, self.root, self.moving or self.parted)
         self.pieces = self._decomposed.all
         self._constants = self._decomposed.constants
-        self.assembled = self._decomposed.assembled
+        self.assembled, self.analysed = self._decomposed.assembled, self._decomposed.analysed
         self._work = compat.create_vector(self.V)
         self._qva = [compat.wrap(x.x) for x in (self.q, self.v, self.a)]
         self._weights: Array = np.ones(len(self.pieces))
@@ -60,11 +61,12 @@ class AffineSystem(System):
         self._by_kind = {kind: (index, [self.pieces[i].operator for i in index]) for kind, index in chosen.items()}
         self._increment: Increment | None = None
         self._make_operators()
-        return self._decomposed.pattern
+        self._sums["K"] = self._decomposed.stiffness
+        return self._decomposed.assembler.pattern
 
     def _make_operators(self) -> None:
         """Make M, C, K and f of a time, none of which is set yet."""
-        self._operators = {kind: self._decomposed.pattern.duplicate() for kind in "MCK"}
+        self._sums, self._operators = dict[str, Any](), dict[str, Any]()
         self._load = compat.create_vector(self.V)
         self._coefficients: Array | None = None
         self._shift: tuple[float, float, float] | None = None
@@ -136,10 +138,17 @@ class AffineSystem(System):
         self._coefficients = c
         if not changed.any():
             return
-        for kind, operator in self._operators.items():
+        for kind in "MCK":
             selected, operators = self._by_kind[kind]
             if first or changed[selected].any():
-                combine(operator, operators, c[selected])
+                there = np.flatnonzero(c[selected])
+                if len(there) == 1 and c[selected][there[0]] == 1.0:
+                    self._operators[kind] = operators[there[0]]  # as it is, which saves a matrix
+                else:
+                    if kind not in self._sums:
+                        self._sums[kind] = self._decomposed.assembler.zero()
+                    self._operators[kind] = self._sums[kind]
+                    combine(self._sums[kind], operators, c[selected])
                 self._changed, self.settled = True, False
         self._load.zeroEntries()
         selected, operators = self._by_kind["f"]

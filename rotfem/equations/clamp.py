@@ -178,7 +178,8 @@ class AtClamp:
         for column, values in zip(out.T, motions.T, strict=True):
             motion.array[:] = values
             there.multTranspose(motion, self._work)
-            column[:] = self._work.array
+            moved_rows = np.flatnonzero(self._work.array)  # few; what is not written takes up no memory
+            column[moved_rows] = self._work.array[moved_rows]
         return out
 
 

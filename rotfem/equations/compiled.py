@@ -21,8 +21,9 @@ def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bo
         problem: what is to be computed.
         comm: communicator the structure is distributed over.
         moving: whether it will be stepped in time; a steady state and its modes do without what only that needs.
-        parted: whether it is for a trial of some hundred steps: forms are shared with other nonlinear theories of the
-            problem (see `NonlinearSystem`), and those of planar beams, whose steps hardly feel it, compiled in haste.
+        parted: whether effects will be left out, or it is for a trial of some hundred steps: forms are shared with
+            other nonlinear theories of the problem (see `NonlinearSystem`), and those of planar beams, whose steps
+            hardly feel it, compiled in haste.
 
     Raises:
         InputError: a mesh or a section that cannot be computed with; a term that the theory cannot have.
@@ -32,7 +33,7 @@ def compile_system(problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD, moving: bo
     model = Model(seen, comm)
     system: Any
     if problem.theory.linear:
-        system = AffineSystem(model, moving)
+        system = AffineSystem(model, moving, parted)
         if not parted:
             system.check_terms()
     else:

@@ -26,10 +26,11 @@ from ufl.algorithms.analysis import extract_constants
 from rotfem.equations.clamp import AtClamp
 from rotfem.equations.geometric import geometric_stiffness
 from rotfem.equations.model import Model
+from rotfem.mechanics.effects import INTERNAL
 from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import SAME, Assembler
-from rotfem.numerics.linear import SMALL, DirectSolver, restrained, set_diagonal
+from rotfem.numerics.linear import SMALL, DirectSolver, combine, restrained, set_diagonal
 from rotfem.structures.root_reaction import RootReaction
 
 
@@ -91,7 +92,10 @@ def _displaced(pieces: Pieces, material: Any, loads: list[Piece]) -> list[Array]
     if not loads:
         return []
     q, out = pieces.prestressed, []
-    solver = pieces.material_solver if material is pieces.material else DirectSolver(material, symmetric=True)
+    if material is not pieces.material:
+        solver = DirectSolver(material, symmetric=True)
+    else:
+        solver = pieces.analysed or pieces.material_solver
     solved = solver.solve_all(np.array([load.operator.array for load in loads]).T)
     for column in solved.T:
         q.x.array[: len(column)] = -column
@@ -124,6 +128,11 @@ class Piece:
     operator: Any
     of: frozenset[str]
     at_root: Array
+
+    def add(self, other: Piece) -> None:
+        """Make it the sum with another piece of the same kind and constants."""
+        self.operator.axpy(1.0, other.operator, *(() if self.kind == "f" else (SAME,)))
+        self.of, self.at_root = self.of | other.of, self.at_root + other.at_root
 
 
 class PolynomialCheck:
@@ -158,19 +167,24 @@ class Pieces:
     under each load piece (centrifugal, base, gravity, applied) and Γ₁ the axial strain of the theory's second order:
     Simo & Vu-Quoc 1986 eqs. (12), (23) as corrected in docs/theory.md; or that of all its stress resultants.
 
+    Args:
+        apart: whether effects will be left out, or told apart; else terms of the same constants are one piece.
+
     Attributes:
         at_rest: "f", "K", "C", "M" ↦ UFL form at q = v = a = 0, or what stands for it (`rotfem.numerics.forms.drawn`);
             those that vanish are left out.
         constants: name ↦ constant of frame and loads.
         axis: components of the spin axis that w and dw have.
-        pattern: a matrix with the pattern of all.
+        assembler: makes matrices of the pattern of all.
         all: the pieces.
         not_polynomial: names of terms that the pieces do not make up, as they are no polynomials of the constants.
         assembled: time spent on assembly, s.
+        stiffness: a matrix for K of a time, zero, or the `material` where it was factorised.
+        analysed: solver of this matrix, if the structure is large and effects are not apart.
     """
 
-    def __init__(self, model: Model, bcs: list[Any], clamped: npt.NDArray[Any], root: RootReaction):
-        self.model, self.structure, self.bcs, self.clamped = model, model.structure, bcs, clamped
+    def __init__(self, model: Model, bcs: list[Any], clamped: npt.NDArray[Any], root: RootReaction, apart: bool = True):
+        self.model, self.structure, self.bcs, self.clamped, self._apart = model, model.structure, bcs, clamped, apart
         self.q, self.V = model.structure.k.functions[0], model.structure.V
         self._at_clamp = AtClamp(model, clamped, root)
         self._hinged = self.structure.hinged_unknowns()
@@ -178,12 +192,13 @@ class Pieces:
         self._free.array[:] = 1.0
         self._free.array[clamped] = 0.0
         self.assembled = 0.0
+        self.analysed: DirectSolver | None = None
         loads = {name: constant for name, (constant, _) in self.structure.load_constants.items()}
         self.constants: dict[str, Any] = {**model.frame.constants, **loads}
         self.axis: Array = model.motion.axis[2:] if self.structure.planar else model.motion.axis
         self.at_rest, self._forms = model.derived_forms("pieces", self._made)
-        self._assembled = Assembler(self._forms["K"], self.bcs)
-        self.pattern = self._assembled.pattern
+        self.assembler = Assembler(self._forms["K"], self.bcs)
+        self.stiffness = self.assembler.zero()
         self.all: list[Piece] = []
         self.not_polynomial: list[str] = []
         for kind in self.at_rest:
@@ -198,9 +213,9 @@ class Pieces:
         if compiled:
             self._forms |= compiled
             self._prestress()
-        if self.pattern.getSize()[0] > SMALL:  # a factor and a matrix, which are hardly needed again
+        if self.assembler.pattern.getSize()[0] > SMALL:  # a factor and a matrix, which are hardly needed again
             self.__dict__.pop("material_solver", None)
-            self._assembled.release()
+            self.assembler.release()
 
     def _made(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return f, K, C and M at q = v = a = 0, as UFL and compiled forms; those that vanish are left out."""
@@ -270,20 +285,20 @@ class Pieces:
         for name, parts in self._parts(kind):
             bodiless: dict[Key, Any] = {}
             same = () if kind == "f" else (SAME,)
-            for part in parts:
-                self._set_switches((name, part))
+            for part in [(p,) for p in parts] if self._apart else [parts]:
+                self._set_switches((name, *part))
                 check = self._is_checked(name) and PolynomialCheck(self, kind, name)
                 for key in self._keys(name):
-                    self._set_switches((name, part))
+                    self._set_switches((name, *part))
                     operator = self._polarised(kind, key, declared=self.model.acting[name].constants is not None)
                     if check:
                         check.subtract(key, operator)
-                    if part and key in bodiless:
-                        operator.axpy(-1.0, bodiless[key], *same)
-                    elif not part:
+                    if "" in part:
                         bodiless[key] = operator
+                    elif key in bodiless:
+                        operator.axpy(-1.0, bodiless[key], *same)
                     if operator.norm() > 0.0:
-                        found.append((key, operator, frozenset((name, part))))
+                        found.append((key, operator, frozenset((name, *part))))
                 if check and check.failed and name not in self.not_polynomial:
                     self.not_polynomial.append(name)
         for key, operator, of in found:
@@ -300,7 +315,12 @@ class Pieces:
             operator.diagonalScale(self._free, self._free)
             if kind == "K" and of == {"internal", ""}:
                 set_diagonal(self.clamped, operator, 1.0)
-        self.all.append(Piece(kind, key, operator, of, at_root))
+        piece = Piece(kind, key, operator, of, at_root)
+        for other in () if self._apart or INTERNAL.name in of else self.all:
+            if (other.kind, other.key) == (kind, key) and INTERNAL.name not in other.of:
+                other.add(piece)
+                return
+        self.all.append(piece)
 
     def _polarised(self, kind: str, key: Key, declared: bool) -> Any:
         """Assemble what belongs to the product `key` of constants.
@@ -348,7 +368,7 @@ class Pieces:
             fem_petsc.assemble_vector(b, form)
             b.ghostUpdate(addv=compat.ADD, mode=compat.REVERSE)
             return b
-        return self._assembled(form)
+        return self.assembler(form)
 
     @cached_property
     def material(self) -> Any:
@@ -389,6 +409,9 @@ class Pieces:
     def _prestress(self) -> None:
         """Add the geometric stiffness of the stresses that each load piece causes in the linear structure."""
         started = perf_counter()
+        if not self._apart and self.stiffness.getSize()[0] > SMALL:
+            combine(self.stiffness, [self.material], np.ones(1))
+            self.analysed = DirectSolver(self.stiffness, symmetric=True)
         for load, K, added in geometric_pieces(self):
             self._keep("K", load.key, K, load.of | {PRESTRESS} | added)
         self.assembled += perf_counter() - started

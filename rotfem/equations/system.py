@@ -66,6 +66,7 @@ class System(Solutions, ABC):
         plain: whether tangents do without what is known of the way to a state (see `PointStresses`), which takes a form
             of its own.
         parted: whether other theories of the problem share forms with it (see `NonlinearSystem`).
+        analysed: a solver with a symmetric matrix of the pattern, of which others can use the ordering; None at first.
         left_out: effects that are switched off.
         compilations: how often the forms were made; once, or twice where rotations have become very large.
     """
@@ -78,6 +79,7 @@ class System(Solutions, ABC):
     parted = False
     left_out: frozenset[str] = frozenset()
     hub: Any = None
+    analysed: DirectSolver | None = None
     signals: tuple[TimeSignal, ...] = ()
     view: View
 
@@ -113,7 +115,7 @@ class System(Solutions, ABC):
         """
         other = copy(self)
         vars(other).pop("balance", None)
-        other._solver, other.factored, other._mass = None, None, None
+        other._solver, other.factored, other._mass, other.analysed = None, None, None, None
         other.seconds = {"assemble": 0.0, "solve": 0.0}
         other.A = self.A.duplicate()
         return other

@@ -15,6 +15,7 @@ and rows are added up.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
@@ -29,9 +30,10 @@ from scipy.sparse import csr_array
 from slepc4py import SLEPc
 
 from rotfem.errors import ComputationError
-from rotfem.numerics.balance import balanced, least_frequency, power_of_two
+from rotfem.numerics.balance import balanced, least_frequency, power_of_two, unknown_scale
 from rotfem.numerics.damped import MORE, damped_pairs, heavily_damped, quadratic
-from rotfem.numerics.linear import transposed, use_direct_solver
+from rotfem.numerics.gyroscopic import gyroscopic_pairs
+from rotfem.numerics.linear import SMALL, DirectSolver, transposed, use_direct_solver
 from rotfem.numerics.low_rank import sparse_part
 from rotfem.numerics.projection import times
 
@@ -115,19 +117,27 @@ class RoundOff:
 
     def _along_rows(self, values: Array) -> Array:
         """Return for every row the sum of values (n, m) over the columns that K has entries in."""
-        return self._ones @ values if self.pencil.comm.size == 1 else np.real(self.pencil.apply(self._ones, values))
+        if self.pencil.comm.size > 1:
+            return np.real(self.pencil.apply(self._ones, values))
+        block = self.pencil.K.getBlockSize()
+        nodes = values.reshape(-1, block, values.shape[1]).sum(axis=1)
+        return np.repeat(self._ones @ nodes, block, axis=0)
 
     @cached_property
     def _ones(self) -> Any:
-        """One for each entry of K."""
+        """One for each entry of K; on one process for each of its full blocks."""
         K = self.pencil.K
-        indptr, indices, data = K.getValuesCSR()
-        if self.pencil.comm.size == 1:
-            return csr_array((np.ones(len(data)), indices, indptr), shape=K.getSize())
-        ones = K.duplicate()
-        ones.setValuesCSR(indptr, indices, np.ones(len(data)))
-        ones.assemble()
-        return ones
+        if self.pencil.comm.size > 1:
+            ones = K.duplicate()
+            indptr, indices, data = K.getValuesCSR()
+            ones.setValuesCSR(indptr, indices, np.ones(len(data)))
+            ones.assemble()
+            return ones
+        block, (indptr, indices) = K.getBlockSize(), K.getRowIJ()
+        ends = indptr[::block] // block**2  # of the blocks of all nodes before
+        lengths = np.diff(ends)
+        first = np.repeat(indptr[:-1:block] - block * ends[:-1], lengths) + block * np.arange(ends[-1])
+        return csr_array((np.ones(len(first)), indices[first] // block, ends))
 
     def _sum(self, local: Array) -> Array:
         return np.asarray(self.pencil.comm.allreduce(local) if self.pencil.comm.size > 1 else local)
@@ -281,7 +291,12 @@ class Pencil:
 
     Attributes:
         owner: kept alive with the matrices.
+        near: columns (owned rows) near the vectors of a large conservative pencil; None where none are known.
+        factor: solver with K where its factor is kept; before, one with a matrix of its pattern; or None.
     """
+
+    near: Array | None = None
+    factor: DirectSolver | None = None
 
     def __init__(self, M: Any, C: Any, K: Any):
         self.M, self.C, self.K = M, C, K
@@ -383,13 +398,11 @@ class Pencil:
         else:
             M, C, K = (transposed(A) for A in (self.M, self.C, self.K))
             left = matched(values, *self._right(M, C, K, count, target)[:2])
-        pairs = self._checked(values, (right, left), errors, small)
-        values = pairs.values
         # Of ± pairs of real eigenvalues of a conservative pencil, the growing one determines both.
         telling = (values.real >= 0.0) | (not self.conservative)
-        upper = np.flatnonzero((values.imag > 0.0) | ((values.imag == 0.0) & telling))
-        order = upper[np.argsort(np.abs(values[upper]), kind="stable")]
-        return pairs.select(order)
+        upper = (values.imag > 0.0) | ((values.imag == 0.0) & telling)
+        pairs = self._checked(values[upper], (right[:, upper], left[:, upper]), errors[upper], small)
+        return pairs.select(np.argsort(np.abs(pairs.values), kind="stable"))
 
     @cached_property
     def damped(self) -> bool:
@@ -433,9 +446,25 @@ class Pencil:
     def _right(self, M: Any, C: Any, K: Any, count: int, target: float) -> tuple[Array, Array, Array]:
         """Return (λ, x, backward error) of the pairs nearest to the target, both signs of the imaginary part."""
         unit = self.unit or 1.0
+        if target == 0.0 and K.getSize()[0] > SMALL and not self.pivots and self.conservative:
+            with suppress(ComputationError):  # where round-off is too large for it, or K is singular
+                return self._by_blocks(count)
+        self.factor = None
         with balanced(M, C, K, unit, self.unknowns) as d:
             values, right, errors = self._nearest(M, C, K, count, target / unit)
         return (self.unit or 1.0) * values, d[:, None] * right, errors
+
+    def _by_blocks(self, count: int) -> tuple[Array, Array, Array]:
+        """Return (λ, x, backward error) of the slowest pairs of a large conservative pencil; keeps the factor of K."""
+        started, solver = perf_counter(), self.factor or DirectSolver(self.K, symmetric=True)
+        self.factor = None
+        solver.refresh(self.K)
+        solver.factorise()
+        self.factored += perf_counter() - started
+        scale = unknown_scale(self.M, self.K, 1.0).array
+        out = gyroscopic_pairs((self.M, self.C, self.K), scale, solver, count, self.near)
+        self.factor = solver
+        return out
 
     def _nearest(self, M: Any, C: Any, K: Any, count: int, target: float) -> tuple[Array, Array, Array]:
         """Return (λ, x, backward error) nearest to the target, of balanced matrices."""

@@ -9,12 +9,8 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics.eigenproblem import ROUNDED
-from rotfem.numerics.linear import SMALL
+from rotfem.numerics.linear import COUNTING, SMALL
 from rotfem.numerics.low_rank import sparse_part
-
-#: What MUMPS needs to count pivots: a look-out for null ones, and the last front not left to ScaLAPACK.
-COUNTING = {24: 1, 13: 1}
-
 
 #: Entries of a row that err together, as the root of their number (see `rotfem.numerics.eigenproblem`).
 ROWS = 10.0

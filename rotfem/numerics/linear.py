@@ -30,6 +30,12 @@ MANY, MIDDLE = 50, 1000
 #: What makes a factor of its own, with which many right-hand sides are solved at once.
 FACTORS = (PETSc.PC.Type.LU, PETSc.PC.Type.CHOLESKY)
 
+#: What MUMPS needs to count negative pivots: a look-out for null ones, and the last front not left to ScaLAPACK.
+COUNTING = {24: 1, 13: 1}
+
+#: What is said of a singular matrix.
+SINGULAR = "the tangent is singular: the factorisation met a zero pivot"
+
 #: Relative difference of two solutions from which a matrix is singular.
 LOST = 1e-2
 
@@ -101,7 +107,13 @@ class DirectSolver:
     Args:
         A: assembled PETSc matrix, or `PlusLowRank`, of which the sparse part is factorised.
         symmetric: whether it is symmetric.
+
+    Attributes:
+        negative: number of negative eigenvalues of A, by the signs of its pivots (Sylvester); None where none are
+            counted: by MUMPS of symmetric matrices.
     """
+
+    negative: int | None = None
 
     def __init__(self, A: Any, symmetric: bool = False):
         self._whole, self.A, self.factorisations = A, sparse_part(A), 0
@@ -114,6 +126,7 @@ class DirectSolver:
         wide = symmetric and A.comm.size == 1 and A.getInfo()["nz_used"] > MANY * size
         use_direct_solver(self._ksp, size, symmetric, small=MIDDLE if wide else SMALL)
         self._ksp.setErrorIfNotConverged(False)
+        self._counting = self._ksp.getPC().getType() == PETSc.PC.Type.CHOLESKY
         self._stale = True
 
     def refresh(self, A: Any = None) -> None:
@@ -122,6 +135,34 @@ class DirectSolver:
         if A is not None:
             self._whole, self.A = A, sparse_part(A)
 
+    def factorise(self) -> None:
+        """Make the factor of the entries of now.
+
+        Raises:
+            ComputationError: A is singular to working precision.
+        """
+        self.factorisations += 1
+        pc = self._ksp.getPC()
+        if self._counting:
+            if self._ksp.getOperators()[0] != self.A:
+                self._ksp.reset()  # PETSc makes a new factor for another matrix, which does not know the controls
+            self._ksp.setOperators(self.A)
+            pc.setFactorSetUpSolverType()
+            for control, value in COUNTING.items():
+                pc.getFactorMatrix().setMumpsIcntl(control, value)
+        else:
+            self._ksp.setOperators(self.A)
+        self._ksp.setUp()
+        if pc.getFailedReason():
+            raise ComputationError(SINGULAR)
+        self._stale = False
+        if self._counting:
+            self.negative, zero, _ = pc.getFactorMatrix().getInertia()
+            if zero:
+                raise ComputationError(SINGULAR)
+        whole = self._whole
+        self._update = Update(whole.part, whole.factor, self._column) if isinstance(whole, PlusLowRank) else None
+
     def solve(self, b: Any, x: Any) -> None:
         """Solve A x = b.
 
@@ -129,11 +170,7 @@ class DirectSolver:
             ComputationError: A is singular to working precision.
         """
         if self._stale:
-            self._ksp.setOperators(self.A)
-            self.factorisations += 1
-            self._stale = False
-            whole = self._whole
-            self._update = Update(whole.part, whole.factor, self._column) if isinstance(whole, PlusLowRank) else None
+            self.factorise()
         self._apply(b, x)
         if self._update is not None:
             x.array[:] = self._update(x.array)
@@ -144,25 +181,26 @@ class DirectSolver:
         Raises:
             ComputationError: A is singular to working precision.
         """
-        out, (x, b) = np.empty_like(right), self.A.createVecs()
-        pc, m = self._ksp.getPC(), right.shape[1]
-        alone = min(1, m) if pc.getType() in FACTORS else m  # the first makes the factor, or fails
-        for j in range(alone):
-            b.array[:] = right[:, j]
-            self.solve(b, x)
-            out[:, j] = x.array
-        if alone < m:
-            rest = dense(self.A.comm, right[:, alone:])
-            found = rest.duplicate()
-            pc.getFactorMatrix().matSolve(rest, found)
-            solved = found.getDenseArray()
-            out[:, alone:] = solved if self._update is None else self._update(solved)
-        return out
+        if self._stale:
+            self.factorise()
+        pc = self._ksp.getPC()
+        if pc.getType() not in FACTORS:
+            out, (x, b) = np.empty_like(right), self.A.createVecs()
+            for column, solved in zip(right.T, out.T, strict=True):
+                b.array[:] = column
+                self.solve(b, x)
+                solved[:] = x.array
+            return out
+        columns = dense(self.A.comm, right)
+        found = columns.duplicate()
+        pc.getFactorMatrix().matSolve(columns, found)
+        out = np.array(found.getDenseArray())
+        return out if self._update is None else self._update(out)
 
     def _apply(self, b: Any, x: Any) -> None:
         self._ksp.solve(b, x)
         if self._ksp.getConvergedReason() < 0:
-            raise ComputationError("the tangent is singular: the factorisation met a zero pivot")
+            raise ComputationError(SINGULAR)
 
     def _column(self, b: Array) -> Array:
         """Return A⁻¹ b of owned rows."""

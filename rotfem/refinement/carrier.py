@@ -48,14 +48,15 @@ def interpolation(V: Any, points: Array) -> Any:
     padding = CLOSE * float(np.ptp(mesh.geometry.x, axis=0).max())
     tree = geometry.bb_tree(mesh, mesh.topology.dim, padding=padding)
     cells = geometry.compute_colliding_cells(mesh, geometry.compute_collisions_points(tree, points), points)
-    rows, columns, values = [], [], []
-    for i, x in enumerate(points):
-        if not len(inside := cells.links(i)):
-            return None
-        corners = mesh.geometry.x[mesh.geometry.dofmap[inside[0]]][:, : mesh.geometry.dim]
-        X = mesh.geometry.cmap.pull_back(x[None, : mesh.geometry.dim], corners)
-        dofs = V.dofmap.list[inside[0]]
-        rows += [i] * len(dofs)
-        columns += dofs.tolist()
-        values += element.tabulate(0, X)[0, 0, :, 0].tolist()
-    return scipy.sparse.csr_matrix((values, (rows, columns)), (len(points), V.dofmap.index_map.size_local))
+    if np.any(np.diff(cells.offsets) == 0):
+        return None
+    inside = cells.array[cells.offsets[:-1]]
+    dofs, values = V.dofmap.list[inside], np.empty((len(points), V.dofmap.list.shape[1]))
+    order = np.argsort(inside, kind="stable")
+    for same in np.split(order, 1 + np.flatnonzero(np.diff(inside[order]))):
+        corners = mesh.geometry.x[mesh.geometry.dofmap[inside[same[0]]]][:, : mesh.geometry.dim]
+        X = mesh.geometry.cmap.pull_back(points[same, : mesh.geometry.dim], corners)
+        values[same] = element.tabulate(0, X)[0, :, :, 0]
+    ends = np.arange(len(points) + 1) * dofs.shape[1]
+    shape = len(points), V.dofmap.index_map.size_local
+    return scipy.sparse.csr_matrix((values.ravel(), dofs.ravel(), ends), shape)

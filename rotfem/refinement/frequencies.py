@@ -18,6 +18,8 @@ import numpy.typing as npt
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
+from rotfem.numerics.eigenproblem import Pencil
+from rotfem.numerics.linear import SMALL
 from rotfem.refinement.carrier import interpolation
 from rotfem.refinement.coarser import on_other_mesh
 
@@ -32,7 +34,7 @@ ALIKE = 0.9
 
 @dataclass
 class Level:
-    """Modes of a problem on another mesh, or in another theory.
+    """A problem on another mesh, or in another theory.
 
     Attributes:
         analysis: of the problem there.
@@ -47,6 +49,23 @@ class Level:
     before: Spinning | None = None
 
 
+@dataclass
+class Modes:
+    """Modes on another mesh, or in another theory.
+
+    Attributes:
+        speed: Ω, rad/s.
+        values: λ.
+        carried: their vectors at the nodes of the analysed mesh, without the hub; None on several processes.
+        error: see `Level`.
+    """
+
+    speed: float
+    values: Array
+    carried: Array | None
+    error: Callable[[float], float]
+
+
 class FrequencyErrors:
     """The errors of the frequencies of an analysis at any speed.
 
@@ -58,19 +77,51 @@ class FrequencyErrors:
     def __init__(self, analysis: ModalAnalysis, richer: Problem | None = None):
         self.analysis, self.richer = analysis, richer
         self._level: Level | None = None
+        self._modes: Modes | None = None
 
     def __call__(self, spinning: Spinning) -> list[float | None]:
         """Return the relative error of every eigenvalue; None where it is unknown."""
         lam = spinning.pairs.values
-        self._level = self._level or self._made()
-        if self._level is None or not len(lam):
+        modes = self._at(spinning.speed, len(lam) + int(spinning.rigid)) if len(lam) else None
+        if modes is None:
             return [None] * len(lam)
+        differences = np.abs(self._matched(modes, spinning) - lam) / np.maximum(np.abs(lam), np.finfo(float).tiny)
+        return [modes.error(float(d)) for d in differences]
+
+    def near(self, speed: float, count: int) -> Array | None:
+        """Return the modes on half the cells as columns of the analysed mesh, if it is large; its matrices are freed.
+
+        Args:
+            speed: Ω, rad/s.
+            count: number of modes.
+        """
+        size = self.analysis.system.V.dofmap.index_map.size_global * self.analysis.structure.size
+        modes = self._at(speed, count) if size > SMALL else None
+        if modes is None or modes.carried is None:
+            return None
+        self._level = None
+        return np.hstack([modes.carried.real, modes.carried.imag])
+
+    def _at(self, speed: float, count: int) -> Modes | None:
+        """Return at least so many modes on the other mesh; None where there are none."""
+        if self._modes is not None and self._modes.speed == speed and len(self._modes.values) >= count:
+            return self._modes
+        level = self._level = self._level or self._made()
+        if level is None:
+            return None
+        there = level.analysis
+        most = there.structure.free_unknowns() + int(there.free)
         try:
-            there = self._matched(self._level, spinning)
+            level.before = there.at(speed, min(count + SPARE, most), level.before, keep=False)
         except (ComputationError, InputError, np.linalg.LinAlgError):
-            return [None] * len(lam)
-        differences = np.abs(there - lam) / np.maximum(np.abs(lam), np.finfo(float).tiny)
-        return [self._level.error(float(d)) for d in differences]
+            return None
+        values, carried = level.before.pairs.values, None
+        if level.weights is not None:
+            shapes = there.right(level.before)[: level.weights.shape[1] * self.analysis.structure.size]
+            columns = shapes.reshape(level.weights.shape[1], -1)
+            carried = (level.weights @ columns).reshape(-1, shapes.shape[1])
+        self._modes = Modes(speed, values, carried, level.error) if len(values) + int(there.free) >= count else None
+        return self._modes
 
     @property
     def there(self) -> ModalAnalysis | None:
@@ -94,37 +145,14 @@ class FrequencyErrors:
         nodes = own.system.V.tabulate_dof_coordinates()
         return Level(there, error, interpolation(there.system.V, nodes) if own.comm.size == 1 else None)
 
-    def _matched(self, level: Level, spinning: Spinning) -> Array:
+    def _matched(self, modes: Modes, spinning: Spinning) -> Array:
         """Return for every mode the eigenvalue of the most similar one on another mesh."""
-        there, count = level.analysis, len(spinning.pairs.values)
-        most = there.structure.free_unknowns() + int(there.free)
-        level.before = there.at(spinning.speed, min(count + int(spinning.rigid) + SPARE, most), level.before)
-        values = level.before.pairs.values
-        if len(values) < count:
-            raise ComputationError("there are fewer modes to compare with")
-        if level.weights is None:
-            return np.array([values[np.argmin(np.abs(values - lam))] for lam in spinning.pairs.values])
-        block = self.analysis.structure.size
-        shapes = there.right(level.before)[: level.weights.shape[1] * block]
-        columns = shapes.reshape(level.weights.shape[1], -1)
-        carried = (level.weights @ columns).reshape(-1, shapes.shape[1])
-        alike = np.abs(self.analysis.mass_times(spinning)[: len(carried)].conj().T @ carried)
-        size = np.abs(np.sum(carried.conj() * _massed(self.analysis, carried), axis=0))
-        alike /= np.sqrt(np.maximum(size, 1e-300))
+        values, carried = modes.values, modes.carried
         apart = np.abs(values[None, :] - spinning.pairs.values[:, None])
-        apart[alike < ALIKE * np.max(alike, axis=1, keepdims=True)] = np.inf
+        if carried is not None:
+            alike = np.abs(self.analysis.mass_times(spinning)[: len(carried)].conj().T @ carried)
+            M = self.analysis.system.held.matrix(0.0, 0.0, 1.0, 0.0)
+            size = np.abs(np.sum(carried.conj() * Pencil(M, M, M).apply(M, carried), axis=0))
+            alike /= np.sqrt(np.maximum(size, 1e-300))
+            apart[alike < ALIKE * np.max(alike, axis=1, keepdims=True)] = np.inf
         return np.asarray(values[np.argmin(apart, axis=1)])
-
-
-def _massed(analysis: ModalAnalysis, columns: Array) -> Array:
-    """Return M at rest times columns of the structure's unknowns."""
-    held = analysis.system.held
-    M = held.matrix(0.0, 0.0, 1.0, 0.0)
-    x, b = M.createVecs()
-    out = np.empty(columns.shape, dtype=complex)
-    for j in range(columns.shape[1]):
-        for part, unit in ((columns[:, j].real, 1.0), (columns[:, j].imag, 1j)):
-            x.array[:] = part
-            M.mult(x, b)
-            out[:, j] = b.array if unit == 1.0 else out[:, j] + unit * b.array
-    return out

@@ -31,6 +31,18 @@ def test_modes_on_any_number_of_processes(tmp_path: Path, theory: str, more: int
     assert labels[1] == labels[0]
 
 
+def test_modes_of_a_large_plate_on_two_processes(tmp_path: Path) -> None:
+    """More than 5000 unknowns, whose pairs are computed by blocks; on one process from those of half the cells."""
+    large = RECTANGLE | {"mesh": "elements = [20, 20]"}
+    (tmp_path / "plate.toml").write_text(PLATE_SCENE.format(**large))
+    found = []
+    for ranks in (1, 2):
+        done = rotfem(tmp_path, ranks, "modes", "plate.toml", "--json", "--no-plots")
+        assert done.returncode == 0, done.stderr
+        found.append([row["frequency"] for row in json.loads(done.stdout)["modes"]])
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-8)
+
+
 def test_history_on_four_processes(tmp_path: Path) -> None:
     """Those on two and three are compared in `test_checkpoint_mpi`."""
     time = "[time]\nend = 0.02\nstep = 1e-3\n"
