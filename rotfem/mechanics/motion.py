@@ -55,10 +55,6 @@ Scalar = Callable[[float], float]
 Array = npt.NDArray[np.float64]
 
 
-#: Parts of a smooth spin-up that are nearly straight.
-SPIN_UP_KNOTS = 16
-
-
 def no_acceleration(t: float) -> Array:
     """Return a_o = 0."""
     return np.zeros(3)
@@ -128,11 +124,9 @@ class Motion:
     def spin_up(cls, speed: float | str, duration: float | str, axis: npt.ArrayLike = (0, 0, 1), **more: Any) -> Motion:
         """Return the smooth spin-up from rest to a speed (rad/s) in a time (s); see `smooth_spin_up`."""
         speed, duration = si(speed, "rad/s", "motion.speed"), si(duration, "s", "motion.duration")
-        turns = speed != 0.0
-        state: dict[str, Any] = {"is_spinning": turns, "changes_speed": turns, "settled": duration}
-        state["arrays"] = True
-        state["sharp"] = (duration,)
-        state["knots"] = tuple(duration * np.arange(1, SPIN_UP_KNOTS + 1) / SPIN_UP_KNOTS)
+        turns, knots = speed != 0.0, duration * np.arange(1, 17) / 16  # parts of it that are nearly straight
+        state: dict[str, Any] = {"is_spinning": turns, "changes_speed": turns, "settled": duration, "arrays": True}
+        state |= {"sharp": (duration,), "knots": tuple(knots)}
         return cls(*smooth_spin_up(speed, duration), about(axis), **(state | more))
 
     @classmethod

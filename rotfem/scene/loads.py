@@ -18,6 +18,10 @@ from rotfem.scene.values import ROUND_OFF, Matrix, PaddedVector, as_number, as_v
 KEYS = "write over_time = [[t, …], …], over_span = [[x, …], …] or over_span_and_time = [[x, t, …], …]"
 
 
+#: Key of a table ↦ what its rows are over.
+OVER = {"table": ("t",), "over_time": ("t",), "over_span": ("x",), "over_span_and_time": ("x", "t")}
+
+
 class Load(Given):
     """A force over time (N), components in the rotating frame; vectors of two get a third component, zero.
 
@@ -45,10 +49,10 @@ class Load(Given):
     def _read_value(cls, value: Any) -> tuple[float, ...] | None:
         return None if value is None else cls.VECTORS.vector(value)
 
-    @field_validator("table", "over_time", mode="plain")
+    @field_validator(*OVER, mode="plain", check_fields=False)
     @classmethod
     def _read_rows(cls, value: Any, info: ValidationInfo) -> Over | None:
-        return None if value is None else cls.VECTORS.rows(("t",), value, info)
+        return None if value is None else cls.VECTORS.rows(OVER[str(info.field_name)], value, info)
 
     @field_validator("harmonic", mode="after")
     @classmethod
@@ -112,16 +116,6 @@ class SpanLoad(Load):
 
     over_span: Any = None
     over_span_and_time: Any = None
-
-    @field_validator("over_span", mode="plain")
-    @classmethod
-    def _read_over_span(cls, value: Any, info: ValidationInfo) -> Over | None:
-        return None if value is None else cls.VECTORS.rows(("x",), value, info)
-
-    @field_validator("over_span_and_time", mode="plain")
-    @classmethod
-    def _read_over_both(cls, value: Any, info: ValidationInfo) -> Over | None:
-        return None if value is None else cls.VECTORS.rows(("x", "t"), value, info)
 
     @classmethod
     def _read_amplitude(cls, value: Any, info: ValidationInfo) -> Any:

@@ -107,13 +107,10 @@ class Given(SceneModel):
     def _check_one(self) -> Self:
         harmonic = vars(self).get("harmonic")
         if len(self.given) > 1 or not (self.given or harmonic):
+            ways = ", ".join(name for name in self.WAYS if name != "function")
             added = "" if harmonic is None else "; harmonic may be given in addition"
-            raise problem("", ", ".join(self.given) or None, f"give exactly one of {self.alternatives()}{added}")
+            raise problem("", ", ".join(self.given) or None, f"give exactly one of {ways}{added}")
         return self
-
-    def alternatives(self) -> str:
-        """Return the keys of which one is to be given, for messages."""
-        return ", ".join(name for name in self.WAYS if name != "function")
 
 
 class Signal(Given):

@@ -115,7 +115,7 @@ def _rows_of_21(table: YamlNode, length: float, definite: bool) -> list[list[Any
     for row, entries in zip(rows, upper, strict=True):
         if len(entries) != len(ELEMENTS):
             row.fail(f"has {len(entries)} entries; must be the 21 of the upper triangle")
-    return scaled_rows(grid, length, _checked(_along_ours(np.array(upper)), rows, definite))
+    return scaled_rows(grid, length, _matrices(np.array(upper), rows, definite))
 
 
 def _stiffness(table: YamlNode, length: float) -> list[list[Any]]:
@@ -135,7 +135,7 @@ def _stiffness(table: YamlNode, length: float) -> list[list[Any]]:
     upper = np.zeros((count, len(ELEMENTS)))
     for column, name in enumerate(ELEMENTS):
         upper[:, column] = _column(table, name, count, needed=False)
-    return scaled_rows(grid, length, _checked(_along_ours(upper), table["K44"].entries(), definite=True))
+    return scaled_rows(grid, length, _matrices(upper, table["K44"].entries(), definite=True))
 
 
 def _mass(table: YamlNode, length: float) -> list[list[Any]]:
@@ -150,7 +150,7 @@ def _mass(table: YamlNode, length: float) -> list[list[Any]]:
     M = {"K11": mass, "K16": -mass * y, "K22": mass, "K26": mass * x, "K33": mass, "K34": mass * y, "K35": -mass * x}
     M |= {"K44": edge, "K45": -cross, "K55": flap, "K66": polar}
     upper = np.stack([M.get(element, np.zeros(count)) for element in ELEMENTS], axis=-1)
-    return scaled_rows(grid, length, _checked(_along_ours(upper), table["mass"].entries(), definite=False))
+    return scaled_rows(grid, length, _matrices(upper, table["mass"].entries(), definite=False))
 
 
 def _column(table: YamlNode, name: str, count: int, needed: bool = True) -> Array:
@@ -163,21 +163,17 @@ def _column(table: YamlNode, name: str, count: int, needed: bool = True) -> Arra
     return values
 
 
-def _checked(matrices: Array, places: list[YamlNode], definite: bool) -> Array:
-    """Return matrices (n, 6, 6); refuse one that no section has where its numbers stand."""
-    for matrix, place in zip(matrices, places, strict=True):
-        if not is_positive(matrix, definite, DIGITS):
+def _matrices(upper: Array, places: list[YamlNode], definite: bool) -> Array:
+    """Return matrices (n, 6, 6) along our axes of upper triangles (n, 21) along x, y, z; refuse what no section has."""
+    out = np.zeros((len(upper), 6, 6))
+    out[:, *UPPER] = upper
+    for M, place in zip(out, places, strict=True):
+        M[:] = turned_matrix(M + np.triu(M, 1).T, FROM_IEC)
+        if not is_positive(M, definite, DIGITS):
             place.fail(
                 "is of a matrix that is not positive definite" + ("; nor may shear stiffness be 0" if definite else "")
             )
-    return matrices
-
-
-def _along_ours(upper: Array) -> Array:
-    """Return matrices (n, 6, 6) along our axes from the upper triangles (n, 21) along x, y, z."""
-    out = np.zeros((len(upper), 6, 6))
-    out[:, *UPPER] = upper
-    return np.array([turned_matrix(M + np.triu(M, 1).T, FROM_IEC) for M in out])
+    return out
 
 
 # --- YAML whose values know where they stand ----------------------------------------------------------------------
