@@ -36,6 +36,10 @@ from rotfem.structures.turning_clamp import TurningClamp
 Array = npt.NDArray[np.float64]
 
 
+#: Unknowns from which a factor is kept over steps, by the dimension of the mesh: a plate's matrix is dear to factorise.
+KEPT_FROM = {1: 5000, 2: 300}
+
+
 def forget(owner: Any) -> None:
     """Make an object compute all its cached properties anew when they are next asked for."""
     for name in list(vars(owner)):
@@ -105,8 +109,8 @@ class System(Solutions, ABC):
         self._damped = True
         self.A = self._compile()
         self._by_mode = damping_by_mode(self)
-        #: Whether a factor is kept for the steps that follow: where factorising is dear, of a plate soon.
-        self.keeps_factor = self.A.getSize()[0] > {1: 5000, 2: 300}[self.structure.mesh.topology.dim]
+        #: Whether a factor is kept for the steps that follow, where factorising is dear.
+        self.keeps_factor = self.A.getSize()[0] > KEPT_FROM[self.structure.mesh.topology.dim]
 
     def twin(self) -> Self:
         """Return another system of the same forms, functions and constants, with matrices and a factor of its own.

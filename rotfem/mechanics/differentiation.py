@@ -30,8 +30,8 @@ GOLDEN = (5**0.5 - 1) / 2
 #: Points of the interpolation in units of h, the inner five first.
 NODES = (0.0, -(GOLDEN**2), GOLDEN**2, -GOLDEN, GOLDEN, -1.0, 1.0)
 
-#: Length of a cell of time (s) where no time grid says it, and halvings of it down to the shortest h.
-CELL, HALVINGS = 0.1, 16
+#: Length of a cell of time (s) where no time grid says it.
+CELL = 0.1
 
 #: Relative round-off of a value.
 EPS = float(np.finfo(float).eps)
@@ -93,7 +93,7 @@ class Derivative:
         longest = min(self._cell, 0.5 * (limits[1] - limits[0]))
         seen: list[tuple[list[float], float]] = []
         best, least, floor = longest, np.inf, 0.0
-        for k in range(HALVINGS, -1, -1):
+        for k in range(16, -1, -1):
             h = longest / 2**k
             found = [self._at(t, h, limits) for t in times]
             if k > 0 and not any(size for _, _, size in found):  # below the digits of a stair

@@ -35,7 +35,7 @@ TimeSignal = tuple[Scalar, Scalar, Scalar]
 
 def turn_about(axis: Array, angle: float) -> Array:
     """Return the matrix (3, 3) of the turn by an angle (rad) about a unit vector (Rodrigues' formula)."""
-    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    cross = np.cross(axis, np.eye(3)).T
     return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
 
 

@@ -53,10 +53,6 @@ def _as_point_masses(value: Any) -> Matrix:
     return rows
 
 
-#: What a stiffness of a plate is called ↦ the power of the thickness that a modulus is multiplied with.
-_POWERS = {" h": 1, " h³": 3}
-
-
 class PlateStructure(StructureTable):
     """A plate in the plane (1, 2) of the rotating frame: a rectangle clamped at x = 0, or a mesh file.
 
@@ -172,7 +168,7 @@ class PlateStructure(StructureTable):
             f"{name}{of}": value * h**power
             for name, value in moduli.items()
             if value is not None
-            for of, power in _POWERS.items()
+            for of, power in ((" h", 1), (" h³", 3))
         }
         return {**stiffnesses, "mass per area": self.rho * h, "rotary inertia": self.rho * h**3}
 

@@ -17,9 +17,6 @@ from rotfem.scene.units import AngularUnit
 from rotfem.scene.values import Bounds, Count, Matrix, Number, Positive, as_increasing_rows
 from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
 
-#: Most stations along a beam.
-STATIONS = 10_000
-
 
 def _as_effects(value: Any) -> str | tuple[str, ...]:
     return "auto" if value == "auto" else as_names(value, registry.effects.names, "an effect", '"auto" or ')
@@ -377,11 +374,11 @@ def _as_quantities(value: Any) -> tuple[str, ...]:
 
 
 def _as_stations(value: Any) -> int | tuple[float, ...]:
-    if type(value) is int and 2 <= value <= STATIONS:
+    if type(value) is int and 2 <= value <= 10_000:
         return value
     numbers = isinstance(value, list | tuple) and all(type(x) in (int, float) and np.isfinite(x) for x in value)
-    if not numbers or not 0 < len(value) <= STATIONS:
-        why = f"must be a list of positions along the beam (m), or how many there are, 2 to {STATIONS}"
+    if not numbers or not 0 < len(value) <= 10_000:
+        why = "must be a list of positions along the beam (m), or how many there are, 2 to 10000"
         raise problem("", value, why)
     if any(b <= a for a, b in pairwise(value)):
         raise problem("", value, "must be positions that increase")

@@ -15,9 +15,6 @@ import numpy.typing as npt
 
 Array = npt.NDArray[Any]
 
-#: Positions in a cell are distinguished in steps of this part of its size.
-PART = 1e-6
-
 
 class Numbering:
     """The common order of the nodes of a space and of the cells of its mesh. Its methods are called by all processes.
@@ -105,8 +102,7 @@ def common_order(cells: Array, nodes: Array, positions: Array) -> tuple[Array, A
     nodes, positions = nodes[first], positions[first]
     low = positions.min(axis=1, keepdims=True)
     size = (positions.max(axis=1, keepdims=True) - low).max(axis=2, keepdims=True)
-    place = np.rint((positions - low) / (PART * size)).astype(np.int64)
-    step = int(2 / PART)
+    place, step = np.rint((positions - low) / (1e-6 * size)).astype(np.int64), 2_000_000
     inside = np.argsort((place[..., 0] * step + place[..., 1]) * step + place[..., 2], axis=1, kind="stable")
     flat = np.take_along_axis(nodes, inside, axis=1).ravel()
     _, new = np.unique(flat, return_index=True)

@@ -19,9 +19,6 @@ from rotfem.errors import OutputError
 
 Array = npt.NDArray[Any]
 
-#: Bytes that are written at a time.
-BLOCK = 4096
-
 #: Most snapshots of a history that are kept.
 MOST = 200
 
@@ -64,8 +61,8 @@ def size_of_one(W: fem.FunctionSpace, fields: int) -> int:
     cells, nodes = W.mesh.topology.index_map(W.mesh.topology.dim), W.dofmap.index_map
     points, cell_count = nodes.size_local + nodes.num_ghosts, cells.size_local + cells.num_ghosts
     here = 8 * (points * (3 * fields + 5) + cell_count * (2 + W.dofmap.dof_layout.num_dofs))
-    blocks = 2 + here // BLOCK  # a whole number for each process, and what describes them
-    return int(W.mesh.comm.allreduce(blocks)) * BLOCK
+    blocks = 2 + here // 4096  # whole blocks of bytes for each process, and what describes them
+    return int(W.mesh.comm.allreduce(blocks)) * 4096
 
 
 def reserve(comm: Any, path: Path, size: int) -> None:

@@ -265,9 +265,6 @@ class DirectorTurns(Turns):
 
 # --- theories of moderate rotation, whose rotations are counted from the undeformed structure -------------------------
 
-#: Largest |alpha_2|, rad: at π/2 the two angles of the director meet their pole.
-LARGEST_TILT = 1.5
-
 
 def check_sections(beam: Any, q: Array, time: float | None = None) -> None:
     """Refuse a state in which some section of a spatial beam has turned by more than a full turn.
@@ -299,10 +296,10 @@ def check_directors(plate: Any, q: Array, time: float | None = None) -> None:
     owned = plate.V.dofmap.index_map.size_local
     tilt = np.abs(q[: plate.size * owned].reshape(-1, plate.size)[:, 4])
     worst = plate.comm.allreduce(float(tilt.max(initial=0.0)), op=MPI.MAX)
-    if worst > LARGEST_TILT:
+    if worst > DirectorTurns.limit:
         raise ComputationError(
-            f"the plate has turned about direction 1 by {worst:.3g} rad (largest: {LARGEST_TILT}); in the theory "
-            f"{plate.problem.theory.name} the director's angles are limited there, not about direction 2",
+            f"the plate has turned about direction 1 by {worst:.3g} rad (largest: {DirectorTurns.limit}); in the "
+            f"theory {plate.problem.theory.name} the director's angles are limited there, not about direction 2",
             time,
             f'a smaller load, or model.theory = "{richest().name}", which holds for any rotation',
         )

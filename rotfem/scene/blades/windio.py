@@ -23,6 +23,10 @@ from rotfem.scene.values import DIGITS, Array, is_positive
 #: Key that later versions have, and those that are known.
 VERSION, KNOWN = "windIO_version", re.compile(r"2\.[01](\.\d+)?")
 
+#: Characters of a file, at most, without libyaml and with it. A list of single digits, the slowest content, then takes
+#: ten seconds; a blade has some 800 000.
+MOST_YAML = (900_000, 4_500_000)
+
 UPPER = np.triu_indices(6)
 
 #: Elements of a stiffness matrix of version 2, those on the diagonal among them; others are 0 where they are not given.
@@ -183,8 +187,7 @@ def _yaml_tree(deck: Deck) -> YamlNode:
     """Return the root of a YAML file; refuse one that is none, or empty, or not read in ten seconds."""
     import yaml
 
-    # Single digits, the slowest content, are then read in ten seconds; a blade has some 800 000 characters.
-    most = 4_500_000 if yaml.__with_libyaml__ else 900_000
+    most = MOST_YAML[bool(yaml.__with_libyaml__)]
     if len(deck.text) > most:
         deck.fail(f"has {len(deck.text)} characters; of YAML at most {most} are read")
     try:
