@@ -48,24 +48,8 @@ Array = npt.NDArray[Any]
 SURE, AMBIGUOUS = 0.9, 0.5
 
 
-#: Correlation below which two modes have nothing in common: the branch is lost, not joined to a stranger.
-STRANGER = 0.02
-
-
 #: Relative distance of eigenvalues below which they are taken for one, as those of a disk at rest.
 TWIN = 1e-6
-
-
-#: Largest |dω/dΩ| in the rotor of a mode whose ω may pass zero: 1 of the frame, and at most 2 of gyroscopic moments, as
-#: the polar moment of inertia of a body is at most twice its diametral one.
-STEEPEST = 3.0
-
-
-#: Smallest refined step as a part of the speed range: a veering narrower than this passes as a crossing.
-FINEST = 1e-5
-
-#: Speeds that may be put between those asked for: so many in all, and for each of those. A veering takes 17.
-ADDED, ADDED_EACH = 1000, 40
 
 
 #: Modes computed beyond those asked for, so that a branch that falls in the order is still there.
@@ -163,7 +147,9 @@ def assign(node: Node, following: Node) -> float:
 
     c, single = likeness(False)
     a, b = node.spinning.pairs.values[node.order[known]], following.spinning.pairs.values
-    may_pass = a.imag[:, None] + b.imag[None, :] <= STEEPEST * abs(following.speed - node.speed)
+    # |dω/dΩ| in the rotor of a mode whose ω passes zero is at most 3: 1 of the frame, and at most 2 of gyroscopic
+    # moments, as the polar moment of inertia of a body is at most twice its diametral one.
+    may_pass = a.imag[:, None] + b.imag[None, :] <= 3.0 * abs(following.speed - node.speed)
     passed = np.zeros_like(may_pass)
     if np.any(may_pass):
         c_bar, single_bar = likeness(True)
@@ -175,7 +161,7 @@ def assign(node: Node, following: Node) -> float:
     following.conjugate = node.conjugate.copy()
     following.conjugate[known[rows]] ^= passed[rows, columns]
     following.confidence[known[rows]] = c[rows, columns]
-    kin = c[rows, columns] >= STRANGER
+    kin = c[rows, columns] >= 0.02  # else they have nothing in common, and the branch is lost
     following.order[known[rows[kin]]] = columns[kin]
     return float(np.min(c[rows, columns], initial=1.0))
 
@@ -217,8 +203,8 @@ class Sweep:
         first.order, first.confidence = np.arange(total), np.ones(total)
         first.conjugate = np.zeros(total, dtype=bool)
         self.nodes = [first]
-        self.finest = FINEST * max(speeds[-1] - speeds[0], 1e-300)
-        self.most_solves = min(self.most_solves, ADDED + (1 + ADDED_EACH) * len(speeds))
+        self.finest = 1e-5 * max(speeds[-1] - speeds[0], 1e-300)  # a narrower veering passes as a crossing
+        self.most_solves = min(self.most_solves, 1000 + 41 * len(speeds))  # a veering takes 17
         for i, speed in enumerate(speeds[1:], start=1):
             self._advance(self.solve(speed, self.nodes[-1].spinning, True))
             progress(i / (len(speeds) - 1))

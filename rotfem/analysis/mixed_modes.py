@@ -35,12 +35,6 @@ from rotfem.numerics.low_rank import sparse_part
 
 Array = npt.NDArray[Any]
 
-#: Error bound from which digits are lost, so that the modes are computed once more.
-LOST = 1e-5
-
-#: Error bound that viscosity alone would leave, from which nothing is gained.
-WORTH = 0.1
-
 
 @dataclass(frozen=True)
 class Saddle:
@@ -214,9 +208,9 @@ class KeptDigits:
             count: number of pairs wanted.
         """
         worst = float(np.max(pairs.bounds[:count], initial=0.0))
-        if worst <= LOST or sparse_part(pencil.C) is not pencil.C or not Resultants.possible(self.system):
+        if worst <= 1e-5 or sparse_part(pencil.C) is not pencil.C or not Resultants.possible(self.system):
             return pairs
-        if self._in_damping(pairs, count) > WORTH:
+        if self._in_damping(pairs, count) > 0.1:  # nothing is gained
             return pairs
         if self._resultants is None:
             self._resultants = Resultants(self.system)

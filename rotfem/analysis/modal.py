@@ -40,9 +40,6 @@ from rotfem.structures.mode_names import Wave, with_overdamped, with_whirl
 
 Array = npt.NDArray[Any]
 
-#: Share of kinetic energy from which a mode belongs to one family; below it is named as mixed.
-PURE = 0.8
-
 #: Part of an eigenvalue that its real part must exceed to count as growth.
 GROWTH = 1e-6
 
@@ -402,7 +399,7 @@ class Described:
         for j, shape in enumerate(self._shapes):
             first, *others = sorted(families, key=lambda name: -self.shares[name][j])
             kind, number = self._structure.mode_name(first, *shape)
-            mixed = others and self.shares[first][j] < PURE
+            mixed = others and self.shares[first][j] < 0.8
             out.append(f"{kind}–{others[0]} {number}" if mixed else f"{kind} {number}")
         pencil, pairs, speed = self._spinning.pencil, self._spinning.pairs, self._spinning.speed
         if np.any(pairs.values.imag == 0.0):

@@ -27,12 +27,6 @@ from rotfem.numerics.newton import Newton
 
 Array = npt.NDArray[np.float64]
 
-#: Number of modes whose phase is compared: a free vibration from a smooth start has little of higher ones.
-MODES = 8
-
-#: Difference of two vibrations of one size, relative to it, that are out of phase.
-OPPOSITE = 2.0
-
 
 def drift(problem: Problem, system: Any, start: tuple[Array, Array], time: float, newton: Newton) -> float:
     """Return by how much the phase moves the tip, m.
@@ -55,7 +49,7 @@ def drift(problem: Problem, system: Any, start: tuple[Array, Array], time: float
     exact.set_state(steady_state(exact, speed, newton))
     system.set_state(rest)
     pencil, other = (Pencil(*each.mass_damping_stiffness()) for each in (system, exact))
-    pairs, there = pencil.solve(MODES), other.solve(MODES)
+    pairs, there = pencil.solve(8), other.solve(8)  # a free vibration from a smooth start has little of higher ones
     lam, x, y = pairs.values, pairs.right, pairs.left
 
     def times(A: Any, vector: Array) -> Array:
@@ -70,7 +64,7 @@ def drift(problem: Problem, system: Any, start: tuple[Array, Array], time: float
     same = np.argmax(np.abs(product(pencil.apply(M, there.right))), axis=1)
     change = np.abs(there.values[same] - lam)
     lasting = np.minimum(time, 1.0 / np.maximum(-lam.real, 1.0 / time))
-    out = np.abs(share) * np.minimum(change * lasting, OPPOSITE)
+    out = np.abs(share) * np.minimum(change * lasting, 2.0)  # which is out of phase
     moves = [i for i, name in enumerate(system.structure.components) if name.startswith("u")]
 
     def tip(owned: Array) -> Array:

@@ -27,9 +27,6 @@ Array = npt.NDArray[Any]
 #: Speeds from which a basis saves time: it takes three full solutions at least.
 MANY = 3
 
-#: Accepted relative difference of a frequency from that of the full system; most full solutions in the search for it.
-AGREEMENT, MOST = 1e-6, 9
-
 
 def in_basis(analysis: ModalAnalysis, speeds: Sequence[float], count: int) -> ModalAnalysis:
     """Return the analysis in a basis where that is possible and saves time, else the analysis itself.
@@ -143,6 +140,8 @@ class ReducedAnalysis(ModalAnalysis):
     def prepare(self, first: float, last: float, count: int) -> bool:
         """Build the basis for speeds from first to last (rad/s) and `count` modes; return whether the checks agree.
 
+        It grows until frequencies halfway between known speeds are those of the full system to 1e-6.
+
         Raises:
             ComputationError: a full solution failed.
         """
@@ -152,7 +151,7 @@ class ReducedAnalysis(ModalAnalysis):
             return False
         self._project()
         gaps = [(first, last)]
-        while gaps and len(self.checks) + 2 < MOST:
+        while gaps and len(self.checks) < 7:
             low, high = gaps.pop(0)
             middle = 0.5 * (low + high)
             exact = self._solve(middle, count)
@@ -160,7 +159,7 @@ class ReducedAnalysis(ModalAnalysis):
             self.checks.append({"speed": middle, "difference": error})
             self._add(exact)
             self._project()
-            gaps += [(low, middle), (middle, high)] if error > AGREEMENT else []
+            gaps += [(low, middle), (middle, high)] if error > 1e-6 else []
         return not gaps
 
     def report(self) -> dict[str, Any]:

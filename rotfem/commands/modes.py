@@ -42,9 +42,6 @@ from rotfem.scene import Scene, as_scene
 
 R = TypeVar("R", bound=Result)
 
-#: An instability that grows by more than this, relative to the modes that are asked for, is none of them.
-GROWS_AS_SAID = 1.001
-
 
 def modes(
     scene: Scene | str | Path | Mapping[str, Any],
@@ -155,7 +152,8 @@ def _modes(scene: Scene, problem: ProblemData, comm: MPI.Comm, sensitivities: bo
 
 def _of_stability(stability: Stability, rows: list[dict[str, Any]]) -> list[str]:
     """Return the warning of a state that is not stable, if the rows of the modes do not say it."""
-    known = GROWS_AS_SAID * max((row["growth"] for row in rows if row["stability"] != "neutral"), default=0.0)
+    # An instability that grows by more than those of the modes that are asked for is none of them.
+    known = 1.001 * max((row["growth"] for row in rows if row["stability"] != "neutral"), default=0.0)
     unsaid = stability.stable is None or stability.held_by_spin or stability.growth > max(known, 0.0)
     return [stability.warning()] if unsaid else []
 

@@ -28,9 +28,6 @@ Matrices: TypeAlias = tuple[Any, Any, Any]
 #: A size that is none, and that of an eigenvalue whose square, times anything, may be no number any more.
 TINY, BEYOND = 1e-300, 1e140
 
-#: Part −Re λ/|λ| from which damping is heavy.
-HEAVY = 0.3
-
 #: Undamped modes, and Ritz pairs, beyond those wanted.
 MORE = 4
 
@@ -45,9 +42,9 @@ NEW = 1e-8
 
 
 def heavily_damped(values: Array, small: float) -> bool:
-    """Return whether eigenvalues (1/s), those above `small` in size, have heavy damping among them."""
+    """Return whether eigenvalues (1/s), those above `small` in size, have heavy damping among them, −Re λ > 0.3 |λ|."""
     sizes = np.abs(values)
-    return bool(np.any((sizes > small) & (values.real < -HEAVY * sizes)))
+    return bool(np.any((sizes > small) & (values.real < -0.3 * sizes)))
 
 
 def quadratic(m: Array, c: Array, k: Array, target: float) -> tuple[Array, Array, Array]:

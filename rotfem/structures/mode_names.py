@@ -58,13 +58,6 @@ def ordinal_ending(number: int) -> str:
     return "th" if number % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
 
 
-#: Part of the largest amplitude below which a shape counts as zero when its nodes are counted.
-NODE_NOISE = 1e-3
-
-#: Share of a wave below which a mode stands: its orbits are ellipses of an axial ratio below a half of it.
-STANDING = 0.02
-
-
 @dataclass(frozen=True)
 class Wave:
     """How a mode of a rotor precesses, seen from the rotor or the fixed frame.
@@ -101,7 +94,8 @@ class Wave:
         A shaft's whirl has the direction that the fixed frame sees: forward whirl above its critical speed runs against
         the spin in the rotor. A disk's wave has that in the disk.
         """
-        if abs(self.share) < STANDING or self.number == 0 or speed == 0.0:
+        # A standing mode has orbits that are ellipses of an axial ratio below 1 %.
+        if abs(self.share) < 0.02 or self.number == 0 or speed == 0.0:
             return ""
         return "forward" if (self.seen_fixed(omega, speed) if self.shaft else self.share) > 0.0 else "backward"
 
@@ -127,17 +121,14 @@ def in_phase(y: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
     return np.asarray(np.real(y * np.exp(-1j * np.angle(y.flat[np.argmax(np.abs(y))]))))
 
 
-def sign_changes(y: npt.NDArray[np.float64], noise: float = NODE_NOISE) -> int:
-    """Return how often the values (n,) along a line change sign; those below the noise do not count."""
+def sign_changes(y: npt.NDArray[np.float64], noise: float = 1e-3) -> int:
+    """Return how often the values (n,) along a line change sign; those below noise times the largest do not."""
     y = y[np.abs(y) > noise * np.max(np.abs(y))]
     return int(np.count_nonzero(np.diff(np.sign(y))))
 
 
 #: Stations along a plate at which its cross lines are sampled, and highest polynomial across.
 STATIONS, ACROSS = 24, 4
-
-#: Stations around a disk, and gap in the angles of the clamp (rad) up to which the plate counts as a disk.
-AROUND, GAP = 64, 1.0
 
 
 def plate_mode_name(family: str, coordinates: dict[str, npt.NDArray[Any]], y: npt.NDArray[Any]) -> tuple[str, str]:
@@ -184,14 +175,14 @@ def disk_wave(coordinates: dict[str, npt.NDArray[Any]], w: npt.NDArray[Any], axi
 
 
 def _is_disk(x: npt.NDArray[Any], y: npt.NDArray[Any]) -> bool:
-    """Return whether nodes about their centre leave a round hole there and lie at all angles."""
+    """Return whether nodes about their centre leave a round hole there and lie at all angles, within 1 rad."""
     r = np.hypot(x, y)
     if r.min() < 1e-2 * r.max():
         return False
     inner = np.sort(np.arctan2(y, x)[r < 1.02 * r.min() + 1e-3 * r.max()])
     outer = np.sort(np.arctan2(y, x)[r > 0.98 * r.max()])
     gaps = [np.max(np.diff(np.append(a, a[0] + 2 * np.pi))) if len(a) > 5 else np.inf for a in (inner, outer)]
-    return max(gaps) < GAP
+    return max(gaps) < 1.0
 
 
 @lru_cache(maxsize=4)
@@ -227,7 +218,7 @@ def _diameters(
     r, angle = np.hypot(x, y), np.arctan2(y, x)
     edges = np.linspace(r.min(), r.max(), STATIONS // 2 + 1)
     ring = np.clip(np.digitize(r, edges) - 1, 0, STATIONS // 2 - 1)
-    orders = np.arange(AROUND // 4)
+    orders = np.arange(16)
     parts = np.zeros((STATIONS // 2, len(orders)), dtype=complex)
     for i in range(STATIONS // 2):
         here = ring == i
