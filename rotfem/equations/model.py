@@ -90,11 +90,13 @@ class Model:
         terms: name ↦ virtual work, a UFL form.
         compositions: how often they were written.
         time: that constants are set to, s.
+        shown: the same, how signals are seen, and effects left out; None of another motion than the problem's.
     """
 
     def __init__(self, problem: Problem, comm: MPI.Comm = MPI.COMM_WORLD):
         self.problem, self.comm, self.theory = problem, comm, problem.theory
         self.time, self.compositions = 0.0, 1
+        self.shown: tuple[Any, ...] | None = None
         self.effects = problem.effective_effects()
         self.hub = HubAngle(problem.motion) if problem.motion.hub is not None else None
         self.motion: Motion = problem.motion if self.hub is None else self.hub.motion

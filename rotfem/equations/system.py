@@ -88,6 +88,7 @@ class System(Solutions, ABC):
     view: View
 
     def __init__(self, model: Model, moving: bool = True):
+        self.view = View()
         self.model, self.structure, self.motion, self.moving = model, model.structure, model.motion, moving
         self.comm = model.comm
         self.q, self.v, self.a, _ = self.structure.k.functions
@@ -143,7 +144,7 @@ class System(Solutions, ABC):
             self.model.compositions += 1
         if reference is not None and self.compilations < self.model.compositions:
             forget(self)
-            self._solver = None
+            self.model.shown, self._solver = None, None
             self.A = self._compile()
             self.compilations = self.model.compositions
 
@@ -230,8 +231,8 @@ class System(Solutions, ABC):
 
         The load factor multiplies loads, gravity and base acceleration, not the spin.
         """
-        motion = motion or self.motion
-        self.model.time = t
+        plain, motion = motion is None and load_factor == 1.0, motion or self.motion
+        self.model.time, self.model.shown = t, (t, self.view.side, self.view.line, self.left_out) if plain else None
         self.model.switch_off(self.left_out)
         values = self.model.frame.values(motion, t)
         if load_factor != 1.0:
@@ -241,6 +242,11 @@ class System(Solutions, ABC):
             for name, value in self.load_values(t, motion).items():
                 self.structure.load_constants[name][0].value[...] = load_factor * value
             self.structure.update_loads(motion.rotation(t) if self.model.fixed else None)
+
+    def show_time(self, t: float) -> None:
+        """Set the time t (s) unless it is set already, for the problem's motion and as it is at t itself."""
+        if self.model.shown != (t, 0, None, self.left_out):
+            self.set_time(t)
 
     def load_values(self, t: float, motion: Motion) -> dict[str, Array]:
         """Return the amplitude of every load constant at time t (s); in a fixed frame dead loads turn with the hub."""

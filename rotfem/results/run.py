@@ -113,7 +113,7 @@ class Table:
 
     def append(self, row: Iterable[float]) -> None:
         """Add one row in the order of the columns."""
-        self._rows.append(tuple(float(value) for value in row))
+        self._rows.append(tuple(map(float, row)))
 
     def __len__(self) -> int:
         return len(self._rows)
