@@ -1,8 +1,8 @@
 """How good every row of `rotfem explain` is on ten scenes, against runs on finer meshes with finer steps.
 
-    ./with-fenicsx python3 benchmarks/explain_truth.py [further | odd | SCENE …]
+    ./with-fenicsx python3 benchmarks/explain_truth.py [further | odd | unseen | SCENE …]
 
-of `explain_scenes.FRESH`, of the ten of `explain_further_scenes` or `explain_odd_scenes`, or of those named.
+of `explain_scenes.FRESH`, of the scenes of `explain_further_scenes` and its like, or of those named.
 
 The truth of an effect or a theory is the difference of two runs on twice the elements with a quarter of the steps in a
 scheme of fourth order; of the steps and the mesh that of the scene's own to the finer ones. Columns: kind, name and
@@ -18,6 +18,7 @@ import numpy as np
 from explain_further_scenes import FURTHER
 from explain_odd_scenes import ODD
 from explain_scenes import FRESH, scene
+from explain_unseen_scenes import UNSEEN
 
 import rotfem
 from rotfem.commands.explain import compared
@@ -95,8 +96,8 @@ def main() -> None:
     """Print the table, and how many rows are within a factor 3, large ones for large ones counted with them."""
     inside, missed = [], []
     asked = sys.argv[1:] or list(FRESH)
-    FRESH.update(FURTHER | ODD)
-    sets = {"further": FURTHER, "odd": ODD}
+    FRESH.update(FURTHER | ODD | UNSEEN)
+    sets = {"further": FURTHER, "odd": ODD, "unseen": UNSEEN}
     for name in [name for one in asked for name in sets.get(one, [one])]:
         result = rotfem.explain(scene(name))
         print(f"{name}: {', '.join(result.summary['effects'])}", flush=True)

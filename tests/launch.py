@@ -1,13 +1,17 @@
-"""Starts `rotfem` in a folder on one or several processes, as a user would."""
+"""Runs `rotfem` in a folder, in this process or on several of their own."""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+from rotfem.commands.cli import app
 
 ROOT = Path(__file__).resolve().parents[1]
 MPIRUN = shutil.which("mpirun")
@@ -32,9 +36,16 @@ def environment() -> dict[str, str]:
 
 
 def rotfem(folder: Path, ranks: int, *arguments: str, timeout: float = 300.0) -> subprocess.CompletedProcess[str]:
-    """Run `rotfem …` in a folder on that many processes; one that hangs is ended by `timeout` (s), as a failure."""
-    start = [str(MPIRUN), "-n", str(ranks), "--oversubscribe"] if ranks > 1 else []
-    command = [*start, sys.executable, "-m", "rotfem", *arguments]
+    """Run `rotfem …` in a folder: on one process in this one, on several in others, which `timeout` (s) ends."""
+    command = [str(MPIRUN), "-n", str(ranks), "--oversubscribe", sys.executable, "-m", "rotfem", *arguments]
+    if ranks == 1:
+        out, err, status = io.StringIO(), io.StringIO(), 0
+        with contextlib.chdir(folder), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            try:
+                app(list(arguments))
+            except SystemExit as end:
+                status = int(end.code or 0)
+        return subprocess.CompletedProcess(command, status, out.getvalue(), err.getvalue())
     return subprocess.run(
         command, cwd=folder, env=environment(), capture_output=True, text=True, check=False, timeout=timeout
     )

@@ -31,7 +31,7 @@ from rotfem.analysis.time_grid import Leg
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
-from rotfem.mechanics.theories import Theory, theories
+from rotfem.mechanics.theories import theories
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import OtherMesh, on_other_mesh
 from rotfem.refinement.companion import Companion
@@ -255,32 +255,27 @@ class Explanation:
         self.own = problem.effective_effects()
         problem = problem.replace(effects=None)
         self.effects, kind = problem.effective_effects(), problem.structure.type
-        named = {t.name: t for t in theories() if t.holds_for(kind)} | {problem.theory.name: problem.theory}
-        self.theories: tuple[Theory, ...] = tuple(sorted(named.values(), key=lambda t: t.rank))
-        self.moving = HISTORY in self.wanted
-        self.problem = problem
+        others = sorted((t for t in theories() if t.holds_for(kind)), key=lambda t: t.rank)
+        self.problem, self.moving, steps = problem, HISTORY in self.wanted, case.steps
         self.system = self._compiled(problem, comm, set(self.effects) - set(self.own))
         self.speed, self.failed = self._reached(), dict[str, str]()
         self.scale = self.size = 0.0
         self.values: Array = np.empty(0)
         self.changes = [Change("effect", name, name in self.own) for name in self.effects]
-        self.changes += [Change("theory", t.name, False) for t in self.theories if t is not problem.theory]
-        self.steps, self.mesh = Change("discretisation", "", True), Change("discretisation", "", True)
-        self.steps.estimate = dict.fromkeys(self.wanted, 0.0)
+        self.changes += [Change("theory", t.name, False) for t in others if t is not problem.theory]
+        length = "time.tolerance" if steps is not None and steps.step is None else "time.step"
+        self.steps = Change("discretisation", length, True, dict.fromkeys(self.wanted, 0.0))
+        from_file = getattr(problem.structure, "mesh", None) is not None
+        self.mesh = Change("discretisation", "mesh.degree" if from_file else "mesh.elements", True)
         self._others: dict[tuple[str, str], Any] = {}
 
     def all(self) -> list[Change]:
         """Return every effect there are data for, then every other theory, the steps of a history, and the mesh."""
-        steps, from_file = self.case.steps, getattr(self.problem.structure, "mesh", None) is not None
-        self.mesh.name = "mesh.degree" if from_file else "mesh.elements"
         other = self._history() if self.moving else on_other_mesh(self.problem, self.system, moving=False)
         for name, of, measure in ((STEADY, self._tip, distance), (MODES, self._modes, distance_each)):
             if name in self.wanted:
                 self._compare(name, of, measure, other)
-        if steps is None:
-            return [*self.changes, self.mesh]
-        self.steps.name = "time.tolerance" if steps.step is None else "time.step"
-        return [*self.changes, self.steps, self.mesh]
+        return [*self.changes, *([self.steps] if self.case.steps else []), self.mesh]
 
     # --- systems ------------------------------------------------------------------------------------------------------
 
@@ -423,15 +418,17 @@ class Explanation:
         history = self._marched(system, self._steps(ratio), [other for other in others if other is not None])
         scale, out = largest(history.tips), dict[str, float | None]()
         for change, other in zip(changes, others, strict=True):
-            size, at = (np.inf, 0.0) if other is None else other.difference
-            out[change.name] = float(size / scale if scale > 0.0 else np.inf * size) if size > 0.0 else 0.0
             if other is None:
+                out[change.name] = np.inf
                 continue
+            size, at = other.difference
             change.notes.pop(HISTORY, None)
             if size > other.limit:
-                change.notes[HISTORY], out[change.name] = f"it diverges at t = {at:.4g} s", float(np.inf)
+                change.notes[HISTORY], out[change.name] = f"it diverges at t = {at:.4g} s", np.inf
             elif not other.sound and size < LARGE * scale:
                 out[change.name] = None
+            else:
+                out[change.name] = 0.0 if size == 0.0 else float(size / scale) if scale > 0.0 else np.inf
         return history, out
 
     def _following(self, own: Any, changes: Sequence[Change]) -> list[Companion | None]:

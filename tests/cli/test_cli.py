@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from rotfem.results.files import read_csv
+from tests import launch
 from tests.beams import SECTION
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -64,9 +65,11 @@ def here(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def rotfem(here: Path) -> Run:
-    """Return a function that runs `rotfem …` in that folder."""
+    """Return a function that runs `rotfem …` in that folder, where asked for as a process of its own, or code."""
 
-    def run(*arguments: str, code: str | None = None) -> subprocess.CompletedProcess[str]:
+    def run(*arguments: str, code: str = "", alone: bool = False) -> subprocess.CompletedProcess[str]:
+        if not (code or alone):
+            return launch.rotfem(here, 1, *arguments)
         start = ["-c", code] if code else ["-m", "rotfem"]
         environment = os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
         return subprocess.run(
@@ -157,7 +160,7 @@ def test_several_mistakes_are_told_at_once(rotfem: Run, here: Path) -> None:
 
 
 def test_run_writes_its_results(rotfem: Run, here: Path) -> None:
-    done = rotfem("run", "beam.toml")
+    done = rotfem("run", "beam.toml", alone=True)
     assert done.returncode == 0, done.stderr
     assert "50 time steps" in done.stdout
     assert "results/beam" in done.stdout
@@ -251,7 +254,7 @@ def test_json_of_a_failed_computation(rotfem: Run, here: Path) -> None:
 
 
 def test_debug_shows_the_traceback(rotfem: Run) -> None:
-    done = rotfem("run", "beam.toml", "--debug", "--set", "time.step=0")
+    done = rotfem("run", "beam.toml", "--debug", "--set", "time.step=0", alone=True)
     assert done.returncode not in (0, 2)
     assert "Traceback" in done.stderr
     assert "SceneError" in done.stderr
@@ -289,7 +292,7 @@ def test_an_interrupted_run_keeps_what_it_had(rotfem: Run, here: Path, name: str
 
 
 def test_no_arguments_show_help(rotfem: Run) -> None:
-    done = rotfem()
+    done = rotfem(alone=True)
     assert "run" in done.stdout + done.stderr
     assert "Traceback" not in done.stderr
     assert rotfem("--help").returncode == 0

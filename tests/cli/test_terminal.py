@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import json
 import os
 import re
 import signal
@@ -11,7 +12,7 @@ import subprocess
 import sys
 import termios
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -110,29 +111,50 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+#: Runs one command after another, given as JSON in the lines of a pipe, and writes its exit status behind each.
+SERVER = """
+import json, sys
+from rotfem.commands.cli import app
+for line in open(int(sys.argv.pop())):
+    status = 0
+    try:
+        app(json.loads(line), prog_name="rotfem")
+    except SystemExit as end:
+        status = int(end.code or 0)
+    print(f"\\0{status}\\0", end="", flush=True)
+"""
+
+
+def started(
+    folder: Path, *command: str, keep: tuple[int, ...] = (), **more: str
+) -> tuple[subprocess.Popen[bytes], int]:
+    """Return Python with a command in a folder at a terminal, and our end of that."""
+    ours, theirs = os.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 40, COLUMNS, 0, 0))
+    process = subprocess.Popen(
+        [sys.executable, *command],
+        cwd=folder,
+        env=environment() | {"TERM": "xterm-256color", "COLUMNS": "", "LINES": "", **more},
+        stdin=theirs,
+        stdout=theirs,
+        stderr=theirs,
+        pass_fds=keep,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    os.close(theirs)
+    return process, ours
+
+
 @pytest.fixture(scope="module")
-def terminal(folder: Path) -> Terminal:
-    """Return a function that runs `rotfem …` there, at a terminal; `stop` ends it with SIGINT at a text."""
+def alone(folder: Path) -> Terminal:
+    """Return a function that runs `rotfem …` there as a process; `stop` ends it with SIGINT at a text."""
 
     def run(*arguments: str, stop: str = "", **more: str) -> Shown:
-        ours, theirs = os.openpty()
-        fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 40, COLUMNS, 0, 0))
-        inside = {"TERM": "xterm-256color", "COLUMNS": "", "LINES": "", **more}
-        command = [sys.executable, "-m", "rotfem", *arguments]
-        started, text, parts = time.monotonic(), "", []
-        process = subprocess.Popen(
-            command,
-            cwd=folder,
-            env=environment() | inside,
-            stdin=theirs,
-            stdout=theirs,
-            stderr=theirs,
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-        )
-        os.close(theirs)
+        began, text, parts = time.monotonic(), "", []
+        process, ours = started(folder, "-m", "rotfem", *arguments, **more)
         while data := _read(ours):
             text += data
-            parts.append((time.monotonic() - started, data))
+            parts.append((time.monotonic() - began, data))
             if stop and stop in CONTROL.sub("", text):
                 process.send_signal(signal.SIGINT)
                 stop = ""
@@ -140,6 +162,27 @@ def terminal(folder: Path) -> Terminal:
         return Shown(text, parts, process.wait(60))
 
     return run
+
+
+@pytest.fixture(scope="module")
+def terminal(folder: Path) -> Iterator[Terminal]:
+    """Yield a function that runs `rotfem …` there, all in one process at a terminal."""
+    reading, writing = os.pipe()
+    process, ours = started(folder, "-c", SERVER, str(reading), keep=(reading,))
+    os.close(reading)
+
+    def run(*arguments: str) -> Shown:
+        os.write(writing, json.dumps(arguments).encode() + b"\n")
+        text = ""
+        while not text.endswith("\0") and (data := _read(ours)):
+            text += data
+        text, status, _ = text.split("\0")
+        return Shown(text, [], int(status))
+
+    yield run
+    os.close(writing)
+    process.wait(60)
+    os.close(ours)
 
 
 def _read(descriptor: int) -> str:
@@ -164,8 +207,8 @@ def test_what_a_verb_prints(name: str, terminal: Terminal, folder: Path) -> None
 
 
 @pytest.mark.parametrize("verb", HELPS)
-def test_help(verb: str, terminal: Terminal) -> None:
-    shown = terminal(*verb.split(), "--help")
+def test_help(verb: str, alone: Terminal) -> None:
+    shown = alone(*verb.split(), "--help")
     assert shown.status == 0
     assert "Usage: rotfem" in shown.text
     assert "\\[" not in shown.text
@@ -194,29 +237,29 @@ def test_comparing(terminal: Terminal) -> None:
     assert [line for line in shown.lines if len(line) > COLUMNS] == []
 
 
-def test_no_colour(terminal: Terminal) -> None:
+def test_no_colour(terminal: Terminal, alone: Terminal) -> None:
     assert COLOUR.search(terminal("modes", "blade.toml", "-o", "out-colour").text)
-    plain = terminal("modes", "blade.toml", "-o", "out-colour", NO_COLOR="1")
+    plain = alone("modes", "blade.toml", "-o", "out-colour", NO_COLOR="1")
     assert "blade: modes" in plain.text, "the bar is there all the same"
     assert not COLOUR.search(plain.text)
 
 
-def test_compilation_is_said_with_a_bar_that_moves(terminal: Terminal, tmp_path: Path) -> None:
+def test_compilation_is_said_with_a_bar_that_moves(alone: Terminal, tmp_path: Path) -> None:
     """With an empty cache of forms: a bar from the start on, which says so as soon as something is compiled."""
-    shown = terminal("modes", "blade.toml", "-o", "out-cold", XDG_CACHE_HOME=str(tmp_path))
+    shown = alone("modes", "blade.toml", "-o", "out-cold", XDG_CACHE_HOME=str(tmp_path))
     whole = shown.parts[-1][0]
     frames = [(when, text) for when, text in shown.parts if "compiling (first run only)" in text]
     assert shown.parts[0][0] < 0.5 * whole, "the bar is there long before the result"
     assert len({text for _, text in frames}) > 3, "it moves"
     assert frames[-1][0] - frames[0][0] > 0.3 * (whole - frames[0][0]), "it is seen for as long as that takes"
-    warm = terminal("modes", "blade.toml", "-o", "out-cold", XDG_CACHE_HOME=str(tmp_path))
+    warm = alone("modes", "blade.toml", "-o", "out-cold", XDG_CACHE_HOME=str(tmp_path))
     assert "compiling" not in warm.text
 
 
-def test_an_interrupted_run_says_where_its_results_are(terminal: Terminal, folder: Path) -> None:
+def test_an_interrupted_run_says_where_its_results_are(alone: Terminal, folder: Path) -> None:
     """Ctrl-C once the bar shows a share of the run: a step of 1e-4 s to 100 s takes longer than anyone waits."""
     long = ("--set", "time.end=100.0", "--set", "time.step=1e-4", "--set", "output.error=false", "--no-plots")
-    shown = terminal("run", "arm.toml", *long, "-o", "out-cut", stop=" 0 %")
+    shown = alone("run", "arm.toml", *long, "-o", "out-cut", stop=" 0 %")
     assert shown.status == 130
     said = " ".join(CONTROL.sub("", shown.text).split())
     assert "rotfem: interrupted; results until then are in out-cut; history.csv has" in said

@@ -49,7 +49,7 @@ def accepted(make: Any) -> Scene | None:
             return None
 
 
-@sized(mutants("all"), core=300, nightly=6000)
+@sized(mutants("all"), core=100, nightly=6000)
 def test_tables_of_any_kind(tables: Any) -> None:
     scene = accepted(lambda: Scene.from_dict(tables, directory=FOLDER))
     if scene is not None:

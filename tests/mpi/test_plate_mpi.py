@@ -17,12 +17,12 @@ pytestmark = [pytest.mark.mpi, pytest.mark.skipif(MPIRUN is None, reason="there 
 RECTANGLE = {"shape": "length = 1.0\nwidth = 0.6\npoint_masses = [[0.83, 0.1, 1.0]]", "mesh": "elements = [5, 4]"}
 
 
-@pytest.mark.parametrize(("theory", "more"), [("consistent_linear", 4), ("reissner", 2)])
-def test_modes_on_any_number_of_processes(tmp_path: Path, theory: str, more: int) -> None:
+def test_modes_on_three_processes(tmp_path: Path) -> None:
+    """To 1e-8; of other theories, and Campbell diagrams, on two processes to 1e-5 in `tests.pairs`."""
     (tmp_path / "plate.toml").write_text(PLATE_SCENE.format(**RECTANGLE))
     found, labels = [], []
-    for ranks in (1, more):
-        done = rotfem(tmp_path, ranks, "modes", "plate.toml", "--json", "--no-plots", "--set", f"model.theory={theory}")
+    for ranks in (1, 3):
+        done = rotfem(tmp_path, ranks, "modes", "plate.toml", "--json", "--no-plots", "--set", "model.theory=reissner")
         assert done.returncode == 0, done.stderr
         rows = json.loads(done.stdout)["modes"]
         found.append([row["frequency"] for row in rows])
@@ -60,17 +60,6 @@ def test_history_on_four_processes(tmp_path: Path) -> None:
             np.testing.assert_allclose(other[column], values, rtol=0, atol=1e-8 * scale, err_msg=column)
 
 
-def test_campbell_on_two_processes(tmp_path: Path) -> None:
-    (tmp_path / "plate.toml").write_text(PLATE_SCENE.format(**RECTANGLE))
-    found = []
-    for ranks in (1, 2):
-        arguments = ("--speeds", "0:90:4", "--json", "--no-plots", "--set", "model.theory=von_karman_linear")
-        done = rotfem(tmp_path, ranks, "campbell", "plate.toml", *arguments)
-        assert done.returncode == 0, done.stderr
-        found.append([[b["frequency_first"], b["frequency_last"]] for b in json.loads(done.stdout)["branches"]])
-    np.testing.assert_allclose(found[1], found[0], rtol=1e-8)
-
-
 POINTS, GROUPS = grid(2, 2)
 
 
@@ -90,13 +79,7 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> list[float]:
     return frequencies(folder, "bad.msh", 1)
 
 
-def test_a_good_mesh_file(tmp_path: Path, good: list[float]) -> None:
-    """On one and three processes the same."""
-    write_msh(tmp_path / "bad.msh", POINTS, GROUPS)
-    np.testing.assert_allclose(frequencies(tmp_path, "bad.msh", 3), good, rtol=1e-8)
-
-
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [1, 3])
 def test_nodes_of_no_cell(tmp_path: Path, good: list[float], ranks: int) -> None:
     """Anywhere in the numbers and off the plane: they are no part of the plate."""
     spoiled = np.insert(np.column_stack([POINTS, np.zeros(len(POINTS))]), 4, [9.0, 9.0, 9.0], axis=0)

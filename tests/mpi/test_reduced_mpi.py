@@ -28,10 +28,6 @@ step = 0.02
 
 MOTIONS = {
     "spin-up": '[motion]\ntype = "spin_up"\nspeed = 2.0\nduration = 3.0\n',
-    "constant speed": (
-        '[motion]\ntype = "constant"\nspeed = 2.0\n[loads]\n'
-        'tip_force = { kind = "dead", table = [[0, 0, 0], [1, 0, 5], [3, 0, -2]] }\n'
-    ),
     "free": '[motion]\ntype = "torque"\nhub_inertia = 400.0\ntable = [[0, 0], [1, 300], [3, 0]]\n',
 }
 

@@ -153,30 +153,41 @@ def test_nothing_to_compute_is_an_error() -> None:
         rotfem.cost(scene, theories=["linear"], elements=[4], steps=[0.05], degrees=[2], repeat=1)
 
 
-def study(folder: Path | None, **more: Any) -> CostResult:
-    """Return a small study, kept in a folder if there is one."""
+def study(folder: Path, **more: Any) -> CostResult:
+    """Return a small study, kept in a folder."""
     chosen: dict[str, Any] = {"theories": ["reissner"], "steps": [0.04, 0.02], "elements": [2, 4], "degrees": [2]}
     chosen["schemes"] = ["generalised_alpha"]
     return rotfem.cost(SHORT, folder=folder, repeat=1, **(chosen | more))
 
 
-def test_second_start_computes_only_what_is_new(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    first = study(tmp_path)
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, CostResult]:
+    """Return a small study and its folder."""
+    folder = tmp_path_factory.mktemp("study")
+    return folder, study(folder)
+
+
+def test_second_start_computes_only_what_is_new(
+    finished: tuple[Path, CostResult], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, first = finished
     assert first.summary["measured"] > 0
     assert first.summary["resumed"] < first.summary["measured"]
-    again = study(tmp_path)
+    again = study(folder)
     assert again.summary["measured"] == 0
     assert again.rows == first.rows
-    more = study(tmp_path, theories=["consistent_linear", "reissner"])
-    assert {row["theory"] for row in more.rows} == {"consistent_linear", "reissner"}
+    more = study(folder, steps=[0.08, 0.04, 0.02])
+    assert more.summary["measured"] == 2
     before = {setting_of(row).key(): row["time"] for row in first.rows}
     after = {setting_of(row).key(): row["time"] for row in more.rows}
     assert all(after[setting] == time for setting, time in before.items())
     monkeypatch.setattr("rotfem.commands.cost.bench.__version__", "0.0.0")
-    assert study(tmp_path).summary["resumed"] == 0
+    assert study(folder, steps=[0.04], elements=[2]).summary["resumed"] == 0
 
 
-def test_an_interrupted_study_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupted_study_keeps_what_is_finished(
+    finished: tuple[Path, CostResult], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     measure, calls = Bench.measure, 0
 
     def interrupted(self: Bench, setting: Setting, repeat: int, *more: Any) -> Measurement:
@@ -191,8 +202,7 @@ def test_an_interrupted_study_keeps_what_is_finished(tmp_path: Path, monkeypatch
         study(tmp_path)
     assert len((tmp_path / RECORD).read_text().splitlines()) == 2
     monkeypatch.setattr(Bench, "measure", measure)
-    there, afresh = study(tmp_path).summary, study(None).summary
-    assert there["measured"] == afresh["measured"] - 2 > 0
+    assert study(tmp_path).summary["measured"] == finished[1].summary["measured"] - 2 > 0
 
 
 def test_adaptive_scene_is_studied_over_tolerances_too() -> None:
