@@ -64,6 +64,9 @@ MORE = 1.02
 #: Bound of the relative error by round-off from which it is warned of, and the largest that is given as a number.
 DIGITS, KNOWN = 1e-2, 1.0
 
+#: Intervals between the instants at which what acts on a structure is sampled.
+SAMPLES = 16
+
 #: Largest rotation (rad) up to which expansions in it converge quickly enough for an estimate.
 EXPANDED = 1.0
 
@@ -209,6 +212,20 @@ class TheoryCheck:
             return self.of_state(system.zeros())
         solver = factor or DirectSolver(system.matrix(1.0, 0.0, 0.0, 1.0))
         return self.of_state(out.solve(solver, system.residual()).copy())
+
+    def static_rotation(self, end: float) -> float:
+        """Return the largest rotation (rad) of shapes that rest in the frame under what acts on them at some instants.
+
+        Args:
+            end: last of them, s.
+        """
+        system, found, out = self.system, [0.0], Increment(self.system.V)
+        for t in np.linspace(0.0, end, SAMPLES + 1):
+            system.set_time(float(t))
+            system.set_state(system.zeros())
+            q = out.solve(DirectSolver(system.matrix(1.0, 0.0, 0.0, 1.0)), system.residual())
+            found.append(self._sizes(q)[1])
+        return max(found)
 
     def _as(self, estimate: float, basis: str) -> TheoryError:
         return TheoryError(float(estimate), basis, self.theory.name)

@@ -15,7 +15,7 @@ from rotfem.analysis.phase_drift import drift
 from rotfem.analysis.reduced.response import Response, reduced_response
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability, stability_of
-from rotfem.analysis.theory_error import RESOLVED, Farthest, TheoryError
+from rotfem.analysis.theory_error import RESOLVED, Farthest, TheoryCheck, TheoryError
 from rotfem.commands.first_state import Start
 from rotfem.commands.reduced_history import accuracy_of
 from rotfem.equations.compiled import compile_system
@@ -272,6 +272,26 @@ def _relative(apart: float, scale: float) -> float:
     if apart == 0.0:
         return 0.0
     return apart / scale if scale > 0.0 else 1.0
+
+
+def check_rotations(scene: Scene, system: Any) -> None:
+    """Refuse a linear model of motions whose rotations θ are too large: with foreshortening it errs by about θ²/2.
+
+    What is looked at is the static shape under what acts on the structure in the frame; of a free hub nothing is known
+    before its motion.
+
+    Args:
+        scene: with an accuracy.
+        system: of the linear theory.
+
+    Raises:
+        ComputationError: an answer of it would not be within the accuracy.
+    """
+    if scene.time is None or scene.accuracy is None or system.hub is not None:
+        return
+    rotation = TheoryCheck(system).static_rotation(scene.time.end)
+    if rotation**2 / 2 > scene.accuracy:
+        raise ComputationError(f"rotations of about {rotation:.2g} are too large for {scene.model.theory}")
 
 
 def output_of(scene: Scene) -> str:

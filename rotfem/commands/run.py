@@ -9,7 +9,15 @@ from typing import Any
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady
-from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy, within_tolerance
+from rotfem.commands.accuracy import (
+    ROOT_MOMENT,
+    changes_of,
+    first_setting,
+    refuse,
+    to_accuracy,
+    within_tolerance,
+)
+from rotfem.commands.error_report import check_rotations
 from rotfem.commands.problem import Problem
 from rotfem.commands.result_folder import ResultFolder
 from rotfem.commands.run_store import Interval, RunStore
@@ -116,7 +124,10 @@ def run_to_accuracy(
     def compute(setting: Setting) -> RunResult:
         variant = scene.replace(changes_of(scene, setting))
         problem = Problem.of(variant, terms=terms, outputs=outputs)
-        return Simulation(variant, problem, store.comm, store=store, setting=setting, clock=clock).run(progress)
+        simulation = Simulation(variant, problem, store.comm, store=store, setting=setting, clock=clock)
+        if setting.reduced:
+            check_rotations(variant, simulation.system)
+        return simulation.run(progress)
 
     return to_accuracy(scene, store.setting() or first_setting(scene), compute, clock)
 
