@@ -11,6 +11,7 @@ from rotfem.analysis.critical_speed import critical_speed_within
 from rotfem.analysis.march import Steps, grid
 from rotfem.analysis.reduced.response import ACCURACY, Response, reduced_response
 from rotfem.analysis.schemes import State
+from rotfem.commands.accuracy import ROWS
 from rotfem.commands.checkpoint import Log
 from rotfem.commands.monitor import Monitor
 from rotfem.commands.recorder import Recorder
@@ -18,9 +19,6 @@ from rotfem.errors import ComputationError
 from rotfem.scene import Scene
 
 Array = npt.NDArray[np.float64]
-
-#: Rows of a history whose steps are adaptive.
-ROWS = 1000
 
 
 def reduced_history(

@@ -33,20 +33,11 @@ Array = npt.NDArray[np.float64]
 #: Forces (n, unknowns) at times (n,), s.
 Forces = Callable[[Array], Array]
 
-#: Relative change of a matrix that is round-off.
-SAME = 1e-12
-
 #: Relative distance from a breakpoint at which a signal has the value that it has on that side of it.
 ASIDE = 4 * RESOLVED
 
-#: Samples between two breakpoints, and between all of them at least, by which active pieces are found.
-SAMPLES, FEWEST = 5, 40
-
-#: Angle by which a vibration goes on in a step, at most, that the four nodes of a step resolve: half a period, rad.
-HALF = np.pi
-
-#: Part of an interval from one sample to the next, counted on from its start: no multiple of it is a period.
-GOLDEN = 0.5 * (np.sqrt(5.0) - 1)
+#: Effects of which the angular momentum of a structure on a free hub is that of the equations.
+OF_MOMENTUM = ("coriolis", "centrifugal", "euler")
 
 
 class Excitation:
@@ -78,9 +69,9 @@ class Excitation:
         return np.asarray(np.clip(t, np.minimum(low, high), high))
 
     def samples(self) -> Array:
-        """Return times between all breakpoints at which what acts is typical of them, s."""
-        number = max(SAMPLES, -(-FEWEST // (len(self.knots) - 1)))
-        shares = np.sort(GOLDEN * (np.arange(number) + 1) % 1.0)
+        """Return times (s) between all breakpoints, five between two and 40 at least, at no period's distance."""
+        number = max(5, -(-40 // (len(self.knots) - 1)))
+        shares = np.sort(np.random.default_rng(0).random(number))
         return self.within(self.knots[:-1], self.knots[1:], shares).ravel()
 
     def turn(self, t: Array) -> Array:
@@ -157,14 +148,17 @@ class HeldEquations:
     Args:
         model: the basis.
         excitation: what acts.
+
+    Attributes:
         further: of times (n,), s, forces (n, unknowns) that are added; none if None.
     """
 
-    def __init__(self, model: ReducedModel, excitation: Excitation, further: Forces | None = None):
-        self.model, self.excitation, self.further = model, excitation, further
-        self.within = excitation.within
+    further: Forces | None = None
+
+    def __init__(self, model: ReducedModel, excitation: Excitation):
+        self.model, self.excitation, self.within = model, excitation, excitation.within
         matrices = model.operators(excitation.factors(excitation.samples()))[:3]
-        self.constant = all(np.all(np.ptp(A, axis=0) <= SAME * np.abs(A).max(initial=0.0)) for A in matrices)
+        self.constant = all(np.all(np.ptp(A, axis=0) <= 1e-12 * np.abs(A).max(initial=0.0)) for A in matrices)
 
     def start(self, shape: Array | None) -> tuple[Array, Array]:
         """Return coordinates and rates (m,) at the start: of a shape (local dof array), or undeformed; at rest."""
@@ -200,8 +194,11 @@ class HeldEquations:
         return residual
 
     def second_order(self, manifold: Manifold, solution: Solution) -> Forces:
-        """Return the forces (n, unknowns) of a linear solution on a manifold, a function of times; none on a hub."""
-        fastest = HALF / float(np.diff(solution.ends).max())
+        """Return the forces (n, unknowns) of a linear solution on a manifold, a function of times; none on a hub.
+
+        The four nodes of a step resolve vibrations of half a period in it; quicker ones are left out.
+        """
+        fastest = np.pi / float(np.diff(solution.ends).max())
 
         def forces(t: Array) -> Array:
             c = self.excitation.factors(t, self.turn(t, solution))
@@ -213,102 +210,6 @@ class HeldEquations:
         return forces
 
 
-#: Times at which the speed of a rigid structure is known.
-RIGID = 2001
-
-#: Effects of which the angular momentum is that of the equations.
-OF_MOMENTUM = ("coriolis", "centrifugal", "euler")
-
-
-class HubMoment:
-    """The moment of a structure on its free hub, dH/dt and N.
-
-    Args:
-        model: of the structure.
-        row: the hub's equation.
-
-    Attributes:
-        inertia: of the undeformed structure about the axis, kg·m².
-
-    Raises:
-        InputError: the equations lack an effect that angular momentum has.
-    """
-
-    def __init__(self, model: ReducedModel, row: Any):
-        self.model, self.row, self.system = model, row, model.system
-        effects = self.system.model.effects
-        for name in OF_MOMENTUM:
-            if name not in effects:
-                why = f'lacks "{name}", which the reduced model of a free hub needs; leave model.reduced out'
-                raise InputError("model.effects", list(effects), why)
-        self._coupled = float(row.coupled)
-        (self._load, self._stiffness), (self.slope, self._coupling), T0 = model.of_spin()
-        self.slope = self._coupled * self.slope
-        self.inertia = 2 * T0
-        self._read_outside()
-
-    def _read_outside(self) -> None:
-        """Read n, n_q and Q of every component of a constant, in the order of `_entries`."""
-        system, m, zero = self.system, self.model.size, self.system.zeros()
-        constants = {name: c for name, c in system.model.frame.constants.items() if name not in ("w", "dw")}
-        constants |= {name: c for name, (c, _) in system.structure.load_constants.items()}
-        everything = [*system.model.frame.constants.values(), *constants.values()]
-        kept = [c.value.copy() for c in everything]
-        for c in everything:
-            c.value[...] = 0.0
-        self._entries = [(name, i) for name, c in constants.items() for i in range(c.value.size)]
-        size = len(self._entries)
-        self._n, self._slopes = np.zeros(size), np.zeros((size, m))
-        for k, (name, i) in enumerate(self._entries if self.row.has_outside else ()):
-            constants[name].value.flat[i] = 1.0
-            system.structure.update_loads()
-            system.set_state(zero)
-            self._n[k] = -self.row.work()
-            if self.row.coupled and m:
-                self._slopes[k] = self._slope(zero)
-            constants[name].value.flat[i] = 0.0
-        for c, value in zip(everything, kept, strict=True):
-            c.value[...] = value
-        system.structure.update_loads()
-
-    def _slope(self, q: Array) -> Array:
-        """Return the derivative of N by q along the basis at a state, (m,)."""
-        self.system.set_state(q)
-        vector, owned = self.row.row((1.0, 0.0, 0.0)).array, self.model.owned
-        return -np.asarray(summed(self.system.comm, self.model.V[owned].T @ vector[owned]))
-
-    # --- at many times -----------------------------------------------------------------------------------------------
-
-    def outside(self, constants: dict[str, Array], q: Array) -> Array:
-        """Return N at times (n,), N·m.
-
-        Args:
-            constants: values of those of frame and loads, by name, (n, size).
-            q: coordinates of the structure, (n, m).
-        """
-        if not self._entries:
-            return np.zeros(len(q))
-        c = np.stack([constants[name][:, i] for name, i in self._entries], axis=1)
-        return np.asarray(c @ self._n + np.sum((c @ self._slopes) * q, axis=1))
-
-    def of_momentum(self, speed: Array, rate: Array, q: Array, v: Array, a: Array) -> Array:
-        """Return dH/dt (n,), N·m; that of a rigid structure if the hub is uncoupled.
-
-        Args:
-            speed: Ω at n times, rad/s.
-            rate: Ω̇ there.
-            q: coordinates of the structure, (n, m).
-            v: their rates.
-            a: their accelerations.
-        """
-        q, v, a = (self._coupled * x for x in (q, v, a))
-        bent = q @ self._stiffness
-        T0 = 0.5 * self.inertia - q @ self._load - 0.5 * np.sum(q * bent, axis=1)
-        change = -(v @ self._load) - np.sum(v * bent, axis=1)
-        of_T1 = a @ self.slope + np.sum((a @ self._coupling) * q + (v @ self._coupling) * v, axis=1)
-        return np.asarray(2 * rate * T0 + 2 * speed * change + of_T1)
-
-
 class FreeHubEquations(HeldEquations):
     """The equations of a reduced model and its free hub; unknowns are the coordinates and the angle, which is last.
 
@@ -316,13 +217,60 @@ class FreeHubEquations(HeldEquations):
         model: the basis.
         excitation: what acts.
         bordered: equations of structure and hub.
-        further: of times (n,), s, forces (n, m + 1) that are added; none if None.
+
+    Raises:
+        InputError: the equations lack an effect that angular momentum has.
     """
 
-    def __init__(self, model: ReducedModel, excitation: Excitation, bordered: Any, further: Forces | None = None):
-        self.model, self.excitation, self.further = model, excitation, further
-        self.within, self.constant = excitation.within, False
-        self.bordered, self.hub, self.moment = bordered, bordered.hub, HubMoment(model, bordered.row)
+    def __init__(self, model: ReducedModel, excitation: Excitation, bordered: Any):
+        self.model, self.excitation, self.within, self.constant = model, excitation, excitation.within, False
+        self.bordered, self.hub, self._coupled = bordered, bordered.hub, float(bordered.row.coupled)
+        effects = model.system.model.effects
+        for name in OF_MOMENTUM:
+            if name not in effects:
+                why = f'lacks "{name}", which the reduced model of a free hub needs; leave model.reduced out'
+                raise InputError("model.effects", list(effects), why)
+        (self._load, self._stiffness), (slope, self._coupling), T0 = model.of_spin()
+        self._slope, self._inertia = self._coupled * slope, 2 * T0
+        self._read_outside()
+
+    def _read_outside(self) -> None:
+        """Read n and n_q of every component of a constant, in the order of `_entries`."""
+        system, row, V = self.model.system, self.bordered.row, self.model.V[self.model.owned]
+        constants = {name: c for name, c in system.model.frame.constants.items() if name not in ("w", "dw")}
+        constants |= {name: c for name, (c, _) in system.structure.load_constants.items()}
+        everything = [*system.model.frame.constants.values(), *constants.values()]
+        kept = [c.value.copy() for c in everything]
+        for c in everything:
+            c.value[...] = 0.0
+        self._entries = [(name, i) for name, c in constants.items() for i in range(c.value.size)]
+        self._n, self._n_q = np.zeros(len(self._entries)), np.zeros((len(self._entries), self.model.size))
+        for k, (name, i) in enumerate(self._entries if row.has_outside else ()):
+            constants[name].value.flat[i] = 1.0
+            system.structure.update_loads()
+            system.set_state(system.zeros())
+            self._n[k] = -row.work()
+            self._n_q[k] = -np.asarray(summed(system.comm, V.T @ row.row((1.0, 0.0, 0.0)).array[self.model.owned]))
+            constants[name].value.flat[i] = 0.0
+        for c, value in zip(everything, kept, strict=True):
+            c.value[...] = value
+        system.structure.update_loads()
+
+    def _outside(self, constants: dict[str, Array], q: Array) -> Array:
+        """Return N at n times (n,), N·m, of the constants of frame and loads (n, size) and coordinates (n, m)."""
+        if not self._entries:
+            return np.zeros(len(q))
+        c = np.stack([constants[name][:, i] for name, i in self._entries], axis=1)
+        return np.asarray(c @ self._n + np.sum((c @ self._n_q) * q, axis=1))
+
+    def _of_momentum(self, turn: Array, q: Array, v: Array, a: Array) -> Array:
+        """Return dH/dt (n,), N·m, of a turn (n, 3) and states (n, m); of a rigid structure if the hub is uncoupled."""
+        q, v, a = (self._coupled * x for x in (q, v, a))
+        bent = q @ self._stiffness
+        T0 = 0.5 * self._inertia - q @ self._load - 0.5 * np.sum(q * bent, axis=1)
+        change = -(v @ self._load) - np.sum(v * bent, axis=1)
+        of_T1 = a @ self._slope + np.sum((a @ self._coupling) * q + (v @ self._coupling) * v, axis=1)
+        return np.asarray(2 * turn[:, 2] * T0 + 2 * turn[:, 1] * change + of_T1)
 
     def start(self, shape: Array | None) -> tuple[Array, Array]:
         """Return coordinates with the angle 0, and rates with the speed of the hub, (m + 1,)."""
@@ -345,11 +293,11 @@ class FreeHubEquations(HeldEquations):
         there = np.array([t])
         rates = turn + np.array([[0.0, 0.0, 1.0]])
         (*small, f), (*_, pushed) = (self.model.operators(self.excitation.factors(there, x)) for x in (turn, rates))
-        inertia = self.hub.inertia + self.moment.inertia
+        inertia = self.hub.inertia + self._inertia
         M, C, K = (np.zeros((m + 1, m + 1)) for _ in range(3))
         for whole, own, corner in zip((M, C, K), small, (inertia, self.hub.damping, inertia), strict=True):
             whole[:m, :m], whole[m, m] = own[0], corner
-        M[:m, m], M[m, :m] = (pushed - f)[0], self.moment.slope
+        M[:m, m], M[m, :m] = (pushed - f)[0], self._slope
         return M, C, K
 
     def at(self, t: Array) -> Callable[[Array, Array, Array], Array]:
@@ -364,7 +312,7 @@ class FreeHubEquations(HeldEquations):
             M, C, K, f = self.model.operators(c)
             out = f + sum(np.einsum("nij,nj->ni", A, x) for A, x in ((M, a), (C, v), (K, q)))
             own = self.hub.inertia * turn[:, 2] + self.hub.damping * turn[:, 1] - torque
-            own = own + self.moment.of_momentum(turn[:, 1], turn[:, 2], q, v, a) - self.moment.outside(constants, q)
+            own = own + self._of_momentum(turn, q, v, a) - self._outside(constants, q)
             return np.column_stack([out, own]) + further
 
         return residual
@@ -376,7 +324,7 @@ class FreeHubEquations(HeldEquations):
         turn, (q, _, _) = self.turn(t, solution), self.coordinates(solution, t)
         turn[:, 2] = 0.0
         torque = self.hub.torque.many(t) - self.hub.damping * turn[:, 1]
-        outside = self.moment.outside(self.excitation.constants(t, turn), q)
+        outside = self._outside(self.excitation.constants(t, turn), q)
         rates = np.column_stack([torque * turn[:, 1], torque + outside]).reshape(-1, len(POINTS), 2)
         parts = np.diff(grid)[:, None] * np.einsum("j,njk->nk", WEIGHTS, rates)
         return np.asarray(np.vstack([np.zeros(2), np.cumsum(parts, axis=0)])[np.searchsorted(grid, times)])
@@ -386,7 +334,7 @@ def rigid_turn(bordered: Any, t: Array) -> Array:
     """Return angle, speed and its rate (n, 3) of a free hub at times (n,), s, as if the structure were rigid."""
     held, hub = bordered.held, bordered.hub
     inertia = hub.inertia + (2 * held.rest_inertia if "w" in held.model.frame.constants else 0.0)
-    fine = np.unique(np.concatenate([t, np.linspace(0.0, float(t[-1]), RIGID)]))
+    fine = np.unique(np.concatenate([t, np.linspace(0.0, float(t[-1]), 2001)]))
     speed = hub.rigid_speeds(fine, inertia)
     angle = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(fine) * (speed[1:] + speed[:-1]))])
     return np.column_stack([np.interp(t, fine, x) for x in (angle, speed, np.gradient(speed, fine))])

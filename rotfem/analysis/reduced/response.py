@@ -31,12 +31,6 @@ ADDED, MOST, INSTANTS = 6, 60, 24
 #: Part of an accuracy below which the amplitude of a shape is of no account.
 NEGLIGIBLE = 0.01
 
-#: Rows of which these instants are chosen.
-CHOSEN_OF = 600
-
-#: Independent loads, relative to the largest, and most of them.
-INDEPENDENT, LOADS = 1e-9, 8
-
 #: Steps in a history at first, and how often they are halved at most.
 FIRST, HALVINGS = 64, 10
 
@@ -162,11 +156,11 @@ class Growth:
         self.model.grow(np.hstack(columns))
 
     def _loads(self) -> Array:
-        """Return the independent loads of the history, owned rows, (n, k)."""
+        """Return the independent loads of the history, eight at most, owned rows, (n, k)."""
         model, numbers = self.model, self.model.kinds["f"]
         norms = np.array([float(model.system.pieces[i].operator.norm()) for i in numbers])
         _, sizes, parts = np.linalg.svd(self._factors[:, numbers] * norms, full_matrices=False)
-        parts = parts[sizes > INDEPENDENT * max(sizes.max(initial=0.0), 1e-300)][:LOADS]
+        parts = parts[sizes > 1e-9 * max(sizes.max(initial=0.0), 1e-300)][:8]
         return np.asarray((parts / norms @ model.loads).T)
 
     def equations(self) -> HeldEquations:
@@ -231,10 +225,9 @@ class Growth:
 
     def _lacking(self, equations: HeldEquations, solution: Solution, states: States) -> Array:
         """Return the static solutions K⁻¹ r at instants of the history, local dof arrays (n, k)."""
-        rows = np.unique(np.linspace(0, len(self.times) - 1, CHOSEN_OF).astype(int))
-        strength = np.linalg.norm(states[2][rows], axis=1)
-        parts = np.array_split(np.arange(len(rows)), min(INSTANTS, len(rows)))
-        chosen = rows[[int(part[np.argmax(strength[part])]) for part in parts]]
+        strength = np.linalg.norm(states[2], axis=1)
+        parts = np.array_split(np.arange(len(strength)), min(INSTANTS, len(strength)))
+        chosen = np.array([part[np.argmax(strength[part])] for part in parts])
         turn = equations.turn(after(self.times[chosen]), solution)
         factors = self.excitation.factors(after(self.times[chosen]), turn)
         residuals = self.model.residuals(factors, *(x[chosen] for x in states))

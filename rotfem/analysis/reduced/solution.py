@@ -38,23 +38,8 @@ Complex = npt.NDArray[np.complex128]
 NODES = np.array([0.0, 0.5 * (1 - np.sqrt(0.2)), 0.5 * (1 + np.sqrt(0.2)), 1.0])
 CUBIC = np.linalg.inv(np.vander(NODES, increasing=True))
 
-#: |z| below which φ is summed as its power series, and the terms of that: 1/20! is round-off.
-NEAR, TERMS = 1.0, 20
-
-#: Digits to which lengths agree that are the same but for rounding.
-ALIKE = 12
-
-#: Condition of the eigenvectors from which half the digits are lost; the reference then has 9/10 of the damping.
-DEPENDENT, LESS = 1e8, 0.9
-
-#: Part of the largest mass below which a mass is round-off of the projection.
-MASSLESS = 1e-14
-
-#: Iterations in a window, and relative change of its states that ends them.
-ITERATIONS, CLOSE = 16, 1e-10
-
-#: Steps in the first window where matrices change, and at most: memory is that of their weights.
-WINDOW, LARGEST = 64, 1024
+#: Iterations in a window, steps in the first one where matrices change, and at most: memory is that of their weights.
+ITERATIONS, WINDOW, LARGEST = 16, 64, 1024
 
 #: States (n, m) at the times asked for: coordinates, rates, accelerations.
 States = tuple[Array, Array, Array]
@@ -94,7 +79,7 @@ class Modes:
 
     def __init__(self, M: Array, C: Array, K: Array):
         m = len(M)
-        self.M = M + MASSLESS * np.abs(np.diag(M)).max() * np.eye(m)
+        self.M = M + 1e-14 * np.abs(np.diag(M)).max() * np.eye(m)  # of a mass that is round-off of the projection
         # in undamped modes S, and in units in which rates are as large as coordinates
         try:
             squares, S = scipy.linalg.eigh(0.5 * (K + K.T), 0.5 * (self.M + self.M.T))
@@ -102,17 +87,17 @@ class Modes:
             raise ComputationError("the masses of the reduced model are not positive, or not finite") from error
         w = np.sqrt(np.maximum(np.abs(squares), np.finfo(float).eps * np.abs(squares).max()))
         stiff, damped = (np.linalg.solve(S, np.linalg.solve(self.M, A @ S)) for A in (K, C))
-        for part in (1.0, LESS):
+        for part in (1.0, 0.9):  # less damping where eigenvectors are so dependent that half the digits are lost
             A = np.block([[np.zeros((m, m)), np.diag(w)], [-stiff / w, -part * damped]])
             self.values, vectors = np.linalg.eig(A)
-            if np.linalg.cond(vectors) < DEPENDENT:
+            if np.linalg.cond(vectors) < 1e8:
                 break
         self.out: Complex = np.vstack([S / w @ vectors[:m], S @ vectors[m:]])
         self.into: Complex = np.asarray(np.linalg.inv(self.out))
 
     def weights(self, s: Array) -> tuple[Complex, list[Complex]]:
         """Return e^{λs} and s^{d+1} d! φ_{d+1}(λs), d = 0 … 3, at times s (n,) from the start of a step, (n, p)."""
-        digits = np.round(s / max(s.max(initial=0.0), 1e-300), ALIKE)
+        digits = np.round(s / max(s.max(initial=0.0), 1e-300), 12)  # lengths that are the same but for rounding
         _, one, same = np.unique(digits, return_index=True, return_inverse=True)
         t = s[one, None]
         phi = functions(t * self.values, len(NODES))
@@ -120,12 +105,12 @@ class Modes:
 
 
 def functions(z: Complex, most: int) -> list[Complex]:
-    """Return φ_0 … φ_most at the entries of an array."""
-    near = np.abs(z) < NEAR
+    """Return φ_0 … φ_most at the entries of an array, near zero by 20 terms of the power series: 1/20! is round-off."""
+    near = np.abs(z) < 1.0
     safe, small = np.where(near, 1.0, z), np.where(near, z, 0.0)
     out = [np.exp(z)]
     for k in range(most):
-        series = sum(small**j / factorial(j + k + 1) for j in range(TERMS))
+        series = sum(small**j / factorial(j + k + 1) for j in range(20))
         out.append(np.where(near, series, (out[k] - 1 / factorial(k)) / safe))
     return out
 
@@ -164,7 +149,7 @@ class Window:
             y, v, a = self._states(z.reshape(-1, 2 * m), self._g.reshape(-1, m))
             if not np.all(np.isfinite(a)):
                 break
-            if np.abs(y - before).max(initial=0.0) <= CLOSE * np.abs(y).max(initial=0.0):
+            if np.abs(y - before).max(initial=0.0) <= 1e-10 * np.abs(y).max(initial=0.0):
                 self.converged = True
                 break
             before = y
