@@ -76,7 +76,7 @@ def record_rows(response: Response, record: Recorder, monitor: Monitor) -> None:
     Energies and forces at the root are those of the linear theory; tip and fields have the foreshortening, if that is
     wanted.
     """
-    system, model, turn, bent = record.system, response.model, response.turn, response.bent_states
+    system, model, turn = record.system, response.model, response.turn
     given = None if system.hub is None else response.equations.given(response.solution, response.times)
     for i, t in enumerate(map(float, response.times)):
         q, v, a = (model.V @ x[i] for x in response.states)
@@ -88,9 +88,9 @@ def record_rows(response: Response, record: Recorder, monitor: Monitor) -> None:
         monitor.step(state)
         monitor.farthest(state.q, t)
         row = record.row(state)
-        if response.manifold is not None:
+        if response.manifold is not None and response.bent is not None:
             q = state.q.copy()
-            q[: len(model.V)] = response.manifold.shape(bent[i])
+            q[: len(model.V)] = response.manifold.shape(response.bent[i])
             state = state.changed(q=q)
             row[3 : 3 + len(system.structure.components)] = map(float, system.tip(q, t))
         record.add(row, state)

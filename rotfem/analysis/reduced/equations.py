@@ -230,8 +230,9 @@ class FreeHubEquations(HeldEquations):
             if name not in effects:
                 why = f'lacks "{name}", which the reduced model of a free hub needs; leave model.reduced out'
                 raise InputError("model.effects", list(effects), why)
-        (self._load, self._stiffness), (slope, self._coupling), T0 = model.of_spin()
-        self._slope, self._inertia = self._coupled * slope, 2 * T0
+        self._load, self._stiffness = model.of_spin("centrifugal", 2)
+        slope, self._coupling = model.of_spin("euler", 1)
+        self._slope, self._inertia = self._coupled * slope, 2 * model.system.rest_inertia
         self._read_outside()
 
     def _read_outside(self) -> None:

@@ -27,6 +27,7 @@ from dolfinx import fem
 
 from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.equations.geometric import second_order_work
+from rotfem.equations.nonlinear import assembled
 from rotfem.equations.pieces import PRESTRESS, Piece
 from rotfem.mechanics.effects import INTERNAL, Effect
 from rotfem.numerics import forms
@@ -74,7 +75,7 @@ class Manifold:
         right = out[model.owned]
         for column, (i, j) in zip(right.T, self.pairs, strict=True):
             one.x.array[:], other.x.array[:] = V[:, i] * (0.5 if i == j else 1.0), V[:, j]
-            column[:] = model.assembled(form)
+            column[:] = assembled(form, system.V, system.clamped).array[model.owned]
         return -model.solve(system.material_solver, right)
 
     def _project(self) -> None:

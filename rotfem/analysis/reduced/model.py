@@ -15,22 +15,15 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import ufl
 from dolfinx import fem
 
-from rotfem.equations.nonlinear import assembled
 from rotfem.equations.pieces import PRESTRESS
-from rotfem.numerics import forms
 from rotfem.numerics.eigenproblem import is_symmetric
 from rotfem.numerics.linear import MIDDLE, DirectSolver, combine
 from rotfem.numerics.projection import orthonormal, summed, times
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
-
-#: Part of its energy that a column must have outside the basis to be distinguished from round-off: the error of a
-#: solution with a stiffness of condition 1e8, squared.
-INDEPENDENT = 1e-15
 
 
 class ReducedModel:
@@ -66,6 +59,9 @@ class ReducedModel:
     def grow(self, columns: Array, most: int | None = None, least: float = 0.0) -> int:
         """Add to the basis what columns span outside it, shapes of largest strain energy first; return how many.
 
+        A column is distinguished from round-off where it has 1e-15 of its energy outside, the squared error of a
+        solution with a stiffness of condition 1e8.
+
         Args:
             columns: local dof arrays, shape (n, k).
             most: number of shapes that are added; all if None.
@@ -77,7 +73,7 @@ class ReducedModel:
             X = X - V @ summed(self.comm, self._strained(V).T @ X)
         gram = summed(self.comm, X.T @ self._strained(X))
         energies, turns = np.linalg.eigh(0.5 * (gram + gram.T))
-        keep = np.flatnonzero(energies > max(least, INDEPENDENT * float(whole.max(initial=0.0))))[::-1][:most]
+        keep = np.flatnonzero(energies > max(least, 1e-15 * float(whole.max(initial=0.0))))[::-1][:most]
         if not len(keep):
             return 0
         new = np.hstack([V, X @ (turns[:, keep] / np.sqrt(energies[keep]))])
@@ -152,10 +148,6 @@ class ReducedModel:
         """Return the solutions (local dof arrays (n, k)) with right-hand sides of owned rows, (n, k)."""
         return self._with_ghosts(solver.solve_all(right))
 
-    def assembled(self, form: Any) -> Array:
-        """Return a compiled linear form, owned rows, zero at clamped unknowns."""
-        return np.asarray(assembled(form, self.system.V, self.system.clamped).array[self.owned])
-
     # --- outputs -----------------------------------------------------------------------------------------------------
 
     def tips(self, shapes: Array | None = None) -> Array:
@@ -169,15 +161,15 @@ class ReducedModel:
         moves = [name.startswith("u") for name in self.system.structure.components]
         return float(np.linalg.norm(tips[:, moves], axis=1).max(initial=0.0))
 
-    def of_spin(self) -> tuple[tuple[Array, Array], tuple[Array, Array], float]:
-        """Return (−∂T0/∂q, −∂²T0/∂q²) and (∂T1/∂v, ∂²T1/∂v∂q) at rest, and T0 undeformed, all at unit speed."""
-        names, zero = self.system.model.energies(), (np.zeros(self.size), np.zeros((self.size,) * 2))
-        of_T0 = self._pieces_of("centrifugal", 2) if "T0" in names else zero
-        inertia = self.system.rest_inertia if "T0" in names else 0.0
-        return of_T0, self._slopes_of(names["T1"]) if "T1" in names else zero, inertia
+    def of_spin(self, effect: str, degree: int) -> tuple[Array, Array]:
+        """Return f (m,) and K (m, m) of an effect at unit speed or rate about the axis, without prestress.
 
-    def _pieces_of(self, effect: str, degree: int) -> tuple[Array, Array]:
-        """Return f (m,) and K (m, m) of an effect at unit speed or rate about the axis, without prestress."""
+        That of Euler's acceleration is ∂T1/∂q̇ and its derivative by q, the centrifugal one −∂T0/∂q and that of it.
+
+        Args:
+            effect: its name.
+            degree: in which it depends on the speed, or the rate.
+        """
         axis, out = self.system.motion.axis, (np.zeros(self.size), np.zeros((self.size,) * 2))
         components = axis[2:] if self.system.structure.planar else axis
         for kind, sum_ in zip("fK", out, strict=True):
@@ -186,20 +178,3 @@ class ReducedModel:
                 if effect in piece.of and PRESTRESS not in piece.of and len(piece.key) == degree:
                     sum_ += np.prod([components[j] for _, j in piece.key]) * self.small[kind][place]
         return out
-
-    def _slopes_of(self, T1: Any) -> tuple[Array, Array]:
-        """Return ∂T1/∂v at q = 0 (m,) and ∂²T1/∂v∂q (m, m) at unit speed; T1 is linear in v and quadratic in all."""
-        if "euler" in self.system.model.effects:
-            return self._pieces_of("euler", 1)
-        system, k, spin = self.system, self.system.structure.k, self.system.model.frame.constants["w"]
-        form, kept = forms.form(ufl.derivative(T1, k.v, k.dq)), spin.value.copy()
-        spin.value[...] = system.motion.axis[-spin.value.size :]
-
-        def slope(q: Array) -> Array:
-            system.set_state(q)
-            return np.asarray(summed(self.comm, self.V[self.owned].T @ self.assembled(form)))
-
-        at_rest = slope(system.zeros())
-        coupling = np.array([slope(x) - at_rest for x in self.V.T]).reshape(self.size, self.size).T
-        spin.value[...] = kept
-        return at_rest, coupling

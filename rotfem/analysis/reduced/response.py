@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import cached_property
 from time import perf_counter, process_time
 from typing import Any
 
@@ -31,8 +30,8 @@ ADDED, MOST, INSTANTS = 6, 60, 24
 #: Part of an accuracy below which the amplitude of a shape is of no account.
 NEGLIGIBLE = 0.01
 
-#: Steps in a history at first, and how often they are halved at most.
-FIRST, HALVINGS = 64, 10
+#: How often the steps, 64 at first, are halved at most.
+HALVINGS = 10
 
 #: Accuracy that is asked for if none is.
 ACCURACY = 1e-5
@@ -47,12 +46,13 @@ class Response:
         equations: of the linear theory.
         times: of the rows, s.
         solution: of the linear equations.
-        states: coordinates, rates and accelerations in the rows, (n, m) each.
+        states: coordinates, rates and accelerations of them in the rows, (n, m) each.
+        tips: the unknowns at the tip in all rows, (n, components).
         basis_error, time_error: relative to the largest displacement of the tip.
         rounds: solutions until the basis was large enough.
         seconds: of processor and clock, what all of it took, compilation excluded.
         manifold: on which it is foreshortened; None where the theory's own displacements are wanted.
-        bent: solution of the equations on it.
+        bent: coordinates of the motion on it in the rows, (n, m).
         foreshortening: largest difference that it makes at the tip, relative.
     """
 
@@ -61,25 +61,14 @@ class Response:
     times: Array
     solution: Solution
     states: States
+    tips: Array
     basis_error: float
     time_error: float
     rounds: int
     seconds: dict[str, float]
     manifold: Manifold | None = None
-    bent: Solution | None = None
+    bent: Array | None = None
     foreshortening: float | None = None
-
-    @cached_property
-    def bent_states(self) -> Array:
-        """Coordinates of the motion on the manifold in all rows, (n, m); of the linear motion without one."""
-        return self.states[0] if self.bent is None else self.equations.coordinates(self.bent, self.times)[0]
-
-    @property
-    def tips(self) -> Array:
-        """The unknowns at the tip in all rows, (n, components)."""
-        if self.manifold is not None:
-            return self.manifold.tip(self.bent_states)
-        return self.states[0] @ self.model.tips().T
 
     @property
     def turn(self) -> Array:
@@ -125,7 +114,47 @@ def reduced_response(
     Raises:
         ComputationError: the stiffness is singular, or no motion is found.
     """
-    return Growth(system, times, start).response(accuracy, foreshortening)
+    began, growth = (process_time(), perf_counter()), Growth(system, times, start)
+    model, longest = growth.model, float(times[-1] - times[0]) / 64
+    rounds, basis_error, time_error, before = 0, np.inf, 0.0, None
+
+    def solved(equations: HeldEquations) -> tuple[Solution, States]:
+        solution = Solution(equations, cut(growth.excitation.knots, longest), *equations.start(start))
+        return solution, equations.coordinates(solution, times)
+
+    def difference(tips: Array, other: Array) -> float:
+        """Return the largest difference of the tips, relative to the largest displacement."""
+        return model.largest(tips - other) / max(model.largest(tips), 1e-300)
+
+    while True:
+        rounds += 1
+        equations = growth.equations()
+        solution, states = solved(equations)
+        tips = states[0] @ model.tips().T
+        if before is not None:
+            basis_error = difference(tips, before)
+        if basis_error <= accuracy or model.size >= MOST:
+            break
+        before = tips
+        least = (NEGLIGIBLE * accuracy) ** 2 * float(np.einsum("ni,ni->n", states[0], states[0]).max(initial=0.0))
+        if model.grow(growth.lacking(equations, solution, states), ADDED, least) == 0:
+            basis_error = NEGLIGIBLE * accuracy if model.size else 0.0
+            break
+    for _ in range(HALVINGS if model.size else 0):
+        longest /= 2
+        solution, states = solved(equations)
+        tips, before = states[0] @ model.tips().T, tips
+        time_error = difference(tips, before)
+        if time_error <= accuracy:
+            break
+    out = Response(model, equations, times, solution, states, tips, basis_error, time_error, rounds, {})
+    if foreshortening:
+        manifold, beside = Manifold(model, states[0]), copy(equations)
+        beside.further = equations.second_order(manifold, solution)
+        bent = solved(beside)[1][0]
+        found = manifold.tip(bent)
+        out = replace(out, manifold=manifold, bent=bent, tips=found, foreshortening=difference(found, tips))
+    return replace(out, seconds={"cpu": process_time() - began[0], "wall": perf_counter() - began[1]})
 
 
 class Growth:
@@ -138,8 +167,7 @@ class Growth:
     """
 
     def __init__(self, system: Any, times: Array, start: Array | None):
-        self.began = process_time(), perf_counter()
-        self.system, self.times, self.start = system, times, start
+        self.system, self.times = system, times
         self.excitation = excitation = Excitation(system.held, times)
         samples = np.append(after(times[:1]), excitation.samples())
         free = system.hub is not None
@@ -169,61 +197,7 @@ class Growth:
             return HeldEquations(self.model, self.excitation)
         return FreeHubEquations(self.model, self.excitation, self.system)
 
-    def solved(self, equations: HeldEquations, longest: float) -> tuple[Solution, States]:
-        """Return the solution by steps no longer than this (s), and the states of the structure in the rows."""
-        solution = Solution(equations, cut(self.excitation.knots, longest), *equations.start(self.start))
-        return solution, equations.coordinates(solution, self.times)
-
-    def response(self, accuracy: float, foreshortening: bool) -> Response:
-        """Return the history in a basis and in steps that an accuracy asks for (see `reduced_response`)."""
-        rounds, basis_error, before = 0, np.inf, None
-        longest = float(self.times[-1] - self.times[0]) / FIRST
-        while True:
-            rounds += 1
-            equations = self.equations()
-            solution, states = self.solved(equations, longest)
-            tips = self._tips(states)
-            if before is not None:
-                basis_error = self._difference(tips, before)
-            if basis_error <= accuracy or self.model.size >= MOST:
-                break
-            before = tips
-            negligible = NEGLIGIBLE * accuracy
-            energy = float(np.einsum("ni,ni->n", states[0], states[0]).max(initial=0.0))
-            if self.model.grow(self._lacking(equations, solution, states), ADDED, negligible**2 * energy) == 0:
-                basis_error = negligible if self.model.size else 0.0
-                break
-        time_error = 0.0
-        for _ in range(HALVINGS if self.model.size else 0):
-            longest /= 2
-            solution, states = self.solved(equations, longest)
-            tips, before = self._tips(states), tips
-            time_error = self._difference(tips, before)
-            if time_error <= accuracy:
-                break
-        out = Response(
-            self.model, equations, self.times, solution, states, basis_error, time_error, rounds, {"cpu": 0.0}
-        )
-        if foreshortening:
-            manifold = Manifold(self.model, states[0])
-            beside = copy(equations)
-            beside.further = equations.second_order(manifold, solution)
-            bent, (q, _, _) = self.solved(beside, longest)
-            found = manifold.tip(q)
-            difference = self.model.largest(found - tips) / max(self.model.largest(found), 1e-300)
-            out = replace(out, manifold=manifold, bent=bent, foreshortening=difference)
-        began, now = self.began, (process_time(), perf_counter())
-        return replace(out, seconds={"cpu": now[0] - began[0], "wall": now[1] - began[1]})
-
-    def _tips(self, states: States) -> Array:
-        return np.asarray(states[0] @ self.model.tips().T)
-
-    def _difference(self, tips: Array, before: Array) -> float:
-        """Return the largest difference of the tips in all rows, relative to the largest displacement."""
-        change = self.model.largest(tips - before)
-        return change / self.model.largest(tips) if change > 0.0 else 0.0
-
-    def _lacking(self, equations: HeldEquations, solution: Solution, states: States) -> Array:
+    def lacking(self, equations: HeldEquations, solution: Solution, states: States) -> Array:
         """Return the static solutions K⁻¹ r at instants of the history, local dof arrays (n, k)."""
         strength = np.linalg.norm(states[2], axis=1)
         parts = np.array_split(np.arange(len(strength)), min(INSTANTS, len(strength)))
