@@ -30,6 +30,7 @@ def environment() -> dict[str, str]:
         "OMPI_ALLOW_RUN_AS_ROOT": "1",
         "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
         "OMPI_MCA_mpi_yield_when_idle": "1",  # where there are fewer cores than processes
+        "ROTFEM_SHARED_FROM": os.environ.get("ROTFEM_SHARED_FROM", "0"),  # the mesh is shared, however small it is
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",
     }

@@ -183,10 +183,16 @@ class Sweep:
         analysis: compiled scene.
         count: number of branches.
         most: speeds that may be solved; those asked for are in any case.
+
+    Attributes:
+        known: speed ↦ modes there that other processes have solved for.
+        each: (items, work) ↦ what the work makes of every item; processes may share them out.
     """
 
     def __init__(self, analysis: ModalAnalysis, count: int, most: float = np.inf):
         self.analysis, self.count = analysis, count
+        self.known: dict[float, Spinning] = {}
+        self.each: Callable[[Sequence[Any], Callable[[Any], Any]], list[Any]] = lambda items, work: [*map(work, items)]
         self.nodes: list[Node] = []
         self.solves, self.most_solves, self.unresolved = 0, most, False
         self.ambiguous: list[dict[str, float]] = []
@@ -194,7 +200,8 @@ class Sweep:
     def solve(self, speed: float, start: Spinning | None, requested: bool) -> Node:
         """Return the modes at a speed, its equilibrium continued from start."""
         self.solves += 1
-        return Node(self.analysis.at(speed, self.count + SPARE, start), requested)
+        known = self.known.pop(speed, None)
+        return Node(known or self.analysis.at(speed, self.count + SPARE, start), requested)
 
     def run(self, speeds: Sequence[float], progress: Progress) -> None:
         """Follow the modes over increasing speeds."""
@@ -260,24 +267,27 @@ class Sweep:
 
         Modes in the fixed frame are synchronous where their frequency is Ω, and per_rev where it is kΩ.
         """
-        out = []
-        for left, right in pairwise(self.nodes):
+        wanted, out = list[tuple[int, int, int | None]](), []
+        for i, (left, right) in enumerate(pairwise(self.nodes)):
             for b in range(self.count):
-                at_zero = self._meeting(left, right, b, None)
-                wave = self.wave(left, b)
-                if at_zero is not None and wave is not None and not wave.fixed:
-                    out.append(self._critical(b, "forward", 1, 0, at_zero))
                 wave = self.wave(right, b)
                 against = 0 if wave is None else wave.at_rest
-                for k in sorted({*orders, against} - {0}):
-                    speed = self._meeting(left, right, b, k)
-                    if speed is None:
-                        continue
-                    way = self.direction(right, b)
-                    if wave is not None and k == against and (way == "backward" or (wave.fixed and way)):
-                        out.append(self._critical(b, way, wave.number, k, speed))
-                    elif k in orders:
-                        out.append(self._critical(b, "per_rev", k, k, speed))
+                lines = (None, *sorted({*orders, against} - {0}))
+                wanted += [(i, b, k) for k in lines if self._between(left, right, b, k)]
+        for (i, b, k), (speed, solves) in zip(wanted, self.each(wanted, self._meeting), strict=True):
+            self.solves += solves
+            if speed is None:
+                continue
+            left, right = self.nodes[i : i + 2]
+            wave = self.wave(left if k is None else right, b)
+            way = self.direction(right, b)
+            if k is None:
+                if wave is not None and not wave.fixed:
+                    out.append(self._critical(b, "forward", 1, 0, speed))
+            elif wave is not None and k == wave.at_rest and (way == "backward" or (wave.fixed and way)):
+                out.append(self._critical(b, way, wave.number, k, speed))
+            elif k in orders:
+                out.append(self._critical(b, "per_rev", k, k, speed))
         return sorted(out, key=lambda c: (c["kind"] == "per_rev", c["speed"]))
 
     def _critical(self, branch: int, kind: str, order: int, k: int, speed: float) -> dict[str, Any]:
@@ -285,24 +295,34 @@ class Sweep:
         named = {"kind": kind, "order": order, "per_rev": k}
         return {"speed": speed, **named, "branch": branch + 1, "frequency": frequency}
 
-    def _meeting(self, left: Node, right: Node, b: int, k: int | None) -> float | None:
-        """Return the speed between two nodes where a branch has the frequency kΩ, or passes zero without k; or None."""
+    @staticmethod
+    def _gap(node: Node, b: int, k: int | None) -> float:
+        """Return how far a branch is above the line kΩ at a node, or without k above zero, rad/s."""
+        return node.signed(b) if k is None else node.value(b).imag - k * abs(node.speed)
 
-        def gap(node: Node) -> float:
-            return node.signed(b) if k is None else node.value(b).imag - k * abs(node.speed)
+    def _between(self, left: Node, right: Node, b: int, k: int | None) -> bool:
+        """Return whether a branch has the frequency kΩ, or passes zero without k, between two nodes."""
+        ends = [self._gap(node, b, k) for node in (left, right)]
+        return bool(np.all(np.isfinite(ends)) and ends[0] != 0.0 and ends[0] * ends[1] <= 0.0)
+
+    def _meeting(self, place: tuple[int, int, int | None]) -> tuple[float | None, int]:
+        """Return the speed after the node i where a branch b has the frequency kΩ, or None, and solutions it took."""
+        i, b, k = place
+        left, right = self.nodes[i : i + 2]
+        before, self.solves = self.solves, 0
 
         def f(speed: float) -> float:
             try:
-                return gap(self.between(left, speed))
+                return self._gap(self.between(left, speed), b, k)
             except ComputationError:
                 if k is None:
                     return 0.0  # K is singular: this is the speed
                 raise
 
-        ends = [gap(node) for node in (left, right)]
-        if not np.all(np.isfinite(ends)) or ends[0] == 0.0 or ends[0] * ends[1] > 0.0:
-            return None
-        return right.speed if ends[1] == 0.0 else root(f, (left.speed, right.speed), ends)
+        ends = [self._gap(node, b, k) for node in (left, right)]
+        speed = right.speed if ends[1] == 0.0 else root(f, (left.speed, right.speed), ends)
+        taken, self.solves = self.solves, before
+        return speed, taken
 
     def onsets(self) -> list[dict[str, Any]]:
         """Return the ranges in which a mode is unstable, and how: `speed` where each begins, `kind`, and `until`.

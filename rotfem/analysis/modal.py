@@ -176,6 +176,7 @@ class ModalAnalysis:
         InputError: the mesh cannot be shared by the processes, or a mesh or section that cannot be computed with.
 
     Attributes:
+        everyone: all processes that have this analysis, which may be more than share its mesh, `comm`.
         free: whether the hub is free, so that its angle is one more unknown.
         fixed: change to the fixed frame, in which modes are then; None where they are in the rotating one.
         past_limits: whether the path to an equilibrium is followed past maxima of the load.
@@ -198,7 +199,7 @@ class ModalAnalysis:
         self.structure.check_shared()  # SLEPc waits for ever where a process has no unknowns
         self.free = self.system.hub is not None
         self.fixed = FixedFrame(self.system) if has_anisotropic_supports(self.problem) else None
-        self.newton = newton or Newton()
+        self.newton, self.everyone = newton or Newton(), comm
         self._unit: float | None = None
         self._kept = KeptDigits(self.system)
         self.past_limits, self.notes = False, list[str]()

@@ -130,6 +130,7 @@ class ReducedAnalysis(ModalAnalysis):
     def __init__(self, full: ModalAnalysis):
         self.full = full
         self.problem, self.about, self.comm, self.newton = full.problem, full.about, full.comm, full.newton
+        self.everyone = full.everyone
         self.system, self.model, self.structure, self.free = full.system, full.model, full.structure, full.free
         self.seconds, self._unit, self.mesh_by_shape = full.seconds, full._unit, False
         self.estimates, self.past_limits, self.fixed = full.estimates, full.past_limits, full.fixed

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rotfem.listeners import Hint
-from rotfem.numerics.linear import SMALL
 from rotfem.registry import theories
 from rotfem.scene.scene import Scene
 from rotfem.section_quantities import FORCES
@@ -93,14 +92,6 @@ def advise(
     for line in out:
         hint(line)
     return out
-
-
-def few_unknowns(space: Any) -> list[str]:
-    """Return a hint where several processes share a system that one solves quicker, by the dolfinx space of it."""
-    ranks, dofs = space.mesh.comm.size, space.dofmap.index_map.size_global * space.dofmap.index_map_bs
-    if ranks == 1 or dofs >= SMALL:
-        return []
-    return [f"{dofs} unknowns are few for {ranks} processes: below {SMALL} one process, without mpirun, is quicker"]
 
 
 def _softening(scene: Scene, speed: float, critical: float) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -12,7 +13,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.analysis.branches import SPARE, Node, Sweep
-from rotfem.analysis.modal import ModalAnalysis, self_checks
+from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.reduced_basis import in_basis
 from rotfem.commands.error_report import error_of_modes
 from rotfem.commands.loads import frozen_inputs
@@ -20,6 +21,7 @@ from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_ro
 from rotfem.commands.modes import analysis_of, answered, hints_of, theory_error
 from rotfem.commands.monitor import check_rows
 from rotfem.commands.problem import Problem
+from rotfem.commands.processes import shared_out
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import SceneError
 from rotfem.listeners import Hint, Progress, silent
@@ -155,8 +157,12 @@ def diagram(
     """
     fastest, marks, count = max(map(abs, values)), scene.modes, scene.modes.count
     hints = hints_of(analysis, scene, "campbell", hint, fastest)
-    analysis = in_basis(analysis, values, count + SPARE)
+    full, analysis = analysis, in_basis(analysis, values, count + SPARE)
     sweep = Sweep(analysis, count, scene.limits.speeds)
+    if analysis.everyone.size > analysis.comm.size:  # each process has a copy
+        if analysis is full:
+            sweep.known = solved_by_all(analysis, values, count, progress)
+        sweep.each = partial(shared_out, comm=analysis.everyone)
     sweep.run(values, progress or (lambda share: None))
     sweep.count = count = min(count, len(sweep.nodes[0].order))
     found = [node.value(b).imag for node in sweep.nodes for b in range(count)]
@@ -207,6 +213,21 @@ def diagram(
         "advice": hints,
     }
     return CampbellResult(summary, rows)
+
+
+def solved_by_all(
+    analysis: ModalAnalysis, values: Sequence[float], count: int, progress: Progress | None
+) -> dict[float, Spinning]:
+    """Return speed ↦ modes there; processes that each have a copy share out the speeds."""
+    before, ranks = list[Spinning](), analysis.everyone.size
+
+    def solve(speed: float) -> Spinning:
+        before.append(analysis.at(speed, count + SPARE, before[-1] if before else None))
+        if progress is not None:
+            progress(min(1.0, len(before) * ranks / len(values)))
+        return before[-1]
+
+    return dict(zip(values, shared_out(values, solve, analysis.everyone), strict=True))
 
 
 def remarks(sweep: Sweep, labels: list[str], onsets: list[dict[str, Any]], ends: list[dict[str, Any]]) -> list[str]:

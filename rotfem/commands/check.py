@@ -11,6 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from rotfem.commands.problem import Problem
+from rotfem.commands.processes import communicator
 from rotfem.commands.summary import summary
 from rotfem.equations.functionals import rigid_body
 from rotfem.equations.model import Model
@@ -43,7 +44,7 @@ def check(scene: Scene | str | Path | Mapping[str, Any], *, comm: MPI.Comm = MPI
         linear = [theory for theory in Theory.registry if theory.linear and theory.holds_for(scene.structure.type)]
         if linear:  # at rest all are the same, and the forms of these are small
             problem = problem.replace(theory=min(linear, key=lambda theory: theory.rank).name)
-        model = Model(problem, comm)
+        model = Model(problem, communicator(problem, comm))
         body = rigid_body(model)
         structure = scene.structure
         root = np.array(getattr(structure, "root_position", (structure.hub_radius, 0.0, 0.0)))
@@ -51,7 +52,7 @@ def check(scene: Scene | str | Path | Mapping[str, Any], *, comm: MPI.Comm = MPI
         center = np.array(body.first_moment / body.mass)
         columns = columns_of(structure)
         found: dict[str, Any] = {
-            **summary("check", scene, comm),
+            **summary("check", scene, comm, model.structure.mesh.comm),
             "type": structure.type,
             "length": model.structure.length,
             "mass": body.mass,

@@ -16,6 +16,7 @@ from rotfem.commands.first_state import first_state
 from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.modes import modes
 from rotfem.commands.problem import Problem, scheme_of
+from rotfem.commands.processes import communicator
 from rotfem.commands.run import run
 from rotfem.commands.summary import summary
 from rotfem.errors import ComputationError, SceneError, input_of
@@ -71,8 +72,9 @@ def explain(
     if check and terms:
         raise SceneError(scene.file, "--check", None, "runs the scene's own models; register the terms as effects")
     with input_of(scene.file):
-        of = Explanation(case_of(scene, terms), comm)
-        return _explained(scene, of, check, progress or (lambda share: None))
+        case = case_of(scene, terms)
+        of = Explanation(case, communicator(case.problem, comm))
+        return _explained(scene, of, check, progress or (lambda share: None), comm)
 
 
 def case_of(scene: Scene, terms: Mapping[str, Work] | None = None) -> Case:
@@ -102,7 +104,7 @@ def case_of(scene: Scene, terms: Mapping[str, Work] | None = None) -> Case:
     )
 
 
-def _explained(scene: Scene, of: Explanation, check: bool, progress: Progress) -> ExplainResult:
+def _explained(scene: Scene, of: Explanation, check: bool, progress: Progress, comm: MPI.Comm) -> ExplainResult:
     started, theory = perf_counter(), of.problem.theory
     changes = of.all()
     spent = {"estimate": perf_counter() - started, "check": 0.0}
@@ -112,7 +114,7 @@ def _explained(scene: Scene, of: Explanation, check: bool, progress: Progress) -
     numbers = groups(of)
     rows = [{**item.row(), "why": why(item, theory)} for item in changes]
     result: dict[str, Any] = {
-        **summary("explain", scene, of.system.comm),
+        **summary("explain", scene, comm, of.system.comm),
         "theory": theory.name,
         "effects": list(of.own),
         "groups": numbers,

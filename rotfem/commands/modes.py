@@ -20,13 +20,14 @@ from rotfem.analysis.modal import participation as masses_of
 from rotfem.analysis.stability import Stability, stability_of_pencil
 from rotfem.analysis.theory_error import TheoryCheck, TheoryError
 from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy, within_tolerance
-from rotfem.commands.advice import advise, few_unknowns
+from rotfem.commands.advice import advise
 from rotfem.commands.error_report import error_of_modes
 from rotfem.commands.fields import modes_writer, surface_of
 from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.mode_tables import mode_tables
 from rotfem.commands.monitor import check_rows
 from rotfem.commands.problem import Problem
+from rotfem.commands.processes import communicator
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import ComputationError, SceneError, input_of
 from rotfem.listeners import Hint, silent
@@ -192,12 +193,13 @@ def theory_error(analysis: ModalAnalysis, spinning: Spinning) -> TheoryError | N
 
 
 def analysis_of(scene: Scene, problem: ProblemData, comm: MPI.Comm) -> ModalAnalysis:
-    """Return the modal analysis that a scene asks for.
+    """Return the modal analysis that a scene asks for, of a small system each process for itself.
 
     Raises:
         InputError: more modes are asked for than there are unknowns, or a mesh that cannot be computed with.
     """
-    analysis = ModalAnalysis(problem, scene.modes.about, Newton.of(scene.solver), comm)
+    analysis = ModalAnalysis(problem, scene.modes.about, Newton.of(scene.solver), communicator(problem, comm))
+    analysis.everyone = comm
     analysis.past_limits, analysis.estimates = scene.solver.past_limits, scene.output.error
     if "count" in scene.modes.model_fields_set:  # what was not asked for is only an upper limit
         analysis.check_count(scene.modes.count)
@@ -210,4 +212,4 @@ def hints_of(analysis: ModalAnalysis, scene: Scene, command: str, hint: Hint | N
     if hint is not None and theory.linear and not theory.prestress:
         with suppress(ComputationError):  # a hint is worth no failure
             critical = critical_speed(analysis.system)
-    return advise(scene, command, hint, speed, critical, few_unknowns(analysis.system.V))
+    return advise(scene, command, hint, speed, critical)

@@ -19,7 +19,15 @@ def report(result: Result) -> list[str]:
     tables = [line for table in result.tables() for line in table.lines()]
     before, after = _AROUND[s["command"]](s)
     error = [error_line(s["error"])] if "error" in s else []
-    return [*before, *tables, *error, *after]
+    return [*before, *shared(s), *tables, *error, *after]
+
+
+def shared(s: dict[str, Any]) -> list[str]:
+    """Return the line that says what several processes have shared."""
+    if "shared" not in s:
+        return []
+    how = {"mesh": "shared the mesh", "nothing": "each computed all of it, as it is too small to be shared"}
+    return [f"{s['ranks']} processes {how.get(s['shared'], 'shared the ' + s['shared'])}"]
 
 
 def of_run(s: dict[str, Any]) -> tuple[list[str], list[str]]:

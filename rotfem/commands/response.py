@@ -32,6 +32,7 @@ from rotfem.commands.loads import SWEPT, frozen_in_frame, swept_loads
 from rotfem.commands.mode_tables import advice, doubtful, instabilities, mode_rows
 from rotfem.commands.modes import analysis_of, theory_error
 from rotfem.commands.problem import Problem
+from rotfem.commands.processes import shared_out
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import SceneError, input_of
 from rotfem.results.columns import described
@@ -91,13 +92,15 @@ def response(
         answers = FrequencyResponse(analysis, spinning, *loaded(scene, analysis, spinning))
         asked, peaks, undamped = frequencies_of(answers, spinning, (low, high, number, per_rev))
 
-        def answer(omega: float) -> Array:  # the same bits on all ranks, which then choose the same frequencies
-            return np.asarray(comm.bcast(answers.direct(omega)))
+        def answers_at(omegas: Array) -> Array:  # the same bits on all ranks, which then choose the same frequencies
+            if analysis.comm.size == comm.size:
+                return np.array([comm.bcast(answers.direct(omega)) for omega in omegas])
+            return np.array(shared_out(list(omegas), answers.direct, comm))
 
-        direct = np.array([answer(omega) for omega in asked])
+        direct = answers_at(asked)
         if not len(per_rev) or low is not None or high is not None:
             given = asked[~peaks]
-            asked, direct = resolved(answer, asked, direct, number)
+            asked, direct = resolved(answers_at, asked, direct, number)
             peaks = ~np.isin(asked, given)
         modal = answers.modal(asked, scene.modes.count)
         return result_of(scene, answers, (asked, peaks, undamped), (direct, modal), started)
@@ -154,14 +157,14 @@ def frequencies_of(
     return asked, ~np.isin(asked, grid), undamped
 
 
-def resolved(answer: Callable[[float], Array], omegas: Array, values: Array, most: int) -> tuple[Array, Array]:
+def resolved(answers_at: Callable[[Array], Array], omegas: Array, values: Array, most: int) -> tuple[Array, Array]:
     """Return frequencies (rad/s) and answers, so close that amplitudes on a logarithmic scale run smoothly.
 
     Where the logarithm of an amplitude is off the line through its neighbours by more than BEND, the intervals on both
     sides are halved, the worst first.
 
     Args:
-        answer: frequency ↦ amplitudes of the outputs, (outputs,).
+        answers_at: frequencies ↦ amplitudes of the outputs, (frequencies, outputs).
         omegas: frequencies, increasing, at least three.
         values: the answers there, (frequencies, outputs).
         most: frequencies that may be added.
@@ -179,7 +182,7 @@ def resolved(answer: Callable[[float], Array], omegas: Array, values: Array, mos
         if not len(chosen):
             break
         further = 0.5 * (omegas[chosen] + omegas[chosen + 1])
-        values = np.insert(values, chosen + 1, np.array([answer(omega) for omega in further]), axis=0)
+        values = np.insert(values, chosen + 1, answers_at(further), axis=0)
         omegas = np.insert(omegas, chosen + 1, further)
         left -= len(further)
     return omegas, values

@@ -82,7 +82,9 @@ class ResultFolder:
         """
         fields: Writer | None = getattr(result, "fields", None)
         of_first: list[Writer] = [*result.large(), *further, *([partial(_plot, result)] if plots else [])]
-        writers = [(write, False) for write in of_first] + ([] if fields is None else [(fields, True)])
+        writers = [(write, False) for write in of_first]
+        if fields is not None:
+            writers.append((fields, result.summary.get("shared") == "mesh"))
         self.first_does(lambda files: files.publish(result, not writers))
         problems: list[OutputError | SceneError] = []
         for write, together in writers:

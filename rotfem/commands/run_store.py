@@ -22,8 +22,8 @@ from rotfem.results.result_set import ResultSet, read_summary
 from rotfem.results.run import LiveTable
 from rotfem.scene import Scene
 
-#: Bits of what ranks tell each other after a step.
-ASKED, DUE = 1, 2
+#: Seconds after which ranks tell each other of signals: mpirun gives its processes a quarter of a second.
+TALK = 0.05
 
 
 @dataclass(frozen=True)
@@ -76,6 +76,8 @@ class RunStore:
         self._tree: Tree | None = None
         self._identity: Tree = {}
         self._written = monotonic()
+        #: Time (s) and step at which ranks last talked to each other, and the step at which they do so next.
+        self._talked, self._next = (monotonic(), 0), 0
         self._failed = False
 
     @property
@@ -142,7 +144,7 @@ class RunStore:
             OutputError: the folder cannot be written.
             SceneError: the checkpoint does not fit.
         """
-        self._parts = run
+        self._parts, self._talked, self._next = run, (monotonic(), run.log.steps), 0
         if self.folder is None:
             return None
         state, path = None, self.folder.path / CHECKPOINT
@@ -170,21 +172,33 @@ class RunStore:
         """
         if self._live is not None:
             self._live.update()
-        comparable = ASKED * self._interrupts.asked + DUE * self._is_due()
-        if self.comm.size > 1:
-            comparable = self.comm.allreduce(comparable, op=MPI.BOR)
-        if comparable or self._is_last(state):
+        asked, due = self._agreed()
+        if asked or due or self._is_last(state):
             self._save(state)
-        if comparable & ASKED and self._interrupts.active:
+        if asked and self._interrupts.active:
             raise Stopped
 
-    def _is_due(self) -> bool:
-        run = self._parts
-        if self.every is None or run is None or run.log.steps == 0:
-            return False
-        if self.every.steps is not None:
-            return run.log.steps % self.every.steps == 0
-        return self.comm.rank == 0 and monotonic() - self._written >= (self.every.seconds or 0.0)
+    def _agreed(self) -> tuple[bool, bool]:
+        """Return whether a signal has come to one of the ranks, and whether a checkpoint is due, the same on all.
+
+        Ranks talk to each other after so many steps only as take about `TALK` on rank 0: they need not meet in between.
+        """
+        asked, every, steps = (
+            self._interrupts.asked,
+            self.every or Interval(),
+            self._parts.log.steps if self._parts else 0,
+        )
+        due = every.steps is not None and steps > 0 and steps % every.steps == 0
+        if self.comm.size > 1 and steps < self._next:
+            return False, due
+        late = every.seconds is not None and steps > 0 and monotonic() - self._written >= every.seconds
+        if self.comm.size > 1:
+            now = monotonic()
+            pace, self._talked = (now - self._talked[0]) / max(1, steps - self._talked[1]), (now, steps)
+            told = self.comm.allgather((asked, late, pace))
+            asked, (_, late, pace) = any(rank[0] for rank in told), told[0]
+            self._next = steps + max(1, int(TALK / max(pace, 1e-9)))
+        return asked, due or late
 
     def _left(self, state: State) -> float:
         """Return how many more steps there are at least; of adaptive ones whether there is one."""

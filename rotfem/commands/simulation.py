@@ -22,7 +22,7 @@ from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.switching import SMOOTHER, watched_switches
 from rotfem.analysis.theory_error import said_of
 from rotfem.commands import monitor
-from rotfem.commands.advice import advise, few_unknowns
+from rotfem.commands.advice import advise
 from rotfem.commands.checkpoint import Log, Parts
 from rotfem.commands.error_report import RunErrors, output_of
 from rotfem.commands.first_state import Start, first_state, hints_of_start
@@ -30,6 +30,7 @@ from rotfem.commands.interrupts import together
 from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.monitor import Monitor
 from rotfem.commands.problem import scheme_of
+from rotfem.commands.processes import communicator
 from rotfem.commands.recorder import Recorder
 from rotfem.commands.reduced_history import reduced_history
 from rotfem.commands.run_store import RunStore
@@ -72,13 +73,13 @@ class Simulation:
         clock: Callable[[int, float], None] | None = None,
     ):
         self.scene, self.setting, self.clock = scene, setting, clock
-        self.store, self.log = store or RunStore(comm), Log()
+        self.comm, self.store, self.log = comm, store or RunStore(comm), Log()
         if scene.time is None and problem.frame == "inertial":
             problem = problem.replace(frame="rotating")
             self.log.warnings.append("a steady state is one only in the rotating frame, where it was computed")
         check_rotating(problem, "a run")
         self.problem = problem = of_active_unknowns(scene, problem)
-        self.system: Any = compile_system(problem, comm, moving=scene.time is not None)
+        self.system: Any = compile_system(problem, communicator(problem, comm), moving=scene.time is not None)
         self.system.compile_readings()
         self.compiled = perf_counter() - self.log.started
         self.record = Recorder(self.system, scene.output)
@@ -97,7 +98,7 @@ class Simulation:
 
     def advise(self, hint: Hint | None) -> None:
         """Give the hints that there are before the computation starts."""
-        also = [*few_unknowns(self.system.V), *hints_of_start(self.scene, self.problem)]
+        also = hints_of_start(self.scene, self.problem)
         self.log.advice = advise(self.scene, "run", hint, critical=self.monitor.critical, also=also)
 
     def run(self, progress: Progress | None = None) -> RunResult:
@@ -122,7 +123,7 @@ class Simulation:
             failure.result = self.result("failed", failure)
             raise failure from (None if failure is error else error)
         except KeyboardInterrupt as stop:
-            if not together(self.system.comm, stop):
+            if not together(self.comm, stop):
                 raise
             raise Stopped(self.result("interrupted")) from stop
         return self.result("done")
@@ -300,7 +301,7 @@ class Simulation:
             parts["reduce"] = self.reduced.seconds["wall"]
         before = {"before": log.elapsed} if log.resumed else {}
         out = {
-            **summary("run", scene, system.comm),
+            **summary("run", scene, self.comm, system.comm),
             "status": status,
             "kind": "steady" if scene.time is None else "history",
             "theory": self.problem.theory.name,

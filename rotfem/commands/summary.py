@@ -9,20 +9,22 @@ from typing import Any
 from mpi4py import MPI
 
 from rotfem.analysis.modal import ModalAnalysis
+from rotfem.commands.processes import what_is_shared
 from rotfem.scene import Scene
 from rotfem.version import versions
 
 
-def summary(command: str, scene: Scene, comm: MPI.Comm) -> dict[str, Any]:
+def summary(command: str, scene: Scene, comm: MPI.Comm, inner: MPI.Comm | None = None) -> dict[str, Any]:
     """Return what every summary has.
 
     Args:
         command: the verb.
         scene: the scene as it was given.
-        comm: MPI communicator.
+        comm: all processes of the command.
+        inner: those that its system is discretised on; all if None.
     """
-    out: dict[str, Any] = {"command": command, "status": "done", "name": scene.name}
-    return out | {"versions": versions(), "ranks": comm.size, "scene": scene.digest()}
+    out: dict[str, Any] = {"command": command, "status": "done", "name": scene.name, "versions": versions()}
+    return {**out, **what_is_shared(command, comm, inner or comm), "scene": scene.digest()}
 
 
 def timings(parts: Mapping[str, float], started: float, before: Mapping[str, float] | None = None) -> dict[str, float]:
@@ -44,7 +46,7 @@ def modal_summary(command: str, analysis: ModalAnalysis, scene: Scene, started: 
     """
     space = analysis.system.V.dofmap
     return {
-        **summary(command, scene, analysis.comm),
+        **summary(command, scene, analysis.everyone, analysis.comm),
         "theory": analysis.problem.theory.name,
         **({} if analysis.fixed is None else {"frame": "fixed"}),
         "about": "undeformed" if analysis.system.linear else analysis.about,

@@ -34,7 +34,7 @@ from rotfem.numerics.balance import balanced, least_frequency, power_of_two, unk
 from rotfem.numerics.damped import MORE, damped_pairs, heavily_damped, quadratic
 from rotfem.numerics.gyroscopic import gyroscopic_pairs
 from rotfem.numerics.linear import SMALL, DirectSolver, transposed, use_direct_solver
-from rotfem.numerics.low_rank import sparse_part
+from rotfem.numerics.low_rank import Sendable, sparse_part
 from rotfem.numerics.projection import times
 
 #: Random vectors by which norms of large matrices are estimated.
@@ -283,7 +283,7 @@ def dense_pairs(M: Array, C: Array, K: Array, wanted: int, target: float) -> tup
     return values, X, np.where(np.isfinite(errors), errors, 1.0)
 
 
-class Pencil:
+class Pencil(Sendable):
     """M, C and K of small motions about an equilibrium (PETSc matrices, clamped unknowns 0, 0 and 1).
 
     Args:

@@ -7,19 +7,41 @@ Equations with A + c B Bᵀ are solved with a factor of A (Sherman, Morrison & W
 
 from __future__ import annotations
 
+import copyreg
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from rotfem.numerics.projection import summed, times
 
 Array = npt.NDArray[Any]
 
 
-class LowRank:
+def _from_rows(size: tuple[int, int], rows: tuple[Array, Array, Array]) -> Any:
+    """Return a PETSc matrix of this process alone, by the arrays of its compressed rows."""
+    return PETSc.Mat().createAIJ(size, csr=rows, comm=MPI.COMM_SELF)
+
+
+copyreg.pickle(PETSc.Mat, lambda A: (_from_rows, (A.getSize(), A.getValuesCSR())))
+
+
+class Sendable:
+    """What holds matrices of one process alone, and can be sent to another one, without what it belongs to."""
+
+    comm: MPI.Comm
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name not in ("comm", "owner")}
+
+    def __setstate__(self, known: dict[str, Any]) -> None:
+        vars(self).update(known, comm=MPI.COMM_SELF, owner=None)
+
+
+class LowRank(Sendable):
     """B Bᵀ; to those who multiply by it, it looks like a PETSc matrix.
 
     Args:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import itertools
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from rotfem.commands.advice import advise, estimates, few_unknowns
+from rotfem.commands.advice import advise, estimates
 from rotfem.commands.cost.bench import Measurement, Record, fingerprint
 from rotfem.commands.cost.result import ERRORS, Row, pareto, recommend, write_tuned
 from rotfem.commands.cost.settings import OUTPUTS, allowed_by, check_choice, grid, own_setting
@@ -238,11 +237,3 @@ def test_estimates_of_the_tiniest_beam_are_numbers() -> None:
 
 def test_the_figure_names_the_error_of_every_output() -> None:
     assert set(ERRORS) == set(OUTPUTS)
-
-
-@pytest.mark.parametrize(("ranks", "nodes", "hints"), [(1, 31, 0), (2, 31, 1), (2, 2000, 0)])
-def test_few_unknowns_on_many_processes(ranks: int, nodes: int, hints: int) -> None:
-    index_map = SimpleNamespace(size_global=nodes)
-    dofmap = SimpleNamespace(index_map=index_map, index_map_bs=3)
-    space = SimpleNamespace(mesh=SimpleNamespace(comm=SimpleNamespace(size=ranks)), dofmap=dofmap)
-    assert len(few_unknowns(space)) == hints

@@ -206,9 +206,12 @@ def test_curves_are_resolved_where_they_bend() -> None:
     def answer(omega: float) -> np.ndarray:
         return np.array([1 / (1 + 0.01j * omega - omega**2) - 1 / (5 + 0.01j * omega - omega**2)])
 
+    def answers_at(omegas: np.ndarray) -> np.ndarray:
+        return np.array([answer(omega) for omega in omegas])
+
     first = np.linspace(0.0, 3.0, 12)
-    values = np.array([answer(omega) for omega in first])
-    omegas, found = resolved(answer, first, values, 500)
+    values = answers_at(first)
+    omegas, found = resolved(answers_at, first, values, 500)
     assert np.all(np.isin(first, omegas))
     np.testing.assert_array_equal(found, [answer(omega) for omega in omegas])
     heights = np.log(np.abs(found[:, 0]))
@@ -219,5 +222,5 @@ def test_curves_are_resolved_where_they_bend() -> None:
     ]
     assert len(bends) > 30
     assert max(bends) < BEND
-    few, _ = resolved(answer, first, values, 20)
+    few, _ = resolved(answers_at, first, values, 20)
     assert len(few) == len(first) + 20

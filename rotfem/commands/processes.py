@@ -1,0 +1,87 @@
+"""How several processes share one command: a large system shares its mesh, of a small one each has a copy.
+
+With a copy on every process nothing is communicated within a solution, and all have the whole result. What there is
+many of, speeds or frequencies, is then shared out; a history or one set of modes is computed by each.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+from mpi4py import MPI
+
+from rotfem.errors import ComputationError, InputError
+from rotfem.mechanics.problem import Problem
+from rotfem.registry import resolved, structures
+
+Item = TypeVar("Item")
+Found = TypeVar("Found")
+
+#: Environment variable with another number of unknowns for each process from which a mesh is shared.
+VARIABLE = "ROTFEM_SHARED_FROM"
+
+#: That number. Below 5000 unknowns two processes lose, as PETSc's own LU is quicker than MUMPS; they gain 1.3 on modes
+#: of a plate of 99 405 (docs/scaling.md). Memory is no reason here: a copy takes 17 kB for each unknown.
+SHARED_FROM = 10_000
+
+#: Command ↦ what is shared out where every process has a copy.
+SHARED_OUT = {"campbell": "speeds", "response": "frequencies"}
+
+
+def communicator(problem: Problem, comm: MPI.Comm) -> MPI.Comm:
+    """Return what a problem is discretised on: all processes where it is large, else each one by itself."""
+    return comm if comm.size == 1 or unknowns(problem) >= _least() * comm.size else MPI.COMM_SELF
+
+
+def unknowns(problem: Problem) -> float:
+    """Return about how many unknowns a problem has; infinite where only its mesh file knows."""
+    structure, mesh = problem.structure, problem.mesh
+    if structure.mesh_file is not None:
+        return math.inf
+    cells = mesh.elements if isinstance(mesh.elements, Sequence) else [mesh.elements]
+    kind: Any = resolved(structures[structure.type].discretised)
+    return float(len(kind.components) * math.prod(n * mesh.degree + 1 for n in cells))
+
+
+def _least() -> float:
+    given = os.environ.get(VARIABLE, "")
+    try:
+        return float(given or SHARED_FROM)
+    except ValueError:
+        raise InputError(VARIABLE, given, "must be a number of unknowns") from None
+
+
+def what_is_shared(command: str, comm: MPI.Comm, inner: MPI.Comm) -> dict[str, Any]:
+    """Return `ranks`, and on several of them `shared`: "mesh", "speeds", "frequencies" or "nothing".
+
+    Args:
+        command: the verb.
+        comm: all processes of the command.
+        inner: those that the system is discretised on.
+    """
+    if comm.size == 1:
+        return {"ranks": 1}
+    return {"ranks": comm.size, "shared": "mesh" if inner.size > 1 else SHARED_OUT.get(command, "nothing")}
+
+
+def shared_out(items: Sequence[Item], work: Callable[[Item], Found], comm: MPI.Comm) -> list[Found]:
+    """Return what some work makes of every item, on all ranks; each rank does neighbouring items in their order.
+
+    Raises:
+        ComputationError: one failed, on all ranks.
+        InputError: likewise.
+    """
+    first, last = (len(items) * rank // comm.size for rank in (comm.rank, comm.rank + 1))
+    done: list[Found] = []
+    problem = None
+    try:
+        done += map(work, items[first:last])
+    except (ComputationError, InputError) as error:
+        problem = error
+    parts = comm.allgather((done, problem))
+    if (problem := next((p for _, p in parts if p is not None), None)) is not None:
+        raise problem
+    return [found for part, _ in parts for found in part]
