@@ -23,6 +23,7 @@ from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy.sparse import csr_array
 
 from rotfem.errors import ComputationError
 from rotfem.mechanics import work
@@ -32,6 +33,7 @@ from rotfem.numerics.balance import power_of_two
 from rotfem.numerics.eigenproblem import ROUNDED, Eigenpairs, Pencil, RoundOff, relative
 from rotfem.numerics.linear import set_diagonal
 from rotfem.numerics.low_rank import sparse_part
+from rotfem.numerics.projection import summed
 
 Array = npt.NDArray[Any]
 
@@ -72,11 +74,6 @@ class Resultants:
         self._rows = [self._compile(s) for s in stiff]
         self._rest = self._compile_rest(stiff, soft)
         self._stressed = self._compile_stressed()
-
-    @staticmethod
-    def possible(system: Any) -> bool:
-        """Whether a system has stiff strains."""
-        return bool(system.structure.stiff)
 
     def _at_rest(self, form: Any) -> Any:
         q, v, a, _ = self.model.mechanics.k.functions
@@ -121,10 +118,6 @@ class Resultants:
         form = self._at_rest(out)
         return None if form.empty() else forms.form(form, once=True)
 
-    @property
-    def _has_stress(self) -> bool:
-        return self.system.prestressed if self.system.linear else bool(np.any(self._state.x.array))
-
     def at_state(self, M: Any, C: Any) -> Saddle:
         """Return the matrices at the state and time set in the system, given its M and C."""
         system = self.system
@@ -152,7 +145,8 @@ class Resultants:
         zero = [_empty(W) for W in blocks]
         grid = _bordered(_empty(M), rows, blocks)
         stressed = None
-        if self._stressed is not None and self.system.comm.allreduce(self._has_stress, op=MPI.LOR):
+        has_stress = system.prestressed if system.linear else bool(np.any(self._state.x.array))
+        if self._stressed is not None and system.comm.allreduce(has_stress, op=MPI.LOR):
             stressed = fem_petsc.assemble_matrix(self._stressed, system.bcs, 0.0)
             stressed.assemble()
         return Saddle(_diagonal(M, zero), _diagonal(C, zero), _bordered(rest, rows, blocks), grid, rest, stressed)
@@ -208,7 +202,7 @@ class KeptDigits:
             count: number of pairs wanted.
         """
         worst = float(np.max(pairs.bounds[:count], initial=0.0))
-        if worst <= 1e-5 or sparse_part(pencil.C) is not pencil.C or not Resultants.possible(self.system):
+        if worst <= 1e-5 or sparse_part(pencil.C) is not pencil.C or not self.system.structure.stiff:
             return pairs
         if self._in_damping(pairs, count) > 0.1:  # nothing is gained
             return pairs
@@ -222,15 +216,19 @@ class KeptDigits:
             return pairs
         n = pairs.right.shape[0]
         right, left, bounds = found.right[:n], found.left[:n], found.bounds
+
+        def products(X: Array) -> Array:
+            return np.asarray(summed(pencil.comm, np.sum(left.conj() * X, axis=0)))
+
         eta = self.system.model.mechanics.damping.stiffness
         left_out: Array = np.zeros(len(bounds))
         if saddle.stressed is not None:
-            left_out += ROUNDED * np.abs(_product(pencil, left, pencil.apply(saddle.stressed, right)))
+            left_out += ROUNDED * np.abs(products(pencil.apply(saddle.stressed, right)))
         if eta is not None:  # C = η K + … is summed as K was
             left_out += np.abs(float(eta.value) * found.values) * RoundOff(pencil).stiffness(left, right)
         if np.any(left_out):
             MX, CX = (pencil.apply(A, right) for A in (pencil.M, pencil.C))
-            slope = np.abs(_product(pencil, left, 2 * found.values * MX + CX) * found.values)
+            slope = np.abs(products(2 * found.values * MX + CX) * found.values)
             bounds = bounds + relative(left_out / np.maximum(slope, np.finfo(float).tiny))
         if len(bounds) < min(count, len(pairs.bounds)) or _digits(bounds[:count]) <= _digits(pairs.bounds[:count]):
             return pairs
@@ -244,12 +242,6 @@ class KeptDigits:
             return 0.0
         bounds = np.maximum(pairs.bounds, pairs.bounds**2)[:count]
         return float(np.max(float(eta.value) * np.abs(pairs.values[:count]) * bounds, initial=0.0))
-
-
-def _product(pencil: Pencil, Y: Array, X: Array) -> Array:
-    """Return y^H x of all columns, over all ranks."""
-    local = np.sum(Y.conj() * X, axis=0)
-    return np.asarray(pencil.comm.allreduce(local) if pencil.comm.size > 1 else local)
 
 
 def _digits(bounds: Array) -> float:
@@ -274,9 +266,12 @@ def saddle_pencil(saddle: Saddle, unit: float) -> Pencil:
     size = np.maximum(rest, unit**2 * np.abs(mass))
     d.array[:] = 1.0
     d.array[:n] = power_of_two(1.0 / np.sqrt(np.where(size > 0.0, size, 1.0)))
-    rows = saddle.factors.copy()
-    rows.diagonalScale(None, _first(d, n))
-    strains = _largest_in_rows(rows)[n:]
+    rows, first = saddle.factors.copy(), d.copy()
+    first.array[n:] = 0.0
+    rows.diagonalScale(None, first)
+    indptr, indices, data = rows.getValuesCSR()
+    shape = len(indptr) - 1, rows.getSize()[1]
+    strains = csr_array((np.abs(data), indices, indptr), shape=shape).max(axis=1).toarray().ravel()[n:]
     d.array[n:] = power_of_two(1.0 / np.where(strains > 0.0, strains, 1.0))
     pencil.unknowns, pencil.pivots, pencil.unit = d, True, unit
     factors = saddle.factors.copy()
@@ -287,18 +282,3 @@ def saddle_pencil(saddle: Saddle, unit: float) -> Pencil:
     pencil.sizes = np.zeros(d.getLocalSize())
     pencil.sizes[:n] = np.sqrt(rest)
     return pencil
-
-
-def _largest_in_rows(A: Any) -> Array:
-    """Return the size of the largest entry of every owned row."""
-    indptr, _, data = A.getValuesCSR()
-    out = np.zeros(len(indptr) - 1)
-    np.maximum.at(out, np.repeat(np.arange(len(out)), np.diff(indptr)), np.abs(data))
-    return out
-
-
-def _first(d: Any, n: int) -> Any:
-    """Return a copy of a vector that is zero but for its first n owned entries."""
-    out = d.copy()
-    out.array[n:] = 0.0
-    return out
