@@ -12,16 +12,11 @@ import ufl
 from dolfinx import geometry
 
 
-@dataclass(frozen=True)
-class PointPlace:
-    """Where a point lies: the cell that holds it (on one rank, none on the others), and its reference coordinates."""
+def locate(domain: Any, point: Sequence[float]) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.float64]] | None:
+    """Return the cell of a mesh that holds a point (m), on one rank, none on the others, and its reference coordinates.
 
-    cells: npt.NDArray[np.int32]
-    reference: npt.NDArray[np.float64]
-
-
-def locate(domain: Any, point: Sequence[float]) -> PointPlace | None:
-    """Return the place of a point (m) in a mesh; None if it is not in it."""
+    None if it is not in the mesh.
+    """
     comm, tdim = domain.comm, domain.topology.dim
     owned = domain.topology.index_map(tdim).size_local
     x = np.array([(*point, 0.0, 0.0)[:3]])
@@ -34,7 +29,7 @@ def locate(domain: Any, point: Sequence[float]) -> PointPlace | None:
     if nowhere:
         return None
     cells: npt.NDArray[np.int32] = np.empty(0, dtype=np.int32)
-    where: npt.NDArray[np.float64] | None = None
+    where: Any = None
     if comm.rank == owner:
         cells = np.array(mine[:1], dtype=np.int32)
         corners = domain.geometry.x[domain.geometry.dofmap[cells[0]]]
@@ -42,21 +37,7 @@ def locate(domain: Any, point: Sequence[float]) -> PointPlace | None:
         if tdim == 1:  # a node, and all nodes are to have one form
             where = np.round(where, 9) + 0.0
     where = comm.bcast(where, root=owner)
-    return PointPlace(cells, where)
-
-
-def point_measure(domain: Any, subdomains: Any, tag: int, place: PointPlace) -> Any:
-    """Return a measure whose integrals are values at a point.
-
-    The cell that holds it gets a quadrature rule of one point with the weight 1 in place of the cell's area.
-    """
-    rule = {
-        "quadrature_rule": "custom",
-        "quadrature_points": place.reference.view(_Digits),
-        "quadrature_weights": np.ones(1).view(_Digits),
-    }
-    measure = ufl.Measure("dx", domain=domain, subdomain_data=subdomains, subdomain_id=tag, metadata=rule)
-    return _AtPoint(measure, 1 / abs(ufl.JacobianDeterminant(domain)))
+    return cells, where
 
 
 class Points:
@@ -68,24 +49,30 @@ class Points:
     """
 
     def __init__(self, domain: Any, points: Sequence[Sequence[float]]):
-        self._domain, self._tags = domain, dict[tuple[float, ...], int]()
-        self._places: list[PointPlace] = []
+        self._domain, self._places = domain, dict[tuple[float, ...], Any]()
         self.missing: tuple[float, ...] | None = None
         for point in map(tuple, points):
-            if point in self._tags:
-                continue
-            place = locate(domain, point)
+            place = self._places.get(point) or locate(domain, point)
             if place is None:
                 self.missing = point
                 break
-            self._places.append(place)
-            self._tags[point] = len(self._places)
-        self.subdomains = [(i, place.cells) for i, place in enumerate(self._places, start=1)] or None
+            self._places[point] = place
+        self.subdomains = [(i, cells) for i, (cells, _) in enumerate(self._places.values(), start=1)] or None
 
     def measure(self, point: Sequence[float]) -> Any:
-        """Return the measure of one of the points."""
-        tag = self._tags[tuple(point)]
-        return point_measure(self._domain, self.subdomains, tag, self._places[tag - 1])
+        """Return a measure whose integrals are values at one of the points.
+
+        Its cell gets a quadrature rule of one point with the weight 1 in place of the cell's area.
+        """
+        place = tuple(point)
+        rule = {
+            "quadrature_rule": "custom",
+            "quadrature_points": self._places[place][1].view(_Digits),
+            "quadrature_weights": np.ones(1).view(_Digits),
+        }
+        tag = 1 + list(self._places).index(place)
+        dx = ufl.Measure("dx", domain=self._domain, subdomain_data=self.subdomains, subdomain_id=tag, metadata=rule)
+        return _AtPoint(dx, 1 / abs(ufl.JacobianDeterminant(self._domain)))
 
 
 class _Digits(np.ndarray):  # type: ignore[type-arg]
