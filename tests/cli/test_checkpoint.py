@@ -134,18 +134,6 @@ def test_the_history_is_that_of_an_unbroken_run(kind: str, tmp_path: Path, monke
     np.testing.assert_array_equal(read_csv(tmp_path / "history.csv")["tip_u2"], whole.history["tip_u2"])
 
 
-@pytest.mark.parametrize("kind", ["fixed steps", "free hub", "inertial frame"])
-def test_the_error_is_that_of_an_unbroken_run(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where stretches of the motion were judged, and closed, before the run was killed: to the last bit."""
-    scene = scene_of(KINDS[kind] | {"time": {"end": 0.4, "step": 0.002}})
-    whole = rotfem.run(scene)
-    with monkeypatch.context() as patch:
-        cut(patch, 130)
-        with pytest.raises(Killed):
-            rotfem.run(scene, folder=tmp_path, checkpoint=25)
-    assert rotfem.run(scene, folder=tmp_path, resume=True).summary["error"] == whole.summary["error"]
-
-
 @pytest.mark.parametrize("end", [0.2, 0.205, 0.21])
 @pytest.mark.parametrize("every", [1, 3])
 def test_a_finished_run_goes_on_to_a_later_end(tmp_path: Path, end: float, every: int) -> None:
