@@ -20,6 +20,19 @@ def _wind() -> list[list[float]]:
     return [[float(s), 0.0, float(round(x, 3))] for s, x in zip(t, f, strict=True)]
 
 
+def _wind_over_span() -> list[list[float]]:
+    """Return rows (x, t, 0, f2, f3) of loads on a blade of 60 m at 20 stations and 2001 times over 100 s, N/m.
+
+    Gusts of several periods, and the sum of independent steps at every station and time, which is rough.
+    """
+    t, x = (v.ravel() for v in np.meshgrid(np.linspace(0.0, 100.0, 2001), np.linspace(0.0, 60.0, 20), indexing="ij"))
+    rough = np.cumsum(np.random.default_rng(3).standard_normal((2001, 20)), axis=0).ravel()
+    gust = 1.0 + 0.2 * np.sin(0.7 * t) + 0.1 * np.sin(2.9 * t + 0.3 * x) + 0.01 * rough
+    columns = (x, t, 0 * x, 800.0 * x / 60 * gust, 3000.0 * np.sqrt(x / 60) * gust)
+    rows: list[list[float]] = np.column_stack(columns).tolist()
+    return rows
+
+
 def _manoeuvres() -> list[list[float]]:
     """Return rows (t, torque) of five turns to and fro with smooth edges, N·m."""
     t = np.linspace(0.0, 10.0, 101)
@@ -63,6 +76,23 @@ SCENES: dict[str, Tables] = {
         "loads": {"distributed": _wind()},
         "mesh": {"elements": 8},
         "time": {"end": 100.0, "step": 0.05},
+    },
+    "wind over the span of a blade of 60 m, 100 s": {
+        "structure": {
+            **{"type": "spatial_beam", "length": 60.0, "hub_radius": 1.5, "pretwist": [[0.0, 0.2], [60.0, 0.0]]},
+            "section": {
+                **{"EA": [[0.0, 1e10], [60.0, 1e9]], "GA2": 2e9, "GA3": 2e9, "GJ": [[0.0, 5e9], [60.0, 5e6]]},
+                **{"EI2": [[0.0, 1.8e10], [60.0, 1e7]], "EI3": [[0.0, 1.8e10], [60.0, 1e8]]},
+                **{"mass_per_length": [[0.0, 600.0], [60.0, 20.0]], "rotary_inertia2": [[0.0, 300.0], [60.0, 0.5]]},
+                "rotary_inertia3": [[0.0, 300.0], [60.0, 5.0]],
+            },
+            "damping": {"kelvin_voigt": 0.003},
+        },
+        "motion": {"type": "constant", "speed": 1.2},
+        "loads": {"gravity": [0.0, -9.81, 0.0], "distributed": {"over_span_and_time": _wind_over_span()}},
+        "mesh": {"elements": 10},
+        "time": {"end": 100.0, "step": 0.01},
+        "output": {"stations": [float(x) for x in np.linspace(0.0, 60.0, 10)]},
     },
     "pretwisted tapered blade, spun up under gravity": {
         "structure": {

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -35,8 +35,14 @@ TimeSignal = tuple[Scalar, Scalar, Scalar]
 
 def turn_about(axis: Array, angle: float) -> Array:
     """Return the matrix (3, 3) of the turn by an angle (rad) about a unit vector (Rodrigues' formula)."""
-    cross = np.cross(axis, np.eye(3)).T
-    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
+    eye, cross, twice = _parts_of_turn(*axis)
+    return np.asarray(eye + np.sin(angle) * cross + (1 - np.cos(angle)) * twice)
+
+
+@lru_cache(maxsize=8)
+def _parts_of_turn(*axis: float) -> tuple[Array, Array, Array]:
+    cross: Array = np.asarray(np.cross(axis, np.eye(3)).T, dtype=np.float64)
+    return np.eye(3), cross, cross @ cross
 
 
 def is_beside(root: npt.ArrayLike, axis: npt.ArrayLike) -> bool:
