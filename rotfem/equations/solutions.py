@@ -21,8 +21,8 @@ class Solutions:
 
     Attributes:
         seconds: time spent on assembly and on solution.
-        factored: of the factor that is kept, time `t`, state `q`, `v`, `a`, and `shifts`, `before`, `datum` of its
-            tangent.
+        factored: of the factor that is kept, time `t`, state `q`, `v`, `a`, and `shifts`, `before`, `reference` of
+            its tangent.
         factored_before: factorisations of the same computation before this object was made.
     """
 

@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import ufl
-from scipy.spatial.transform import Rotation
 from ufl import cross
 
 #: Largest |θ| of the rotation vector, rad; a little beyond, so that a full circle itself can be reached.
@@ -106,6 +105,8 @@ NO_TURN = 1e-12
 
 def rotations(theta: Array) -> Array:
     """Return Λ(θ), shape (…, 3, 3), of rotation vectors (…, 3) in rad."""
+    from scipy.spatial.transform import Rotation  # slow to load, and only large rotations need it
+
     return np.asarray(Rotation.from_rotvec(theta.reshape(-1, 3)).as_matrix().reshape(*theta.shape, 3))
 
 
@@ -142,6 +143,8 @@ def turned_vectors(theta: Array, turn: Array) -> Array:
 
 def rotation_vectors(Lambda: Array, guess: Array) -> Array:
     """Return rotation vectors (…, 3), rad, of matrices (…, 3, 3): of all that they have those nearest to a guess."""
+    from scipy.spatial.transform import Rotation
+
     vectors = Rotation.from_matrix(Lambda.reshape(-1, 3, 3)).as_rotvec().reshape(guess.shape)
     angle, size = (np.linalg.norm(x, axis=-1)[..., None] for x in (vectors, guess))
     along = np.where(size > 0.0, guess / np.where(size, size, 1.0), np.eye(3)[0])
