@@ -285,7 +285,8 @@ class Pieces:
         for name, parts in self._parts(kind):
             bodiless: dict[Key, Any] = {}
             same = () if kind == "f" else (SAME,)
-            for part in [(p,) for p in parts] if self._apart else [parts]:
+            apart = self._apart or name == INTERNAL.name  # strains are wanted without what an effect adds to them
+            for part in [(p,) for p in parts] if apart else [parts]:
                 self._set_switches((name, *part))
                 check = self._is_checked(name) and PolynomialCheck(self, kind, name)
                 for key in self._keys(name):
