@@ -25,14 +25,8 @@ from rotfem.numerics.linear import DirectSolver, Increment
 
 Array = npt.NDArray[np.float64]
 
-#: Filters are made for steps in this ratio, and so many at most are kept.
-COARSE, KEPT = 1.5, 4
-
-#: Where filters start, of τ: some in a row turn off less sharply than (1 + (τω)ᵐ)⁻¹ does.
-SHARP = 0.85
-
-#: Error of a vibration that is not resolved, in units of what its filter leaves: up to 2 A, of which that may be A / 2.
-ONCE = 3.0
+#: Filters are made for steps in this ratio.
+COARSE = 1.5
 
 
 class ErrorMeasure:
@@ -61,11 +55,14 @@ class ErrorMeasure:
         """
         length = round(np.log(h) / np.log(COARSE))
         if length not in self._kept:
-            while len(self._kept) >= KEPT:
+            while len(self._kept) >= 4:
                 self._kept.pop(next(iter(self._kept)))
             self._kept[length] = self._made(COARSE**length)
+        # what is not resolved is off by up to 2 A, of which A/2 may remain
         adds_up, remains = (self.size(self._through(error, filters)) for filters in self._kept[length])
-        return max(self.end / h * adds_up, ONCE * remains)
+        return max(
+            self.end / h * adds_up, 3.0 * remains
+        )
 
     def size(self, x: Array) -> float:
         """Return the largest displacement of a local dof array, in units of their scale."""
@@ -82,7 +79,8 @@ class ErrorMeasure:
     def _made(self, h: float) -> list[list[DirectSolver]]:
         """Return the filters of what adds up and of what remains, for steps of h (s), by the matrices at the start."""
         constant, order, lost = self.scheme.estimate
-        slow = SHARP * (0.5 * constant * self.end / h) ** (1 / order)
+        # filters in a row turn off less sharply than (1 + (τω)ᵐ)⁻¹ does, so they start earlier
+        slow = 0.85 * (0.5 * constant * self.end / h) ** (1 / order)
         times = [slow] * (order // 2) + [slow**0.5] * (order % 2)
         inner = self.inner
         inner.set_time(0.0, inner.model.problem.motion)  # of a free hub the speed it starts with, not that of now

@@ -58,17 +58,8 @@ REPORTED = 0.01
 #: Part of the largest component below which one is round-off: Newton's method accepts such increments.
 RESOLVED = 1e-9
 
-#: By how much a state must exceed the largest one so far to take its place.
-MORE = 1.02
-
 #: Bound of the relative error by round-off from which it is warned of, and the largest that is given as a number.
 DIGITS, KNOWN = 1e-2, 1.0
-
-#: Intervals between the instants at which what acts on a structure is sampled.
-SAMPLES = 16
-
-#: Largest rotation (rad) up to which expansions in it converge quickly enough for an estimate.
-EXPANDED = 1.0
 
 
 @dataclass(frozen=True)
@@ -174,7 +165,7 @@ class TheoryCheck:
         r.axpy(-1.0, stress)
         change = -Increment(system.V).solve(DirectSolver(K), r).copy()
         estimate = self._relative(q, change)
-        if rotation > EXPANDED:
+        if rotation > 1.0:  # expansions in it converge too slowly for an estimate
             estimate = max(estimate, rotation)
         if model.problem.inactive:  # among them are the displacements that bending makes along the structure
             estimate = max(estimate, rotation / 2)
@@ -220,7 +211,7 @@ class TheoryCheck:
             end: last of them, s.
         """
         system, found, out = self.system, [0.0], Increment(self.system.V)
-        for t in np.linspace(0.0, end, SAMPLES + 1):
+        for t in np.linspace(0.0, end, 17):
             system.set_time(float(t))
             system.set_state(system.zeros())
             q = out.solve(DirectSolver(system.matrix(1.0, 0.0, 0.0, 1.0)), system.residual())
@@ -291,7 +282,7 @@ class Farthest:
         if not self.system.linear:
             return
         size = float(np.max(self.system.sizes(q), initial=0.0))
-        if size > MORE * self.seen[0]:
+        if size > 1.02 * self.seen[0]:  # so that not every state of a growing motion is copied
             self.seen = (size, t, np.array(q))
 
     def error(self, system: Any, tips: Array | None, from_rest: bool) -> TheoryError | None:

@@ -25,13 +25,10 @@ from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.discretisation import HistoryErrors, error_of_shape, richer_problem
 from rotfem.refinement.distance import COLUMNS, OUTPUTS, largest, tip
-from rotfem.refinement.estimate import ErrorEstimate, percent
+from rotfem.refinement.estimate import NOTICED, ErrorEstimate, percent
 from rotfem.scene import Scene
 
 Array = npt.NDArray[np.float64]
-
-#: Contribution to an error below which no warning is given, and the part of it that advised steps aim at.
-WANTED, AIM = 0.01, 0.5
 
 #: What the error of a theory is estimated by where its foreshortening is computed.
 OF_FORESHORTENING = "the foreshortening by bending that it neglects, computed afterwards, is that large"
@@ -41,9 +38,6 @@ OF_DRIFT = "its frequencies and strains compared with the exact ones"
 
 #: What the contributions are called that a warning says to be unknown.
 UNKNOWN = {"time": "time steps", "space": "mesh", "model": "theory"}
-
-#: Part of the sum from which a contribution is named.
-NAMED = 0.1
 
 
 @dataclass
@@ -233,23 +227,23 @@ class RunErrors:
             if unknown
             else []
         )
-        if not error.exceeds(max(WANTED, scene.model.tolerance or 0.0, tolerance or 0.0)):
+        if not error.exceeds(max(NOTICED, scene.model.tolerance or 0.0, tolerance or 0.0)):
             return said
         steps, mesh, model = (error.contributions[name] or 0.0 for name in ("time", "space", "model"))
-        if steps + mesh <= WANTED and self.theory is not None and self.theory.warning():
+        if steps + mesh <= NOTICED and self.theory is not None and self.theory.warning():
             return said
         cures = []
-        if steps >= WANTED / 2 and self.stepper is not None:
+        if steps >= NOTICED / 2 and self.stepper is not None:
             cures.append(finer_steps(scene, self.stepper, steps))
-        if mesh >= WANTED / 2:
+        if mesh >= NOTICED / 2:
             cures.append("a higher mesh.degree" if scene.structure.mesh_file else "more mesh.elements")
-        if model >= WANTED / 2:
+        if model >= NOTICED / 2:
             cures.append("a more exact theory")
         contributions = {"time steps": steps, "mesh": mesh, "theory": model}
         named = [
             f"{percent(share)} by the {n}"
             for n, share in contributions.items()
-            if share > NAMED * sum(contributions.values())
+            if share > sum(contributions.values()) / 10
         ]
         parts = f"(estimated: {', '.join(named)})"
         off = f"the tip may be in error by {percent(error.total)} of its largest displacement {parts}"
@@ -312,7 +306,7 @@ def finer_steps(scene: Scene, stepper: Any, share: float) -> str:
     """Return which steps would have a contribution that is not noticed."""
     time = scene.time
     assert time is not None
-    factor = min(1.0, AIM * WANTED / share)
+    factor = min(1.0, NOTICED / 2 / share)
     if time.tolerance is not None:
         return f"time.tolerance = {time.tolerance * factor:.1g}"
     return f"time.step = {time.step * factor ** (1 / stepper.scheme.order):.1g} or shorter"

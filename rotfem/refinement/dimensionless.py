@@ -28,9 +28,6 @@ MEANING = {
     "steps_per_period": "time steps per period of the last of modes.count modes",
 }
 
-#: Times at which the speed of a motion is sampled.
-SAMPLES = 400
-
 
 def groups(of: Explanation) -> dict[str, float]:
     """Return name ↦ number, those that a case has; `MEANING` says what they are.
@@ -79,7 +76,7 @@ def _frequencies_at_rest(of: Explanation) -> Array:
 def _turning(case: Case, system: Any) -> tuple[Array, Array]:
     """Return Ω and dΩ/dt at some times of the motion; of a free hub those of the rigid structure."""
     motion, end = case.problem.motion, case.steps.end if case.steps is not None else 0.0
-    times = np.linspace(0.0, max(end, motion.settled), SAMPLES + 1)
+    times = np.linspace(0.0, max(end, motion.settled), 401)
     if motion.hub is None:
         return np.array([motion.speed(t) for t in times]), np.array([motion.rate(t) for t in times])
     speeds = motion.hub.rigid_speeds(np.asarray(times), system.row.rest_inertia())

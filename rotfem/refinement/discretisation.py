@@ -27,9 +27,6 @@ from rotfem.refinement.estimate import error_of
 #: Order of a scheme up to which it is that of all motions.
 CERTAIN = 2
 
-#: Part of a history that must have been taken in doubled steps for their difference to stand for the whole.
-MOST_OF_IT = 0.5
-
 #: Shape and velocities at t = 0 of a system, local dof arrays; None where it is undeformed, or at rest.
 Start = Callable[[Any], tuple[Array | None, Array | None]]
 
@@ -110,7 +107,7 @@ class HistoryErrors:
 
     def _of_steps(self, scale: float) -> float | None:
         state, steps = self.steps.state, self.steps
-        if not steps.sound or state is None or not steps.doubled > MOST_OF_IT * state.t:
+        if not steps.sound or state is None or not steps.doubled > state.t / 2:  # the lesser part says too little
             return None
         whole = steps.difference[0] * max(1.0, state.t / steps.doubled)  # as if all of it had been doubled
         order = self.scheme.order if self.scheme.order <= CERTAIN else 0

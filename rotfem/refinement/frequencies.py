@@ -28,9 +28,6 @@ Array = npt.NDArray[Any]
 #: Modes in addition to those wanted that are computed on a coarser mesh, where they may come in another order.
 SPARE = 4
 
-#: Part of the largest likeness of shapes from which a shape is as much alike: an angle of 25 degrees to the mode.
-ALIKE = 0.9
-
 
 @dataclass
 class Level:
@@ -154,5 +151,6 @@ class FrequencyErrors:
             M = self.analysis.system.held.matrix(0.0, 0.0, 1.0, 0.0)
             size = np.abs(np.sum(carried.conj() * Pencil(M, M, M).apply(M, carried), axis=0))
             alike /= np.sqrt(np.maximum(size, 1e-300))
-            apart[alike < ALIKE * np.max(alike, axis=1, keepdims=True)] = np.inf
+            # as much alike are shapes within 25 degrees of the mode
+            apart[alike < 0.9 * np.max(alike, axis=1, keepdims=True)] = np.inf
         return np.asarray(values[np.argmin(apart, axis=1)])

@@ -32,18 +32,14 @@ R = TypeVar("R")
 #: steps is accepted as it is: of the fourth-order scheme the difference is not divided by what an order promises.
 SAFETY = 2.0
 
-#: Answers at most, and least growth of a number of elements: below, the next answer would be the same one.
-MOST, GROWTH = 8, 1.25
+#: Answers at most.
+MOST = 8
 
 #: Part of what a contribution may be that the next answer aims at.
 AIM = 0.5
 
 #: Tolerance to begin with under a budget, so that something is reached.
 COARSE = 1e-2
-
-#: Time (s) from which an answer is announced, and part of what is left of a budget that shows how long adaptive
-#: steps take.
-LONG, SHOWN = 5.0, 1 / 3
 
 #: Ratio of steps and cells of two answers whose difference is the error of the finer one, or more, by order 2 or more.
 RATIO = math.sqrt(2.0)
@@ -150,7 +146,7 @@ class Setting:
             order = 2 * self.degree if "round_off" in error else self.degree + 1  # of frequencies, of displacements
             growth = (space / (AIM * each)) ** (1 / order) if space > 0.0 else 2.0
             if self.elements is not None:
-                new = replace(new, elements=grown(self.elements, max(growth, GROWTH)))
+                new = replace(new, elements=grown(self.elements, max(growth, 1.25)))  # less would hardly be another
             elif self.degree < HIGHEST:
                 new = replace(new, degree=self.degree + 1)
             else:
@@ -267,7 +263,7 @@ class Clock:
         self._began, self._next = self.used(), 1
         if self.budget is not None and predicted is not None and predicted > self.budget - self._began:
             raise self._dear(predicted)
-        if predicted is not None and predicted > LONG:
+        if predicted is not None and predicted > 5.0:
             self._announce(f"answer {number}: {words}: about {predicted:.2g} s")
 
     def __call__(self, steps: int, done: float) -> None:
@@ -280,7 +276,8 @@ class Clock:
             return
         self._next = steps + max(1, steps // 8)
         left, elapsed = self.budget - self._began, self.used() - self._began
-        if elapsed > left or (elapsed > SHOWN * left and elapsed > left * done):
+        # a third of what is left shows how long adaptive steps take
+        if elapsed > left or (elapsed > left / 3 and elapsed > left * done):
             raise self._dear(elapsed / done if done > 0.0 else None)
 
     def _dear(self, predicted: float | None) -> TooDear:

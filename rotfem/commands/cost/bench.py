@@ -35,9 +35,6 @@ from rotfem.version import __version__
 
 Array = npt.NDArray[np.float64]
 
-#: Steps of the run that compiles the forms: the first step of a scheme may have forms of its own.
-FIRST_STEPS = 3
-
 #: What computes an output once everything is set up: its values, and numbers of unknowns, steps, Newton iterations.
 Go = Callable[[], tuple[Array, tuple[int, int, int]]]
 
@@ -145,7 +142,8 @@ class Bench:
             return variant
         started, short = cpu_time(), variant
         if setting.moving and time is not None:
-            few = FIRST_STEPS * time.step if time.step is not None else time.output_step or time.end
+            # three steps, as the first one of a scheme may have forms of its own
+            few = 3 * time.step if time.step is not None else time.output_step or time.end
             short = variant.replace({"time.end": min(few, time.end)})
         self._prepared(short, None, "frequencies" if self.output == "campbell" else self.output)()
         self._warm.add(key)

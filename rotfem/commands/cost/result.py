@@ -39,9 +39,6 @@ DECADES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 #: Rows of a table that is printed in full.
 LONGEST_TABLE = 40
 
-#: Least error that a figure shows.
-TINY = 1e-16
-
 #: A marker a scheme, or, where there are none, a degree.
 MARKERS = "osD^Pv*X<>"
 
@@ -399,7 +396,7 @@ def cost_figure(result: CostResult) -> Figure:
             axis.plot(failed, [0.98] * len(failed), "x", color=colour, transform=top, clip_on=False, label=label)
     axis.set(xscale="log", yscale="log", xlabel="CPU time of one run with its set-up, median (s)")
     front = sorted((row for row in result.rows if row["pareto"]), key=lambda row: float(row["cost"]))
-    errors = [max(judged(r) or 0.0, TINY) for r in front]
+    errors = [max(judged(r) or 0.0, 1e-16) for r in front]
     axis.plot([r["cost"] for r in front], errors, "k-", lw=1.2, drawstyle="steps-post", zorder=0, label="Pareto front")
     for row, error in zip(front, errors, strict=True):
         name = f"{mesh_name(row)} P{row['degree']}" + ("" if row["scheme"] is None else f", {step_name(row)}")
@@ -407,7 +404,7 @@ def cost_figure(result: CostResult) -> Figure:
     if (chosen := summary["recommended"]) is not None:
         circle: dict[str, Any] = {"ms": 14, "mfc": "none", "mec": "black", "mew": 1.2, "ls": "none", "marker": "o"}
         label = f"recommended for {summary['accuracy']:g}"
-        axis.plot(chosen["cost"], max(judged(chosen) or 0.0, TINY), label=label, **circle)
+        axis.plot(chosen["cost"], max(judged(chosen) or 0.0, 1e-16), label=label, **circle)
     if known:
         axis.axhspan(0.0, known, color="0.85", zorder=-1, label=f"uncertainty {known:.0e}")
     axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

@@ -16,9 +16,6 @@ from rotfem.scene.settings import estimates_error
 #: What errors may be of: the tip's motion, eigenvalues at the scene's speed, frequencies over a range of speeds.
 OUTPUTS = ("tip", "frequencies", "campbell")
 
-#: Speeds of a Campbell diagram that is studied: from rest to the scene's speed.
-SPEEDS = 9
-
 #: Multiples of the scene's own steps, tolerances and numbers of elements that are tried, of a full and a quick study.
 STEPS = {False: (8.0, 4.0, 2.0, 1.0, 0.5), True: (8.0, 4.0, 2.0, 1.0)}
 TOLERANCES = {False: (1000.0, 100.0, 10.0, 1.0, 0.1), True: (100.0, 10.0, 1.0)}
@@ -126,7 +123,7 @@ def sweep_speeds(scene: Scene) -> list[float]:
     top = scene.motion.top_speed(None if scene.time is None else scene.time.end)
     if not top > 0.0:
         raise SceneError(scene.file, "cost --of", "campbell", "the scene has no speed to go up to")
-    return [top * i / (SPEEDS - 1) for i in range(SPEEDS)]
+    return [top * i / 8 for i in range(9)]
 
 
 def check_choice(scene: Scene, chosen: Chosen) -> None:
