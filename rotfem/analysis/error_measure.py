@@ -60,9 +60,7 @@ class ErrorMeasure:
             self._kept[length] = self._made(COARSE**length)
         # what is not resolved is off by up to 2 A, of which A/2 may remain
         adds_up, remains = (self.size(self._through(error, filters)) for filters in self._kept[length])
-        return max(
-            self.end / h * adds_up, 3.0 * remains
-        )
+        return max(self.end / h * adds_up, 3.0 * remains)
 
     def size(self, x: Array) -> float:
         """Return the largest displacement of a local dof array, in units of their scale."""

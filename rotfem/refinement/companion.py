@@ -84,10 +84,6 @@ class FollowingStepper(Stepper):
         #: Polynomials of the steps that are followed, by the time at their end.
         self._curves: dict[float, Array] = {}
 
-    def solve(self, stage: Stage, state: State) -> None:
-        """Solve a stage by Newton's method alone: what cannot be solved so is not known."""
-        self._iterate(stage, state)
-
     def _gains_energy(self, new: State, state: State) -> bool:
         return False
 
