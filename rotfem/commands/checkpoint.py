@@ -534,6 +534,8 @@ def alike(here: Any, there: Any, name: str) -> None:
     elif isinstance(here, tuple) and isinstance(there, tuple) and len(here) == len(there):
         for i, pair in enumerate(zip(here, there, strict=True)):
             alike(*pair, f"{name}[{i}]")
+    elif isinstance(here, tuple) and isinstance(there, tuple) and len(here) > len(there):
+        raise TypeError(f"{name} has {len(there)} entries")
     elif isinstance(here, np.ndarray) and isinstance(there, np.ndarray):
         if here.shape != there.shape:
             raise TypeError(f"{name} has the shape {there.shape}")

@@ -183,11 +183,8 @@ class RunStore:
 
         Ranks talk to each other after so many steps only as take about `TALK` on rank 0: they need not meet in between.
         """
-        asked, every, steps = (
-            self._interrupts.asked,
-            self.every or Interval(),
-            self._parts.log.steps if self._parts else 0,
-        )
+        asked, every = self._interrupts.asked, self.every or Interval()
+        steps = 0 if self._parts is None else self._parts.log.steps
         due = every.steps is not None and steps > 0 and steps % every.steps == 0
         if self.comm.size > 1 and steps < self._next:
             return False, due

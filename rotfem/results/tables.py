@@ -8,7 +8,7 @@ from html import escape
 from itertools import zip_longest
 from textwrap import wrap
 
-from rotfem.results.columns import described
+from rotfem.results.columns import described, label
 
 #: Part of the largest number in its column below which a number is shown as 0; of ratios the number itself.
 NEGLIGIBLE = 1e-9
@@ -82,8 +82,7 @@ def per_cent(ratio: float | None) -> str:
 
 def named(column: str) -> str:
     """Return what a column is called, with its unit."""
-    what, unit = described(column)
-    return f"{what} ({unit})" if unit not in ("", "1") else what
+    return label(column).removesuffix(" (–)")
 
 
 def by_unit(values: dict[str, float]) -> dict[str, float]:
