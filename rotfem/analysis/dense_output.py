@@ -127,7 +127,7 @@ def end_acceleration(system: Any, state: State) -> Array:
     before, at_rest, left = np.inf, True, MOST
     while True:
         system.set_state(state.q, state.v, a)
-        change = system.accelerated(system.forces(state.t), at_rest)
+        change = system.acceleration(at_rest)
         a += change
         size, left = system.increment_size(change), left - 1
         if not at_rest or (before < np.inf and size * size <= LEFT * before * system.increment_size(a)):

@@ -143,7 +143,7 @@ class Stepper:
             s.prescribe(t, state.q, state.v, state.a)
             s.set_time(t)
             s.set_state(state.q, state.v, state.a)
-            state.jump = np.asarray(s.acceleration(t))
+            state.jump = np.asarray(s.acceleration())
             state.a += state.jump
             state.given = s.given(state)
         return self.scheme.start(state)
@@ -173,7 +173,7 @@ class Stepper:
             s.prescribe(t, new.q, new.v, new.a)
             s.set_time(t)
             s.set_state(new.q, new.v, new.a)
-            change = np.asarray(s.acceleration(t))
+            change = np.asarray(s.acceleration())
             new.a += change
             new.jump = change if state.jump is None else state.jump + change
             new.given = s.given(new)

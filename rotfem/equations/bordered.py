@@ -266,23 +266,13 @@ class BorderedSystem:
         s.seconds["solve"] += perf_counter() - assembled_at
         return out
 
-    def acceleration(self, t: float) -> Array:
-        """Return what is to be added to a so that the equations hold at the state (after a jump of the torque)."""
-        return self.accelerated(self.forces(t))
-
-    def forces(self, t: float) -> Array:
-        """Return −F of the structure at the state and the time t that is set, and that of the hub behind it."""
-        return np.append(self.inner.forces(t), -self.row.residual(t))
-
-    def accelerated(self, forces: Array, at_rest: bool = False) -> Array:
-        """Return the acceleration that forces (as of `forces`) give (see `Solutions.accelerated`)."""
-        s, row, shifts = self.inner, self.row, (0.0, 0.0, 1.0)
+    def acceleration(self, at_rest: bool = False) -> Array:
+        """Return what is to be added to a so that the equations hold at the state (see `Solutions.acceleration`)."""
+        s, row = self.inner, self.row
         solver, massless = s.mass_solver(at_rest)
-        R, b = s.residual(), s.spin_derivative(0.0, 1.0)
-        R.array[:] = forces[:-1]
-        R.array[massless] = 0.0
-        b.array[massless] = 0.0
-        return self._eliminated(solver, (R, b), row.row(shifts), float(forces[-1]), row.diagonal(0.0, 1.0))
+        r, R, b = -row.residual(s.time), s.residual(), s.spin_derivative(0.0, 1.0)
+        R.array[massless] = b.array[massless] = 0.0
+        return self._eliminated(solver, (R, b), row.row((0.0, 0.0, 1.0)), r, row.diagonal(0.0, 1.0))
 
     def _eliminated(self, solver: Any, right: tuple[Any, Any], c: Any, r: float, d: float) -> Array:
         y, z = self.inner._dx.solve(solver, right[0]), self._dz.solve(solver, right[1])

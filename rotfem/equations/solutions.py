@@ -107,32 +107,22 @@ class Solutions:
         """Number of matrix factorisations so far."""
         return self.factored_before + (self._solver.factorisations if self._solver else 0)
 
-    def acceleration(self, t: float) -> Array:
-        """Return what is to be added to a so that F = 0 at the state; `set_time` has been called for t."""
-        return self.accelerated(self.forces(t))
-
-    def forces(self, t: float) -> Array:
-        """Return −F at the state and the time t that is set (a local array), for `accelerated`."""
-        return np.array(self.residual().array)
-
-    def accelerated(self, forces: Array, at_rest: bool = False) -> Array:
-        """Return the acceleration that forces (as of `forces`) give, M δa = forces.
+    def acceleration(self, at_rest: bool = False) -> Array:
+        """Return what is to be added to a so that F = 0 at the state and time set: M δa = −F.
 
         Unknowns without inertia (the rotation, where rotary inertia is absent or off) follow the others at once: their
         acceleration keeps their equation in balance, K δa = 0 in their rows.
 
         Args:
-            forces: as of `forces`.
             at_rest: whether M is taken of the undeformed structure, or of the reference; its factor is kept.
         """
         solver, massless = self.mass_solver(at_rest)
         b = self.residual()
-        b.array[:] = forces
         b.array[massless] = 0.0
         return self._dx.solve(solver, b)
 
     def mass_solver(self, at_rest: bool = False) -> tuple[DirectSolver | SingularSolver, Array]:
-        """Return a solver with M at the state, or at rest (see `accelerated`), and unknowns without inertia."""
+        """Return a solver with M at the state, or at rest (see `acceleration`), and unknowns without inertia."""
         if not at_rest:
             return self._new_mass_solver()
         if self._mass is None or self._mass[0] is not self.reference:

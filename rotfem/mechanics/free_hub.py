@@ -50,18 +50,17 @@ class Torque:
         return tuple((same[start], same[end], torque) for start, end, torque in self.pulses)
 
     @cached_property
-    def _columns(self) -> tuple[Array, Array, Array]:
-        """Times, torques, and ∫ M dt from the first of them: of the table, or after the jumps of the pulses."""
+    def _line(self) -> tuple[Array, Array]:
+        """Times, and torques that are linear between them; of pulses two at a time, before and after a jump."""
         if self.table is not None:
             t, M = np.array(self.table).T
-            return t, M, np.concatenate([[0.0], np.cumsum(0.5 * (M[1:] + M[:-1]) * np.diff(t))])
+            return t, M
         t = np.array(self.jumps)
         change = np.zeros(len(t))
         for start, end, torque in self._pulses:
             change[np.searchsorted(t, start)] += torque
             change[np.searchsorted(t, end)] -= torque
-        M = np.cumsum(change)
-        return t, M, np.concatenate([[0.0], np.cumsum(M[:-1] * np.diff(t))])
+        return np.repeat(t, 2), np.repeat(np.concatenate([[0.0], np.cumsum(change)]), 2)[1:-1]
 
     @cached_property
     def jumps(self) -> tuple[float, ...]:
@@ -71,17 +70,14 @@ class Torque:
     @property
     def knots(self) -> Array:
         """Times (s) between which it is linear."""
-        return self._columns[0]
+        return np.unique(self._line[0])
 
     def many(self, t: Array, after: bool = False) -> Array:
         """Return M at times (n,), shape (n,): the limits from the left, or from the right with `after`."""
-        knots, M, _ = self._columns
+        knots, M = self._line
         if not len(knots):
             return np.zeros(len(t))
-        if self.table is not None:
-            return np.interp(t, knots, M)
-        index = np.searchsorted(knots, t, side="right" if after else "left")
-        return np.concatenate([[0.0], M])[index]
+        return np.interp(t if self.table is not None else np.nextafter(t, np.inf if after else -np.inf), knots, M)
 
     def at(self, t: float, after: bool = False) -> float:
         """Return M(t): the limit from the left, or from the right with `after` (they differ at a jump)."""
@@ -101,17 +97,9 @@ class Torque:
 
     def impulse(self, start: float, end: float) -> float:
         """Return ∫ M dt from start to end (s), N·m·s."""
-        knots, M, area = self._columns
-        if not len(knots):
-            return 0.0
-        t = np.array([start, end])
-        inside = np.clip(t, knots[0], knots[-1])
-        k = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
-        s, outside = inside - knots[k], t - inside
-        slope = np.zeros(2) if self.table is None else (M[k + 1] - M[k]) / (knots[k + 1] - knots[k])
-        held = np.zeros(2) if self.table is None else np.where(outside < 0.0, M[0], M[-1])
-        first, last = area[k] + (M[k] + 0.5 * slope * s) * s + held * outside
-        return float(last - first)
+        knots = self.knots
+        t = np.array([start, *knots[(knots > start) & (knots < end)], end])
+        return float(0.5 * np.diff(t) @ (self.many(t[:-1], after=True) + self.many(t[1:])))
 
 
 #: (t, psi, psi', tip) ↦ torque, N·m; the tip by the names of its components.
