@@ -74,10 +74,6 @@ class Model:
     To try a model without an effect its switch is set; an effect that is not in the model leaves no term, no constant
     and no kernel behind. In the linear theories all terms have switches, so that each can be assembled by itself.
 
-    Args:
-        problem: what is to be computed.
-        comm: MPI communicator.
-
     Attributes:
         structure: mesh, space, bodies.
         effects: names of the effects that are in.

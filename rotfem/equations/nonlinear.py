@@ -67,10 +67,6 @@ class PointStresses:
 
     Eliminated point by point they leave the residual as it is. In the tangent ∫ σ_{k+1}·D²Γ takes the place of
     ∫ C Γ(q_{k+1})·D²Γ. Both are the same where d is small, so the solution stays, and the order of convergence.
-
-    Args:
-        mechanics: strains, and the unknowns they are of.
-        V: space of the unknowns.
     """
 
     def __init__(self, mechanics: Mechanics, V: fem.FunctionSpace):

@@ -89,11 +89,7 @@ class DampedStress:
 
 
 class Stations:
-    """What a beam has at its stations.
-
-    Args:
-        system: equations of motion of the beam, the hub held.
-        positions: of the stations, increasing, m.
+    """What a beam, of a system with its hub held, has at its stations (m, increasing).
 
     Attributes:
         names: of all quantities: forces (N, N·m), strains (1, 1/m) and unknowns (m, rad).

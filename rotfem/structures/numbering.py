@@ -19,9 +19,6 @@ Array = npt.NDArray[Any]
 class Numbering:
     """The common order of the nodes of a space and of the cells of its mesh. Its methods are called by all processes.
 
-    Args:
-        V: function space; the unknowns of a node follow one another.
-
     Attributes:
         positions: of all nodes in the common order, shape (nodes, 3), m; on rank 0.
     """

@@ -185,10 +185,6 @@ class SpatialBeam(Beam):
     Directors and centres of mass turn with Λ of second order in θ in linear theories, which is all that enters there,
     and with the exact Λ in the others.
 
-    Args:
-        problem: what is to be computed; its structure is a spatial beam.
-        comm: communicator the mesh is distributed over.
-
     Raises:
         InputError: a 6×6 mass matrix that no section has, a pitch over time that is not in the motion.
     """
@@ -418,15 +414,7 @@ class SpatialBeam(Beam):
         return out
 
     def _rigid_body(self, name: str, at: Any, mass: float, offset: Any, inertia: tuple[Any, Any]) -> list[Body]:
-        """Return a mass that is fixed to a section, and its directors.
-
-        Args:
-            name: of its constants.
-            at: measure of its place.
-            mass: kg.
-            offset: of its center from the axis, section axes, m.
-            inertia: about the center, kg·m²: as it is given, and its tensor.
-        """
+        """Return a mass (kg) at an offset (m) in section axes and its directors, of its inertia as given and as a tensor."""
         given, tensor = inertia
         out = []
         if mass > 0:

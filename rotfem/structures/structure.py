@@ -57,10 +57,6 @@ class Structure:
 
     A subclass makes the mesh, calls `discretise`, and gives positions, strains, bodies and loads.
 
-    Args:
-        problem: what is to be computed; of it the structure reads its own data, mesh, loads and theory.
-        comm: communicator the mesh is distributed over.
-
     Attributes:
         mesh, V, k: mesh, space of the unknowns, and the unknowns with their rates.
         dx, dx_elastic: measures of full integration, and of that which keeps locking away.
