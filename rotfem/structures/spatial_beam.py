@@ -414,7 +414,7 @@ class SpatialBeam(Beam):
         return out
 
     def _rigid_body(self, name: str, at: Any, mass: float, offset: Any, inertia: tuple[Any, Any]) -> list[Body]:
-        """Return a mass (kg) at an offset (m) in section axes and its directors, of its inertia as given and as a tensor."""
+        """Return a mass (kg) at an offset (m, section axes), and its directors; inertia as given, and as a tensor."""
         given, tensor = inertia
         out = []
         if mass > 0:
