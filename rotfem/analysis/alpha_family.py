@@ -39,11 +39,8 @@ def update_maps(coefficients: tuple[float, float, float, float], h: float) -> tu
     kept, moved = (alpha_f / (1 - alpha_m), -alpha_m / (1 - alpha_m)), np.array([1.0, -alpha_m]) / (1 - alpha_m)
     q, v = (np.array([0.0, 0.5 - beta]) + beta * moved) * h * h, (np.array([0.0, 1 - gamma]) + gamma * moved) * h
     c_a = 1 / (beta * h * h)
-    return (
-        np.array([[1.0, h, *q], [0.0, 1.0, *v], [0.0, 0.0, *kept]]),
-        gamma * h * c_a,
-        (1 - alpha_m) / (1 - alpha_f) * c_a,
-    )
+    maps = np.array([[1.0, h, *q], [0.0, 1.0, *v], [0.0, 0.0, *kept]])
+    return maps, gamma * h * c_a, (1 - alpha_m) / (1 - alpha_f) * c_a
 
 
 class AlphaFamily(Scheme):

@@ -222,7 +222,11 @@ class AdaptiveSteps:
             new, ratio = self._tried(state, leg)
             if ratio > 1.0:
                 stepper.rejected += 1
-                wanted, most = self._shorter(state.t, leg.length * max(SAFETY * ratio ** (-1 / order), SHRINK)), 1.0
+                wanted, most = leg.length * max(SAFETY * ratio ** (-1 / order), SHRINK), 1.0
+                if wanted < self.shortest:
+                    what = f"the step fell below {self.shortest:.3g} s without meeting the tolerance"
+                    advice = "a looser time.tolerance, a smaller time.min_step, or some damping"
+                    raise ComputationError(what, time=state.t, advice=advice)
                 continue
             ratio = max(ratio / SAFETY**order, 1e-12)
             factor = float(np.clip((ratio * before) ** (-1 / (6 * order)), SHRINK, most))
@@ -278,17 +282,3 @@ class AdaptiveSteps:
         i = int(np.searchsorted(self.lines[:, 1], t + 0.5 * h))
         there = i < len(self.lines) and self.lines[i, 0] < t + 0.5 * h
         return Leg(stop, h, lands, (float(self.lines[i, 0]), float(self.lines[i, 1])) if there else None)
-
-    def _shorter(self, t: float, h: float) -> float:
-        """Return the length (s) of a step to be tried again.
-
-        Raises:
-            ComputationError: it is shorter than allowed.
-        """
-        if h >= self.shortest:
-            return h
-        raise ComputationError(
-            f"the step fell below {self.shortest:.3g} s without meeting the tolerance",
-            time=t,
-            advice="a looser time.tolerance, a smaller time.min_step, or some damping",
-        )

@@ -42,11 +42,9 @@ class BackOff:
 #: Iterations with an old factor after which the next step gets a new one.
 LONG = 8
 
-#: Newton iterations after which a way is long.
-SOON = 6
-
-#: Newton iterations after which the prediction of the next step is questioned, and its share that is taken for all.
-MANY, WHOLE = 3, 0.9
+#: Newton iterations after which a way is long, and after which the prediction of the next step is questioned; its share
+#: that is taken for all.
+SOON, MANY, WHOLE = 6, 3, 0.9
 
 #: A linear step is refined with an old factor up to this relative error, as long as that shrinks at this rate, or to
 #: where it stays at round-off.
@@ -132,7 +130,7 @@ class Stepper:
         self.scheme_back_off = BackOff()
         self.pace: tuple[float, float, float] | None = None
         self.observer: Observer | None = None
-        #: Energy at the first step that was hard, and ranges of the energies that were seen since (see `fed`).
+        #: Jacobi integral at the first hard step, least and largest kinetic and strain energy since (J).
         self._exchange: tuple[float, ...] | None = None
 
     def start(self, t: float, q: Array, v: Array) -> State:
@@ -269,11 +267,31 @@ class Stepper:
         return None
 
     def _gains_energy(self, new: State, state: State) -> bool:
-        """Return whether a step that was hard to solve raises an energy that is too large already (see `fed`)."""
-        if not self._hard or self._balanced or self.system.linear or not self.system.model.closed:
+        """Return whether a step that was hard to solve raises an energy that is above what there can be.
+
+        Nothing gives the motion energy. A scheme that does not resolve it may, a little in each step, which Newton's
+        method does not notice until the motion is lost; shorter steps give less, and take some back.
+        """
+        s = self.system
+        if not self._hard or self._balanced or s.linear or not s.model.closed:
             return False
-        self._exchange, gains = energy_gain(self.system, new, state, self._exchange)
-        return gains
+
+        def energies(at: State) -> dict[str, float]:
+            s.set_time(at.t)
+            s.set_state(at.q, at.v, at.a)
+            return dict(s.energies())
+
+        first = None
+        if self._exchange is None:
+            first = energies(state)
+            self._exchange = (first["jacobi"], *2 * (first["kinetic"],), *2 * (first["strain"],))
+        now = energies(new)
+        reference, low_t, high_t, low_w, high_w = self._exchange
+        low_t, high_t = min(low_t, now["kinetic"]), max(high_t, now["kinetic"])
+        low_w, high_w = min(low_w, now["strain"]), max(high_w, now["strain"])
+        self._exchange = reference, low_t, high_t, low_w, high_w
+        too_much = now["jacobi"] - reference > GAIN * max(high_t - low_t, high_w - low_w)
+        return bool(too_much and now["jacobi"] > (first or energies(state))["jacobi"])
 
     def warnings(self) -> list[str]:
         """Return what a run says of its steps."""
@@ -287,7 +305,11 @@ class Stepper:
 
     def predicted(self, stage: Stage, state: State) -> Array:
         """Return q of a stage that turns with the clamp where that moves: it is the better prediction."""
-        return stage.q if self.system.clamp is None else turned_with_clamp(self.system.clamp, state, stage)
+        clamp, end = self.system.clamp, stage.t if stage.over is None else stage.over.end
+        if clamp is None:
+            return stage.q
+        turned = np.asarray(clamp.turned(state.q, state.v, state.t, end))
+        return turned if stage.over is None else (state.q + turned) / 2
 
     def imbalance(self, stage: Stage) -> Array:
         """Return −F at a stage (see `Equations`)."""
@@ -474,46 +496,6 @@ def check_root(system: Any, stage: Stage, state: State) -> None:
     if grown > MORE_ENERGY * there:
         what = f"Newton met a state with {grown:.2g} J more than there were, of {there:.2g} J"
         raise ComputationError(what, time=stage.t)
-
-
-def energy_gain(
-    system: Any, new: State, state: State, known: tuple[float, ...] | None
-) -> tuple[tuple[float, ...], bool]:
-    """Return what is known of the energies, and whether a step raised an energy that is above what there can be.
-
-    Nothing gives the motion energy. A scheme that does not resolve it may, a little in each step, which Newton's method
-    does not notice until the motion is lost; shorter steps give less, and take some back.
-
-    Args:
-        system: nonlinear, and closed.
-        new: end of the step.
-        state: its start.
-        known: Jacobi integral at the start, least and largest kinetic and strain energy since (J); None at first.
-    """
-
-    def energies(at: State) -> dict[str, float]:
-        system.set_time(at.t)
-        system.set_state(at.q, at.v, at.a)
-        return dict(system.energies())
-
-    first = None if known is not None else energies(state)
-    if first is not None:
-        known = (first["jacobi"], *2 * (first["kinetic"],), *2 * (first["strain"],))
-    assert known is not None
-    now = energies(new)
-    reference, low_t, high_t, low_w, high_w = known
-    low_t, high_t = min(low_t, now["kinetic"]), max(high_t, now["kinetic"])
-    low_w, high_w = min(low_w, now["strain"]), max(high_w, now["strain"])
-    too_much = now["jacobi"] - reference > GAIN * max(high_t - low_t, high_w - low_w)
-    gains = too_much and now["jacobi"] > (first or energies(state))["jacobi"]
-    return (reference, low_t, high_t, low_w, high_w), gains
-
-
-def turned_with_clamp(clamp: Any, state: State, stage: Stage) -> Array:
-    """Return q of a stage predicted by a turn with the clamp and the velocity relative to it."""
-    if stage.over is None:
-        return np.asarray(clamp.turned(state.q, state.v, state.t, stage.t))
-    return np.asarray((state.q + clamp.turned(state.q, state.v, state.t, stage.over.end)) / 2)
 
 
 def came_true(system: Any, move: Array, predicted: Array) -> float:
