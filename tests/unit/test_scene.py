@@ -391,6 +391,8 @@ TIME = {"end": 1.0, "step": 0.1}
         ("planar", {"time": TIME | {"step": 0}}, "time.step", "greater than 0"),
         ("planar", {"time": TIME | {"step": 2}}, "time.step", "at most time.end"),
         ("planar", {"time": TIME | {"max_step": 1}}, "time.max_step", "only with tolerance"),
+        ("planar", {"time": TIME | {"breakpoints": [-1]}}, "time.breakpoints", "list of times"),
+        ("planar", {"time": TIME | {"breakpoints": 0.5}}, "time.breakpoints", "list of times"),
         (
             "planar",
             {"time": {"end": 1, "tolerance": 1e-3, "min_step": 0.2, "max_step": 0.1}},
