@@ -234,7 +234,7 @@ class ModalAnalysis:
             count: number of pairs, at least.
             start: the structure at a speed nearby, whose equilibrium to continue from.
             keep: whether the pencil must outlast another call; large systems save memory, and keep a factor, without.
-            near: columns of owned unknowns near the eigenvectors, which a large system begins with.
+            near: complex columns of owned unknowns near the eigenvectors, which a large system begins with.
 
         Raises:
             ComputationError: no equilibrium, or eigenpairs not to be trusted.

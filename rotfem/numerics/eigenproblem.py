@@ -291,7 +291,7 @@ class Pencil(Sendable):
 
     Attributes:
         owner: kept alive with the matrices.
-        near: columns (owned rows) near the vectors of a large conservative pencil; None where none are known.
+        near: complex columns (owned rows) near the vectors of a large conservative pencil; None where none are known.
         factor: solver with K where its factor is kept; before, one with a matrix of its pattern; or None.
     """
 

@@ -38,7 +38,7 @@ def gyroscopic_pairs(
         scale: D of the unknowns that D K D has a diagonal of about one with, owned rows.
         solver: of K.
         count: number of pairs; of conjugate ones, one counts.
-        near: columns (owned rows) near the vectors, if any are known.
+        near: complex columns (owned rows) near the vectors, if any are known.
 
     Raises:
         ComputationError: they do not converge, or K is singular.
@@ -47,15 +47,19 @@ def gyroscopic_pairs(
     wanted, random, d = 2 * count + 2, np.random.default_rng(comm.rank), scale[:, None]
     norms = [_norm(comm, A, d * random.choice([-1.0, 1.0], d.shape), d) for A in matrices]
     W = solver.solve_all(times(matrices[0], d * random.standard_normal((len(d), wanted if near is None else 2))))
-    W = W if near is None else np.hstack([near, W])  # what is near may lack a mode
-    Q, projected, before = np.zeros((len(d), 0)), [np.zeros((0, 0)) for _ in matrices], np.inf
+    if near is not None:  # which may lack a mode
+        W = np.hstack([near.real[:, : count + 1], near.imag[:, : count + 1], W])
+    Q: Array = np.zeros((len(d), 0))
+    projected: list[Array] = [np.zeros((0, 0)) for _ in matrices]
+    before = np.inf
     for _ in range(ROUNDS):
-        new = _new_directions(comm, Q, W / d)
+        W = _new_directions(comm, Q, W / d)
         for i, (A, sign) in enumerate(zip(matrices, (1.0, -1.0, 1.0), strict=True)):
-            product = d * times(A, d * new)
-            mixed, own = summed(comm, Q.T @ product), summed(comm, new.T @ product)
+            AW = times(A, d * W)
+            AW *= d
+            mixed, own = summed(comm, Q.T @ AW), summed(comm, W.T @ AW)
             projected[i] = np.block([[projected[i], mixed], [sign * mixed.T, 0.5 * (own + sign * own.T)]])
-        Q = np.hstack([Q, new])
+        Q = np.hstack([Q, W])
         values, z, _ = quadratic(projected[0], projected[1], projected[2], 0.0)
         upper = np.flatnonzero(values[:wanted].imag >= 0.0)
         values, z = values[upper], z[:, upper]

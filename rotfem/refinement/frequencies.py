@@ -94,10 +94,9 @@ class FrequencyErrors:
         """
         size = self.analysis.system.V.dofmap.index_map.size_global * self.analysis.structure.size
         modes = self._at(speed, count) if size > SMALL else None
-        if modes is None or modes.carried is None:
-            return None
-        self._level = None
-        return np.hstack([modes.carried.real, modes.carried.imag])
+        if modes is not None and modes.carried is not None:
+            self._level = None
+        return None if modes is None else modes.carried
 
     def _at(self, speed: float, count: int) -> Modes | None:
         """Return at least so many modes on the other mesh; None where there are none."""

@@ -12,9 +12,12 @@ from rotfem.errors import InputError
 #: Environment variable with the memory that may be used, in GB, where it is not what the machine has.
 VARIABLE = "ROTFEM_MEMORY"
 
-#: Bytes per unknown, component and dimension of the mesh: measured on modes of plates of 70 × 70 and 140 × 140 (16 and
-#: 17 kB per unknown), and more than planar beams of 4·10⁴ elements took (degrees 1 and 3: 3 kB).
-BYTES = 1700
+#: Bytes per unknown, component and dimension of the mesh: a linear history of a plate took 13.6 kB per unknown. Modes
+#: of 10⁵ to 10⁶ unknowns took 11 kB, and planar beams of 4·10⁴ elements less than this (degrees 1 and 3: 3 kB).
+BYTES = 1400
+
+#: Times as much on several processes together: modes of plates on two took 29 kB per unknown.
+SHARED = 2.2
 
 _GROUP = Path("/sys/fs/cgroup/memory.max")
 
@@ -36,7 +39,7 @@ def check_memory(key: str, value: object, nodes: float, components: int, dimensi
     unknowns = float(nodes) * components
     if unknowns < 1e5:  # nothing is asked of the system for what fits anywhere
         return
-    needed = BYTES * components * dimension * unknowns
+    needed = BYTES * (SHARED if comm.size > 1 else 1.0) * components * dimension * unknowns
     there = comm.allreduce(memory(), MPI.MIN) * len(set(comm.allgather(MPI.Get_processor_name())))
     if needed > there:
         raise InputError(
