@@ -32,6 +32,10 @@ BAR = {"EA": 1.1e7, "GA": 3.5e6, "EI": 3.0e3, "mass_per_length": 0.9, "rotary_in
 VANE = {"EA": 1.5e7, "GA2": 5e6, "GA3": 5e6, "GJ": 4e3, "EI2": 6e3, "EI3": 3e4, "mass_per_length": 1.1}
 LEAF = {"type": "plate", "length": 0.8, "width": 0.4, "thickness": 0.008, "E": 70e9, "nu": 0.3, "rho": 2700.0}
 
+ROD = {"EA": 2.4e7, "GA": 8e6, "EI": 2.2e4, "mass_per_length": 1.8, "rotary_inertia": 5e-4}
+FIN = {"EA": 9e6, "GA2": 3e6, "GA3": 3e6, "GJ": 2.5e3, "EI2": 2.2e3, "EI3": 1.5e4, "mass_per_length": 0.8}
+SHEET = {"type": "plate", "length": 0.6, "width": 0.5, "thickness": 0.006, "E": 72e9, "nu": 0.33, "rho": 2780.0}
+
 
 def _bar(**more: Any) -> Tables:
     return {"type": "planar_beam", "length": 4.0, "section": BAR, "hub_radius": 0.2, **more}
@@ -39,6 +43,14 @@ def _bar(**more: Any) -> Tables:
 
 def _vane(**more: Any) -> Tables:
     return {"type": "spatial_beam", "length": 5.0, "section": VANE, "hub_radius": 0.3, **more}
+
+
+def _rod(**more: Any) -> Tables:
+    return {"type": "planar_beam", "length": 6.0, "section": ROD, "hub_radius": 0.4, **more}
+
+
+def _fin(**more: Any) -> Tables:
+    return {"type": "spatial_beam", "length": 4.0, "section": FIN, "hub_radius": 0.2, **more}
 
 
 def _turning(speed: float, **more: Any) -> Tables:
@@ -124,6 +136,55 @@ NEW: dict[str, Tables] = {
         "motion": _turning(8.0),
         "loads": {"tip_force": [0.0, 15.0, 40.0]},
         "mesh": {"elements": 4},
+    },
+    "rod spun up and braked": {
+        "structure": _rod(tip_mass=0.6),
+        "motion": {"type": "table", "table": [[0, 0], [0.8, 6.0], [1.6, 6.0], [2.4, 2.0], [3.0, 2.0]]},
+        "time": {"end": 3.0, "step": 0.02},
+    },
+    "rod under a follower": {
+        "structure": _rod(),
+        "motion": _turning(2.0),
+        "loads": {"tip_force": {"table": [[0, 0, 0], [1.0, 0, 60.0], [2.0, 0, 10.0]], "kind": "follower"}},
+        "mesh": {"elements": 5},
+        "time": {"end": 2.5, "step": 0.02},
+    },
+    "rod shaken": {
+        "structure": _rod(damping={"rayleigh": [0.8, 0.0]}),
+        "motion": _turning(4.0),
+        "loads": {"distributed": {"harmonic": {"amplitude": [0, 9.0], "frequency": 11.0}}},
+        "time": {"end": 2.5, "step": 0.02},
+    },
+    "rod on a hub, kicked": {
+        "structure": _rod(),
+        "motion": {"type": "torque", "hub_inertia": 40.0, "pulses": [[0.1, 0.4, 150.0], [0.9, 1.1, -120.0]]},
+        "time": {"end": 1.8, "step": 0.01},
+    },
+    "rod struck at the tip": {
+        "structure": _rod(),
+        "motion": _turning(3.0),
+        "loads": {"tip_moment": [[0, 0], [0.2, 90.0], [0.5, 0.0]]},
+        "time": {"end": 1.5, "step": 0.01},
+    },
+    "fin in a gust": {
+        "structure": _fin(pretwist=[[0, 0.4], [4.0, 0.05]]),
+        "motion": _turning(7.0),
+        "loads": {"distributed": [[0, 0, 0, 0], [0.25, 0, 0, 7.0], [0.6, 0, 0, -3.0], [1.0, 0, 0, 0]]},
+        "mesh": {"elements": 4},
+        "time": {"end": 1.2, "step": 0.012},
+    },
+    "fin spun down": {
+        "structure": _fin(precone=0.05),
+        "motion": {"type": "table", "table": [[0, 12.0], [0.4, 12.0], [1.2, 5.0], [1.6, 5.0]]},
+        "mesh": {"elements": 4},
+        "time": {"end": 1.6, "step": 0.016},
+    },
+    "sheet lifted": {
+        "structure": {**SHEET, "damping": {"rayleigh": [6.0, 0.0]}},
+        "motion": _turning(8.0, axis=[0, 0, 1]),
+        "loads": {"pressure": [[0, 0], [0.15, 25.0], [0.3, 5.0], [0.4, 5.0]]},
+        "mesh": {"elements": [5, 4]},
+        "time": {"end": 0.4, "step": 0.004},
     },
 }
 for _tables in NEW.values():
