@@ -19,6 +19,8 @@ from rotfem.equations.system import System
 from rotfem.mechanics.theories import theories
 from rotfem.numerics.newton import Newton
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 Array = npt.NDArray[np.float64]
 
 LINEAR = [theory.name for theory in theories() if theory.linear]

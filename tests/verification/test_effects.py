@@ -14,6 +14,8 @@ from rotfem.commands.problem import Problem
 from rotfem.equations.model import Model
 from rotfem.numerics.forms import integral_count
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 Array = npt.NDArray[np.float64]
 
 #: A planar beam with data for every effect of a prescribed motion; trapeze and supports are of spatial ones.

@@ -13,6 +13,8 @@ import rotfem
 from rotfem.commands.problem import Problem
 from rotfem.scene import Scene
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 #: Their beam: EI = 5.50 N·m², L = 0.5 m, hub radius 0.05 m; J = ρA((a+L)³ − a³)/3 about the axis.
 J = 0.0858 * (0.55**3 - 0.05**3) / 3
 

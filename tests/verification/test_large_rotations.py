@@ -20,6 +20,8 @@ from rotfem.analysis.stepper import keep_rotations_small
 from rotfem.commands.problem import Problem
 from tests.plate_mesh_files import write_msh
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 Array = npt.NDArray[np.float64]
 
 U, THETA = ("tip_u1", "tip_u2", "tip_u3"), ("tip_theta1", "tip_theta2", "tip_theta3")

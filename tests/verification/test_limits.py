@@ -26,6 +26,8 @@ from rotfem.mechanics.motion import smooth_spin_up
 from rotfem.mechanics.theories import ladder
 from rotfem.numerics.newton import Newton
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 Array = npt.NDArray[np.float64]
 
 

@@ -17,6 +17,8 @@ from scipy.interpolate import BarycentricInterpolator
 
 from rotfem import run
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 Array = npt.NDArray[np.float64]
 
 #: A thick beam, well deflected: tip u2 = 0.3 L, with shear, stretch and spin all taking part.

@@ -22,6 +22,8 @@ from tests.plate_mesh_files import grid, write_msh
 
 from .conftest import reference_file
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 THEORIES = ("linear", "consistent_linear", "von_karman_linear", "second_order", "von_karman", "reissner")
 E, NU, RHO = 70e9, 0.3, 2700.0
 

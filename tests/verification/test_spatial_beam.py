@@ -24,6 +24,8 @@ from rotfem.equations.system import System
 from rotfem.mechanics.effects import effects
 from rotfem.mechanics.theories import ladder
 
+pytestmark = pytest.mark.usefixtures("unestimated")
+
 Array = npt.NDArray[np.float64]
 
 #: A kernel of the exact theory with all couplings compiles for ten seconds and more, the first time.
