@@ -20,7 +20,7 @@ from petsc4py import PETSc
 from rotfem.errors import ComputationError
 from rotfem.numerics.linear import DirectSolver
 from rotfem.numerics.low_rank import sparse_part
-from rotfem.numerics.projection import times
+from rotfem.numerics.projection import new_directions, times
 
 Array = npt.NDArray[Any]
 Matrices: TypeAlias = tuple[Any, Any, Any]
@@ -36,9 +36,6 @@ DONE, ROUNDS, COLUMNS = 1e-13, 12, 400
 
 #: Relative distance of real eigenvalues that are one.
 EQUAL = 1e-9
-
-#: Part of a column's length below which it is no new direction.
-NEW = 1e-8
 
 
 def heavily_damped(values: Array, small: float) -> bool:
@@ -162,12 +159,7 @@ class RitzPairs:
 
     def add(self, columns: Array) -> int:
         """Put what is new in real columns into the orthonormal basis; return how many directions that were."""
-        W = columns / np.maximum(np.sqrt(self._sum(np.sum(columns**2, axis=0))), TINY)
-        for limit in (NEW, 0.5):  # twice, as once leaves round-off of what was taken away
-            W = W - self.V @ self._sum(self.V.T @ W)
-            sizes, turns = np.linalg.eigh(self._sum(W.T @ W))
-            keep = sizes > limit**2 if limit == NEW else sizes > limit
-            W = W @ (turns[:, keep] / np.sqrt(sizes[keep]))
+        W = new_directions(self.comm, self.V, columns)
         self.V = np.hstack([self.V, W])
         old = self._products
         self._products = [np.hstack([P, times(A, W)]) for P, A in zip(old, self.matrices, strict=True)]

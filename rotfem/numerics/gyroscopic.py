@@ -15,9 +15,9 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from rotfem.errors import ComputationError
-from rotfem.numerics.damped import NEW, quadratic
+from rotfem.numerics.damped import quadratic
 from rotfem.numerics.linear import DirectSolver
-from rotfem.numerics.projection import summed, times
+from rotfem.numerics.projection import new_directions, summed, times
 
 Array = npt.NDArray[Any]
 
@@ -53,7 +53,7 @@ def gyroscopic_pairs(
     projected: list[Array] = [np.zeros((0, 0)) for _ in matrices]
     before = np.inf
     for _ in range(ROUNDS):
-        W = _new_directions(comm, Q, W / d)
+        W = new_directions(comm, Q, W / d)
         for i, (A, sign) in enumerate(zip(matrices, (1.0, -1.0, 1.0), strict=True)):
             AW = times(A, d * W)
             AW *= d
@@ -98,13 +98,3 @@ def _squares(comm: MPI.Comm, X: Array, scale: Array, swings: Array) -> Array:
 def _norm(comm: MPI.Comm, A: Any, signs: Array, d: Array) -> float:
     """Return a lower bound of the norm ‖D A D‖_∞, from random signs times D."""
     return float(comm.allreduce(float(np.max(np.abs(d * times(A, signs)), initial=0.0)), op=MPI.MAX))
-
-
-def _new_directions(comm: MPI.Comm, V: Array, W: Array) -> Array:
-    """Return an orthonormal basis of what columns W add to the orthonormal V."""
-    W = W / np.sqrt(np.maximum(summed(comm, np.einsum("ij,ij->j", W, W)), 1e-300))
-    for limit in (NEW**2, 0.5):  # twice, as once leaves round-off of what was taken away
-        W = W - V @ summed(comm, V.T @ W)
-        sizes, turns = np.linalg.eigh(summed(comm, W.T @ W))
-        W = W @ (turns[:, sizes > limit] / np.sqrt(sizes[sizes > limit]))
-    return np.asarray(W)

@@ -16,6 +16,9 @@ Array = npt.NDArray[Any]
 #: part would drop what makes the small differences between modes at two speeds.
 DEPENDENT = 1e-13
 
+#: Part of a column's length below which it is no new direction.
+NEW = 1e-8
+
 #: Kinds of matrices that are multiplied by all columns at once, which reads each entry once.
 ENTRIES = ("seqaij", "mpiaij")
 
@@ -45,6 +48,16 @@ def dense(comm: Any, X: Array) -> Any:
     """Return columns of owned rows (n, m) as a dense PETSc matrix over a communicator."""
     columns = np.array(X, dtype=PETSc.ScalarType, order="F")
     return PETSc.Mat().createDense(((len(X), None), (None, X.shape[1])), array=columns, comm=comm)
+
+
+def new_directions(comm: MPI.Comm, V: Array, W: Array) -> Array:
+    """Return an orthonormal basis of what columns W add to the orthonormal V."""
+    W = W / np.sqrt(np.maximum(summed(comm, np.einsum("ij,ij->j", W, W)), 1e-300))
+    for limit in (NEW**2, 0.5):  # twice, as once leaves round-off of what was taken away
+        W = W - V @ summed(comm, V.T @ W)
+        sizes, turns = np.linalg.eigh(summed(comm, W.T @ W))
+        W = W @ (turns[:, sizes > limit] / np.sqrt(sizes[sizes > limit]))
+    return np.asarray(W)
 
 
 def orthonormal(comm: MPI.Comm, columns: Array, product: Callable[[Array], Array]) -> Array:
