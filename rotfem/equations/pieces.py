@@ -207,7 +207,7 @@ class Pieces:
         if self.not_polynomial:
             model.check_smooth()
         symbols = self.structure.section | self.structure.scalars | model.switches
-        purpose = " ".join(("geometric", model.theory.name, *model.effects, *symbols))
+        purpose = " ".join(("geometric", model.theory.name, str(model.problem.prestress), *model.effects, *symbols))
         known, compiled = model.derived_forms(purpose, self._made_geometric, (self.prestressed, *symbols.values()))
         self._geometric = known.get("G", 0)
         if compiled:
