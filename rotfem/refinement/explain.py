@@ -472,7 +472,7 @@ class Explanation:
         """Write the changes of an output that needs no history.
 
         They are computed on half the cells. Where these have errors that are not negligible, they are computed on all
-        cells instead, whose own error is then seen on finer ones.
+        cells instead, whose own error is then seen on finer ones, and on those where it is beyond the asymptotic range.
 
         Args:
             name: of the output.
@@ -488,7 +488,9 @@ class Explanation:
                 at = other.system
             elif other is not None and other.ratio > 1.0:
                 other = on_other_mesh(self.problem, self.system, self.moving, finer=True) or other
-                apart = measure(own, of(other.system))
+                there = of(other.system)
+                apart = measure(own, there)
+                at = other.system if apart > ASYMPTOTIC else at
         except ComputationError as error:
             self._fails(name, error.what)
             return
