@@ -45,7 +45,9 @@ class InputError(ValueError):
 
     def __init__(self, key: str, value: Any, allowed: str) -> None:
         super().__init__(key, value, allowed)
-        self.key, self.value, self.allowed = key, value, allowed
+        self.key = key
+        self.value = value
+        self.allowed = allowed
 
     def __str__(self) -> str:
         return str(Problem(self.key, self.value, self.allowed))
@@ -80,9 +82,13 @@ class SceneError(InputError):
     def __init__(
         self, file: str, key: str = "", value: Any = None, allowed: str = "", others: Sequence[Problem] = ()
     ) -> None:
-        super().__init__(key, value, allowed)
-        self.file, self.others = file, tuple(others)
-        self.args = (file, key, value, allowed, self.others)  # with which it survives pickling (between MPI ranks)
+        # All arguments go to the base class so that the error survives pickling (between MPI ranks).
+        Exception.__init__(self, file, key, value, allowed, tuple(others))
+        self.file = file
+        self.key = key
+        self.value = value
+        self.allowed = allowed
+        self.others = tuple(others)
 
     @property
     def problems(self) -> tuple[Problem, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import abstractmethod
 from time import perf_counter
 from typing import Any
 
@@ -36,16 +36,28 @@ class Solutions:
     _dx: Increment
     _mass: tuple[Any, tuple[DirectSolver | SingularSolver, Array]] | None = None
 
-    #: Returns −F at the state in q, v, a as a PETSc vector (reused), zero at clamped unknowns.
-    residual: Callable[[], Any]
-    #: Of c_k, c_v, c_m returns (c_k K + c_v C + c_m M at the state, whether it changed), clamped rows identity; with
-    #: the q from which a correction has led to the state it may be another one that leads on better.
-    tangent: Callable[..., tuple[Any, bool]]
-    #: Of c_k, c_v, c_m and what is on the diagonal at clamped unknowns returns a new matrix c_k K + c_v C + c_m M.
-    matrix: Callable[[float, float, float, float], Any]
-    #: Write the state q, v, a and what depends on the time (s).
-    set_state: Callable[..., None]
-    set_time: Callable[..., None]
+    @abstractmethod
+    def residual(self) -> Any:
+        """Return −F at the state in q, v, a as a PETSc vector (reused), zero at clamped unknowns."""
+
+    @abstractmethod
+    def tangent(self, c_k: float, c_v: float, c_m: float, before: Array | None = None) -> tuple[Any, bool]:
+        """Return (c_k K + c_v C + c_m M at the state, whether it changed); clamped rows are identity rows.
+
+        With the q from which a correction has led to the state it may be another one that leads on better.
+        """
+
+    @abstractmethod
+    def matrix(self, c_k: float, c_v: float, c_m: float, diagonal: float) -> Any:
+        """Return a new matrix c_k K + c_v C + c_m M at the state with `diagonal` at clamped unknowns."""
+
+    @abstractmethod
+    def set_state(self, q: Array, v: Array | None = None, a: Array | None = None) -> None:
+        """Write the state that the forms are evaluated at."""
+
+    @abstractmethod
+    def set_time(self, t: float) -> None:
+        """Write what the forms depend on at time t (s)."""
 
     def count_rotations_from(self, reference: Any) -> None:
         """Count rotations from a reference, where there can be another one than the undeformed structure, None."""

@@ -8,7 +8,7 @@ with the angle of a free hub as one more unknown in `bordered`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from copy import copy
 from functools import cached_property
 from typing import Any, Self
@@ -86,12 +86,6 @@ class System(Solutions, ABC):
     analysed: DirectSolver | None = None
     signals: tuple[TimeSignal, ...] = ()
     view: View
-    #: Of c_v, c_m returns c_v ∂F/∂Omega + c_m ∂F/∂Omega' at the state, a PETSc vector: the speed along the axis varies.
-    spin_derivative: Callable[[float, float], Any]
-    #: Returns the part of this process in what the clamp does in its unit motions at the state and time set.
-    clamp_forces: Callable[[], Array]
-    #: Returns what small q, v and a of the owned unknowns add to them about an equilibrium, (unknowns, motions) each.
-    clamp_tangents: Callable[[], tuple[Array, Array, Array]]
 
     def __init__(self, model: Model, moving: bool = True):
         self.view = View()
@@ -173,6 +167,10 @@ class System(Solutions, ABC):
     @abstractmethod
     def _compile(self) -> Any:
         """Compile the forms; return a matrix of the pattern of all tangents."""
+
+    @abstractmethod
+    def spin_derivative(self, c_v: float, c_m: float) -> Any:
+        """Return c_v ∂F/∂Omega + c_m ∂F/∂Omega' at the state: the speed along the axis varies; a PETSc vector."""
 
     @property
     @abstractmethod
@@ -312,6 +310,17 @@ class System(Solutions, ABC):
     def time(self) -> float:
         """Time that is set, s."""
         return self.model.time
+
+    @abstractmethod
+    def clamp_forces(self) -> Array:
+        """Return the part of this process in what the clamp does in its unit motions at the state and time set."""
+
+    @abstractmethod
+    def clamp_tangents(self) -> tuple[Array, Array, Array]:
+        """Return what small q, v and a of the owned unknowns add to `clamp_forces` about an equilibrium that is set.
+
+        Three arrays (unknowns, motions), of K, C and M.
+        """
 
     def size(self, x: Array) -> float:
         """Return the largest entry of a local dof array in units of `scale`, over all ranks."""

@@ -39,12 +39,6 @@ class Beam(Structure):
     stiff: ClassVar[tuple[str, ...]] = ("axial", "shear", "shear_2", "shear_3", "section")
     #: Family ↦ the components whose kinetic energy counts, and the one whose nodes are counted.
     families: ClassVar[dict[str, tuple[tuple[int, ...], int]]]
-    #: Axis of the blade at the root, 1 to 3 ↦ the rotation there about it: an expression, rad.
-    root_turn: Callable[[int], Any]
-    #: Measures of a theory ↦ the strains of a section as one vector, ordered as `section_quantities.STRAINS`.
-    section_strains: Callable[[Callable[..., tuple[Any, ...]]], Any]
-    #: Strains of a section ↦ the strains, each with its stiffness, that make the stored energy.
-    stored: Callable[[Any], list[Strain]]
 
     def __init__(self, problem: Problem, comm: MPI.Comm, rows: tuple[float, ...], nodes: tuple[float, ...]):
         super().__init__(problem, comm)
@@ -87,6 +81,10 @@ class Beam(Structure):
         """Axis, 1 to 3, ↦ name, stiffness and damping of the turn that the root may make about it."""
         return getattr(self.data, "hinges", {})
 
+    def root_turn(self, axis: int) -> Any:
+        """Return the rotation at the root about an axis, 1 to 3, of the blade there: an expression, rad."""
+        raise NotImplementedError
+
     def springs(self) -> list[RootSpring]:
         """Return what holds the hinges of the root."""
         found = self.hinges.items()
@@ -123,6 +121,14 @@ class Beam(Structure):
             for x in (values[..., ~moves], slopes[..., moves], self.length * slopes[..., ~moves] / 10)
         )
         return all(size < 0.4 for size in largest)  # rad and slope, far below what turns a beam inside out
+
+    def section_strains(self, measures: Callable[..., tuple[Any, ...]]) -> Any:
+        """Return the strains of a section as one vector, in the order of `rotfem.section_quantities.STRAINS`."""
+        raise NotImplementedError
+
+    def stored(self, values: Any) -> list[Strain]:
+        """Return the strains, each with its stiffness, that make the stored energy of the strains of a section."""
+        raise NotImplementedError
 
     def read_section(self, at: Callable[[Array], dict[str, Array]]) -> None:
         """Take the section properties of at(X), name ↦ values, into the forms."""

@@ -90,25 +90,6 @@ class Structure:
     #: Strains whose stiffness may outweigh that of the others by so much that round-off of it spoils them.
     stiff: ClassVar[tuple[str, ...]] = ()
 
-    #: Strains ↦ an expression that is 1 where the structure is undeformed and at most 0 where it is inside out.
-    stretch: Callable[[list[Strain]], Any]
-    #: Measures of a theory ↦ its strains with the stiffness of the structure.
-    strains: Callable[[Callable[..., tuple[Any, ...]]], list[Strain]]
-    #: Effects ↦ all mass that is always there or that one of them brings, which it then names.
-    bodies: Callable[[Collection[str]], list[Body]]
-    #: q ↦ the axis or mid-surface r(q), frame components (m).
-    position: Callable[[Any], Any]
-    #: q and a vector ↦ the vector that turns with the section, frame components, and is the given one at q = 0.
-    turned: Callable[[Any, Any], Any]
-    #: Name, components of its amplitude, measure, whether it is dead ↦ the work of a moment on the rotations.
-    moment: Callable[[str, Any, Any, bool], list[AppliedLoad]]
-    #: Region of a mesh file ↦ its local cells.
-    cells_of: Callable[[str], npt.NDArray[np.int32]]
-    #: Local dof array ↦ coordinates by name, (n,) each in m, and values (n, components), at all nodes in order.
-    nodes: Callable[[Array], tuple[dict[str, Array], Array]]
-    #: Family, coordinates, complex shape at the nodes (n, components) ↦ kind and number of a mode.
-    mode_name: Callable[[str, dict[str, Array], Array], tuple[str, str]]
-
     dx: Any
     dx_elastic: Any
     tip: Any
@@ -234,9 +215,33 @@ class Structure:
         zero = default_scalar_type(0.0)
         return [fem.dirichletbc(zero, self.clamped * self.size + i, self.V.sub(i)) for i in held]
 
+    def stretch(self, strains: list[Strain]) -> Any:
+        """Return an expression that is 1 where the structure is undeformed and at most 0 where it is inside out."""
+        raise NotImplementedError
+
     def hardly_moved(self) -> bool:
         """Return whether the state in q is surely not inside out, as far as this process sees without compiling."""
         return False
+
+    def strains(self, measures: Callable[..., tuple[Any, ...]]) -> list[Strain]:
+        """Return the strains of one theory's measures with the stiffness of the structure."""
+        raise NotImplementedError
+
+    def bodies(self, effects: Collection[str]) -> list[Body]:
+        """Return all mass that is always there or that one of these effects brings, which it then names."""
+        raise NotImplementedError
+
+    def position(self, q: Any) -> Any:
+        """Return the axis or mid-surface r(q), frame components (m)."""
+        raise NotImplementedError
+
+    def turned(self, q: Any, v: Any) -> Any:
+        """Return a vector that turns with the section, frame components; v is what it is at q = 0."""
+        raise NotImplementedError
+
+    def moment(self, name: str, m: Any, measure: Any, dead: bool) -> list[AppliedLoad]:
+        """Return the work of a moment m (components of its amplitude) on the rotations."""
+        raise NotImplementedError
 
     # --- constants and fields -----------------------------------------------------------------------------------
 
@@ -253,6 +258,10 @@ class Structure:
     def place(self, point: Array) -> Any:
         """Return the place of a point (3,) of the mesh as functions of place are given it: x (m) along a beam."""
         return float(point[0])
+
+    def cells_of(self, region: str) -> npt.NDArray[np.int32]:
+        """Return the local cells of a region of the mesh; a structure without regions is not asked."""
+        raise NotImplementedError
 
     @property
     def point_loads(self) -> tuple[PointLoads, ...]:
@@ -331,6 +340,10 @@ class Structure:
             return x, q
         return np.concatenate(self.comm.allgather(x)), np.concatenate(self.comm.allgather(q))
 
+    def nodes(self, values: Array) -> tuple[dict[str, Array], Array]:
+        """Return (coordinates by name, (n,) each in m; values (n, components)) at all nodes, in order."""
+        raise NotImplementedError
+
     def places(self, coordinates: dict[str, Array]) -> Array:
         """Return where points of the undeformed structure are in the frame, (n, 3) in m, by their coordinates."""
         x, zero = coordinates["x"], np.zeros(len(coordinates["x"]))
@@ -340,6 +353,10 @@ class Structure:
     def surface(self) -> npt.NDArray[np.int64] | None:
         """Return triangles between the nodes in their order, shape (m, 3), on every rank; None of a line."""
         return None
+
+    def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> tuple[str, str]:
+        """Return kind and number of a mode of a family, from its complex shape at the nodes (n, components)."""
+        raise NotImplementedError
 
     def wave(self, coordinates: dict[str, Array], values: Array, axis: Array) -> Wave | None:
         """Return how a mode e^{iωt} with a complex shape at the nodes precesses about an axis; None unless a rotor."""
