@@ -81,9 +81,9 @@ def halved(result: RunResult) -> bool:
 
 
 @pytest.mark.parametrize("theory", NONLINEAR)
-def test_energy_stays_for_thousands_of_steps(theory: str) -> None:
+def test_energy_stays_for_a_thousand_steps(theory: str) -> None:
     """Steps of 0.02 s do not resolve what vibrates; what Newton's last increment leaves the next step makes up for."""
-    result = run(released(theory, 2500))
+    result = run(released(theory, 1000))
     assert drift(result) < 1e-7
     energy = result.history["jacobi"]
     assert abs(np.median(energy[-100:]) - energy[0]) < 1e-11 * np.max(result.history["strain"])
@@ -156,7 +156,7 @@ def test_damping_only_takes(theory: str) -> None:
 
 def test_linear_theories_have_their_own_energy() -> None:
     """There the scheme is the midpoint rule, which keeps quadratic integrals."""
-    result = run(released("consistent_linear", 2000, **{"initial.tip_displacement": 0.5}))
+    result = run(released("consistent_linear", 500, **{"initial.tip_displacement": 0.5}))
     assert drift(result) < 1e-8
 
 
