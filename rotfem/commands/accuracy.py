@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from time import perf_counter
 from typing import Any, TypeVar
 
 from mpi4py import MPI
 
 from rotfem.commands.interrupts import together
-from rotfem.errors import ComputationError, SceneError, Stopped
+from rotfem.errors import ComputationError, InputError, SceneError, Stopped
 from rotfem.mechanics.theories import Theory, theories
 from rotfem.refinement.estimate import WORDS
 from rotfem.refinement.refine import COARSE, SAFETY, Clock, Refinement, Setting, contribution, is_within, refine
@@ -48,17 +49,12 @@ def first_setting(scene: Scene, modes: int = 0) -> Setting:
             elements = mesh.elements if time is None else coarsened(mesh.elements, mesh.degree)
         else:
             elements = -(-nodes // mesh.degree)
+    first = Setting(models_of(scene, moving=time is not None), elements, mesh.degree)
+    if time is None:
+        return first
     assert scene.accuracy is not None
-    tolerance = scene.accuracy / SAFETY
-    if scene.accuracy_budget is not None:
-        tolerance = max(tolerance, COARSE)
-    return Setting(
-        models=models_of(scene, moving=time is not None),
-        elements=elements,
-        degree=mesh.degree,
-        scheme=None if time is None else ADAPTIVE,
-        tolerance=None if time is None else tolerance,
-    )
+    least = 0.0 if scene.accuracy_budget is None else COARSE
+    return replace(first, scheme=ADAPTIVE, tolerance=max(scene.accuracy / SAFETY, least))
 
 
 def coarsened(elements: tuple[int, int], degree: int) -> tuple[int, int]:
@@ -75,13 +71,17 @@ def models_of(scene: Scene, moving: bool) -> tuple[dict[str, Any], ...]:
     model; steady states and modes cost little by any theory, and moments at the root are those of the theory itself.
     """
     full = {"theory": scene.model.theory, "reduced": False, "foreshortening": False}
-    if not moving or scene.accuracy_of == ROOT_MOMENT:
-        return (full,)
     linear = linear_of(scene)
+    if not moving or scene.accuracy_of == ROOT_MOMENT or linear is None:
+        return (full,)
     assert scene.accuracy is not None
-    gives_back = linear is not None and bool(linear.prestress)
-    quick = {"theory": linear and linear.name, "reduced": scene.accuracy / (4 * SAFETY), "foreshortening": gives_back}
-    return (quick, full) if linear and allows(scene, quick) else (full,)
+    reduced = scene.accuracy / (4 * SAFETY)
+    quick = {"theory": linear.name, "reduced": reduced, "foreshortening": bool(linear.prestress)}
+    try:
+        scene.replace({f"model.{key}": value for key, value in quick.items()})
+    except SceneError:  # no reduced model has a torque by a controller
+        return (full,)
+    return quick, full
 
 
 def linear_of(scene: Scene) -> Theory | None:
@@ -89,15 +89,6 @@ def linear_of(scene: Scene) -> Theory | None:
     named = {theory.name: theory for theory in theories() if theory.holds_for(scene.structure.type)}
     own = named[scene.model.theory]
     return own if own.linear else next((named[n] for n in own.poorer if n in named and named[n].prestress), None)
-
-
-def allows(scene: Scene, model: dict[str, Any]) -> bool:
-    """Return whether a scene takes these keys of [model]: no reduced one has a torque by a controller."""
-    try:
-        scene.replace({f"model.{key}": value for key, value in model.items()})
-    except SceneError:
-        return False
-    return True
 
 
 def refuse(scene: Scene, wanted: tuple[str, ...], command: str) -> None:
@@ -109,12 +100,12 @@ def refuse(scene: Scene, wanted: tuple[str, ...], command: str) -> None:
         command: its verb.
 
     Raises:
-        SceneError: the scene asks for another.
+        InputError: the scene asks for another.
     """
     if scene.accuracy_of not in (None, *wanted):
         able = " or ".join(f'"{name}"' for name in wanted)
         reason = f'is not what "{command}" computes; it must be {able}, or not given'
-        raise SceneError(scene.file, "accuracy_of", scene.accuracy_of, reason)
+        raise InputError("accuracy_of", scene.accuracy_of, reason)
 
 
 def changes_of(scene: Scene, setting: Setting) -> dict[str, Any]:
@@ -144,24 +135,46 @@ def to_accuracy(scene: Scene, first: Setting, compute: Callable[[Setting], R], c
         Stopped: its attribute `result` holds the best that was reached.
         KeyboardInterrupt: nothing was, or the ranks do not agree.
     """
-    started, found = perf_counter(), Refinement[R]()
-    assert scene.accuracy is not None
+    started, found, accuracy = perf_counter(), Refinement[R](), scene.accuracy
+    assert accuracy is not None
 
     def answer(setting: Setting) -> tuple[R, dict[str, Any]]:
         done = compute(setting)
         return done, done.summary["error"]
 
+    def best(**entries: Any) -> R:
+        """Return the best result, with how it was found in its summary."""
+        assert found.best is not None
+        result, error = found.best.result, found.best.error
+        how = {
+            "asked": accuracy,
+            "of": scene.accuracy_of or ("tip" if "time" in error else "frequencies"),
+            "met": is_within(error, accuracy),
+            "estimated": error["total"],
+            "chosen": found.best.setting.summary(),
+            "attempts": found.tried,
+        }
+        if clock.budget is not None:
+            how["budget"] = clock.summary()
+        timings = with_choice(result.summary["timings"], started)
+        return result.with_summary(scene=scene.digest(), accuracy=how, timings=timings, **entries)
+
     try:
-        refine(first, answer, scene.accuracy, clock, found)
+        refine(first, answer, accuracy, clock, found)
     except KeyboardInterrupt as stop:
         if found.best is not None and together(clock.comm, stop):
-            best = described(scene, found, clock, started)
-            raise Stopped(best.with_summary(status="interrupted")) from stop
+            raise Stopped(best(status="interrupted")) from stop
         raise
-    done = described(scene, found, clock, started)
-    if not is_within(done.summary["error"], scene.accuracy):
+    done = best()
+    if not done.summary["accuracy"]["met"]:
         raise missed(scene, done, found.failure)
     return done
+
+
+def with_choice(timings: Mapping[str, float], started: float) -> dict[str, float]:
+    """Return the timings of a result (s) with `choice`, what was used besides since a start, in their total."""
+    choice = max(0.0, perf_counter() - started - timings["total"])
+    return {**timings, "choice": choice, "total": timings["total"] + choice}
 
 
 def within_tolerance(
@@ -202,7 +215,7 @@ def within_tolerance(
         for row in found.tried
         if row["theory"] != chosen
     ]
-    seconds = max(0.0, perf_counter() - started - summary["timings"]["total"])
+    timings = with_choice(summary["timings"], started)
     choice = {
         "theory": chosen,
         "effects": effects,
@@ -210,19 +223,15 @@ def within_tolerance(
         "tolerance": tolerance,
         "dropped": [] if chosen == own else [{"kind": "theory", "name": f"{own} → {chosen}", "estimate": error}],
         "full_model": {"theory": own, "effects": effects},
-        "seconds": seconds,
+        "seconds": timings["choice"],
         **({"upgrades": upgrades} if upgrades else {}),
     }
     warnings = [*summary["warnings"], *(f"{row['from']} was given up: {row['why']}" for row in upgrades)]
-    missed_by = "" if is_within(found.best.error, tolerance) else f"the error of {chosen} is {estimated(error)}"
-    what = f"model.tolerance = {tolerance:g} is not met: {missed_by}"
-    done = found.best.result.with_summary(
-        scene=scene.digest(),
-        choice=choice,
-        warnings=[*warnings, what] if missed_by else warnings,
-        timings={**summary["timings"], "choice": seconds, "total": summary["timings"]["total"] + seconds},
-    )
-    if missed_by and scene.model.on_exceed == "stop":
+    met = is_within(found.best.error, tolerance)
+    what = f"model.tolerance = {tolerance:g} is not met: the error of {chosen} is {estimated(error)}"
+    warnings += [] if met else [what]
+    done = found.best.result.with_summary(scene=scene.digest(), choice=choice, warnings=warnings, timings=timings)
+    if not met and scene.model.on_exceed == "stop":
         raise failed(done, what, f"a larger model.tolerance, or a richer model.theory than {own}")
     return done
 
@@ -230,27 +239,6 @@ def within_tolerance(
 def estimated(error: float | None) -> str:
     """Return an estimate in words."""
     return "unknown" if error is None else f"estimated as {error:.2g}"
-
-
-def described(scene: Scene, found: Refinement[R], clock: Clock, started: float) -> R:
-    """Return the best result, with how it was found in its summary."""
-    best, accuracy = found.best, scene.accuracy
-    assert best is not None
-    assert accuracy is not None
-    summary = best.result.summary
-    how = {
-        "asked": accuracy,
-        "of": scene.accuracy_of or ("tip" if "time" in best.error else "frequencies"),
-        "met": is_within(best.error, accuracy),
-        "estimated": best.error["total"],
-        "chosen": best.setting.summary(),
-        "attempts": found.tried,
-    }
-    if clock.budget is not None:
-        how["budget"] = clock.summary()
-    choice = max(0.0, perf_counter() - started - summary["timings"]["total"])
-    timings = {**summary["timings"], "choice": choice, "total": summary["timings"]["total"] + choice}
-    return best.result.with_summary(scene=scene.digest(), accuracy=how, timings=timings)
 
 
 def missed(scene: Scene, done: Result, failure: ComputationError | None) -> Missed:

@@ -30,14 +30,12 @@ from rotfem.scene import Scene
 
 Array = npt.NDArray[np.float64]
 
-#: What the error of a theory is estimated by where its foreshortening is computed.
+#: What the error of a theory is estimated by, where its foreshortening is computed and where a phase counts.
 OF_FORESHORTENING = "the foreshortening by bending that it neglects, computed afterwards, is that large"
-
-#: What it is estimated by where the phase of a vibration counts.
 OF_DRIFT = "its frequencies and strains compared with the exact ones"
 
-#: What the contributions are called that a warning says to be unknown.
-UNKNOWN = {"time": "time steps", "space": "mesh", "model": "theory"}
+#: What the contributions are called in warnings.
+NAMES = {"time": "time steps", "space": "mesh", "model": "theory"}
 
 
 @dataclass
@@ -123,19 +121,16 @@ class RunErrors:
         richer = richer_problem(self.problem)
         if richer is None:
             return self._drifting(self.farthest.error(self.system, tips, from_rest))
-        if not self.wanted:
-            return None
         try:
-            found = self._apart(richer)
+            found = self._apart(richer) if self.wanted else None
         except (ComputationError, InputError):
             return None
         if found is None:
             return None
         system, apart, components = found
         if self.shape is not None and self._buckles(system):
-            return TheoryError(
-                1.0, "it is above a buckling load that this theory does not have", self.problem.theory.name
-            )
+            why = "it is above a buckling load that this theory does not have"
+            return TheoryError(1.0, why, self.problem.theory.name)
         base = self.farthest.error(system, tips, from_rest)
         if base is None:
             return None
@@ -217,46 +212,47 @@ class RunErrors:
 
     def warnings(self, error: ErrorEstimate) -> list[str]:
         """Return what is to be known of an error; nothing where it is small, asked for, or reported already."""
-        scene = self.scene
-        tolerance = None if scene.time is None else scene.time.tolerance
+        scene, time = self.scene, self.scene.time
         if scene.accuracy is not None:  # what asked for it says what was reached
             return []
-        unknown = [word for name, word in UNKNOWN.items() if error.contributions[name] is None]
-        said = (
-            [f"the error by the {' and the '.join(unknown)} could not be estimated: {self._why_unknown(error)}"]
-            if unknown
-            else []
-        )
-        if not error.exceeds(max(NOTICED, scene.model.tolerance or 0.0, tolerance or 0.0)):
+        unknown = [word for name, word in NAMES.items() if error.contributions[name] is None]
+        said = []
+        if unknown:
+            why = self._why_unknown(error)
+            said = [f"the error by the {' and the '.join(unknown)} could not be estimated: {why}"]
+        if not error.exceeds(max(NOTICED, scene.model.tolerance or 0.0, (time and time.tolerance) or 0.0)):
             return said
-        steps, mesh, model = (error.contributions[name] or 0.0 for name in ("time", "space", "model"))
+        steps, mesh, model = sizes = [error.contributions[name] or 0.0 for name in NAMES]
         if steps + mesh <= NOTICED and self.theory is not None and self.theory.warning():
             return said
         cures = []
         if steps >= NOTICED / 2 and self.stepper is not None:
-            cures.append(finer_steps(scene, self.stepper, steps))
+            cures.append(self._finer_steps(steps))
         if mesh >= NOTICED / 2:
             cures.append("a higher mesh.degree" if scene.structure.mesh_file else "more mesh.elements")
         if model >= NOTICED / 2:
             cures.append("a more exact theory")
-        contributions = {"time steps": steps, "mesh": mesh, "theory": model}
-        named = [
-            f"{percent(share)} by the {n}"
-            for n, share in contributions.items()
-            if share > sum(contributions.values()) / 10
-        ]
-        parts = f"(estimated: {', '.join(named)})"
-        off = f"the tip may be in error by {percent(error.total)} of its largest displacement {parts}"
+        named = zip(NAMES.values(), sizes, strict=True)
+        parts = ", ".join(f"{percent(size)} by the {name}" for name, size in named if size > sum(sizes) / 10)
+        off = f"the tip may be in error by {percent(error.total)} of its largest displacement (estimated: {parts})"
         return [f"{off}; to reduce it: {', '.join(cures)}" if cures else off, *said]
+
+    def _finer_steps(self, share: float) -> str:
+        """Return which steps would have a contribution that is not noticed."""
+        time = self.scene.time
+        assert time is not None
+        factor = min(1.0, NOTICED / 2 / share)
+        if time.tolerance is not None:
+            return f"time.tolerance = {time.tolerance * factor:.1g}"
+        return f"time.step = {time.step * factor ** (1 / self.stepper.scheme.order):.1g} or shorter"
 
     def _why_unknown(self, error: ErrorEstimate) -> str:
         """Return why a contribution is unknown."""
-        known = {name: share is not None for name, share in error.contributions.items()}
-        if self.companions is not None and not known["time"]:
+        if self.companions is not None and error.contributions["time"] is None:
             if self.companions.steps.sound:
                 return "the prescribed motion or loads allow no steps of twice the length"
             return "a run with steps of twice the length failed, so these are hardly short enough"
-        if not known["space"]:
+        if error.contributions["space"] is None:
             return "there is no other mesh to compare with, or the run failed on it"
         return "the run failed with a more exact theory"
 
@@ -300,13 +296,3 @@ def error_of_modes(rows: Iterable[Mapping[str, Any]], theory: TheoryError | None
     bound = float(max((row["error_bound"] for row in flexible), default=0.0))
     space = None if None in mesh else float(max(mesh, default=0.0))
     return ErrorEstimate({"space": space, "model": None if theory is None else theory.estimate, "round_off": bound})
-
-
-def finer_steps(scene: Scene, stepper: Any, share: float) -> str:
-    """Return which steps would have a contribution that is not noticed."""
-    time = scene.time
-    assert time is not None
-    factor = min(1.0, NOTICED / 2 / share)
-    if time.tolerance is not None:
-        return f"time.tolerance = {time.tolerance * factor:.1g}"
-    return f"time.step = {time.step * factor ** (1 / stepper.scheme.order):.1g} or shorter"

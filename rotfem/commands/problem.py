@@ -63,7 +63,7 @@ class Problem(ProblemData):
         if twice := [name for name in outputs or {} if name in wanted]:
             raise SceneError(scene.file, "output.quantities", twice[0], "is the name of an output of the call, too")
         with input_of(scene.file):
-            motion = with_pitch(scene, motion_of(scene))
+            motion = motion_of(scene)
             return cls(
                 structure=scene.structure,
                 motion=motion,
@@ -209,7 +209,7 @@ def scheme_of(time: Time) -> Scheme:
 
 
 def motion_of(scene: Scene) -> Motion:
-    """Return the motion that a scene prescribes."""
+    """Return the motion that a scene prescribes, with the pitch of its blade."""
     m: Any = scene.motion
     base = m.base_acceleration
     more = {
@@ -220,7 +220,9 @@ def motion_of(scene: Scene) -> Motion:
     if m.type not in _MOTIONS or m.type == "callable":
         more["cell"] = cell_of(scene.time)
     motion: Motion = _MOTIONS.get(m.type, _by_law)(m, {"axis": m.axis, **more})
-    return motion if base is None or base.constant else replace(motion, constant=False)
+    if base is not None and not base.constant:
+        motion = replace(motion, constant=False)
+    return with_pitch(scene, motion) if scene.structure.pitches else motion
 
 
 def _base_acceleration(base: Any) -> Any:
@@ -254,8 +256,6 @@ _MOTIONS: dict[str, Any] = {
 def with_pitch(scene: Scene, motion: Motion) -> Motion:
     """Return the motion of a scene with the pitch of its blade, which may change with time."""
     structure: Any = scene.structure
-    if not structure.pitches:
-        return motion
     given = structure.root.pitch
     parts = [constant_pitch(given.value or 0.0)]
     parts += [harmonic_pitch(h.amplitude, h.phase, _turn(h, motion)) for h in given.harmonic]

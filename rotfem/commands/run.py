@@ -9,14 +9,7 @@ from typing import Any
 from mpi4py import MPI
 
 from rotfem.analysis.equilibrium import check_steady
-from rotfem.commands.accuracy import (
-    ROOT_MOMENT,
-    changes_of,
-    first_setting,
-    refuse,
-    to_accuracy,
-    within_tolerance,
-)
+from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.error_report import check_rotations
 from rotfem.commands.problem import Problem
 from rotfem.commands.result_folder import ResultFolder
@@ -87,70 +80,32 @@ def simulate(
     terms: Mapping[str, Work] | None = None,
     outputs: Mapping[str, Functional] | None = None,
 ) -> RunResult:
-    """Return the result of a scene (see `run`), with what is kept of it on disk while it goes on."""
-    comm = store.comm
-    scene.check_run()
-    store.open(scene, terms or {}, outputs or {})
-    problem = Problem.of(scene, terms=terms, outputs=outputs)
-    with input_of(scene.file):
-        if scene.time is None:
-            check_steady(problem)
-        if scene.accuracy is not None:
-            return run_to_accuracy(scene, store, (progress, hint), terms, outputs)
-        if scene.model.tolerance is not None:
-            return run_within_tolerance(scene, store, (progress, hint), terms, outputs)
-        simulation = Simulation(scene, problem, comm, store=store)
-        simulation.advise(hint)
-        return simulation.run(progress)
-
-
-def run_to_accuracy(
-    scene: Scene,
-    store: RunStore,
-    listeners: tuple[Progress | None, Hint | None],
-    terms: Mapping[str, Work] | None,
-    outputs: Mapping[str, Functional] | None,
-) -> RunResult:
-    """Return the result that meets the accuracy of a scene (see `rotfem.refinement.refine`).
+    """Return the result of a scene (see `run`), with what is kept of it on disk while it goes on.
 
     Raises:
-        Missed: it was not met.
+        Missed: its accuracy, or its model.tolerance with model.on_exceed = "stop", was not met.
         ComputationError: the richest model failed.
     """
-    refuse(scene, ("tip", ROOT_MOMENT), "run")
-    progress, hint = listeners
-    clock = Clock(scene.accuracy_budget, store.comm, hint)
+    comm, clock = store.comm, Clock(scene.accuracy_budget, store.comm, hint)
+    scene.check_run()
+    store.open(scene, terms or {}, outputs or {})
 
-    def compute(setting: Setting) -> RunResult:
-        variant = scene.replace(changes_of(scene, setting))
+    def compute(setting: Setting | None = None) -> RunResult:
+        variant = scene if setting is None else scene.replace(changes_of(scene, setting))
         problem = Problem.of(variant, terms=terms, outputs=outputs)
-        simulation = Simulation(variant, problem, store.comm, store=store, setting=setting, clock=clock)
-        if setting.reduced:
+        simulation = Simulation(variant, problem, comm, store, setting, clock)
+        if scene.accuracy is None:
+            simulation.advise(hint)
+        elif setting is not None and setting.reduced:
             check_rotations(variant, simulation.system)
         return simulation.run(progress)
 
-    return to_accuracy(scene, store.setting() or first_setting(scene), compute, clock)
-
-
-def run_within_tolerance(
-    scene: Scene,
-    store: RunStore,
-    listeners: tuple[Progress | None, Hint | None],
-    terms: Mapping[str, Work] | None,
-    outputs: Mapping[str, Functional] | None,
-) -> RunResult:
-    """Return the result of the cheapest theory within the model.tolerance of a scene (see `within_tolerance`).
-
-    Raises:
-        ComputationError: the richest theory failed, or misses the tolerance with model.on_exceed = "stop".
-    """
-    progress, hint = listeners
-
-    def compute(setting: Setting) -> RunResult:
-        variant = scene.replace(setting.changes())
-        problem = Problem.of(variant, terms=terms, outputs=outputs)
-        simulation = Simulation(variant, problem, store.comm, store=store, setting=setting)
-        simulation.advise(hint)
-        return simulation.run(progress)
-
-    return within_tolerance(scene, compute, store.comm, store.setting())
+    with input_of(scene.file):
+        if scene.time is None:
+            check_steady(Problem.of(scene, terms=terms, outputs=outputs))
+        if scene.accuracy is not None:
+            refuse(scene, ("tip", ROOT_MOMENT), "run")
+            return to_accuracy(scene, store.setting() or first_setting(scene), compute, clock)
+        if scene.model.tolerance is not None:
+            return within_tolerance(scene, compute, comm, store.setting())
+        return compute()

@@ -333,6 +333,12 @@ class Refinement(Generic[R]):
     best: Answer[R] | None = None
     failure: ComputationError | None = None
 
+    def predicted(self, setting: Setting) -> float | None:
+        """Return the time (s) that an answer takes, from the best one of the same model; None where there is none."""
+        if self.best is None or self.best.setting.models != setting.models:
+            return None
+        return self.best.seconds * setting.work() / self.best.setting.work()
+
     def take(self, answer: Answer[R]) -> None:
         """Take note of an answer."""
         self.tried.append({**answer.setting.summary(), "error": answer.error["total"], "seconds": answer.seconds})
@@ -364,19 +370,16 @@ def refine(
     while following is not None and len(found.tried) < MOST:
         setting, following, began = following, None, clock.used()
         try:
-            clock.begin(setting.words(), len(found.tried) + 1, predicted(found, setting))
+            clock.begin(setting.words(), len(found.tried) + 1, found.predicted(setting))
             result, error = compute(setting)
-        except InputError as refusal:  # a model that cannot have what the scene has gives way to a richer one
-            following = setting.richer()
+        except (InputError, ComputationError) as failure:  # a richer model may have what this one cannot
+            why = failure.allowed if isinstance(failure, InputError) else failure.what
+            found.tried.append({**setting.summary(), "failed": why, "seconds": clock.used() - began})
+            dear = isinstance(failure, TooDear)
+            following = None if dear else setting.richer()
             if following is None:
-                raise
-            found.tried.append({**setting.summary(), "failed": refusal.allowed, "seconds": clock.used() - began})
-            continue
-        except ComputationError as failure:
-            found.tried.append({**setting.summary(), "failed": failure.what, "seconds": clock.used() - began})
-            following = None if isinstance(failure, TooDear) else setting.richer()
-            if following is None:
-                if found.best is None or (found.best.setting.models != setting.models and not within_budget(failure)):
+                of_model = found.best is not None and found.best.setting.models == setting.models
+                if isinstance(failure, InputError) or found.best is None or not (dear or of_model):
                     raise
                 found.failure = failure
             continue
@@ -384,15 +387,3 @@ def refine(
         if not is_within(error, accuracy):
             following = clock.comm.bcast(setting.finer(error, accuracy))
     return found
-
-
-def within_budget(failure: ComputationError) -> bool:
-    """Return whether something failed for want of time, so that what was reached before stands."""
-    return isinstance(failure, TooDear)
-
-
-def predicted(found: Refinement[Any], setting: Setting) -> float | None:
-    """Return the time (s) that an answer takes, from the last one of the same model; None where there is none."""
-    if found.best is None or found.best.setting.models != setting.models:
-        return None
-    return found.best.seconds * setting.work() / found.best.setting.work()

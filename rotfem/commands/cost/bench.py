@@ -35,8 +35,8 @@ from rotfem.version import __version__
 
 Array = npt.NDArray[np.float64]
 
-#: What computes an output once everything is set up: its values, and numbers of unknowns, steps, Newton iterations.
-Go = Callable[[], tuple[Array, tuple[int, int, int]]]
+#: Values of an output, and numbers of unknowns, steps and Newton iterations.
+Output = tuple[Array, tuple[int, int, int]]
 
 
 @dataclass
@@ -121,12 +121,12 @@ class Bench:
             variant = self.compiled(setting)
             for _ in range(repeat - len(out.wall)):
                 self._once(variant, out, clock)
+            if out.values is not None and not np.all(np.isfinite(out.values)):
+                raise ComputationError("the output is not finite")
         except TooDear as error:
             out.status, out.reason, out.values = "stopped", error.what, None
         except (ComputationError, InputError) as error:
             out.status, out.reason, out.values = "failed", str(error), None
-        if out.values is not None and not np.all(np.isfinite(out.values)):
-            out.status, out.reason, out.values = "failed", "the output is not finite", None
         return out
 
     def compiled(self, setting: Setting) -> Scene:
@@ -159,28 +159,29 @@ class Bench:
             values, counts = go()
         finally:
             end = perf_counter(), process_time()
+            peak = bytes_of("VmHWM") or 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
             out.setup.append(ready[0] - start[0])
             out.setup_cpu.append(ready[1] - start[1])
             out.wall.append(end[0] - ready[0])
             out.cpu.append(end[1] - ready[1])
-            out.memory = max(out.memory, self.comm.allreduce(max(most_memory() - self.memory, 0.0)))
+            out.memory = max(out.memory, self.comm.allreduce(max(peak - self.memory, 0.0)))
         out.values, (out.dofs, out.steps, out.iterations) = values, counts
 
-    def _prepared(self, variant: Scene, clock: Clock | None, output: str) -> Go:
+    def _prepared(self, variant: Scene, clock: Clock | None, output: str) -> Callable[[], Output]:
         """Return what computes an output once everything is set up."""
         with input_of(variant.file):
             if output == "tip":
                 return self._motion(variant, clock)
             return self._sweep(variant) if output == "campbell" else self._modal(variant)
 
-    def _motion(self, variant: Scene, clock: Clock | None) -> Go:
+    def _motion(self, variant: Scene, clock: Clock | None) -> Callable[[], Output]:
         variant.check_run()
         problem = Problem.of(variant)
         if variant.time is None:
             check_steady(problem)
         simulation = Simulation(variant, problem, self.comm, clock=clock)
 
-        def go() -> tuple[Array, tuple[int, int, int]]:
+        def go() -> Output:
             result = simulation.run()
             columns = [x for name, x in result.history.items() if name.startswith(COLUMNS["tip"])]
             s = result.summary
@@ -188,23 +189,23 @@ class Bench:
 
         return go
 
-    def _modal(self, variant: Scene) -> Go:
+    def _modal(self, variant: Scene) -> Callable[[], Output]:
         problem = Problem.of(variant)
         analysis = analysis_of(variant, problem, self.comm)
         V, speed = analysis.system.V, problem.motion.final_speed(variant.time.end if variant.time is not None else 0.0)
 
-        def go() -> tuple[Array, tuple[int, int, int]]:
+        def go() -> Output:
             values = analysis.at(speed, variant.modes.count).pairs.values[: variant.modes.count]
             dofs = V.dofmap.index_map.size_global * V.dofmap.index_map_bs
             return np.column_stack([values.imag, values.real]), (dofs, 0, analysis.newton.iterations)
 
         return go
 
-    def _sweep(self, variant: Scene) -> Go:
+    def _sweep(self, variant: Scene) -> Callable[[], Output]:
         speeds, started = sweep_speeds(variant), perf_counter()
         analysis = analysis_of(variant, Problem.of(variant).spinning(), self.comm)
 
-        def go() -> tuple[Array, tuple[int, int, int]]:
+        def go() -> Output:
             result = diagram(variant, analysis, speeds, started)
             rows = sorted((r["speed"], r["frequency"]) for r in result.rows if not r["refined"])
             values = np.array([[frequency] for _, frequency in rows])
@@ -259,10 +260,10 @@ class Record:
             if fresh:
                 path.unlink(missing_ok=True)
                 text = ""
-            if text and not text.endswith("\n"):  # a start that died in the middle of a line
-                self._append("\n")
         except OSError as error:
             raise OutputError(path, error.strerror or str(error)) from None
+        if text and not text.endswith("\n"):  # a start that died in the middle of a line
+            self._append("\n")
         for line in text.splitlines():
             try:
                 entry = json.loads(line)
@@ -278,22 +279,21 @@ class Record:
             OutputError: the file cannot be written.
         """
         self.found[key] = measurement
-        if self.path is None:
-            return
         entry = {"study": self.identity, "setting": key, "measurement": measurement.to_json()}
-        try:
-            self._append(json.dumps(entry) + "\n")
-        except OSError as error:
-            raise OutputError(self.path, error.strerror or str(error)) from None
+        self._append(json.dumps(entry) + "\n")
 
     def _append(self, text: str) -> None:
-        assert self.path is not None
-        descriptor = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW, 0o666)
+        if self.path is None:
+            return
         try:
-            os.write(descriptor, text.encode())
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+            descriptor = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW, 0o666)
+            try:
+                os.write(descriptor, text.encode())
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
+        except OSError as error:
+            raise OutputError(self.path, error.strerror or str(error)) from None
 
 
 # --- memory ----------------------------------------------------------------------------------------------------------
@@ -312,16 +312,6 @@ def restart_memory() -> float:
     with suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5", encoding="ascii")  # proc(5): sets VmHWM back
     return bytes_of("VmRSS") or 0.0
-
-
-def most_memory() -> float:
-    """Return the most memory of this process since the mark was set back, bytes."""
-    return bytes_of("VmHWM") or 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-
-
-def free_memory() -> float:
-    """Return the memory (bytes) that can be had without swapping; infinite where the system does not say."""
-    return bytes_of("MemAvailable", "/proc/meminfo") or float("inf")
 
 
 def bytes_of(name: str, file: str = "/proc/self/status") -> float | None:

@@ -77,21 +77,19 @@ class Reference:
         return sum(self.parts.values())
 
 
-def judged(row: Row) -> float | None:
-    """Return the error a setting is judged by: with that of its model; None where it is not known."""
-    value = row["total_error"] if row["status"] == "done" else None
-    return value if value is not None and math.isfinite(value) else None
+def judged(row: Row) -> float:
+    """Return the error a setting is judged by: with that of its model; infinite where it is not known."""
+    known = row["status"] == "done" and row["total_error"] is not None and math.isfinite(row["total_error"])
+    return float(row["total_error"]) if known else math.inf
 
 
 def pareto(rows: Sequence[Row]) -> list[Row]:
     """Return the rows for which no other one costs as little and is as exact, and is better in one; cheapest first."""
-    best, front = math.inf, []
-    candidates = (r for r in rows if r["candidate"] and judged(r) is not None)
+    front: list[Row] = []
+    candidates = (r for r in rows if r["candidate"] and judged(r) < math.inf)
     for row in sorted(candidates, key=lambda r: (r["cost"], judged(r))):
-        error = judged(row)
-        if error is not None and error < best:
+        if not front or judged(row) < judged(front[-1]):
             front.append(row)
-            best = error
     return front
 
 
@@ -103,7 +101,7 @@ def recommend(rows: Sequence[Row], accuracy: float, uncertainty: float = 0.0) ->
 def bound(row: Row, uncertainty: float) -> float:
     """Return the most that the error of a setting is; that of the reference itself is its uncertainty."""
     error = judged(row)
-    return math.inf if error is None else error if error == uncertainty else error + uncertainty
+    return error if error == uncertainty else error + uncertainty
 
 
 def setting_of(row: Row) -> Setting:
@@ -129,63 +127,25 @@ def step_name(row: Row) -> str:
 def promise(row: Row, uncertainty: float) -> dict[str, float]:
     """Return what a recommended setting promises: its error as measured, and its bound; times (s), memory (bytes)."""
     names = ("time", "cpu_time", "setup", "setup_cpu", "cost", "memory")
-    measured = {"error": judged(row) or 0.0, "bound": bound(row, uncertainty)}
+    measured = {"error": judged(row), "bound": bound(row, uncertainty)}
     return measured | {name: row[name] for name in names}
 
 
 def closest(rows: list[Row], uncertainty: float) -> dict[str, Any] | None:
     """Return `within`, the least accuracy that is known to be met, and the `row` that does; None where none is."""
-    within = min((bound(row, uncertainty) for row in pareto(rows)), default=math.inf)
-    if not math.isfinite(within):
-        return None
-    within = float(np.nextafter(within, math.inf)) if within == 0.0 else within
-    return {"within": within, "row": recommend(rows, within, uncertainty)}
+    within = min((bound(row, uncertainty) for row in pareto(rows)), default=math.inf) or math.ulp(0.0)
+    return {"within": within, "row": recommend(rows, within, uncertainty)} if within < math.inf else None
 
 
 def missing(rows: list[Row], uncertainty: float, refused: list[dict[str, Any]]) -> str:
     """Return what was reached, and what the budget left out."""
-    errors = _errors(rows)
-    known = errors and math.isfinite(uncertainty)
-    said = f"the best error is {min(errors):.1e}, known to {uncertainty:.0e}" if known else "nothing could be judged"
+    best = min((judged(row) for row in rows if row["candidate"]), default=math.inf)
+    known = max(best, uncertainty) < math.inf
+    said = f"the best error is {best:.1e}, known to {uncertainty:.0e}" if known else "nothing could be judged"
     if not refused:
         return said
     together = sum(entry["time"] or 0.0 for entry in refused)
     return f"{said}; {len(refused)} settings were left out, of about {together:.2g} s: {refused[0]['why']}"
-
-
-def _errors(rows: list[Row]) -> list[float]:
-    """Return the errors of all settings that may be recommended, as far as they are known."""
-    return [error for error in (judged(row) for row in rows if row["candidate"]) if error is not None]
-
-
-def cost_report(result: CostResult) -> list[str]:
-    """Return the lines `cost` prints: the table (its Pareto front, if it is long), model errors, the recommendation."""
-    summary = result.summary
-    lines = [
-        f"{summary['name']}: error of {summary['output']}, {summary['settings']} settings ({summary['failed']} failed, "
-        f"{summary['resumed']} results from before) in {summary['timings']['total']:.1f} s",
-        *(line for table in result.tables() for line in table.lines()),
-        "* no other setting is both cheaper and more accurate"
-        + ("" if len(result.rows) <= LONGEST_TABLE else "; all settings are in cost.csv"),
-    ]
-    for theory, error in summary["model_errors"].items():
-        known = summary["references"][theory]["uncertainty"]
-        lines.append(f"{theory} theory: error {percent(error)}, known to {percent(known)}")
-    lines += [f"{theory} theory: failed, {reason}" for theory, reason in summary["reference_failures"].items()]
-    if summary["budget"]["refused"]:
-        lines.append(f"{len(summary['budget']['refused'])} settings were left out for want of time or memory")
-    row, wanted = summary["recommended"], f"{summary['accuracy']:g}"
-    if row is not None:
-        lines.append(
-            f"for a relative accuracy of {wanted}: {setting_of(row).words()}; error {percent(judged(row))}, known to "
-            f"{percent(summary['uncertainty'])}, {row['cost']:.3g} s of CPU time"
-        )
-    else:
-        lines.append(f"no setting is known to be within {wanted} (relative): {summary['missing']}")
-        if (near := summary["closest"]) is not None:
-            words, cost = setting_of(near["row"]).words(), near["row"]["cost"]
-            lines.append(f"within {percent(near['within'])}: {words}, {cost:.3g} s of CPU time")
-    return lines
 
 
 # --- the result ------------------------------------------------------------------------------------------------------
@@ -212,9 +172,8 @@ class CostPoint:
     @classmethod
     def of(cls, row: Row) -> CostPoint | None:
         """Return the point of a row; None if its setting failed or there is nothing to judge it by."""
-        if (error := judged(row)) is None:
-            return None
-        return cls(setting_of(row), float(row["time"]), float(row["cost"]), error, bool(row["pareto"]))
+        error = judged(row)
+        return cls(setting_of(row), row["time"], row["cost"], error, row["pareto"]) if error < math.inf else None
 
     def __str__(self) -> str:
         return f"{self.setting.words()}: error {self.error:.1e}, {self.cost:.3g} s of CPU time"
@@ -285,13 +244,34 @@ class CostResult(Result):
         remark = (
             f"# {self.scene.name}, tuned to a relative accuracy of {wanted:g} of {self.summary['output']}: "
             f"{setting_of(row).words()}.\n# Measured: error {judged(row):.1e}, known to "
-            f"{self.summary['uncertainty']:.0e}; {row['cost']:.3g} s of CPU time with set-up.\n\n"
+            f"{self.summary['uncertainty']:.0e}; {_cost(row)} with set-up.\n\n"
         )
         return write_tuned(self.scene, setting_of(row), Path(path), remark)
 
     def report(self) -> list[str]:
-        """Return the lines that the command prints."""
-        return cost_report(self)
+        """Return the lines `cost` prints: the table (its Pareto front, if long), model errors, the recommendation."""
+        summary, wanted = self.summary, f"{self.summary['accuracy']:g}"
+        lines = [
+            f"{summary['name']}: error of {summary['output']}, {summary['settings']} settings ({summary['failed']} "
+            f"failed, {summary['resumed']} results from before) in {summary['timings']['total']:.1f} s",
+            *(line for table in self.tables() for line in table.lines()),
+            "* no other setting is both cheaper and more accurate"
+            + ("" if len(self.rows) <= LONGEST_TABLE else "; all settings are in cost.csv"),
+        ]
+        for theory, error in summary["model_errors"].items():
+            known = summary["references"][theory]["uncertainty"]
+            lines.append(f"{theory} theory: error {percent(error)}, known to {percent(known)}")
+        lines += [f"{theory} theory: failed, {reason}" for theory, reason in summary["reference_failures"].items()]
+        if refused := summary["budget"]["refused"]:
+            lines.append(f"{len(refused)} settings were left out for want of time or memory")
+        if (row := summary["recommended"]) is not None:
+            errors = f"error {percent(judged(row))}, known to {percent(summary['uncertainty'])}"
+            return [*lines, f"for a relative accuracy of {wanted}: {setting_of(row).words()}; {errors}, {_cost(row)}"]
+        lines.append(f"no setting is known to be within {wanted} (relative): {summary['missing']}")
+        if (near := summary["closest"]) is not None:
+            row = near["row"]
+            lines.append(f"within {percent(near['within'])}: {setting_of(row).words()}, {_cost(row)}")
+        return lines
 
     def tables(self) -> list[ShortTable]:
         """Return one row a setting, cheapest first; of many settings those of the Pareto front."""
@@ -327,6 +307,10 @@ class CostResult(Result):
         over: dict[str, Variable] = {name: (("setting",), column_of_rows(rows, name)) for name in rows[0]}
         coordinates: dict[str, Variable] = {"setting": (("setting",), np.arange(len(rows)))}
         return dataset(over, coordinates, self._attributes())
+
+
+def _cost(row: Row) -> str:
+    return f"{row['cost']:.3g} s of CPU time"
 
 
 def _cells(row: Row) -> tuple[str, ...]:
@@ -378,25 +362,21 @@ def cost_figure(result: CostResult) -> Figure:
     axis, known = figure.add_subplot(), summary["uncertainty"]
     kinds = list(dict.fromkeys(str(row["scheme"] or f"degree {row['degree']}") for row in result.rows))
     for i, theory in enumerate(dict.fromkeys(row["theory"] for row in result.rows)):
-        colour = f"C{i}"
+        colour, own = f"C{i}", [row for row in result.rows if row["theory"] == theory]
         for kind, marker in zip(kinds, MARKERS, strict=False):
-            mine = [r for r in result.rows if r["theory"] == theory and kind in (r["scheme"], f"degree {r['degree']}")]
-            done = [r for r in mine if judged(r) is not None]
+            done = [r for r in own if kind in (r["scheme"], f"degree {r['degree']}") and judged(r) < math.inf]
             style: dict[str, Any] = {"marker": marker, "color": colour, "ls": "none"}
             costs = [r["cost"] for r in done]
             axis.plot(costs, [r["error"] or math.nan for r in done], mfc="none", ms=5, alpha=0.35, **style)
             axis.plot(costs, [judged(r) or math.nan for r in done], ms=6, label=f"{theory}, {kind}", **style)
         if error := summary["model_errors"].get(theory):
             axis.axhline(error, color=colour, ls="--", lw=1.0, label=f"error of {theory}")
-        failed = [
-            r["cost"] for r in result.rows if r["theory"] == theory and r["status"] == "failed" and r["cost"] > 0.0
-        ]
-        if failed:
+        if failed := [r["cost"] for r in own if r["status"] == "failed" and r["cost"] > 0.0]:
             top, label = axis.get_xaxis_transform(), f"{theory}, failed at that time"
             axis.plot(failed, [0.98] * len(failed), "x", color=colour, transform=top, clip_on=False, label=label)
     axis.set(xscale="log", yscale="log", xlabel="CPU time of one run with its set-up, median (s)")
     front = sorted((row for row in result.rows if row["pareto"]), key=lambda row: float(row["cost"]))
-    errors = [max(judged(r) or 0.0, 1e-16) for r in front]
+    errors = [max(judged(r), 1e-16) for r in front]
     axis.plot([r["cost"] for r in front], errors, "k-", lw=1.2, drawstyle="steps-post", zorder=0, label="Pareto front")
     for row, error in zip(front, errors, strict=True):
         name = f"{mesh_name(row)} P{row['degree']}" + ("" if row["scheme"] is None else f", {step_name(row)}")
@@ -404,7 +384,7 @@ def cost_figure(result: CostResult) -> Figure:
     if (chosen := summary["recommended"]) is not None:
         circle: dict[str, Any] = {"ms": 14, "mfc": "none", "mec": "black", "mew": 1.2, "ls": "none", "marker": "o"}
         label = f"recommended for {summary['accuracy']:g}"
-        axis.plot(chosen["cost"], max(judged(chosen) or 0.0, 1e-16), label=label, **circle)
+        axis.plot(chosen["cost"], max(judged(chosen), 1e-16), label=label, **circle)
     if known:
         axis.axhspan(0.0, known, color="0.85", zorder=-1, label=f"uncertainty {known:.0e}")
     axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

@@ -15,6 +15,7 @@ theory, mesh and steps add up, and each is no larger than the least error of a s
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import inf, isfinite, log, nan
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ import numpy as np
 from mpi4py import MPI
 
 from rotfem import registry
-from rotfem.commands.cost.bench import Array, Bench, Measurement, Record, fingerprint, free_memory
+from rotfem.commands.cost.bench import Array, Bench, Measurement, Record, bytes_of, fingerprint
 from rotfem.commands.cost.result import (
     DECADES,
     CostResult,
@@ -135,8 +136,9 @@ def cost(
     seconds = DEFAULT[quick] if budget is None else seconds_of(budget, scene.file)
     check_choice(scene, chosen)
     check_degrees(scene, degrees or (), comm)
-    path = None if folder is None else Path(folder) / RECORD
-    study = Study(scene, output, chosen, repeat, (seconds, path, resume), comm)
+    path = None if folder is None or comm.rank > 0 else Path(folder) / RECORD
+    record = Record(path, fingerprint(scene, output, comm.size), fresh=not resume)
+    study = Study(scene, output, chosen, repeat, Clock(seconds, comm, key="the budget"), record)
     return study.run(quick, accuracy, progress or (lambda share: None))
 
 
@@ -189,8 +191,8 @@ class Study:
         output: one of OUTPUTS.
         chosen: lists that replace those of the grid.
         repeat: repetitions of every setting that may be recommended.
-        limits: CPU time of all, s; where the record is kept, or None; whether to go on with the one that is there.
-        comm: MPI communicator.
+        clock: CPU time of all.
+        record: what is measured already, of rank 0; keeps what follows.
 
     Attributes:
         measured: key of a setting ↦ the setting and what was measured of it.
@@ -201,22 +203,11 @@ class Study:
         new: keys of those that were not taken from the record.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        output: str,
-        chosen: Chosen,
-        repeat: int,
-        limits: tuple[float, Path | None, bool],
-        comm: MPI.Comm,
-    ):
-        seconds, path, resume = limits
-        self.scene, self.output, self.chosen, self.repeat, self.comm = scene, output, chosen, repeat, comm
-        self.clock = Clock(seconds, comm, key="the budget")
-        identity = fingerprint(scene, output, comm.size)
-        self.record = Record(path if comm.rank == 0 else None, identity, fresh=not resume)
-        self.record.found = comm.bcast(self.record.found)
-        self.bench = Bench(scene.replace({"output.error": False}), output, comm)
+    def __init__(self, scene: Scene, output: str, chosen: Chosen, repeat: int, clock: Clock, record: Record):
+        self.scene, self.output, self.chosen, self.repeat = scene, output, chosen, repeat
+        self.clock, self.record, self.comm = clock, record, clock.comm
+        record.found = self.comm.bcast(record.found)
+        self.bench = Bench(scene.replace({"output.error": False}), output, self.comm)
         self.own = own_setting(scene, output)
         self.measured: dict[str, tuple[Setting, Measurement]] = {}
         self.references: dict[str, Reference] = {}
@@ -326,24 +317,22 @@ class Study:
 
     def _refine(self, theory: str, quick: bool, accuracy: float) -> None:
         """Make the reference of a theory by refinement."""
-        own, found, goal = self.own, Refinement[Array](), AIM * accuracy
-        elements, degree = own.elements, own.degree
-        if elements is None:
-            degree = min(degree + 1, HIGHEST)
+        first, found = with_theory(self.own, theory), Refinement[Array]()
+        if first.elements is None:
+            first = replace(first, degree=min(first.degree + 1, HIGHEST))
         else:
-            elements = grown(grown(elements, min(MESHES[quick])), 2.0)
-        first = Setting(({"theory": theory},), elements, degree)
-        if own.moving:
-            first = Setting(first.models, elements, degree, ADAPTIVE, max(accuracy, COARSE))
+            first = replace(first, elements=grown(grown(first.elements, min(MESHES[quick])), 2.0))
+        if first.moving:
+            first = replace(first, scheme=ADAPTIVE, tolerance=max(accuracy, COARSE), step=None)
         try:
             self.bench.compiled(first)  # so that the first answer shows what the next ones take
-            refine(first, self._paired, goal, self.clock, found)
+            refine(first, self._paired, AIM * accuracy, self.clock, found)
         except (ComputationError, InputError) as error:
             self.failures[theory] = str(error)
         if isinstance(found.failure, TooDear):
             self.refused["reference"] = {"setting": {}, "why": found.failure.what, "time": None, "memory": None}
         if found.best is not None and is_known(found.best.error):
-            parts = {name: float(x) for name, x in found.best.error.items() if name in ("time", "space")}
+            parts = {name: float(found.best.error[name]) for name in ("time", "space") if name in found.best.error}
             self.references[theory] = Reference(found.best.result, parts, found.best.setting)
         elif found.best is not None:
             self.failures[theory] = "its error is unknown"
@@ -382,9 +371,9 @@ class Study:
 
     def _own_step(self) -> float | None:
         """Return the scene's fixed step (s), or the mean of its adaptive ones; None where there is none."""
-        time = self.scene.time if self.own.moving else None
-        if time is None or time.step is not None:
-            return None if time is None else time.step
+        time = self.scene.time
+        if time is None or self.own.tolerance is None:
+            return self.own.step
         found = self.get(self.own, "grid")
         return None if found is None or found.values is None else time.end / found.steps
 
@@ -416,7 +405,7 @@ class Study:
         """Time the recommended setting and the front as often as was asked for."""
         rows = self.rows()
         best = recommend(rows, accuracy, self.uncertainty)
-        for row in [*([best] if best is not None else []), *(row for row in rows if row["pareto"])]:
+        for row in sorted((row for row in rows if row["pareto"]), key=lambda row: row is not best):
             self.get(setting_of(row), row["purpose"], self.repeat)
 
     @property
@@ -431,11 +420,12 @@ class Study:
 
         Args:
             setting: what is measured.
-            purpose: what for: grid or reference.
+            purpose: "grid" or "reference".
             repeat: how often it is to be computed, in all.
         """
         key = setting.key()
-        self.of_grid |= {key} if purpose == "grid" else set()
+        if purpose == "grid":
+            self.of_grid.add(key)
         found = self.record.found.get(key)
         if found is None or (found.status == "done" and len(found.wall) < repeat):
             if not self._allows(setting):
@@ -448,23 +438,17 @@ class Study:
         return found
 
     def _allows(self, setting: Setting) -> bool:
-        """Return whether a setting may be computed, and note what is refused.
-
-        Besides a reference it may take half of the time left, so that there is as much for what follows from it; and
-        the free memory.
-        """
-        known, free = self.predicted(setting), self.comm.bcast(free_memory())
-        time, memory, why = known["time"], known["memory"], ""
-        if memory is not None and memory > free:
-            why = f"would need about {memory / 1e9:.2g} GB, {free / 1e9:.2g} GB are free"
-        else:
-            try:
-                self.clock.begin(setting.words(), len(self.measured) + 1, (time or 0.0) / (AIM if self.truth else 1.0))
-            except TooDear as error:
-                why = error.what
-        if why:
-            self.refused.setdefault(setting.key(), {"setting": setting.summary(), "why": why, **known})
-        return not why
+        """Return whether a setting may be computed, in half of the time left besides a reference; note a refusal."""
+        known, free = self.predicted(setting), self.comm.bcast(bytes_of("MemAvailable", "/proc/meminfo") or inf)
+        time, memory = known["time"] or 0.0, known["memory"] or 0.0
+        try:
+            if memory > free:
+                raise TooDear(f"would need about {memory / 1e9:.2g} GB, {free / 1e9:.2g} GB are free")
+            self.clock.begin(setting.words(), len(self.measured) + 1, time / (AIM if self.truth else 1.0))
+        except TooDear as error:
+            self.refused.setdefault(setting.key(), {"setting": setting.summary(), "why": error.what, **known})
+            return False
+        return True
 
     def predicted(self, setting: Setting) -> dict[str, float | None]:
         """Return `time` (s, CPU, with set-up) and `memory` (bytes) that a setting takes, by the most similar one.
