@@ -93,7 +93,7 @@ def simulate(
     def compute(setting: Setting | None = None) -> RunResult:
         variant = scene if setting is None else scene.replace(changes_of(scene, setting))
         problem = Problem.of(variant, terms=terms, outputs=outputs)
-        simulation = Simulation(variant, problem, comm, store, setting, clock)
+        simulation = Simulation(variant, problem, store, setting, clock)
         if scene.accuracy is None:
             simulation.advise(hint)
         elif setting is not None and setting.reduced:

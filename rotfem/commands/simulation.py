@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from mpi4py import MPI
 
 from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.dense_output import RowTimes
@@ -57,8 +56,7 @@ class Simulation:
     Args:
         scene: the scene as it was asked for.
         problem: its problem, with the model it is run with.
-        comm: MPI communicator.
-        store: what is kept of it on disk while it goes on.
+        store: what is kept of it on disk while it goes on, and the processes that run it.
         setting: of the refinement that it is an answer of, if it is.
         clock: called with the number of steps and the part of the history that is done.
     """
@@ -67,23 +65,24 @@ class Simulation:
         self,
         scene: Scene,
         problem: Problem,
-        comm: MPI.Comm = MPI.COMM_WORLD,
-        store: RunStore | None = None,
+        store: RunStore,
         setting: Setting | None = None,
         clock: Callable[[int, float], None] | None = None,
     ):
         self.scene, self.setting, self.clock = scene, setting, clock
-        self.comm, self.store, self.log = comm, store or RunStore(comm), Log()
+        self.comm, self.store, self.log = store.comm, store, Log()
         if scene.time is None and problem.frame == "inertial":
             problem = problem.replace(frame="rotating")
             self.log.warnings.append("a steady state is one only in the rotating frame, where it was computed")
         check_rotating(problem, "a run")
-        self.problem = problem = of_active_unknowns(scene, problem)
-        self.system: Any = compile_system(problem, communicator(problem, comm), moving=scene.time is not None)
+        by_basis = scene.time is not None and bool(scene.model.reduced)
+        if scene.time is not None and not (by_basis or scene.model.all_unknowns or scene.initial.first is not None):
+            problem = problem.replace(inactive=inactive_unknowns(problem))
+        self.problem, there = problem, communicator(problem, self.comm)
+        self.system: Any = compile_system(problem, there, moving=scene.time is not None)
         self.system.compile_readings()
         self.compiled = perf_counter() - self.log.started
         self.record = Recorder(self.system, scene.output)
-        by_basis = scene.time is not None and bool(scene.model.reduced)
         critical = None if by_basis else critical_speed(self.system)
         self.monitor = Monitor(self.system, critical)
         self.iteration = Newton.of(scene.solver)
@@ -331,11 +330,3 @@ class Simulation:
             why = "structure, loads and spin are symmetric, so that nothing moves them"
             out["left_out"] = {"unknowns": list(self.problem.inactive), "why": why}
         return out
-
-
-def of_active_unknowns(scene: Scene, problem: Problem) -> Problem:
-    """Return the problem of a history without the unknowns that symmetry keeps at zero."""
-    model = scene.model
-    if scene.time is None or model.all_unknowns or model.reduced or scene.initial.first is not None:
-        return problem
-    return problem.replace(inactive=inactive_unknowns(problem))

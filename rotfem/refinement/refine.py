@@ -185,8 +185,7 @@ class Setting:
 
 def contribution(error: Mapping[str, Any], name: str) -> float:
     """Return a contribution to an error; 0 of one that is unknown or not there."""
-    value = error.get(name)
-    return 0.0 if value is None else float(value)
+    return float(error.get(name) or 0.0)
 
 
 def is_known(error: Mapping[str, Any]) -> bool:
@@ -250,12 +249,7 @@ class Clock:
         return float(self.comm.bcast(cpu_time() - self._started))
 
     def begin(self, words: str, number: int, predicted: float | None) -> None:
-        """Take note that an answer begins.
-
-        Args:
-            words: its setting.
-            number: of it, from 1.
-            predicted: time that it will take, s; None where nothing is known.
+        """Take note that answer `number` begins, of a setting in words, in a predicted time (s; None: not known).
 
         Raises:
             TooDear: that is more than what is left.

@@ -26,6 +26,7 @@ from rotfem.commands.cost.settings import sweep_speeds
 from rotfem.commands.interrupts import held_back
 from rotfem.commands.modes import analysis_of
 from rotfem.commands.problem import Problem
+from rotfem.commands.run_store import RunStore
 from rotfem.commands.simulation import Simulation
 from rotfem.errors import ComputationError, InputError, OutputError, input_of
 from rotfem.refinement.distance import COLUMNS
@@ -179,7 +180,7 @@ class Bench:
         problem = Problem.of(variant)
         if variant.time is None:
             check_steady(problem)
-        simulation = Simulation(variant, problem, self.comm, clock=clock)
+        simulation = Simulation(variant, problem, RunStore(self.comm), clock=clock)
 
         def go() -> Output:
             result = simulation.run()

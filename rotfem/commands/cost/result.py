@@ -124,28 +124,38 @@ def step_name(row: Row) -> str:
     return f"{row['step']:.3g}" if row["step"] is not None else f"tol {row['tolerance']:.2g}"
 
 
-def promise(row: Row, uncertainty: float) -> dict[str, float]:
-    """Return what a recommended setting promises: its error as measured, and its bound; times (s), memory (bytes)."""
-    names = ("time", "cpu_time", "setup", "setup_cpu", "cost", "memory")
-    measured = {"error": judged(row), "bound": bound(row, uncertainty)}
-    return measured | {name: row[name] for name in names}
+def recommendations(
+    rows: list[Row], accuracy: float, uncertainty: float, refused: Sequence[Mapping[str, Any]]
+) -> dict[str, Any]:
+    """Return what a summary says of the settings to take.
 
-
-def closest(rows: list[Row], uncertainty: float) -> dict[str, Any] | None:
-    """Return `within`, the least accuracy that is known to be met, and the `row` that does; None where none is."""
-    within = min((bound(row, uncertainty) for row in pareto(rows)), default=math.inf) or math.ulp(0.0)
-    return {"within": within, "row": recommend(rows, within, uncertainty)} if within < math.inf else None
-
-
-def missing(rows: list[Row], uncertainty: float, refused: list[dict[str, Any]]) -> str:
-    """Return what was reached, and what the budget left out."""
-    best = min((judged(row) for row in rows if row["candidate"]), default=math.inf)
-    known = max(best, uncertainty) < math.inf
-    said = f"the best error is {best:.1e}, known to {uncertainty:.0e}" if known else "nothing could be judged"
-    if not refused:
-        return said
-    together = sum(entry["time"] or 0.0 for entry in refused)
-    return f"{said}; {len(refused)} settings were left out, of about {together:.2g} s: {refused[0]['why']}"
+    `recommended` is the row for the accuracy, `promise` its error as measured, the bound of it, times (s) and memory
+    (bytes). Where there is none, `closest` is the least accuracy that is known to be met, with its row, and `missing`
+    says what was reached and what the budget left out. `recommendations` are those for DECADES, too.
+    """
+    best = {a: recommend(rows, a, uncertainty) for a in sorted({*DECADES, accuracy}, reverse=True)}
+    row, promise, closest, missing = best[accuracy], None, None, ""
+    if row is not None:
+        names = ("time", "cpu_time", "setup", "setup_cpu", "cost", "memory")
+        promise = {"error": judged(row), "bound": bound(row, uncertainty), **{name: row[name] for name in names}}
+    else:
+        within = min((bound(row, uncertainty) for row in pareto(rows)), default=math.inf) or math.ulp(0.0)
+        if within < math.inf:
+            closest = {"within": within, "row": recommend(rows, within, uncertainty)}
+        least = min((judged(row) for row in rows if row["candidate"]), default=math.inf)
+        known = max(least, uncertainty) < math.inf
+        missing = f"the best error is {least:.1e}, known to {uncertainty:.0e}" if known else "nothing could be judged"
+        if refused:
+            together = sum(entry["time"] or 0.0 for entry in refused)
+            missing += f"; {len(refused)} settings were left out, of about {together:.2g} s: {refused[0]['why']}"
+    listed = [{"accuracy": a, "setting": r and setting_of(r).words(), "row": r} for a, r in best.items()]
+    return {
+        "recommended": row,
+        "promise": promise,
+        "closest": closest,
+        "missing": missing,
+        "recommendations": listed,
+    }
 
 
 # --- the result ------------------------------------------------------------------------------------------------------

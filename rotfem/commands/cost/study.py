@@ -25,18 +25,7 @@ from mpi4py import MPI
 
 from rotfem import registry
 from rotfem.commands.cost.bench import Array, Bench, Measurement, Record, bytes_of, fingerprint
-from rotfem.commands.cost.result import (
-    DECADES,
-    CostResult,
-    Reference,
-    Row,
-    closest,
-    missing,
-    pareto,
-    promise,
-    recommend,
-    setting_of,
-)
+from rotfem.commands.cost.result import CostResult, Reference, Row, pareto, recommend, recommendations, setting_of
 from rotfem.commands.cost.settings import (
     MESHES,
     OUTPUTS,
@@ -309,10 +298,8 @@ class Study:
             if found is None or found.values is None:
                 self.failures[theory] = "the budget is too small for it" if found is None else found.reason
             else:
-                product = self.apart(truth.values, found.values) * truth.uncertainty
-                self.references[theory] = Reference(
-                    found.values, {**truth.parts, "theory": product}, with_theory(truth.setting, theory)
-                )
+                parts = truth.parts | {"theory": self.apart(truth.values, found.values) * truth.uncertainty}
+                self.references[theory] = Reference(found.values, parts, with_theory(truth.setting, theory))
         self.clock.budget = whole
 
     def _refine(self, theory: str, quick: bool, accuracy: float) -> None:
@@ -484,9 +471,7 @@ class Study:
     def _summary(self, rows: list[Row], accuracy: float, quick: bool) -> dict[str, Any]:
         """Return the summary of the study."""
         references, uncertainty, truth = self.references, self.uncertainty, self.truth
-        best = {a: recommend(rows, a, uncertainty) for a in sorted({*DECADES, accuracy}, reverse=True)}
-        chosen, refused, clock = best[accuracy], list(self.refused.values()), self.clock.summary()
-        used, compiling, warnings = self.clock.used(), self.bench.compiling, []
+        refused, used, compiling, warnings = list(self.refused.values()), self.clock.used(), self.bench.compiling, []
         if richest().name not in references:
             reason = self.failures.get(richest().name, "")
             warnings.append(f"no reference of {richest().name} ({reason}): errors do not include that of the model")
@@ -507,18 +492,12 @@ class Study:
             },
             "reference_failures": self.failures,
             "model_errors": {t: self.apart(truth.values, r.values) for t, r in references.items() if truth is not None},
-            "recommended": chosen,
-            "promise": None if chosen is None else promise(chosen, uncertainty),
-            "closest": closest(rows, uncertainty) if chosen is None else None,
-            "missing": missing(rows, uncertainty, refused) if chosen is None else "",
-            "recommendations": [
-                {"accuracy": a, "setting": r and setting_of(r).words(), "row": r} for a, r in best.items()
-            ],
+            **recommendations(rows, accuracy, uncertainty, refused),
             "settings": len(rows),
             "failed": sum(row["status"] == "failed" for row in rows),
             "measured": len(self.new),
             "resumed": len(rows) - len(self.new),
-            "budget": {"seconds": clock["seconds"], "used": used, "refused": refused},
+            "budget": {"seconds": self.clock.budget, "used": used, "refused": refused},
             "timings": {"compile": compiling, "other": used - compiling, "total": used},
             "warnings": warnings,
             "versions": versions(),
