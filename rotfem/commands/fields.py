@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.commands.check import columns_of
-from rotfem.errors import OutputError
+from rotfem.results.files import writing
 from rotfem.results.modes import ModesResult
 from rotfem.results.run import StationHistory
 from rotfem.results.surfaces import HALF_WIDTH, Surface
@@ -22,9 +22,6 @@ Array = npt.NDArray[np.float64]
 #: Names, and values (nodes, names) at times.
 Named = tuple[tuple[str, ...], list[tuple[float, Array]]]
 Writer = Callable[[Path], list[Path]]
-
-#: Nodes of a cell ↦ what XDMF calls it.
-CELLS = {2: "Polyline", 3: "Triangle"}
 
 
 def fields_writer(
@@ -51,7 +48,12 @@ def fields_writer(
 def _write(system: Any, states: list[tuple[float, Array]], path: Path, more: Named | None) -> list[Path]:
     """Gather the displacements, and write them on rank 0."""
     structure = system.structure
-    frames = [(t, {"displacement": displacement(system, t, q)}) for t, q in states]
+
+    def displacement(t: float, q: Array) -> Array:  # in the turning frame
+        coordinates, values = structure.nodes(q[: len(system.held.zeros())])
+        return moved(structure, system.held.seen_from_hub(values, coordinates["x"], t))
+
+    frames = [(t, {"displacement": displacement(t, q)}) for t, q in states]
     if more is not None:
         names, further = more
         for (_, fields), (_, values) in zip(frames, further, strict=True):
@@ -60,13 +62,6 @@ def _write(system: Any, states: list[tuple[float, Array]], path: Path, more: Nam
     surface = structure.surface()
     cells = chain(len(points)) if surface is None else surface
     return write_xdmf(path, points, cells, frames) if system.comm.rank == 0 else []
-
-
-def displacement(system: Any, t: float, q: Array) -> Array:
-    """Return the displacements (n, 3) in m of all nodes in the turning frame, on every rank."""
-    structure = system.structure
-    coordinates, values = structure.nodes(q[: len(system.held.zeros())])
-    return moved(structure, system.held.seen_from_hub(values, coordinates["x"], t))
 
 
 def moved(structure: Any, values: Array) -> Array:
@@ -149,38 +144,32 @@ def write_xdmf(
 ) -> list[Path]:
     """Write point data over time as path (.xdmf) and, beside it, .h5; return both paths.
 
-    Args:
-        path: of the file, ending in .xdmf.
-        points: positions (n, 3), m.
-        cells: numbers of the points of lines or triangles, (m, 2 or 3).
-        frames: (time in s, name ↦ values (n,) or (n, 3)), the same names at all times.
+    Points (n, 3) are in m; cells, lines or triangles, have the numbers of theirs, (m, 2 or 3); frames are times (s)
+    with values (n,) or (n, 3) by name, the same names at all times.
 
     Raises:
         OutputError: one cannot be written.
     """
-    heavy = path.with_suffix(".h5")
+    heavy, per_cell = path.with_suffix(".h5"), cells.shape[1]
     root = ET.Element("Xdmf", Version="3.0")
     series = ET.SubElement(ET.SubElement(root, "Domain"), "Grid", Name=path.stem, GridType="Collection")
     series.set("CollectionType", "Temporal")
-    try:
-        with h5py.File(heavy, "w") as file:
-            file["points"], file["cells"] = points, cells
-            for number, (t, fields) in enumerate(frames):
-                grid = ET.SubElement(series, "Grid", Name=path.stem, GridType="Uniform")
-                ET.SubElement(grid, "Time", Value=repr(float(t)))
-                kind = {"TopologyType": CELLS[cells.shape[1]], "NodesPerElement": str(cells.shape[1])}
-                topology = ET.SubElement(grid, "Topology", kind, NumberOfElements=str(len(cells)))
-                _refer(topology, heavy.name, "cells", cells)
-                _refer(ET.SubElement(grid, "Geometry", GeometryType="XYZ"), heavy.name, "points", points)
-                for name, values in fields.items():
-                    file[f"{name}/{number}"] = values
-                    what = "Vector" if values.ndim > 1 else "Scalar"
-                    attribute = ET.SubElement(grid, "Attribute", Name=name, AttributeType=what, Center="Node")
-                    _refer(attribute, heavy.name, f"{name}/{number}", values)
+    with writing(path), h5py.File(heavy, "w") as file:
+        file["points"], file["cells"] = points, cells
+        for number, (t, fields) in enumerate(frames):
+            grid = ET.SubElement(series, "Grid", Name=path.stem, GridType="Uniform")
+            ET.SubElement(grid, "Time", Value=repr(float(t)))
+            kind = {"TopologyType": "Polyline" if per_cell == 2 else "Triangle", "NodesPerElement": str(per_cell)}
+            topology = ET.SubElement(grid, "Topology", kind, NumberOfElements=str(len(cells)))
+            _refer(topology, heavy.name, "cells", cells)
+            _refer(ET.SubElement(grid, "Geometry", GeometryType="XYZ"), heavy.name, "points", points)
+            for name, values in fields.items():
+                file[f"{name}/{number}"] = values
+                what = "Vector" if values.ndim > 1 else "Scalar"
+                attribute = ET.SubElement(grid, "Attribute", Name=name, AttributeType=what, Center="Node")
+                _refer(attribute, heavy.name, f"{name}/{number}", values)
         ET.indent(root)
         ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
-    except OSError as error:
-        raise OutputError(path, str(error).splitlines()[0]) from None
     return [path, heavy]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.errors import OutputError, SceneError
+from rotfem.results.files import writing
 from rotfem.results.surfaces import Surface
 from rotfem.results.units import ShownUnits
 
@@ -37,21 +39,20 @@ def animate(result: ModesResult, mode: int, folder: Path) -> list[Path]:
         SceneError: there is no such mode.
         OutputError: PyVista is not installed, or a file cannot be written.
     """
-    shapes, surface = list(result.shapes.values()), result.surface
-    if surface is None or not 1 <= mode <= len(shapes):
-        raise SceneError("command line", "--animate", mode, f"must be a mode from 1 to {len(shapes)}")
+    surface, there = result.surface, len(result.shapes)
+    if surface is None or not 1 <= mode <= there:
+        raise SceneError("command line", "--animate", mode, f"must be a mode from 1 to {there}")
     try:
         import pyvista  # noqa: F401
         from PIL import Image
     except ImportError:
         raise OutputError(folder / f"mode_{mode}.gif", "PyVista is not installed (pip install rotfem[plots])") from None
-    row, units = result.rows[len(result.rows) - len(shapes) + mode - 1], ShownUnits.of(result.summary)
-    moving = Moving(surface, shapes[mode - 1])
+    (row, shape, frequency), units = result.with_shapes()[mode - 1], ShownUnits.of(result.summary)
+    moving = Moving(surface, shape)
     paths = [folder / f"mode_{mode}.png", folder / f"mode_{mode}.gif"]
-    frequency = f"{units.frequencies(row['frequency']):.5g} {units.frequency}"
     speed = f"{units.speeds(result.speed):.5g} {units.speed}"
     plotter = moving.plotter(f"mode {row['mode']}: {row['name']}, {frequency} at {speed}")
-    try:
+    with closing(plotter), writing(paths[1]):
         plotter.screenshot(str(paths[0]))
         frames = []
         for turn in np.linspace(0.0, 2 * np.pi, FRAMES, endpoint=False):
@@ -59,10 +60,6 @@ def animate(result: ModesResult, mode: int, folder: Path) -> list[Path]:
             plotter.render()
             frames.append(Image.fromarray(plotter.screenshot(return_img=True)).quantize(64))
         frames[0].save(paths[1], save_all=True, append_images=frames[1:], duration=1000 // RATE, loop=0)
-    except OSError as error:
-        raise OutputError(paths[1], error.strerror or str(error)) from None
-    finally:
-        plotter.close()
     return paths
 
 
@@ -104,11 +101,8 @@ class Moving:
         plotter.add_mesh(self.mesh, scalars=self._name, cmap="RdBu_r", clim=limits, scalar_bar_args=bar)
         plotter.add_text(title, font_size=11, position="upper_edge")
         plotter.add_axes(xlabel="1", ylabel="2", zlabel="3")
-        plotter.camera_position = [
-            np.add(self._rest.center, np.multiply(VIEW, self._size)),
-            self._rest.center,
-            (0, 0, 1),
-        ]
+        centre = np.array(self._rest.center)
+        plotter.camera_position = [centre + self._size * np.array(VIEW), centre, (0, 0, 1)]
         plotter.reset_camera(bounds=np.array(self._rest.bounds) + WARP * self._size * np.array([-1, 1] * 3))
         plotter.camera.zoom(1.8)
         return plotter

@@ -7,7 +7,8 @@ import io
 import json
 import os
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -25,25 +26,26 @@ PART = ".rotfem-"
 CHECKPOINT, CHECKPOINT_MAGIC = "checkpoint.h5", "rotfem-checkpoint"
 
 
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn an OSError into an OutputError that names the file or folder that is written."""
+    try:
+        yield
+    except OSError as error:
+        raise OutputError(path, error.strerror or str(error).partition("\n")[0]) from None
+
+
 def prepare_folder(folder: str | Path) -> Path:
     """Make the result folder and see that it can be written, before anything is computed."""
     path = Path(folder)
-    try:
+    with writing(path):
         path.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path):
-            pass
-    except OSError as error:
-        raise OutputError(path, error.strerror or str(error)) from None
+        tempfile.TemporaryFile(dir=path).close()
     return path
 
 
 def unwritable(path: Path, inputs: Iterable[Path] = ()) -> str:
-    """Return why a file cannot be written there; nothing where it can. Neither folder nor file is made or changed.
-
-    Args:
-        path: the file.
-        inputs: files that have been read.
-    """
+    """Return why a file cannot be written there, or is one of the inputs; nothing where it can. Nothing is changed."""
     if os.path.realpath(path) in map(os.path.realpath, inputs):
         return "is what has been read; must be another file"
     if path.is_dir():
@@ -125,7 +127,7 @@ def write_whole(path: Path, *content: bytes, durable: bool = False) -> Path:
     Raises:
         OutputError: it cannot be written; the one before is still there.
     """
-    try:
+    with writing(path):
         descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f"{PART}{path.name}-", suffix=".part")
         try:
             with os.fdopen(descriptor, "wb") as file:
@@ -145,8 +147,6 @@ def write_whole(path: Path, *content: bytes, durable: bool = False) -> Path:
                 os.fsync(folder)
             finally:
                 os.close(folder)
-    except OSError as error:
-        raise OutputError(path, error.strerror or str(error)) from None
     return path
 
 

@@ -185,6 +185,12 @@ class ModesResult(Result):
             raise KeyError(f"no number {name!r} of the modes; there are {', '.join(there)}")
         return np.array([row[name] for row in self.rows], dtype=np.float64)
 
+    def with_shapes(self) -> list[tuple[dict[str, Any], dict[str, Array], str]]:
+        """Return row, shape, and frequency in the unit shown of every mode but that of a rigid body, the first one."""
+        units, rows = ShownUnits.of(self.summary), self.rows[len(self.rows) - len(self.shapes) :]
+        said = [f"{units.frequencies(row['frequency']):.5g} {units.frequency}" for row in rows]
+        return list(zip(rows, self.shapes.values(), said, strict=True))
+
     def files(self) -> dict[str, str]:
         """Return modes.csv, mode_shapes.csv, modes.json, summary.json, and what else is wanted.
 
@@ -215,8 +221,7 @@ class ModesResult(Result):
         """Yield of every mode with a shape its number and names, real columns, and direction ↦ displacement, slope."""
         if self.triangles is not None:
             raise InputError("structure.type", "plate", "tables over the span are those of beams")
-        rows = self.rows[len(self.rows) - len(self.shapes) :]
-        for row, shape in zip(rows, self.shapes.values(), strict=True):
+        for row, shape, _ in self.with_shapes():
             columns = _real(shape)
             found = {name: pair for name in DIRECTIONS if (pair := _of(columns, name)) is not None}
             yield {name: row[name] for name in ("mode", "label", "frequency_hz")}, columns, found

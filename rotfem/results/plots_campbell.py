@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 from scipy.optimize import isotonic_regression
 
 from rotfem.results.columns import ZERO, label
-from rotfem.results.plots import GRID
+from rotfem.results.plots import dress
 from rotfem.results.units import ShownUnits
 
 if TYPE_CHECKING:
@@ -24,23 +24,11 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
-#: Room above the highest mode that is drawn, part of its frequency.
-ROOM = 0.06
-
 #: Height of a name at the end of a line, and width of one of a line kΩ, inch.
 NAME_HEIGHT, ORDER_WIDTH = 0.16, 0.42
 
 #: Width of the diagram, and height of the frequencies over the damping ratios, inch.
 WIDTH, HEIGHT, DAMPING_HEIGHT = 9.0, 4.8, 1.6
-
-#: Columns of the legend below.
-LEGEND_COLUMNS = 3
-
-#: How many times higher than the modes of interest call for a diagram may be.
-SQUASHED = 2.0
-
-#: Most modes above the diagram that are named there.
-NAMED = 4
 
 
 @dataclass(frozen=True)
@@ -72,12 +60,8 @@ class Branch:
 def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     """Return frequencies over speed, lines kΩ with their crossings, what is unstable, and damping where there is any.
 
-    It reaches up to the lowest mode that no line meets; higher ones that would squash it are named above it.
-
-    Args:
-        result: the branches.
-        fixed: whether modes of a rotor in the rotating frame are drawn as the fixed one sees them, with the line Ω and
-            the synchronous critical speeds.
+    It reaches up to the lowest mode that no line meets; higher ones that would squash it are named above it. With
+    `fixed` modes of a rotor are drawn as the fixed frame sees them, with the line Ω and synchronous critical speeds.
     """
     units, branches = ShownUnits.of(result.summary), drawn_branches(result, fixed)
     rise = float(units.frequencies(1.0) / units.speeds(1.0))  # of the line 1Ω
@@ -85,14 +69,16 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     first = min(0.0, *(float(b.speed[0]) for b in branches))
     last = max(0.0, *(float(b.speed[-1]) for b in branches))
     shown = branches if fixed or not orders else of_interest(branches, max(orders) * rise)
-    top = (1.0 + ROOM) * max(float(np.max(b.frequency)) for b in shown)
+    top = 1.06 * max(float(np.max(b.frequency)) for b in shown)
     damped = any(np.nanmax(np.abs(b.damping)) > 0.0 for b in shown)
     heights = [max(HEIGHT, (len(shown) + len(orders) + 1) * NAME_HEIGHT), DAMPING_HEIGHT][: 1 + damped]
     figure = Figure(figsize=(WIDTH, sum(heights)), layout=ConstrainedLayoutEngine(w_pad=0.1))
     panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     axis = panels[0]
-    for panel in panels:
-        panel.grid(**GRID)
+    seen = "frequency_fixed" if fixed or result.summary.get("frame") == "fixed" else "frequency"
+    captions = [label(seen, units.frequency), "damping ratio (%)"]
+    for panel, caption in zip(panels, captions, strict=False):
+        dress(panel, label("psi_dot", units.speed) if panel is panels[-1] else "", caption, size=None)
         entries = marks(panel, result, units, last)
     for b in shown:
         axis.plot(b.speed, b.frequency, lw=1.6, **b.style)
@@ -109,42 +95,25 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     entries += crossings(axis, result, units, fixed)
     axis.set_xlim(first, last)
     axis.set_ylim(0.0, top)
-    name_lines(axis, shown, rays, (heights[0], last, top))
+    name_lines(axis, shown, rays, heights[0])
     above = [b for b in branches if b not in shown]
-    names = [f"↑ {b.name}, {b.frequency[-1]:.3g} {units.frequency}" for b in above[:NAMED]]
-    names += [f"↑ {len(above) - NAMED} more"] if len(above) > NAMED else []
-    axis.annotate(
-        "\n".join(reversed(names)),
-        (1.0, 1.0),
-        xytext=(14, 4),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        fontsize=7,
-        color="0.4",
-        va="bottom",
-    )
-    seen = "frequency_fixed" if fixed or result.summary.get("frame") == "fixed" else "frequency"
-    axis.set_ylabel(label(seen, units.frequency))
+    names = [f"↑ {b.name}, {b.frequency[-1]:.3g} {units.frequency}" for b in above[:4]]
+    names += [f"↑ {len(above) - 4} more"] if len(above) > 4 else []
+    style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "color": "0.4", "va": "bottom"}
+    axis.annotate("\n".join(reversed(names)), (1.0, 1.0), xytext=(14, 4), xycoords="axes fraction", **style)
     if damped:
-        panels[1].set_ylabel("damping ratio (%)")
         panels[1].axhline(0.0, lw=0.8, color="0.4", zorder=1)
-    panels[-1].set_xlabel(label("psi_dot", units.speed))
     figure.suptitle(result.title, fontsize=11)
     entries += line_entries(shown)
-    around = 1.1 + 0.2 * -(-len(entries) // LEGEND_COLUMNS) + 0.12 * len(names) + 0.2 * damped
+    around = 1.1 + 0.2 * -(-len(entries) // 3) + 0.12 * len(names) + 0.2 * damped
     figure.set_figheight(sum(heights) + around)
     if entries:
-        figure.legend(handles=entries, loc="outside lower center", ncols=LEGEND_COLUMNS, fontsize=8, frameon=False)
+        figure.legend(handles=entries, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     return figure
 
 
 def drawn_branches(result: CampbellResult, fixed: bool) -> list[Branch]:
-    """Return the branches in the units that are shown; each passes through its critical speeds, where it may touch 0.
-
-    Args:
-        result: the diagram.
-        fixed: whether frequencies are those in the fixed frame.
-    """
+    """Return the branches in the units shown; each passes through its critical speeds, where it may touch 0."""
     units, out = ShownUnits.of(result.summary), []
     ambiguous = {(int(a["branch"]), float(a["speed"])) for a in result.summary["ambiguous"]}
     for named, columns in zip(result.summary["branches"], result.branches().values(), strict=True):
@@ -180,7 +149,7 @@ def seen_fixed(critical: Any) -> float:
 def of_interest(branches: list[Branch], steepest: float) -> list[Branch]:
     """Return the branches that the steepest line kΩ meets or passes, the next above, and what lies among them.
 
-    All are returned where the diagram is at most `SQUASHED` times as high with them.
+    All are returned where the diagram is at most twice as high with them.
     """
     met = [np.any((b.frequency <= steepest * np.abs(b.speed)) | b.unstable) for b in branches]
     others = [float(np.min(b.frequency)) for b, there in zip(branches, met, strict=True) if not there]
@@ -191,7 +160,7 @@ def of_interest(branches: list[Branch], steepest: float) -> list[Branch]:
         found = [b for b in branches if np.min(b.frequency) <= max(top, bottom)]
         top = max(float(np.max(b.frequency)) for b in found)
         if len(found) == len(shown):
-            return branches if max(float(np.max(b.frequency)) for b in branches) <= SQUASHED * top else found
+            return branches if max(float(np.max(b.frequency)) for b in branches) <= 2.0 * top else found
         shown = found
 
 
@@ -244,46 +213,24 @@ def line_entries(branches: list[Branch]) -> list[Line2D]:
     return [Line2D([], [], label=name, **style) for there, name, style in kinds if there]
 
 
-def name_lines(
-    axis: Axes, branches: list[Branch], rays: list[tuple[str, float]], extent: tuple[float, float, float]
-) -> None:
-    """Write the names of the branches at their ends, and of the lines kΩ where they leave the diagram.
+def name_lines(axis: Axes, branches: list[Branch], rays: list[tuple[str, float]], height: float) -> None:
+    """Write the names of the branches at their ends, and of the lines kΩ (rays, with slopes) where they leave the axis.
 
-    Args:
-        axis: of the frequencies.
-        branches: those drawn.
-        rays: (name, slope) of the lines kΩ.
-        extent: height of the axis, inch; last speed and highest frequency.
+    The axis is of a height in inch.
     """
-    height, last, top = extent
+    last, top = axis.get_xlim()[1], axis.get_ylim()[1]
+    text: dict[str, Any] = {"annotation_clip": False, "fontsize": 8}
     ends = [(b.name, float(b.speed[-1]), float(b.frequency[-1]), str(b.style["color"])) for b in branches]
     ends += [(name, last, slope * last, "0.4") for name, slope in rays if slope * last <= top]
     places = spread([y for _, _, y, _ in ends], NAME_HEIGHT / height * top, (0.0, top))
     for (name, x, y, color), place in zip(ends, places, strict=True):
-        axis.annotate(
-            name,
-            (x, y),
-            xytext=(1.02, place),
-            textcoords=axis.get_yaxis_transform(),
-            annotation_clip=False,
-            fontsize=8,
-            color=color,
-            va="center",
-            arrowprops={"arrowstyle": "-", "lw": 0.6, "color": color, "shrinkA": 1, "shrinkB": 0},
-        )
+        line = {"arrowstyle": "-", "lw": 0.6, "color": color, "shrinkA": 1, "shrinkB": 0}
+        beside: dict[str, Any] = {"xytext": (1.02, place), "textcoords": axis.get_yaxis_transform(), "va": "center"}
+        axis.annotate(name, (x, y), color=color, arrowprops=line, **beside, **text)
     leaving = [(name, top / slope) for name, slope in rays if slope * last > top]
     at = spread([x for _, x in leaving], ORDER_WIDTH / (WIDTH - 3.0) * last, (0.0, last))
     for (name, _), place in zip(leaving, at, strict=True):
-        axis.annotate(
-            name,
-            (place, top),
-            xytext=(0, 3),
-            textcoords="offset points",
-            annotation_clip=False,
-            fontsize=8,
-            color="0.4",
-            ha="center",
-        )
+        axis.annotate(name, (place, top), (0, 3), textcoords="offset points", color="0.4", ha="center", **text)
 
 
 def spread(values: list[float], gap: float, limits: tuple[float, float]) -> list[float]:

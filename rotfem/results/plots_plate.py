@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from matplotlib.tri import Triangulation
 
-from rotfem.results.columns import ZERO, described, label, zeros
-from rotfem.results.plots import said_zero
-from rotfem.results.units import ShownUnits
+from rotfem.results.columns import ZERO, described, label
+from rotfem.results.plots import not_zero
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,8 +24,9 @@ if TYPE_CHECKING:
 Array = npt.NDArray[Any]
 
 
-def maps(number: int, aspect: float, title: str) -> tuple[Figure, list[Axes]]:
-    """Return a figure and its axes, for maps whose height is `aspect` times their width."""
+def maps(number: int, mesh: Triangulation, title: str) -> tuple[Figure, list[Axes]]:
+    """Return a figure and its axes, for maps over a mesh."""
+    aspect = float(np.ptp(mesh.y) / np.ptp(mesh.x))
     columns = min(number, 3 if aspect > 0.4 else 1)
     rows = -(-max(number, 1) // max(columns, 1))
     width = 10.0 / max(columns, 1)
@@ -44,15 +44,9 @@ def maps(number: int, aspect: float, title: str) -> tuple[Figure, list[Axes]]:
 
 
 def draw(axis: Axes, mesh: Triangulation, values: Array, still: Array | None = None) -> Any:
-    """Draw a field over the mid-surface; return what a colour bar is of.
+    """Draw values at the nodes; return what a colour bar is of.
 
-    One of both signs has white at 0 and a line there, one of a single sign has one hue from 0.
-
-    Args:
-        axis: where.
-        mesh: the nodes and triangles between them.
-        values: at the nodes.
-        still: whether nodes are clamped, at which there are no nodal lines; none if None.
+    Values of both signs have white at 0 and a line there, but at `still` nodes; those of one sign one hue from 0.
     """
     peak = max(float(np.max(np.abs(values))), 1e-300)
     low, high = (float(end) if abs(end) > ZERO * peak else 0.0 for end in (np.min(values), np.max(values)))
@@ -72,28 +66,18 @@ def add_bar(figure: Figure, drawn: Any, axes: Any, caption: str) -> None:
     """Add a colour bar to the right of one axis or of several."""
     powers = ScalarFormatter(useMathText=True)
     powers.set_powerlimits((-3, 4))
-    bar = figure.colorbar(
-        drawn, ax=axes, shrink=0.9, aspect=40 if isinstance(axes, list) else 20, fraction=0.05, format=powers
-    )
+    aspect = 40 if isinstance(axes, list) else 20
+    bar = figure.colorbar(drawn, ax=axes, shrink=0.9, aspect=aspect, fraction=0.05, format=powers)
     bar.set_label(caption, fontsize=8)
     bar.ax.tick_params(labelsize=7)
     bar.ax.yaxis.get_offset_text().set_fontsize(7)
 
 
 def fields_figure(columns: Mapping[str, Array], triangles: Array, names: list[str], title: str) -> Figure:
-    """Return one map a field, but for those that are 0.
-
-    Args:
-        columns: `x`, `y` (m) and the fields at the nodes.
-        triangles: between the nodes.
-        names: of the fields.
-        title: of the figure.
-    """
-    zero = zeros({name: columns[name] for name in names})
-    shown = [name for name in names if name not in zero]
+    """Return one map a named field, but for those that are 0; columns are at the nodes, `x` and `y` (m) too."""
+    shown, title = not_zero({name: columns[name] for name in names}, title)
     mesh = Triangulation(columns["x"], columns["y"], triangles)
-    aspect = float(np.ptp(columns["y"]) / np.ptp(columns["x"]))
-    figure, axes = maps(len(shown), aspect, "\n".join(filter(None, [title, said_zero(zero)])))
+    figure, axes = maps(len(shown), mesh, title)
     for axis, name in zip(axes, shown, strict=True):
         axis.set_title(described(name)[0], fontsize=9)
         add_bar(figure, draw(axis, mesh, columns[name]), axis, label(name))
@@ -102,8 +86,7 @@ def fields_figure(columns: Mapping[str, Array], triangles: Array, names: list[st
 
 def shape_figure(result: RunResult) -> Figure:
     """Return maps of the displacements of the final shape."""
-    names = ["u1", "u2", "u3"]
-    return fields_figure(result.shape, result.triangles, names, result.title + ", final shape")
+    return fields_figure(result.shape, result.triangles, ["u1", "u2", "u3"], result.title + ", final shape")
 
 
 def resultants_figure(result: RunResult) -> Figure:
@@ -114,19 +97,16 @@ def resultants_figure(result: RunResult) -> Figure:
 
 def modes_figure(result: ModesResult) -> Figure:
     """Return a map of the leading displacement of every mode, the largest translation 1."""
-    shapes, units = result.shapes, ShownUnits.of(result.summary)
-    rows = result.rows[len(result.rows) - len(shapes) :]
+    shapes = result.shapes
     first = next(iter(shapes.values()))
     mesh = Triangulation(first["x"], first["y"], result.triangles)
-    title = f"{result.title}, largest displacement 1"
-    figure, axes = maps(len(shapes), float(np.ptp(first["y"]) / np.ptp(first["x"])), title)
+    figure, axes = maps(len(shapes), mesh, f"{result.title}, largest displacement 1")
     sizes = np.array([[np.hypot(c[n], c.get(f"{n}_imag", 0.0)) for n in ("u1", "u2", "u3")] for c in shapes.values()])
     clamped = np.all(sizes == 0.0, axis=(0, 1))
-    for axis, columns, row, size in zip(axes, shapes.values(), rows, sizes, strict=True):
+    for axis, (row, columns, frequency), size in zip(axes, result.with_shapes(), sizes, strict=True):
         name = f"u{1 + int(np.argmax(np.max(size, axis=1)))}"
         drawn = draw(axis, mesh, columns[name], clamped)
         drawn.set(cmap="RdBu_r", norm=Normalize(-1.0, 1.0))
-        frequency = f"{units.frequencies(row['frequency']):.5g} {units.frequency}"
         axis.set_title(f"{row['mode']}  {row['name']}, {described(name)[0]}\n{frequency}", fontsize=9)
     add_bar(figure, drawn, axes, "displacement (–)")
     return figure

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rotfem.results.columns import ZERO
-from rotfem.results.plots import GRID
+from rotfem.results.plots import dress
 from rotfem.results.surfaces import HALF_WIDTH
 
 if TYPE_CHECKING:
@@ -46,12 +46,10 @@ def check_figure(result: CheckResult) -> Figure:
             axis.set_yscale("log")
         last = row == len(panels) + 1
         axis.set_xlim(columns["x"][0], columns["x"][-1])
-        axis.set_xlabel("position X along the axis (m)" if last else "", fontsize=8)
-        axis.set_ylabel(title, fontsize=8)
-        axis.grid(**GRID)
+        dress(axis, "position X along the axis (m)" if last else "", title)
+        axis.tick_params(labelbottom=last)
         if len(names) > 1:
             axis.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
-        axis.tick_params(labelsize=7, labelbottom=last)
     s = result.summary
     figure.suptitle(f"{s['name']}: {s['mass']:.6g} kg, {s['length']:.6g} m", fontsize=10)
     return figure
@@ -84,10 +82,7 @@ def _view(axis: Any, result: CheckResult, i: int, j: int) -> None:
         axis.plot(*(x if n == 0 else np.zeros(len(x)) for n in (i, j)), "k", lw=1.2)
     center = result.summary["center_of_mass"]
     axis.plot(center[i], center[j], "o", ms=6, mfc="none", color="C3")
-    axis.set_xlabel(f"{i + 1} (m)", fontsize=8)
-    axis.set_ylabel(f"{j + 1} (m)", fontsize=8)
-    axis.tick_params(labelsize=7)
-    axis.grid(**GRID)
+    dress(axis, f"{i + 1} (m)", f"{j + 1} (m)")
 
 
 def explain_figure(result: ExplainResult) -> Figure:
@@ -102,14 +97,8 @@ def explain_figure(result: ExplainResult) -> Figure:
         for i, row in enumerate(rows):
             known, at = row["estimate"].get(output, 0.0), i + (j - (len(outputs) - 1) / 2) * height
             value = left if known is None else known
-            axis.barh(
-                at,
-                float(np.clip(value, left, right)) - left,
-                height,
-                left=left,
-                color=f"C{j}",
-                label=output if i == 0 else None,
-            )
+            width = float(np.clip(value, left, right)) - left
+            axis.barh(at, width, height, left=left, color=f"C{j}", label=output if i == 0 else None)
             if known is None:
                 axis.annotate("unknown", (left, at), (3, -3), textcoords="offset points", fontsize=8)
             if not np.isfinite(value):

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 import tomli_w
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_hex
 from matplotlib.lines import Line2D
@@ -36,9 +35,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = npt.NDArray[np.float64]
-
-#: Name of the file.
-NAME = "report.html"
 
 #: Points of a line, at most; numbers of all modes that move, at most; rows of a table, at most.
 POINTS, NUMBERS, ROWS = 2000, 60_000, 2000
@@ -84,12 +80,7 @@ def require() -> None:
 
 
 def write_report(result: Result, drawing: Figure | None, folder: Path) -> Path:
-    """Write report.html into a folder; return its path.
-
-    Args:
-        result: what is reported.
-        drawing: of the scene's structure, where there is one.
-        folder: where the file goes.
+    """Write report.html of a result, with a drawing of the scene's structure, into a folder; return its path.
 
     Raises:
         OutputError: it cannot be written.
@@ -104,17 +95,13 @@ def write_report(result: Result, drawing: Figure | None, folder: Path) -> Path:
         f"<figure><h3>{escape(_title(figures[name]))}</h3>{places.get(name) or picture(figures[name])}</figure>"
         for name in figures
     )
-    hint = (
-        '<p class="hint">Drag to move, zoom with the tools on the right, click a name to hide its line.</p>'
-        if live
-        else ""
-    )
+    hint = '<p class="hint">Drag to move, zoom with the tools on the right, click a name to hide its line.</p>'
     moving, cards = animated(result)
     sections = [
         header(result.summary),
         section("Summary", facts(result.summary) + messages(result.summary)),
-        section("Figures", hint + parts) if figures else "",
-        section("Modes in motion", cards) if cards else "",
+        section("Figures", (hint if live else "") + parts),
+        section("Modes in motion", cards),
         section("Tables", "".join(table(*entry) for entry in tables(result))),
         section("How exact it is", error_table(result.summary)),
         section("Scene", scene(result.summary, drawing)),
@@ -131,7 +118,7 @@ def write_report(result: Result, drawing: Figure | None, folder: Path) -> Path:
     for name, value in content.items():
         before, _, after = text.partition(f"@{name}@")
         text = before + value + after
-    return write_text(folder / NAME, text)
+    return write_text(folder / "report.html", text)
 
 
 # --- words and tables -------------------------------------------------------------------------------------------------
@@ -185,7 +172,7 @@ def tables(result: Result) -> Iterator[tuple[str, list[dict[str, Any]]]]:
                 if key.endswith(ending):
                     name = key.removesuffix(ending)
                     row = figures.setdefault(name, {"quantity": described(name)[0], "unit": described(name)[1]})
-                    row[ending.strip("_").replace("_", " at t (s), ").replace(" at t (s), time", " at t (s)")] = value
+                    row[ending[1:].replace("_time", " at t (s)")] = value
                     break
         yield "Largest and last values", list(figures.values())
     if "peaks" in summary:
@@ -205,7 +192,8 @@ def table(title: str, rows: Sequence[Mapping[str, Any]]) -> str:
         return ""
     numbers = {n: [abs(r[n]) for r in flat if isinstance(r.get(n), float) and np.isfinite(r[n])] for n in names}
     numbers |= {"damping": [1.0], "growth": numbers.get("frequency", [])}  # the scale below which these are 0
-    least = {n: 0.0 if n in EXACT else ZERO * max(values, default=0.0) for n, values in numbers.items()}
+    exact = ("residual", "error_bound", "mesh_error")  # near 0 and not shown as 0
+    least = {n: 0.0 if n in exact else ZERO * max(values, default=0.0) for n, values in numbers.items()}
     head = "".join(f"<th{_kind(flat, n)}>{escape(label_of(n))}</th>" for n in names)
     body = ""
     for row in flat:
@@ -220,10 +208,6 @@ def table(title: str, rows: Sequence[Mapping[str, Any]]) -> str:
     more = f"<p>the first {ROWS} of {len(rows)} rows</p>" if len(rows) > ROWS else ""
     inner = f'<table class="sortable"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
     return f'<h3>{escape(title)}</h3><div class="scroll">{inner}</div>{more}'
-
-
-#: Columns of numbers that are near 0 and not shown as 0.
-EXACT = ("residual", "error_bound", "mesh_error")
 
 
 def _kind(rows: Sequence[Mapping[str, Any]], name: str) -> str:
@@ -290,7 +274,6 @@ def _title(figure: Figure) -> str:
 def picture(figure: Figure) -> str:
     """Return a figure as an image in the page."""
     content = io.BytesIO()
-    FigureCanvasAgg(figure)
     figure.savefig(content, dpi=110, format="png")
     data = base64.b64encode(content.getvalue()).decode()
     return f'<img alt="{escape(_title(figure))}" src="data:image/png;base64,{data}">'
@@ -313,10 +296,6 @@ def interactive(figure: Figure) -> Any:
     return gridplot(rows, sizing_mode="stretch_width", toolbar_location="right", toolbar_options=options)
 
 
-#: Dashes of Matplotlib ↦ those of Bokeh.
-DASHES = {"-": "solid", "--": "dashed", ":": "dotted", "-.": "dashdot"}
-
-
 def panel(axes: Any, x_range: Any) -> Any:
     """Return one panel as a figure of Bokeh."""
     from bokeh.models import BoxAnnotation, Legend, LegendItem, Range1d, Span
@@ -335,10 +314,11 @@ def panel(axes: Any, x_range: Any) -> Any:
         tools="pan,wheel_zoom,box_zoom,reset,hover",
         tooltips=[("", "$name"), ("x", "$x"), ("y", "$y")],
     )
+    dashes = {"-": "solid", "--": "dashed", ":": "dotted", "-.": "dashdot"}
     named: dict[str, list[Any]] = {}
     for line in (line for line in axes.lines if len(line.get_xydata())):
         colour = to_hex(line.get_color())
-        dash = DASHES.get(str(line.get_linestyle()), "solid")
+        dash = dashes.get(str(line.get_linestyle()), "solid")
         if line.get_transform() != axes.transData:  # a line from one side to the other
             across = line.get_transform() == axes.get_yaxis_transform()
             place = float(np.asarray(line.get_ydata() if across else line.get_xdata())[0])
@@ -372,9 +352,8 @@ def panel(axes: Any, x_range: Any) -> Any:
             plot.patch(corners[:, 0], corners[:, 1], color=colour, alpha=0.25, line_width=0)
     items = [LegendItem(label=said, renderers=drawn) for said, drawn in named.items() if said and drawn]
     if items and (len(items) > 1 or len(named) > 1):
-        plot.add_layout(
-            Legend(items=items, click_policy="hide", label_text_font_size="9pt", border_line_color=None), "right"
-        )
+        style = {"click_policy": "hide", "label_text_font_size": "9pt", "border_line_color": None}
+        plot.add_layout(Legend(items=items, **style), "right")
     if isinstance(axes.yaxis.get_major_locator(), FixedLocator) and (ticks := axes.get_yticks()) is not None:
         plot.yaxis.ticker = [float(tick) for tick in ticks]
         labels = [text.get_text() for text in axes.get_yticklabels()]
@@ -415,15 +394,13 @@ def animated(result: Result) -> tuple[dict[str, Any], str]:
     if result.triangles is not None:
         pairs = np.concatenate([result.triangles[:, [i, j]] for i, j in ((0, 1), (1, 2), (2, 0))])
         lines = np.unique(np.sort(pairs, axis=1), axis=0)
-    shapes = list(result.shapes.values())[: max(1, NUMBERS // (6 * n))]
-    moves, cards, units = [], "", ShownUnits.of(result.summary)
-    rows = result.rows[len(result.rows) - len(result.shapes) :]  # a rigid-body mode comes first and has no shape
-    for columns, row in zip(shapes, rows, strict=False):
+    moves, cards = [], ""
+    for row, columns, frequency in result.with_shapes()[: max(1, NUMBERS // (6 * n))]:
         u = np.stack([columns.get(f"u{i}", np.zeros(n)) for i in (1, 2, 3)], axis=-1)
         v = np.stack([columns.get(f"u{i}_imag", np.zeros(n)) for i in (1, 2, 3)], axis=-1)
         scale = AMPLITUDE * length / max(float(np.max(np.hypot(u, v))), 1e-300)
         moves.append([np.round(scale * part, 5).tolist() for part in (u, v)])
-        said = f"{row.get('name', row['label'])}, {float(units.frequencies(row['frequency'])):.5g} {units.frequency}"
+        said = f"{row.get('name', row['label'])}, {frequency}"
         cards += f"<figure><canvas></canvas><figcaption>{row['mode']}: {escape(said)}</figcaption></figure>"
     low, high = nodes.min(axis=0), nodes.max(axis=0)
     extent = float(np.linalg.norm(high - low))

@@ -34,6 +34,7 @@ from rotfem.results.files import (
     prepare_folder,
     read_csv,
     write_text,
+    writing,
 )
 from rotfem.results.run import LiveTable
 from rotfem.version import __version__
@@ -208,11 +209,7 @@ class ResultSet:
         self.close(error)
 
     def close(self, error: BaseException | None = None) -> None:
-        """Give the folder free; a set that has not ended by now has failed.
-
-        Args:
-            error: what ended it.
-        """
+        """Give the folder free; a set that has not ended by now has failed, by the error that ended it."""
         if self.begun and not self.ended:
             self._fail(error)
         for name in self._staged:
@@ -245,7 +242,8 @@ class ResultSet:
         old = [name for name in previous(self.folder) if name not in keep]
         self.files = old  # they are found by the next start, should this one be killed here
         self.mark(status)
-        for name in [*old, *(name for name in leftovers(self.folder) if name not in self._staged)]:
+        hidden = [name for name in os.listdir(self.folder) if name.startswith(PART) and name.endswith(".part")]
+        for name in {*old, *hidden} - self._staged:
             remove(self.folder / name)
         self.begun, self.files = True, []
 
@@ -282,10 +280,8 @@ class ResultSet:
 
     def open_stage(self) -> Path:
         """Return a new hidden folder."""
-        try:
+        with writing(self.folder):
             new = Path(tempfile.mkdtemp(dir=self.folder, prefix=PART, suffix=".part"))
-        except OSError as error:
-            raise OutputError(self.folder, error.strerror or str(error)) from None
         self._staged.add(new.name)
         return new
 
@@ -305,11 +301,9 @@ class ResultSet:
                 raise OutputError(self.folder / name, os.strerror(errno.EISDIR))
         self.begin("writing")
         self.files = sorted({*self.files, *names})
-        try:
+        with writing(self.folder):
             for name in names:
                 os.replace(new / name, self.folder / name)
-        except OSError as error:
-            raise OutputError(self.folder, error.strerror or str(error)) from None
 
     def grow(self, name: str, table: Table) -> LiveTable:
         """Return a table of the set that is on disk while it grows."""
@@ -319,11 +313,7 @@ class ResultSet:
         return self.live
 
     def publish(self, result: Result, complete: bool = True) -> list[Path]:
-        """Write the files of a result, the summary last; return their paths.
-
-        Args:
-            result: the result.
-            complete: whether no other files follow.
+        """Write the files of a result, the summary last unless others follow; return their paths.
 
         Raises:
             OutputError: one cannot be written.
@@ -334,16 +324,11 @@ class ResultSet:
         if live is not None and live.flush() and live.path.name in texts:
             del texts[live.path.name]
         self.put({name: text for name, text in texts.items() if name != SUMMARY})
-        following = not complete and result.status == "done"
-        self.finish(result.summary, "writing" if following else None)
+        self.finish(result.summary, None if complete or result.status != "done" else "writing")
         return paths
 
     def finish(self, summary: Mapping[str, Any], status: str | None = None) -> Path:
-        """Write summary.json with the list of the files; return its path.
-
-        Args:
-            summary: of the result.
-            status: another one than the summary's, while files are to follow.
+        """Write summary.json, with another status while files are to follow; return its path.
 
         Raises:
             OutputError: it cannot be written.
@@ -417,17 +402,10 @@ def read_summary(folder: Path) -> dict[str, Any]:
     return summary if isinstance(summary, dict) else {}
 
 
-def leftovers(folder: Path) -> list[str]:
-    """Return the hidden names that killed processes left in a folder (which is locked now)."""
-    return [name for name in os.listdir(folder) if name.startswith(PART) and name.endswith(".part")]
-
-
 def remove(path: Path) -> None:
     """Remove a file or a folder, as far as that goes."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
-        return
-    try:
-        path.unlink(missing_ok=True)
-    except OSError:
-        return
+    else:
+        with suppress(OSError):
+            path.unlink(missing_ok=True)

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.errors import OutputError
 from rotfem.results.columns import described
-from rotfem.results.files import csv_text, json_text, line, write_text
+from rotfem.results.files import csv_text, json_text, line, write_text, writing
 from rotfem.results.frames import Variable, dataset, frame, nodes_of
 from rotfem.results.result import Result
 from rotfem.results.tables import ShortTable, by_unit, largest, named, number
@@ -81,13 +80,10 @@ class StationHistory:
         """
         import h5py  # takes longer than all other imports of this package
 
-        try:
-            with h5py.File(path, "w") as file:
-                for name, values in {"t": self.t, "x": self.x, **self.values}.items():
-                    data = file.create_dataset(name, data=values, compression="gzip" if values.ndim > 1 else None)
-                    data.attrs["long_name"], data.attrs["units"] = described(name)
-        except OSError as error:
-            raise OutputError(path, str(error).splitlines()[0]) from None
+        with writing(path), h5py.File(path, "w") as file:
+            for name, values in {"t": self.t, "x": self.x, **self.values}.items():
+                data = file.create_dataset(name, data=values, compression="gzip" if values.ndim > 1 else None)
+                data.attrs["long_name"], data.attrs["units"] = described(name)
         return path
 
     def figure(self, title: str) -> Figure:

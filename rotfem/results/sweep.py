@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.errors import OutputError
-from rotfem.results.columns import label_of
-from rotfem.results.files import json_text, rows_text
+from rotfem.results.columns import ZERO, label_of
+from rotfem.results.files import json_text, rows_text, writing
 from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows
 from rotfem.results.result import Result
 from rotfem.results.tables import ShortTable, numbers
@@ -24,14 +23,8 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.figure import Figure
 
-#: Panels of the figure, and lines named in its legend, at most.
-PANELS, NAMED = 6, 12
-
-#: Quantities in the table that is printed, at most.
-COLUMNS = 2
-
-#: Part of the largest value, of damping ratios of 1, below which a change is round-off.
-ROUND_OFF = 1e-9
+#: Panels of the figure, lines named in its legend, and quantities in the table that is printed, at most.
+PANELS, NAMED, COLUMNS = 6, 12, 2
 
 
 def quantities(summary: Mapping[str, Any]) -> dict[str, float]:
@@ -47,10 +40,9 @@ def quantities(summary: Mapping[str, Any]) -> dict[str, float]:
             found.setdefault(f"speed_{c['kind']}_{c['order']}_{c['branch']}", c["speed"])
         return found
     if command == "response":
-        peaks = summary["peaks"].items()
-        return {f"{name}_peak": p["amplitude"] for name, p in peaks} | {
-            f"frequency_{n}": p["frequency"] for n, p in peaks
-        }
+        peaks = summary["peaks"]
+        sizes = {f"{name}_peak": peak["amplitude"] for name, peak in peaks.items()}
+        return sizes | {f"frequency_{name}": peak["frequency"] for name, peak in peaks.items()}
     return {name: value for name, value in summary.items() if isinstance(value, float)}
 
 
@@ -72,6 +64,11 @@ class SweepResult(Result):
         return dict(self.summary["keys"])
 
     @property
+    def shape(self) -> tuple[int, ...]:
+        """Numbers of the values of the swept keys."""
+        return tuple(map(len, self.keys.values()))
+
+    @property
     def names(self) -> list[str]:
         """Names of what was computed."""
         no = {*self.keys, "status", "reason", "folder"}
@@ -79,8 +76,7 @@ class SweepResult(Result):
 
     def array(self, name: str) -> npt.NDArray[Any]:
         """Return a quantity over the swept keys, one axis a key; NaN where there is none."""
-        shape = [len(values) for values in self.keys.values()]
-        return column_of_rows(self.rows, name).astype(np.float64).reshape(shape)
+        return column_of_rows(self.rows, name).astype(np.float64).reshape(self.shape)
 
     def files(self) -> dict[str, str]:
         """Return sweep.csv and summary.json."""
@@ -91,10 +87,8 @@ class SweepResult(Result):
         return [self._netcdf] if find_spec("xarray") else []
 
     def _netcdf(self, folder: Path) -> None:
-        try:
+        with writing(folder / "sweep.nc"):
             self.to_xarray().to_netcdf(folder / "sweep.nc", engine="scipy")
-        except OSError as error:
-            raise OutputError(folder / "sweep.nc", error.strerror or str(error)) from None
 
     def drawings(self) -> dict[str, Callable[[], Figure]]:
         """Return sweep.png; nothing where no quantity varies."""
@@ -107,7 +101,7 @@ class SweepResult(Result):
             y = self.array(name)
             y = y[np.isfinite(y)]
             size = max(np.max(np.abs(y), initial=0.0), 1.0 if name.startswith("damping") else 0.0)
-            if len(y) and np.ptp(y) > ROUND_OFF * size:
+            if len(y) and np.ptp(y) > ZERO * size:
                 out.append(name)
         return out
 
@@ -126,8 +120,7 @@ class SweepResult(Result):
     def to_xarray(self) -> xarray.Dataset:
         """Return what was computed over the swept keys, each a dimension."""
         over: dict[str, Variable] = {name: (tuple(self.keys), self.array(name)) for name in self.names}
-        shape = [len(values) for values in self.keys.values()]
-        over["status"] = tuple(self.keys), column_of_rows(self.rows, "status").reshape(shape)
+        over["status"] = tuple(self.keys), column_of_rows(self.rows, "status").reshape(self.shape)
         return dataset(over, {k: ((k,), np.array(v)) for k, v in self.keys.items()}, self._attributes())
 
 
