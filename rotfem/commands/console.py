@@ -27,9 +27,6 @@ from rotfem.errors import ComputationError, InputError, OutputError, SceneError,
 if TYPE_CHECKING:
     from rotfem.commands.result_folder import ResultFolder, Writer
 
-#: Seconds that mpirun is given to pass on what was printed.
-PASSED_ON = 0.2
-
 #: Seconds after which a computation says how far it is where there is no bar; again after twice the time, and so on.
 LONG = 10.0
 
@@ -42,14 +39,12 @@ STUDY = "cost.jsonl"
 #: Whether commands run on this process alone, whatever others mpirun has started.
 ALONE: ContextVar[bool] = ContextVar("ALONE", default=False)
 
-#: Where to find out what is to be done without FEniCSx.
-MISSING = "FEniCSx is not here (there is no module {}); see docs/installation.md"
-
 
 def missing() -> str:
     """Return the message where a module of FEniCSx is missing; empty where none is."""
     names = ("mpi4py", "petsc4py", "slepc4py", "dolfinx")
-    return next((MISSING.format(name) for name in names if find_spec(name) is None), "")
+    absent = next((name for name in names if find_spec(name) is None), "")
+    return absent and f"FEniCSx is not here (there is no module {absent}); see docs/installation.md"
 
 
 def fitted(text: str, stream: TextIO) -> str:
@@ -104,15 +99,17 @@ class Session:
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, io.TextIOWrapper):
                 stream.reconfigure(errors="backslashreplace")  # not every terminal has every letter
-        signal.signal(signal.SIGTERM, _interrupt)
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
         return self
 
     def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
         self.bar.stop()
         if self._folder is not None:
             self._folder.close(error)
-        if error is not None:
-            self._tidy()
+        if error is not None:  # remove the folders that this command made, the innermost first, if they are empty
+            with suppress(OSError):
+                for made in self._made:
+                    made.rmdir()
         self._pass_on()
         if error is None or (self.debug and not isinstance(error, SystemExit)):
             return
@@ -124,9 +121,7 @@ class Session:
             self._end("the computation failed: there is not enough memory; use fewer elements, or fewer modes", 3)
         if isinstance(error, KeyboardInterrupt):
             message = f"interrupted{self._kept() or '; there are no results yet'}"
-            if not together(self.comm, error):
-                self._leave(message, 130)
-            self._end(message, 130)
+            self._end(message, 130, alone=not together(self.comm, error))
         if self.comm.size > 1 and not isinstance(error, SystemExit):
             # A rank that fails alone would leave the others waiting for it.
             import traceback
@@ -138,7 +133,7 @@ class Session:
         """Wait until mpirun has passed on what was printed: what follows on stderr would go astray with it."""
         if self.comm.size > 1 and self.first:
             sys.stdout.flush()
-            sleep(PASSED_ON)
+            sleep(0.2)
 
     def _kept(self) -> str:
         """Return where results are of a command that did not end well, and how it goes on; empty where none are."""
@@ -152,14 +147,12 @@ class Session:
         found = kept_in(path) if self._folder.set.begun else []
         return "; ".join(["", f"results until then are in {path}", *found]) if found else ""
 
-    def _end(self, message: str, status: int) -> NoReturn:
+    def _end(self, message: str, status: int, alone: bool = False) -> NoReturn:
+        """End this process, at once where the others may be waiting for it, or gone."""
         self._error(f"rotfem: {message}")
+        if alone:
+            os._exit(status)
         raise SystemExit(status) from None
-
-    def _leave(self, message: str, status: int) -> NoReturn:
-        """End this process at once: the others may be waiting for it, or gone, so that it must not wait for them."""
-        self._error(f"rotfem: {message}")
-        os._exit(status)
 
     def _error(self, line: str) -> None:
         if self.first:
@@ -174,14 +167,6 @@ class Session:
         from rotfem.results.units import in_unit
 
         return ANGULAR.sub(lambda found: f"{found[0]} ({in_unit(float(found[1]), unit):.6g} {unit})", line)
-
-    def _tidy(self) -> None:
-        """Remove the folders that this command made, the innermost first, as far as they are empty."""
-        for made in self._made:
-            try:
-                made.rmdir()
-            except OSError:
-                return
 
     def folder(self, path: Path, command: str, inputs: Sequence[Path]) -> ResultFolder:
         """Return the result folder, made and locked; say so if the command before was killed there."""
@@ -220,12 +205,7 @@ class Session:
         return lambda line: self.remark(f"hint: {line}")
 
     def write(self, result: Any, plots: bool, further: Sequence[Writer] = ()) -> None:
-        """Write a result and its figures; print its summary if --json asks for it.
-
-        Args:
-            result: the result.
-            plots: whether its figures are wanted.
-            further: what else is to be written.
+        """Write a result, its figures and what else is wanted; print its summary if --json asks for it.
 
         Raises:
             OutputError: a file cannot be written; those that can are.
@@ -266,13 +246,7 @@ class Session:
 
 
 class ProgressBar:
-    """Progress on stderr; calls are free where it is off.
-
-    Args:
-        title: text before the bar.
-        on: whether to draw it.
-        speaks: whether lines may be printed where it is not drawn.
-    """
+    """Progress on stderr, a bar if it is on, with a title before it; or else lines, if it speaks."""
 
     def __init__(self, title: str = "", on: bool = False, speaks: bool = True):
         self._bar: Any = None
@@ -296,16 +270,19 @@ class ProgressBar:
         self._bar.start()
         self._log = logging.getLogger("rotfem.compilation")
         self._log.setLevel(logging.INFO)
-        self._log.propagate = False
-        self._heard = _Heard(self.describe)
-        self._log.addHandler(self._heard)
+        self._log.addFilter(self._heard)
 
     def stop(self) -> None:
         """Take the bar away."""
         if self._bar is not None:
             self._bar.stop()
             self._bar = None
-            self._log.removeHandler(self._heard)
+            self._log.removeFilter(self._heard)
+
+    def _heard(self, record: logging.LogRecord) -> bool:
+        """Say in the bar what a log says, and nowhere else."""
+        self.describe(record.getMessage())
+        return False
 
     def describe(self, what: str = "") -> None:
         """Say what is being done."""
@@ -340,19 +317,3 @@ class ProgressBar:
         left = (1.0 - share) * (now - since) / (share - before)
         self._due, self._last = self._started + 2 * (now - self._started), (now, share)
         self.says(f"{self._title}: {100 * share:.3g} % after {now - self._started:.0f} s, about {left:.3g} s to go")
-
-
-class _Heard(logging.Handler):
-    """Hands the messages of a log on."""
-
-    def __init__(self, hand_on: Callable[[str], None]):
-        super().__init__()
-        self._hand_on = hand_on
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Hand on a message."""
-        self._hand_on(record.getMessage())
-
-
-def _interrupt(signum: int, frame: object) -> NoReturn:
-    raise KeyboardInterrupt

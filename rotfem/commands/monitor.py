@@ -6,7 +6,7 @@ Energy and momentum that a history has from nowhere show what steps that are too
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -24,14 +24,8 @@ Array = npt.NDArray[np.float64]
 #: Growth of the Jacobi integral, relative to the energy exchanged, that is reported.
 GROWN = 0.02
 
-#: Part of the energies that round-off may make of them.
-ROUND_OFF = 1e-9
-
 #: Angular momentum from nowhere, relative to the largest that there was or was given, that is reported.
 TURNED = 0.01
-
-#: Rows from which on a growth can be distinguished from a fluctuation.
-FEWEST = 20
 
 
 class Monitor:
@@ -47,11 +41,7 @@ class Monitor:
         stability: of the equilibrium that is computed, or that a history starts from; None where there is none.
     """
 
-    def __init__(
-        self,
-        system: Any,
-        critical: float | None,
-    ):
+    def __init__(self, system: Any, critical: float | None):
         self.system, self.critical = system, critical
         self.since: float | None = None
         self.farthest = Farthest(system)
@@ -67,8 +57,26 @@ class Monitor:
         size = self.system.size(state.q)
         if np.isfinite(size) and size <= LARGEST_LINEAR_DEFLECTION:
             return
+        raise self._diverged(state.t)
+
+    def _diverged(self, time: float) -> ComputationError:
+        """Return the error of a linear solution that has diverged, and which theories to use in its place."""
+        theory: Theory = self.system.model.problem.theory
         loose = [hinge.name for hinge in self.system.structure.hinges.values() if hinge.stiffness == 0.0]
-        raise diverged(self.system.model.problem.theory, state.t, self.critical, self.since, loose)
+        why = "the motion is unstable, or the load is too large for a linear theory"
+        if loose:
+            why = f"no spring holds the root's hinge ({', '.join(loose)}), which turns beyond what is linear"
+        if self.since is not None:
+            why = f"its stiffness is not definite above {self.critical:.6g} rad/s, passed at t = {self.since:.4g} s"
+            if not theory.prestress:
+                why += ": first-order strains have the softening by the centrifugal force but not the stiffening"
+        what = f"the {theory.name} solution diverged (a displacement exceeds the length, or a rotation 1 rad; {why})"
+        exact = richest().name
+        advice = f'use model.theory = "{exact}", which holds for any deflection'
+        if not theory.prestress and not loose:
+            stiffened = next(t.name for t in theories() if t.linear and t.prestress)
+            advice = f'use model.theory = "{stiffened}" for small or "{exact}" for any deflection'
+        return ComputationError(what, time=time, advice=advice)
 
     def row(self, state: State) -> None:
         """Take note of a state that is recorded."""
@@ -105,59 +113,44 @@ def _growth(constant: Array, moving: Array, between: bool) -> float:
     """
     fine: npt.NDArray[np.bool_] = np.all(np.isfinite(np.vstack([constant, moving])), axis=0)
     n = len(fine) if fine.all() else int(np.argmin(fine))
-    if n < FEWEST:
+    if n < 20:  # too few to distinguish a growth from a fluctuation
         return 0.0
     constant, moving, part = constant[:n], moving[:, :n], n // 10
     exchanged = float(np.max(np.ptp(moving, axis=1)))
     last = np.min(constant[-part:]) if between else np.max(constant[-part:])
     grown = float(last - np.max(constant[:part]))
-    return grown / exchanged if exchanged > ROUND_OFF * np.max(np.abs(moving)) and grown > 0.0 else 0.0
+    round_off = 1e-9 * float(np.max(np.abs(moving)))
+    return grown / exchanged if exchanged > round_off and grown > 0.0 else 0.0
 
 
 def energy_warning(system: Any, history: dict[str, Array], between: bool = False) -> str:
     """Return what a run says of energy that came from nowhere; nothing where something gives it, or none came.
 
-    Args:
-        system: equations of motion.
-        history: columns by name.
-        between: whether rows lie between steps, see `_growth`.
+    `between` is whether rows of the history lie between steps, see `_growth`.
     """
-    if system.hub is not None:
-        by_hub = system.inner.model.driven_by_hub
-        return _said_of_momentum(history) or (_said_of_hub(history, between) if by_hub else "")
-    share = growth(history, between) if system.model.closed else 0.0
-    if share < GROWN:
-        return ""
-    return (
-        f"the energy has grown by {100 * share:.2g} % of the energy exchanged, though nothing supplies any: the time "
-        'steps are too long for this motion, or unstable; give a smaller time.step, time.scheme = "energy_conserving", '
-        "or numerical damping"
-    )
-
-
-def _said_of_momentum(history: dict[str, Array]) -> str:
+    if system.hub is None:
+        share = growth(history, between) if system.model.closed else 0.0
+        said = (
+            f"the energy has grown by {100 * share:.2g} % of the energy exchanged, though nothing supplies any: the "
+            "time steps are too long for this motion, or unstable; give a smaller time.step, "
+            'time.scheme = "energy_conserving", or numerical damping'
+        )
+        return said if share >= GROWN else ""
+    cause = "the time steps do not resolve the motion of the hub, as where it has little inertia of its own"
     momentum, impulse = history["angular_momentum"], history["impulse"]
     largest = max(np.max(np.abs(momentum), initial=0.0), np.max(np.abs(impulse), initial=0.0))
     off = float(np.ptp(momentum - impulse)) if len(momentum) else 0.0
-    if not off > TURNED * largest:
-        return ""
-    return (
-        f"the angular momentum of hub and structure differs by {100 * off / largest:.2g} % from the impulse of the "
-        "torque: the time steps do not resolve the motion of the hub, as where it has little inertia of its own; "
-        'give a smaller time.step, or time.scheme = "radau5" or "energy_conserving"'
-    )
-
-
-def _said_of_hub(history: dict[str, Array], between: bool) -> str:
-    share = growth_on_hub(history, between)
-    if share < GROWN:
-        return ""
-    return (
+    if off > TURNED * largest:
+        return (
+            f"the angular momentum of hub and structure differs by {100 * off / largest:.2g} % from the impulse of the "
+            f'torque: {cause}; give a smaller time.step, or time.scheme = "radau5" or "energy_conserving"'
+        )
+    share = growth_on_hub(history, between) if system.inner.model.driven_by_hub else 0.0
+    said = (
         f"the energy of hub and structure has grown by {100 * share:.2g} % of the energy exchanged beyond the work of "
-        "the torque: the time steps do not resolve the motion of the hub, as where it has little inertia of its own, "
-        "or are unstable; "
-        "give a smaller time.step or more motion.hub_inertia"
+        f"the torque: {cause}, or are unstable; give a smaller time.step or more motion.hub_inertia"
     )
+    return said if share >= GROWN else ""
 
 
 def with_cause(
@@ -171,60 +164,17 @@ def with_cause(
     return ComputationError(f"{error.what}; before that {why}", time=error.time, advice=advice.removeprefix("give "))
 
 
-def diverged(
-    theory: Theory, time: float, critical: float | None, since: float | None, loose: Sequence[str] = ()
-) -> ComputationError:
-    """Return the error of a linear solution that has diverged.
-
-    Args:
-        theory: its theory.
-        time: when (s).
-        critical: speed at which its stiffness is singular, rad/s; None if there is none.
-        since: from when on (s) the speed was above that; None if it never was.
-        loose: hinges of the root without a spring.
-    """
-    why = "the motion is unstable, or the load is too large for a linear theory"
-    if loose:
-        why = f"no spring holds the root's hinge ({', '.join(loose)}), which turns beyond what is linear"
-    if since is not None:
-        why = f"its stiffness is not definite above {critical:.6g} rad/s, passed at t = {since:.4g} s"
-        if not theory.prestress:
-            why += ": first-order strains have the softening by the centrifugal force but not the stiffening"
-    return ComputationError(
-        f"the {theory.name} solution diverged (a displacement exceeds the length, or a rotation 1 rad; {why})",
-        time=time,
-        advice=better_theories(theory, turning=bool(loose)),
-    )
-
-
-def better_theories(theory: Theory, turning: bool = False) -> str:
-    """Return which theories to use in the place of a linear one that diverged, or whose root turns far."""
-    exact = richest().name
-    if theory.prestress or turning:
-        return f'use model.theory = "{exact}", which holds for any deflection'
-    stiffened = next(t.name for t in theories() if t.linear and t.prestress)
-    return f'use model.theory = "{stiffened}" for small or "{exact}" for any deflection'
-
-
-#: What to try where numbers overflow.
-ADVICE = "check the units of the scene, whose numbers are out of all proportion, or use a shorter time step"
-
-
 def check_finite(values: Iterable[tuple[str, Any]], time: float | None = None, where: str = "") -> None:
-    """See that all values are finite; what is no number passes.
-
-    Args:
-        values: name and value of each.
-        time: when they were computed (s), where there is a time.
-        where: what they belong to, for the message.
+    """See that all named values, computed at a time (s), are finite; what is no number passes.
 
     Raises:
-        ComputationError: names those that are not.
+        ComputationError: names those that are not, and where.
     """
     wrong = [name for name, value in values if isinstance(value, float) and not math.isfinite(value)]
     if wrong:
         more = f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
-        raise ComputationError(f"not a finite number{where}: {', '.join(wrong[:3])}{more}", time, ADVICE)
+        advice = "check the units of the scene, whose numbers are out of all proportion, or use a shorter time step"
+        raise ComputationError(f"not a finite number{where}: {', '.join(wrong[:3])}{more}", time, advice)
 
 
 def check_rows(rows: Iterable[Mapping[str, Any]]) -> None:

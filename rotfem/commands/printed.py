@@ -64,11 +64,6 @@ def reduced_report(s: dict[str, Any]) -> str:
     )
 
 
-def of_check(s: dict[str, Any]) -> tuple[list[str], list[str]]:
-    """Return what `check` prints before and after its tables."""
-    return [f"{s['name']}: {s['type']} of {s['elements']} elements"], []
-
-
 def of_modes(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     """Return what `modes` prints before and after its table."""
     return [about(s), effects(s), *choice_report(s)], []
@@ -109,7 +104,7 @@ def of_sweep(s: dict[str, Any]) -> tuple[list[str], list[str]]:
 #: Command ↦ what it prints before and after its tables.
 _AROUND = {
     "run": of_run,
-    "check": of_check,
+    "check": lambda s: ([f"{s['name']}: {s['type']} of {s['elements']} elements"], []),
     "modes": of_modes,
     "campbell": of_campbell,
     "response": of_response,
@@ -140,18 +135,15 @@ def accuracy_report(summary: dict[str, Any]) -> list[str]:
         return []
     chosen, tries = wanted["chosen"], len(wanted["attempts"])
     model = f"{chosen['theory']} theory" + (", reduced model" if chosen.get("reduced") else "")
-    mesh = f"{by(chosen['elements'])} elements" if "elements" in chosen else "the mesh of the file"
+    number = chosen.get("elements")
+    number = "×".join(map(str, number)) if isinstance(number, list | tuple) else number
+    mesh = "the mesh of the file" if number is None else f"{number} elements"
     steps = f", {chosen['scheme']} to {chosen['tolerance']:.2g}" if "tolerance" in chosen else ""
     steps = f", {chosen['scheme']} with steps of {chosen['step']:.3g} s" if "step" in chosen else steps
     met = "met" if wanted["met"] else "not met"
     attempts = "" if tries == 1 else f" after {tries} attempts"
-    asked = percent(wanted["asked"])
-    return [f"accuracy of {asked} {met}{attempts}: {model}, {mesh} of degree {chosen['degree']}{steps}"]
-
-
-def by(elements: int | list[int] | tuple[int, ...]) -> str:
-    """Return numbers of elements as text."""
-    return "×".join(map(str, elements)) if isinstance(elements, list | tuple) else str(elements)
+    found = f"{model}, {mesh} of degree {chosen['degree']}{steps}"
+    return [f"accuracy of {percent(wanted['asked'])} {met}{attempts}: {found}"]
 
 
 def choice_report(summary: dict[str, Any]) -> list[str]:

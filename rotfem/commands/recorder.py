@@ -26,11 +26,7 @@ STRESS = "von_mises"
 
 
 class ResultantRows:
-    """Takes the states of the rows of a history.
-
-    Args:
-        system: equations of motion of a plate, the hub held.
-        names: of the resultants that are wanted.
+    """Takes the states of the rows of a history of a plate, its hub held, and keeps named resultants.
 
     Attributes:
         frames: values (nodes, names) at the times of the fields' snapshots, which the recorder adds.
@@ -39,8 +35,9 @@ class ResultantRows:
     """
 
     def __init__(self, system: Any, names: tuple[str, ...]):
-        self.names, self._system = names, system
+        self.names = names
         self._resultants = PlateResultants(system)
+        self._nodes = system.structure.nodes(system.zeros())[0]
         self._columns = [self._resultants.names.index(name) for name in names]
         self._stress = self._resultants.names.index(STRESS)
         self.frames = Snapshots()
@@ -58,8 +55,7 @@ class ResultantRows:
         stress = float(values[worst, self._stress])
         check_finite([("the equivalent stress", float(values.sum()))], t)
         if not self.largest or stress > self.largest[0]:
-            coordinates = self._system.structure.nodes(self._system.zeros())[0]
-            self.largest = (stress, float(coordinates["x"][worst]), float(coordinates["y"][worst]), t)
+            self.largest = (stress, float(self._nodes["x"][worst]), float(self._nodes["y"][worst]), t)
         self.last = values[:, self._columns]
         return stress
 
@@ -67,8 +63,7 @@ class ResultantRows:
         """Return the positions of the nodes (m), and the resultants of the last row; empty of no row."""
         if self.last is None:
             return {}
-        coordinates = self._system.structure.nodes(self._system.zeros())[0]
-        return {**coordinates, **dict(zip(self.names, self.last.T, strict=True))}
+        return {**self._nodes, **dict(zip(self.names, self.last.T, strict=True))}
 
     def summary(self) -> dict[str, float]:
         """Return the largest equivalent stress (Pa), where (m) and when (s)."""
@@ -96,11 +91,7 @@ class ResultantRows:
 
 
 class StationRows:
-    """Takes the states of every so many rows of a history.
-
-    Args:
-        system: equations of motion of a beam.
-        output: what is asked for, with stations.
+    """Takes the states of every so many rows of a history of a beam, and keeps what is asked for at its stations.
 
     Attributes:
         kept: (time in s, values (stations, quantities)) so far.
@@ -115,18 +106,13 @@ class StationRows:
         self.kept: list[tuple[float, Array]] = []
         self.seen = 0
 
-    @property
-    def due(self) -> bool:
-        """Whether the next row is one of those that are kept."""
-        return self.seen % self.output.every == 0
-
     def __call__(self, t: float) -> None:
         """Keep the values at the state that is written into the system, or pass the row by.
 
         Raises:
             ComputationError: a number is not finite.
         """
-        if self.due:
+        if self.seen % self.output.every == 0:
             values = self._stations()[:, self._columns]
             check_finite(zip(self.names, map(float, values.sum(axis=0)), strict=True), t, " at the stations")
             self.kept.append((t, values))
@@ -159,24 +145,8 @@ class StationRows:
 Array = npt.NDArray[np.float64]
 
 
-def check_names(outputs: Sequence[str], taken: Sequence[str]) -> None:
-    """Refuse outputs of a user with the name of something that is recorded anyway.
-
-    Raises:
-        InputError: a name is taken.
-    """
-    for name in outputs:
-        if name in taken:
-            why = f"is the name of a column already; choose another one than {', '.join(taken)}"
-            raise InputError("output.quantities", name, why)
-
-
 class Recorder:
-    """Takes states and keeps rows of history.csv.
-
-    Args:
-        system: equations of motion.
-        output: what is recorded in addition to what always is, of it the stations.
+    """Takes states and keeps rows of history.csv, and what the scene's output asks for in addition.
 
     Attributes:
         history: rows so far.
@@ -185,24 +155,27 @@ class Recorder:
         InputError: an output of a user has the name of a column.
     """
 
-    def __init__(self, system: Any, output: OutputTable | None = None):
+    def __init__(self, system: Any, output: OutputTable):
         self.system = system
         names = tuple(f"tip_{c}" for c in system.structure.components)
         free = ("torque", "hub_kinetic", "angular_momentum", "impulse", "work") if system.hub is not None else ()
         root, further = (f"root_{name}" for name in system.root.names), tuple(system.model.problem.outputs)
-        named = () if output is None else output.resultants(system.structure.type)
+        named = output.resultants(system.structure.type)
         self.resultants = ResultantRows(system.held, named) if named else None
         stress = ("von_mises_max",) if named else ()
         energies = ("kinetic", "strain", "jacobi")
         pitch = () if system.motion.pitch is None else ("pitch",)
         columns = ("t", "psi", "psi_dot", *names, *energies, *root, *free, *pitch)
         self._last: State | None = None
-        self.formats = ("xdmf",) if output is None else output.fields
+        self.formats = output.fields
         self.snapshots = Snapshots() if self.formats else None
-        stations = output is not None and output.stations is not None
-        self.stations = StationRows(system, output) if stations and output is not None else None
-        of_stations = ("x", *self.stations.names) if self.stations is not None else ()
-        check_names(further, (*columns, *stress, *of_stations, *named))
+        self.stations = None if output.stations is None else StationRows(system, output)
+        of_stations = () if self.stations is None else ("x", *self.stations.names)
+        taken = (*columns, *stress, *of_stations, *named)
+        for name in further:
+            if name in taken:
+                why = f"is the name of a column already; choose another one than {', '.join(taken)}"
+                raise InputError("output.quantities", name, why)
         self.history = Table((*columns, *further, *stress))
 
     def __call__(self, state: State) -> None:

@@ -23,17 +23,11 @@ Array = npt.NDArray[Any]
 #: Largest displacement in a picture, part of the structure's size; frames of an animation and their number a second.
 WARP, FRAMES, RATE = 0.15, 24, 24
 
-#: From where a picture is taken, seen from the centre.
-VIEW = (0.7, -1.6, 1.0)
-
 
 def animate(result: ModesResult, mode: int, folder: Path) -> list[Path]:
     """Write mode_N.png and mode_N.gif: a mode at its largest and through one period, in space; return their paths.
 
-    Args:
-        result: modes.
-        mode: number of the mode, 1 for the first that is none of a rigid body.
-        folder: where the files go.
+    Mode 1 is the first that is none of a rigid body.
 
     Raises:
         SceneError: there is no such mode.
@@ -64,12 +58,7 @@ def animate(result: ModesResult, mode: int, folder: Path) -> list[Path]:
 
 
 class Moving:
-    """A surface in a mode, coloured by its leading displacement.
-
-    Args:
-        surface: of the structure.
-        shape: the mode, of which the surface shows `WARP` of its own size.
-    """
+    """A surface in a mode, moved by `WARP` of its own size and coloured by its leading displacement."""
 
     def __init__(self, surface: Surface, shape: Mapping[str, Array]):
         import pyvista
@@ -102,7 +91,7 @@ class Moving:
         plotter.add_text(title, font_size=11, position="upper_edge")
         plotter.add_axes(xlabel="1", ylabel="2", zlabel="3")
         centre = np.array(self._rest.center)
-        plotter.camera_position = [centre + self._size * np.array(VIEW), centre, (0, 0, 1)]
+        plotter.camera_position = [centre + self._size * np.array([0.7, -1.6, 1.0]), centre, (0, 0, 1)]
         plotter.reset_camera(bounds=np.array(self._rest.bounds) + WARP * self._size * np.array([-1, 1] * 3))
         plotter.camera.zoom(1.8)
         return plotter

@@ -57,7 +57,7 @@ def check_figure(result: CheckResult) -> Figure:
 
 def _view(axis: Any, result: CheckResult, i: int, j: int) -> None:
     """Draw the structure over axes i and j (from 0) of the frame."""
-    c = result.columns
+    c, triangles = result.columns, result.triangles
     if "axis_1" in c:
         r = np.stack([c[f"axis_{n}"] for n in (1, 2, 3)], axis=-1)
         for across, EI, colour in ((2, "EI3", "C0"), (3, "EI2", "C1")):
@@ -68,18 +68,13 @@ def _view(axis: Any, result: CheckResult, i: int, j: int) -> None:
             for place in np.linspace(0, len(r) - 1, 12).astype(int):
                 line = np.stack([r[place] - ends[place], r[place] + ends[place]])
                 axis.plot(line[:, i], line[:, j], lw=0.6, color=colour)
-        axis.plot(r[:, i], r[:, j], "k", lw=1.2)
-    elif result.triangles is not None:
-        x, y = list(result.nodes.values())[:2]
-        root = result.summary["root"]
-        places = np.stack([x + root[0], y + root[1], np.zeros(len(x)) + root[2]], axis=-1)
-        if (i, j) == (0, 1):
-            axis.triplot(places[:, 0], places[:, 1], result.triangles, lw=0.3, color="0.5")
-        else:
-            axis.plot(places[:, i], places[:, j], "k", lw=1.2)
     else:
-        x = result.nodes["x"] + result.summary["root"][0]
-        axis.plot(*(x if n == 0 else np.zeros(len(x)) for n in (i, j)), "k", lw=1.2)
+        x = result.nodes["x"]
+        r = np.column_stack([x, result.nodes.get("y", 0.0 * x), 0.0 * x]) + result.summary["root"]
+    if triangles is not None and (i, j) == (0, 1):
+        axis.triplot(r[:, 0], r[:, 1], triangles, lw=0.3, color="0.5")
+    else:
+        axis.plot(r[:, i], r[:, j], "k", lw=1.2)
     center = result.summary["center_of_mass"]
     axis.plot(center[i], center[j], "o", ms=6, mfc="none", color="C3")
     dress(axis, f"{i + 1} (m)", f"{j + 1} (m)")

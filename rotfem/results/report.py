@@ -88,35 +88,36 @@ def write_report(result: Result, drawing: Figure | None, folder: Path) -> Path:
     from bokeh.embed import components
     from bokeh.resources import Resources
 
-    figures = {name: draw() for name, draw in result.drawings().items()}
-    live = {name: found for name, figure in figures.items() if (found := interactive(figure)) is not None}
+    summary, figures = result.summary, {name: draw() for name, draw in result.drawings().items()}
+    name, command, status = (escape(str(summary[key])) for key in ("name", "command", "status"))
+    live = {file: found for file, figure in figures.items() if (found := interactive(figure)) is not None}
     scripts, places = components(live) if live else ("", {})
     parts = "".join(
-        f"<figure><h3>{escape(_title(figures[name]))}</h3>{places.get(name) or picture(figures[name])}</figure>"
-        for name in figures
+        f"<figure><h3>{escape(_title(figure))}</h3>{places.get(file) or picture(figure)}</figure>"
+        for file, figure in figures.items()
     )
     hint = '<p class="hint">Drag to move, zoom with the tools on the right, click a name to hide its line.</p>'
     moving, cards = animated(result)
     sections = [
-        header(result.summary),
-        section("Summary", facts(result.summary) + messages(result.summary)),
+        f'<header><h1>{name}</h1><p>rotfem {command}</p><span class="status {status}">{status}</span></header>',
+        section("Summary", facts(summary) + messages(summary)),
         section("Figures", (hint if live else "") + parts),
         section("Modes in motion", cards),
         section("Tables", "".join(table(*entry) for entry in tables(result))),
-        section("How exact it is", error_table(result.summary)),
-        section("Scene", scene(result.summary, drawing)),
-        section("Made with", facts_list(result.summary["versions"]) + summary_text(result.summary)),
+        section("How exact it is", error_table(summary)),
+        section("Scene", scene(summary, drawing)),
+        section("Made with", facts_list(summary["versions"]) + folded("summary.json", json_text(dict(summary)))),
     ]
     content = {
-        "title": escape(f"{result.summary['name']}: rotfem {result.summary['command']}"),
+        "title": f"{name}: rotfem {command}",
         "library": Resources(mode="inline", components=["bokeh"]).render_js() if live else "",
         "content": "\n".join(sections),
         "modes": json.dumps(moving, separators=(",", ":")),
         "scripts": scripts,
     }
     text = Path(__file__).with_suffix(".html").read_text(encoding="utf-8")
-    for name, value in content.items():
-        before, _, after = text.partition(f"@{name}@")
+    for key, value in content.items():
+        before, _, after = text.partition(f"@{key}@")
         text = before + value + after
     return write_text(folder / "report.html", text)
 
@@ -127,12 +128,6 @@ def write_report(result: Result, drawing: Figure | None, folder: Path) -> Path:
 def section(title: str, content: str) -> str:
     """Return a section; nothing where it has no content."""
     return f"<section><h2>{title}</h2>\n{content}</section>" if content else ""
-
-
-def header(summary: Mapping[str, Any]) -> str:
-    """Return the heading: scene, command, how it ended."""
-    name, command, status = (escape(str(summary[key])) for key in ("name", "command", "status"))
-    return f'<header><h1>{name}</h1><p>rotfem {command}</p><span class="status {status}">{status}</span></header>'
 
 
 def facts(summary: Mapping[str, Any]) -> str:
@@ -254,13 +249,12 @@ def scene(summary: Mapping[str, Any], drawing: Figure | None) -> str:
     image = "" if drawing is None else f"<figure>{picture(drawing)}</figure>"
     if "scene" not in summary:
         return image
-    text = escape(tomli_w.dumps(summary["scene"]))
-    return f"{image}<details><summary>all keys of the scene</summary><pre>{text}</pre></details>"
+    return image + folded("all keys of the scene", tomli_w.dumps(summary["scene"]))
 
 
-def summary_text(summary: Mapping[str, Any]) -> str:
-    """Return the whole summary as JSON, folded away."""
-    return f"<details><summary>summary.json</summary><pre>{escape(json_text(dict(summary)))}</pre></details>"
+def folded(title: str, text: str) -> str:
+    """Return a text that is folded away under its title."""
+    return f"<details><summary>{title}</summary><pre>{escape(text)}</pre></details>"
 
 
 # --- figures ----------------------------------------------------------------------------------------------------------
@@ -292,8 +286,8 @@ def interactive(figure: Figure) -> Any:
         return None
     x: dict[tuple[float, float], Any] = {}
     panels = [panel(a, x.setdefault(a.get_xlim(), Range1d(*map(float, a.get_xlim())))) for a in axes]
-    rows, options = [[one] for one in panels], {"logo": None}
-    return gridplot(rows, sizing_mode="stretch_width", toolbar_location="right", toolbar_options=options)
+    options = {"sizing_mode": "stretch_width", "toolbar_location": "right", "toolbar_options": {"logo": None}}
+    return gridplot(panels, ncols=1, **options)
 
 
 def panel(axes: Any, x_range: Any) -> Any:

@@ -51,12 +51,9 @@ _locks: dict[str, tuple[int, int]] = {}
 
 
 class FolderLock:
-    """Lock on a result folder. A process may hold it several times over; another one is refused.
+    """Lock on a result folder that is there. A process may hold it several times over; another one is refused.
 
     What a killed process leaves of it is a file that no process holds, and no obstacle.
-
-    Args:
-        folder: the folder; it must be there.
     """
 
     def __init__(self, folder: Path):
@@ -173,18 +170,15 @@ class ResultSet:
         self.begun = self.ended = False
         self.live: LiveTable | None = None
         self._staged: set[str] = set()
-        self.before = said_of(folder) if self._was_left() else ""
+        there = read_summary(folder)
+        left = is_ours(there) and there["status"] in AT_WORK and not holder(folder)
+        self.before = said_of(folder) if left else ""
         self._lock = FolderLock(folder)
         self._lock.acquire()
         taken = self._taken(inputs)
         if taken is not None:
             self._lock.release()
             raise taken
-
-    def _was_left(self) -> bool:
-        """Return whether a process has vanished that was at work on the set there."""
-        summary = read_summary(self.folder)
-        return is_ours(summary) and summary["status"] in AT_WORK and not holder(self.folder)
 
     def _taken(self, inputs: Iterable[Path]) -> OutputError | None:
         """Return the error of a file that is not to be lost and has the name of a result; None where there is none."""
@@ -228,11 +222,7 @@ class ResultSet:
                 overwrite(self.folder / SUMMARY, self._text(summary))
 
     def begin(self, status: str, keep: Collection[str] = ()) -> None:
-        """Say that the folder's set is this one and not complete, and remove the one before.
-
-        Args:
-            status: what summary.json says: "running" or "writing".
-            keep: files of the set before that are part of this one.
+        """Say that the folder's set is this one, "running" or "writing", and remove what is not kept of the one before.
 
         Raises:
             OutputError: summary.json cannot be written.

@@ -48,10 +48,7 @@ class Surface:
     def of_beam(cls, places: Array, sides: tuple[Array, Array], length: float) -> Surface:
         """Return the four sides and both ends of a beam with rectangular sections.
 
-        Args:
-            places: of the nodes along the axis, (n, 3), m.
-            sides: half the width and half the height of the sections as vectors, (n, 3) each, m.
-            length: of the beam, m.
+        Places are those of the nodes on the axis; sides half the widths and half the heights as vectors, (n, 3), m.
         """
         n, (a, b) = len(places), sides
         sizes = [np.linalg.norm(side, axis=1) for side in sides]

@@ -8,10 +8,7 @@ from html import escape
 from itertools import zip_longest
 from textwrap import wrap
 
-from rotfem.results.columns import described, label
-
-#: Part of the largest number in its column below which a number is shown as 0; of ratios the number itself.
-NEGLIGIBLE = 1e-9
+from rotfem.results.columns import ZERO, described, label
 
 #: Columns of characters that a table is made for, and fewest that a column of text is given.
 WIDTH, NARROWEST = 80, 16
@@ -43,8 +40,8 @@ class ShortTable:
             cells = [*row, *[""] * (len(sizes) - len(row))]
             folded = wrap(cells[-1], max(room, NARROWEST)) or [""]
             *most, size = sizes
-            before = [_aligned(*each) for each in zip(cells, most, left, strict=False)]
-            out.append("  ".join([*before, _aligned(folded[0], size if size <= room else 0, left[-1])]).rstrip())
+            one = zip([*cells[:-1], folded[0]], [*most, size if size <= room else 0], left, strict=True)
+            out.append("  ".join(text.ljust(n) if to_left else text.rjust(n) for text, n, to_left in one).rstrip())
             out += [" " * (sum(most) + 2 * len(most)) + text for text in folded[1:]]
         return out
 
@@ -58,10 +55,10 @@ class ShortTable:
 
 
 def number(value: float | None, scale: float = 1.0, digits: int = 6) -> str:
-    """Return a number as text; 0 if it is below `NEGLIGIBLE` of a scale, and – where there is none."""
+    """Return a number as text; 0 if it is below `ZERO` of a scale, and – where there is none."""
     if value is None:
         return "–"
-    return "0" if abs(value) <= NEGLIGIBLE * scale else f"{value:.{digits}g}"
+    return "0" if abs(value) <= ZERO * scale else f"{value:.{digits}g}"
 
 
 def numbers(values: Sequence[float | None], digits: int = 6) -> list[str]:
@@ -97,7 +94,3 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _aligned(text: str, size: int, left: bool) -> str:
-    return text.ljust(size) if left else text.rjust(size)

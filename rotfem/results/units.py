@@ -43,16 +43,12 @@ class ShownUnits:
 
     def rows(self, rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         """Return rows of modes with columns more, such as `speed_rpm`, where another unit than SI is asked for."""
-        return [dict(row) | {name: float(value) for name, value in self._beside(row).items()} for row in rows]
-
-    def _beside(self, values: Mapping[str, Any]) -> dict[str, Any]:
         named = {"speed": self.speed, "frequency": self.frequency}
-        wanted = {
-            f"{name}_{unit.lower().replace('/', '_')}": in_unit(values[name], unit)
-            for name, unit in named.items()
-            if unit != SI and name in values
-        }
-        return {column: value for column, value in wanted.items() if column not in values}  # frequency_hz always is
+        wanted = [(f"{n}_{unit.lower().replace('/', '_')}", n, unit) for n, unit in named.items() if unit != SI]
+        return [
+            dict(row) | {c: float(in_unit(row[n], unit)) for c, n, unit in wanted if n in row and c not in row}
+            for row in rows
+        ]
 
 
 def in_unit(values: npt.ArrayLike, unit: str) -> npt.NDArray[np.float64]:
