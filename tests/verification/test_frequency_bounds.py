@@ -61,10 +61,9 @@ def test_what_is_lost_is_said() -> None:
     assert "lag 1" in warning
 
 
-@pytest.mark.parametrize("slenderness", [1e-6, 1e-7])
-def test_no_instability_out_of_round_off(slenderness: float) -> None:
+def test_no_instability_out_of_round_off() -> None:
     """At rest nothing is unstable, whatever round-off makes of the eigenvalues; campbell says so, too."""
-    for scene in (frequency_bounds.slender_beam(slenderness, 64), viscous(slenderness)):
+    for scene in (frequency_bounds.slender_beam(1e-7, 64), viscous(1e-7)):
         result = modes(scene)
         assert all(not row["stability"].endswith("instability") for row in result.rows)
         diagram = campbell(scene, [0.0, 0.1])

@@ -124,10 +124,11 @@ def test_spinning(viscosity: float) -> None:
 
 def test_campbell() -> None:
     """Branches of a heavily damped beam are followed over speed, and none is lost."""
-    result = campbell(beam(5e-3, 1.0, 6.0, 6), [0.0, 3.0, 6.0])
-    assert result.labels == [f"lag {n}" for n in range(1, 7)]
+    scene = beam(5e-3, 1.0, 6.0, 4, mesh={"elements": 4})
+    result = campbell(scene, [0.0, 3.0, 6.0])
+    assert result.labels == [f"lag {n}" for n in range(1, 5)]
     assert np.all(np.isfinite(result.frequencies))
-    single = modes(beam(5e-3, 1.0, 6.0, 6))
+    single = modes(scene)
     np.testing.assert_allclose(result.frequencies[-1], single.frequencies, rtol=1e-8)
 
 

@@ -169,12 +169,12 @@ def test_load_pulse_shorter_than_a_step() -> None:
 def test_dense_noise_is_averaged() -> None:
     """A speed table with noise, 100 rows in a step, costs no further steps and is as good as landing on each."""
     rng = np.random.default_rng(1)
-    t = np.linspace(0.0, 1.0, 5001)
+    t = np.linspace(0.0, 0.4, 2001)
     rows = np.column_stack([t, t + 1e-3 * rng.standard_normal(len(t))])
     answers = []
     for step in (0.02, t[1]):
-        result = krb(speeds(*rows), step, 1.0)
-        answers.append(np.interp(np.arange(0.0, 1.0, 0.02), result.history["t"], result.history["tip_u2"]))
+        result = krb(speeds(*rows), step, 0.4)
+        answers.append(np.interp(np.arange(0.0, 0.4, 0.02), result.history["t"], result.history["tip_u2"]))
         assert result.summary["factorisations"] < 4 * result.summary["steps"]
     assert np.abs(answers[0] - answers[1]).max() < 5e-3 * np.abs(answers[1]).max()
 
