@@ -92,12 +92,7 @@ def linear_of(scene: Scene) -> Theory | None:
 
 
 def refuse(scene: Scene, wanted: tuple[str, ...], command: str) -> None:
-    """Refuse an accuracy of something that a command does not compute.
-
-    Args:
-        scene: with an accuracy.
-        wanted: what the command computes.
-        command: its verb.
+    """Refuse an accuracy of something else than what a command computes, by its verb.
 
     Raises:
         InputError: the scene asks for another.
@@ -242,13 +237,7 @@ def estimated(error: float | None) -> str:
 
 
 def missed(scene: Scene, done: Result, failure: ComputationError | None) -> Missed:
-    """Return the error that says what was reached instead of an accuracy.
-
-    Args:
-        scene: with an accuracy.
-        done: the best result.
-        failure: of a further answer, where one failed or was too dear.
-    """
+    """Return the error that says what the best result reached instead of an accuracy, and what failed after it."""
     error = done.summary["error"]
     worst = max(WORDS, key=lambda name: contribution(error, name))
     advice = {

@@ -220,7 +220,8 @@ class RunErrors:
         if unknown:
             why = self._why_unknown(error)
             said = [f"the error by the {' and the '.join(unknown)} could not be estimated: {why}"]
-        if not error.exceeds(max(NOTICED, scene.model.tolerance or 0.0, (time and time.tolerance) or 0.0)):
+        allowed = max(NOTICED, scene.model.tolerance or 0.0, (time and time.tolerance) or 0.0)
+        if error.total is None or error.total <= allowed:
             return said
         steps, mesh, model = sizes = [error.contributions[name] or 0.0 for name in NAMES]
         if steps + mesh <= NOTICED and self.theory is not None and self.theory.warning():

@@ -238,7 +238,10 @@ class Simulation:
                 f"the speed is above {watched.critical:.6g} rad/s, where the {self.problem.theory.name} stiffness is "
                 f"no longer definite, since t = {watched.since:.4g} s"
             )
-        errors = self._errors(history)
+        errors = RunErrors(
+            *(self.scene, self.problem, self.system, history, self._wants_error, watched.farthest, watched.stability),
+            *(self.shape, self.reduced, self.companions, self.stepper, self._start),
+        )
         theory, lost = errors.theory, said_of(watched.farthest.conditioning() or 0.0)
         log.warnings += [line for line in ("" if theory is None else theory.warning(), lost) if line]
         error = None if failure is not None else errors.estimate()
@@ -279,13 +282,6 @@ class Simulation:
             grown = monitor.energy_warning(self.system, history, self.rows is not None)
             out += [grown] if grown else []
         return out
-
-    def _errors(self, history: dict[str, Array]) -> RunErrors:
-        """Return the errors of what was computed."""
-        return RunErrors(
-            *(self.scene, self.problem, self.system, history, self._wants_error, self.monitor.farthest),
-            *(self.monitor.stability, self.shape, self.reduced, self.companions, self.stepper, self._start),
-        )
 
     @property
     def _wants_error(self) -> bool:

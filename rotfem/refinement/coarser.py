@@ -41,25 +41,8 @@ class OtherMesh:
         return difference + error_of(difference, self.order, 1.0 / self.ratio)
 
 
-def like(system: Any, problem: Problem, moving: bool = True) -> Any:
-    """Return the system of a variant of a problem, compiled as another one is and without what that leaves out.
-
-    Args:
-        system: of the problem.
-        problem: the variant.
-        moving: whether it will be stepped in time.
-
-    Raises:
-        InputError: a mesh that cannot be computed with.
-    """
-    other, held = compile_system(problem, system.comm, moving, system.held.parted), system.held
-    if held.left_out:
-        other.leave_out(held.left_out)
-    return other
-
-
 def on_other_mesh(problem: Problem, system: Any, moving: bool = True, finer: bool = False) -> OtherMesh | None:
-    """Return a problem on half the cells or a finer mesh.
+    """Return a problem on half the cells or a finer mesh, without what its own system leaves out.
 
     Where the nodes that a section, a mass or a load asks for fix the cells they are halved in length, and those of a
     mesh file have one degree more. None where there is no other mesh at all.
@@ -77,7 +60,9 @@ def on_other_mesh(problem: Problem, system: Any, moving: bool = True, finer: boo
         if finer and ratio > 1.0:
             continue
         try:
-            other = like(system, problem.replace(mesh=mesh), moving)
+            other = compile_system(problem.replace(mesh=mesh), system.comm, moving, system.held.parted)
+            if system.held.left_out:
+                other.leave_out(system.held.left_out)
         except InputError:
             continue
         if other.V.dofmap.index_map.size_global != nodes:

@@ -69,16 +69,14 @@ class HistoryErrors:
         richer: Problem | None = None,
     ):
         self.scheme = scheme
-
         same, self.other = system.twin(), on_other_mesh(problem, system)
         self.mesh: Companion | None = None
         self.theory: Companion | None = None
         if self.other is not None:
             self.mesh = Companion(self.other.system, same, scheme, newton, False, output=output, interval=interval)
         if richer is not None:
-            self.theory = Companion(
-                compile_system(richer.replace(outputs={}), system.comm), same, scheme, newton, doubles=False
-            )
+            there = compile_system(richer.replace(outputs={}), system.comm)
+            self.theory = Companion(there, same, scheme, newton, doubles=False)
         further = [companion for companion in (self.mesh, self.theory) if companion is not None]
         self.steps = Companion(same, system, scheme, newton, True, further, output, interval)
         for companion in self.companions:

@@ -58,14 +58,6 @@ class ErrorEstimate:
         """Return what a summary has of it."""
         return {**self.contributions, "total": self.total, **self.found}
 
-    def line(self) -> str:
-        """Return it as a line of text."""
-        return error_line(self.summary())
-
-    def exceeds(self, allowed: float = NOTICED) -> bool:
-        """Return whether the sum is more than what is allowed."""
-        return self.total is not None and not self.total <= allowed
-
 
 def error_line(summary: dict[str, Any]) -> str:
     """Return the line about `error` of a summary."""

@@ -88,7 +88,7 @@ class Setting:
     def changes(self) -> dict[str, Any]:
         """Return the scene's keys ↦ values of this setting; None removes what the scene says."""
         out: dict[str, Any] = {f"model.{key}": value for key, value in self.models[0].items()}
-        out |= {"mesh.degree": self.degree}
+        out["mesh.degree"] = self.degree
         if self.elements is not None:
             out["mesh.elements"] = list(self.elements) if isinstance(self.elements, tuple) else self.elements
         if self.moving:
@@ -99,8 +99,8 @@ class Setting:
     def summary(self) -> dict[str, Any]:
         """Return the setting as far as it is in use."""
         unused = {"models", "scheme", "tolerance"} if self.reduced else {"models"}
-        known = {key: value for key, value in asdict(self).items() if key not in unused and value is not None}
-        return {**{key: value for key, value in self.models[0].items() if value is not None}, **known}
+        used = {**self.models[0], **{key: value for key, value in asdict(self).items() if key not in unused}}
+        return {key: value for key, value in used.items() if value is not None}
 
     def key(self) -> str:
         """Return what identifies the setting: all of it as JSON."""
@@ -333,12 +333,6 @@ class Refinement(Generic[R]):
             return None
         return self.best.seconds * setting.work() / self.best.setting.work()
 
-    def take(self, answer: Answer[R]) -> None:
-        """Take note of an answer."""
-        self.tried.append({**answer.setting.summary(), "error": answer.error["total"], "seconds": answer.seconds})
-        if self.best is None or answer.rank <= self.best.rank:
-            self.best = answer
-
 
 def refine(
     first: Setting,
@@ -377,7 +371,10 @@ def refine(
                     raise
                 found.failure = failure
             continue
-        found.take(Answer(setting, error, clock.used() - began, result))
+        answer = Answer(setting, error, clock.used() - began, result)
+        found.tried.append({**setting.summary(), "error": error["total"], "seconds": answer.seconds})
+        if found.best is None or answer.rank <= found.best.rank:
+            found.best = answer
         if not is_within(error, accuracy):
             following = clock.comm.bcast(setting.finer(error, accuracy))
     return found

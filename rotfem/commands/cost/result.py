@@ -149,13 +149,8 @@ def recommendations(
             together = sum(entry["time"] or 0.0 for entry in refused)
             missing += f"; {len(refused)} settings were left out, of about {together:.2g} s: {refused[0]['why']}"
     listed = [{"accuracy": a, "setting": r and setting_of(r).words(), "row": r} for a, r in best.items()]
-    return {
-        "recommended": row,
-        "promise": promise,
-        "closest": closest,
-        "missing": missing,
-        "recommendations": listed,
-    }
+    found = {"recommended": row, "promise": promise, "closest": closest, "missing": missing}
+    return {**found, "recommendations": listed}
 
 
 # --- the result ------------------------------------------------------------------------------------------------------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import inf
 from typing import Any
 
 from rotfem import registry
@@ -20,6 +21,9 @@ OUTPUTS = ("tip", "frequencies", "campbell")
 STEPS = {False: (8.0, 4.0, 2.0, 1.0, 0.5), True: (8.0, 4.0, 2.0, 1.0)}
 TOLERANCES = {False: (1000.0, 100.0, 10.0, 1.0, 0.1), True: (100.0, 10.0, 1.0)}
 MESHES = {False: (0.25, 0.5, 1.0, 2.0), True: (0.5, 1.0)}
+
+#: Keys of a scene by which it chooses its setting, which a study does itself.
+CHOICES = ("accuracy", "accuracy_of", "accuracy_budget", "model.tolerance", "model.reduced", "model.foreshortening")
 
 #: Lists of values that take the place of the default ones, None where none are given.
 Chosen = Mapping[str, Sequence[Any] | None]
@@ -124,6 +128,34 @@ def sweep_speeds(scene: Scene) -> list[float]:
     if not top > 0.0:
         raise SceneError(scene.file, "cost --of", "campbell", "the scene has no speed to go up to")
     return [top * i / 8 for i in range(9)]
+
+
+def without_choices(scene: Scene) -> Scene:
+    """Return a scene in its own setting."""
+    changes: dict[str, Any] = dict.fromkeys(CHOICES)
+    if scene.time is not None:  # an accuracy may have given its steps
+        changes |= {"time.tolerance": scene.time.tolerance, "time.step": scene.time.step}
+    return scene.replace(changes)
+
+
+def checked(scene: Scene, accuracy: float, repeat: int, output: str | None) -> str:
+    """Return the output that is compared.
+
+    Raises:
+        SceneError: what is asked for is not valid, or has no meaning for the scene.
+    """
+    if not 0 < accuracy < inf:
+        raise SceneError(scene.file, "cost --accuracy", accuracy, "must be a number greater than 0")
+    if repeat < 1:
+        raise SceneError(scene.file, "cost --repeat", repeat, "must be an integer at least 1")
+    output = default_output(scene) if output is None else output
+    if output not in OUTPUTS:
+        raise SceneError(scene.file, "cost --of", output, f"allowed: {', '.join(OUTPUTS)}")
+    if output == "tip":
+        scene.check_run()
+    if output == "campbell":
+        sweep_speeds(scene)
+    return output
 
 
 def check_choice(scene: Scene, chosen: Chosen) -> None:

@@ -28,17 +28,16 @@ from rotfem.commands.cost.bench import Array, Bench, Measurement, Record, bytes_
 from rotfem.commands.cost.result import CostResult, Reference, Row, pareto, recommend, recommendations, setting_of
 from rotfem.commands.cost.settings import (
     MESHES,
-    OUTPUTS,
     Chosen,
     allowed_by,
     check_choice,
-    default_output,
+    checked,
     default_theories,
     grid,
     own_setting,
     parts_of,
-    sweep_speeds,
     with_theory,
+    without_choices,
 )
 from rotfem.commands.options import seconds_of
 from rotfem.commands.problem import Problem
@@ -71,9 +70,6 @@ RECORD = "cost.jsonl"
 
 #: Scheme of the adaptive steps that references are made with.
 ADAPTIVE = "esdirk4"
-
-#: Keys of a scene by which it chooses its setting, which a study does itself.
-CHOICES = ("accuracy", "accuracy_of", "accuracy_budget", "model.tolerance", "model.reduced", "model.foreshortening")
 
 
 def cost(
@@ -129,34 +125,6 @@ def cost(
     record = Record(path, fingerprint(scene, output, comm.size), fresh=not resume)
     study = Study(scene, output, chosen, repeat, Clock(seconds, comm, key="the budget"), record)
     return study.run(quick, accuracy, progress or (lambda share: None))
-
-
-def without_choices(scene: Scene) -> Scene:
-    """Return a scene in its own setting."""
-    changes: dict[str, Any] = dict.fromkeys(CHOICES)
-    if scene.time is not None:  # an accuracy may have given its steps
-        changes |= {"time.tolerance": scene.time.tolerance, "time.step": scene.time.step}
-    return scene.replace(changes)
-
-
-def checked(scene: Scene, accuracy: float, repeat: int, output: str | None) -> str:
-    """Return the output that is compared.
-
-    Raises:
-        SceneError: what is asked for is not valid, or has no meaning for the scene.
-    """
-    if not (np.isfinite(accuracy) and accuracy > 0):
-        raise SceneError(scene.file, "cost --accuracy", accuracy, "must be a number greater than 0")
-    if repeat < 1:
-        raise SceneError(scene.file, "cost --repeat", repeat, "must be an integer at least 1")
-    output = default_output(scene) if output is None else output
-    if output not in OUTPUTS:
-        raise SceneError(scene.file, "cost --of", output, f"allowed: {', '.join(OUTPUTS)}")
-    if output == "tip":
-        scene.check_run()
-    if output == "campbell":
-        sweep_speeds(scene)
-    return output
 
 
 def check_degrees(scene: Scene, degrees: Sequence[int], comm: MPI.Comm) -> None:
