@@ -73,10 +73,7 @@ class _Alone:
 class Session:
     """One command under one set of flags: speaks on rank 0 only, and turns errors into messages and exit status.
 
-    Args:
-        as_json: print the summary on stdout as JSON and nothing else there.
-        quiet: print errors only.
-        debug: let tracebacks through.
+    It prints JSON of the summary and nothing else on stdout, errors only if it is quiet, and tracebacks to debug.
 
     Attributes:
         speed_unit: unit in which the user gives speeds.

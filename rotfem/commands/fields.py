@@ -29,11 +29,8 @@ def fields_writer(
 ) -> Writer | None:
     """Return what writes the fields of a run into a folder, on all ranks together; None of no format.
 
-    Args:
-        system: equations of motion.
-        states: (time in s, local dof array).
-        more: names of further fields of the XDMF file, and (time, values (nodes, names)) at the same times.
-        formats: "vtx" (fields.bp) and "xdmf" (fields.xdmf with fields.h5).
+    States are (time in s, local dof array); formats "vtx" (fields.bp) and "xdmf" (fields.xdmf with fields.h5), which
+    has more named fields at the same times.
     """
     writers: list[Writer] = []
     if "vtx" in formats:
@@ -113,13 +110,9 @@ def surface_of(structure: Any, shape: dict[str, Array]) -> Surface:
 
 
 def modes_writer(analysis: Any, result: ModesResult, scaled: Array, formats: tuple[str, ...]) -> Writer:
-    """Return what writes modes.xdmf (the surface) and modes.bp (the mesh); the time is the number of the mode.
+    """Return what writes "xdmf" (the surface) and "vtx" (the mesh) of modes; the time is the number of the mode.
 
-    Args:
-        analysis: of the modes.
-        result: with their shapes and the surface that they move.
-        scaled: the shapes as vectors of the owned unknowns, (n, modes).
-        formats: "vtx" and "xdmf".
+    `scaled` are the shapes as vectors of the owned unknowns, (n, modes).
     """
     surface, shapes = result.surface, result.shapes
     assert surface is not None

@@ -42,26 +42,14 @@ def of_run(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     if s["kind"] != "history":
         stable = {True: "stable ", False: "unstable ", None: ""}[s.get("stability", {}).get("stable")]
         return [*lines, f"{stable}steady state, computed in {s['timings']['total']:.2f} s"], []
-    return [*lines, reduced_report(s) if "reduced" in s else steps_report(s)], []
-
-
-def steps_report(s: dict[str, Any]) -> str:
-    """Return the line about the time steps of a run."""
-    time = s["timings"]
-    return (
-        f"{s['steps']} time steps, {s['newton_iterations']} Newton iterations, {time['total']:.2f} s: compilation "
-        f"{time['compile']:.2f} s, assembly {time['assemble']:.2f} s, linear solves {time['solve']:.2f} s"
-    )
-
-
-def reduced_report(s: dict[str, Any]) -> str:
-    """Return the line about the reduced model of a run."""
-    model, time = s["reduced"], s["timings"]
-    return (
-        f"reduced model of {model['vectors']} shapes, {model['steps']} time steps, {time['total']:.2f} s: compilation "
-        f"{time['compile']:.2f} s, reduction {time['reduce']:.2f} s; its error: shapes "
-        f"{percent(model['projection_error'])}, time steps {percent(model['time_error'])}"
-    )
+    time, model = s["timings"], s.get("reduced")
+    took = f"{time['total']:.2f} s: compilation {time['compile']:.2f} s"
+    if model is None:
+        how = f"{s['steps']} time steps, {s['newton_iterations']} Newton iterations, {took}"
+        return [*lines, f"{how}, assembly {time['assemble']:.2f} s, linear solves {time['solve']:.2f} s"], []
+    how = f"reduced model of {model['vectors']} shapes, {model['steps']} time steps, {took}"
+    errors = f"shapes {percent(model['projection_error'])}, time steps {percent(model['time_error'])}"
+    return [*lines, f"{how}, reduction {time['reduce']:.2f} s; its error: {errors}"], []
 
 
 def of_modes(s: dict[str, Any]) -> tuple[list[str], list[str]]:

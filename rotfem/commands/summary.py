@@ -15,14 +15,7 @@ from rotfem.version import versions
 
 
 def summary(command: str, scene: Scene, comm: MPI.Comm, inner: MPI.Comm | None = None) -> dict[str, Any]:
-    """Return what every summary has.
-
-    Args:
-        command: the verb.
-        scene: the scene as it was given.
-        comm: all processes of the command.
-        inner: those that its system is discretised on; all if None.
-    """
+    """Return what every summary has; `inner` are the processes that the system is discretised on, all if None."""
     out: dict[str, Any] = {"command": command, "status": "done", "name": scene.name, "versions": versions()}
     return {**out, **what_is_shared(command, comm, inner or comm), "scene": scene.digest()}
 
@@ -36,14 +29,7 @@ def timings(parts: Mapping[str, float], started: float, before: Mapping[str, flo
 
 
 def modal_summary(command: str, analysis: ModalAnalysis, scene: Scene, started: float) -> dict[str, Any]:
-    """Return what the summaries of modes and Campbell diagrams have in common (see `summary`).
-
-    Args:
-        command: the verb.
-        analysis: what was solved.
-        scene: the scene as it was given.
-        started: `perf_counter()` at the start.
-    """
+    """Return what the summaries of modes and Campbell diagrams have in common, started at a `perf_counter()`."""
     space = analysis.system.V.dofmap
     return {
         **summary(command, scene, analysis.everyone, analysis.comm),

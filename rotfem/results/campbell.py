@@ -24,14 +24,6 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 
-#: How a branch is critical, by the kind of the speed.
-MEETINGS = {
-    "forward": "{name}, synchronous",
-    "backward": "{name}, synchronous",
-    "per_rev": "{name} meets {per_rev}Ω",
-}
-
-
 @dataclass(frozen=True)
 class CriticalSpeed:
     """A speed at which the frequency of a branch is a multiple of it.
@@ -140,10 +132,7 @@ class CampbellResult(Result):
         return [k for k, v in self.rows[0].items() if isinstance(v, int | float) and k not in own]
 
     def column(self, name: str) -> Array:
-        """Return a number of every mode, shape (speeds, branches), NaN where a branch is lost.
-
-        Args:
-            name: `frequency`, `residual`, `confidence`, `share_lag`, …
+        """Return a number of every mode, such as `residual`, shape (speeds, branches), NaN where a branch is lost.
 
         Raises:
             KeyError: there is none of that name.
@@ -228,14 +217,14 @@ class CampbellResult(Result):
         ]
         first, last = (f"{units.frequency} at {number(float(units.speeds(x)))} {units.speed}" for x in ends)
         head = ("branch", "name", first, last, "MAC (–)")
-        critical = [
-            (number(float(units.speeds(c.speed)), digits=8), MEETINGS[c.kind].format(**vars(c)))
-            for c in self.critical_speeds
-        ]
+        critical = []
+        for c in self.critical_speeds:
+            what = f"{c.name} meets {c.per_rev}Ω" if c.kind == "per_rev" else f"{c.name}, synchronous"
+            critical.append((number(float(units.speeds(c.speed)), digits=8), what))
         out = [ShortTable(head, list(zip(*columns, strict=True)))]
-        return (
-            [*out, ShortTable((f"critical speed ({units.speed})", "what happens there"), critical)] if critical else out
-        )
+        if critical:
+            out.append(ShortTable((f"critical speed ({units.speed})", "what happens there"), critical))
+        return out
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return one row a speed and branch, indexed by `speed` (rad/s) and `label`, as in campbell.csv.

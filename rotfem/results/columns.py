@@ -123,18 +123,13 @@ COLUMNS = {
 }
 
 
-def is_at_station(column: str) -> bool:
-    """Return whether a column is of a place along a beam, as M@2.5 is of 2.5 m."""
-    return "@" in column
-
-
 def described(column: str) -> tuple[str, str]:
     """Return what a column is and its unit; its name and "" of one that nothing is known of.
 
     A registered output functional has the unit it was registered with.
     """
-    if is_at_station(column):
-        name, _, place = column.partition("@")
+    name, at, place = column.partition("@")
+    if at:  # a place along a beam, as M@2.5 is of 2.5 m
         what, unit = described(name)
         return f"{what} at {place} m", unit
     if column in COLUMNS:

@@ -315,6 +315,8 @@ def compare_figure(result: CompareResult) -> Figure:
     """Return the curves over each other, the reference solid and the others dashed; of modes their differences."""
     from matplotlib.figure import Figure
 
+    from rotfem.results.plots import dress
+
     reference, command = result.compared[0], result.compared[0].command
     names = [n for n in reference.curves if n.startswith(("tip_", "psi_dot"))]
     figure = Figure(figsize=(9, 1.7 * len(names) + 4.5 * (len(names) < 2)), layout="constrained")
@@ -324,8 +326,8 @@ def compare_figure(result: CompareResult) -> Figure:
             for curve in (c for c in one.curves.values() if c.name == name or not names):
                 values, mark = np.abs(curve.y) if command == "response" else curve.y, "." * (len(curve.x) == 1)
                 axis.plot(curve.x, values, f"C{k}{mark}{'--' if k else '-'}", lw=1.3, label=one.title)
-        axis.set(ylabel=label(name), yscale="log" if command == "response" else "linear")
-        axis.grid(True, lw=0.4, alpha=0.6)
+        dress(axis, y=label(name), size=None)
+        axis.set_yscale("log" if command == "response" else "linear")
     axes[-1].set_xlabel(label({"campbell": "psi_dot", "response": "frequency"}.get(command, "t")))
     if command == "modes":
         for k, one in enumerate(result.compared[1:]):

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from rotfem.results.columns import ZERO, described, is_at_station, label, shown_unit, zeros
+from rotfem.results.columns import ZERO, described, label, shown_unit, zeros
 from rotfem.results.files import write_whole
 from rotfem.results.units import ShownUnits
 
@@ -58,7 +58,7 @@ def dress(panel: Axes, x: str = "", y: str = "", size: float | None = 8) -> None
     panel.set_xlabel(x, fontsize=size)
     panel.set_ylabel(y, fontsize=size)
     if size is not None:
-        panel.tick_params(labelsize=size)
+        panel.tick_params(which="both", labelsize=size)
 
 
 def panels_over(x: str, number: int, title: str) -> tuple[Figure, list[Axes]]:
@@ -206,7 +206,7 @@ def response_figure(result: ResponseResult) -> Figure:
     A row has what is of one kind. Deep antiresonances, at most 5 % of the frequencies, are cut off.
     """
     units = ShownUnits.of(result.summary)
-    own = {name: i for i, name in enumerate(result.outputs) if not is_at_station(name)}
+    own = {name: i for i, name in enumerate(result.outputs) if "@" not in name}  # no stations
     title = f"{result.title}, at {units.speeds(result.summary['speed']):.6g} {units.speed}\namplitudes by modes dashed"
     shown, title = not_zero({name: np.abs(result.direct[:, i]) for name, i in own.items()}, title)
     rows: dict[tuple[str, str], list[str]] = {}

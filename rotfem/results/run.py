@@ -97,11 +97,7 @@ Array = npt.NDArray[np.float64]
 
 
 class Table:
-    """Columns of equal length that grow by rows.
-
-    Args:
-        columns: names, in the order they are written.
-    """
+    """Columns of equal length that grow by rows; their names are in the order they are written."""
 
     def __init__(self, columns: Iterable[str]):
         self.columns = tuple(columns)
@@ -246,10 +242,6 @@ class RunResult(Result):
         return dataset({**over, **along}, {"t": (("t",), self.t), **nodes}, self._attributes())
 
 
-#: Seconds from one time that rows are written to the next.
-INTERVAL = 1.0
-
-
 class LiveTable:
     """CSV file of a table that grows: what is new is written once a second, by one call of the system.
 
@@ -272,8 +264,8 @@ class LiveTable:
         self._written, self._busy = monotonic(), False
 
     def update(self) -> None:
-        """Write the rows that are new, if `INTERVAL` has passed since that was done."""
-        if monotonic() - self._written >= INTERVAL:
+        """Write the rows that are new, if a second has passed since that was done."""
+        if monotonic() - self._written >= 1.0:
             self.flush()
 
     def flush(self) -> bool:

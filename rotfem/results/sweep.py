@@ -64,8 +64,7 @@ class SweepResult(Result):
         return dict(self.summary["keys"])
 
     @property
-    def shape(self) -> tuple[int, ...]:
-        """Numbers of the values of the swept keys."""
+    def _shape(self) -> tuple[int, ...]:
         return tuple(map(len, self.keys.values()))
 
     @property
@@ -76,7 +75,7 @@ class SweepResult(Result):
 
     def array(self, name: str) -> npt.NDArray[Any]:
         """Return a quantity over the swept keys, one axis a key; NaN where there is none."""
-        return column_of_rows(self.rows, name).astype(np.float64).reshape(self.shape)
+        return column_of_rows(self.rows, name).astype(np.float64).reshape(self._shape)
 
     def files(self) -> dict[str, str]:
         """Return sweep.csv and summary.json."""
@@ -120,13 +119,15 @@ class SweepResult(Result):
     def to_xarray(self) -> xarray.Dataset:
         """Return what was computed over the swept keys, each a dimension."""
         over: dict[str, Variable] = {name: (tuple(self.keys), self.array(name)) for name in self.names}
-        over["status"] = tuple(self.keys), column_of_rows(self.rows, "status").reshape(self.shape)
+        over["status"] = tuple(self.keys), column_of_rows(self.rows, "status").reshape(self._shape)
         return dataset(over, {k: ((k,), np.array(v)) for k, v in self.keys.items()}, self._attributes())
 
 
 def sweep_figure(result: SweepResult) -> Figure:
     """Return the first quantities that vary over the first swept key, a line for each value of the others."""
     from matplotlib.figure import Figure
+
+    from rotfem.results.plots import dress
 
     names, (first, *others) = result.varying()[:PANELS], list(result.keys)
     figure = Figure(figsize=(9, 1.9 * len(names) + 0.8), layout="constrained")
@@ -138,9 +139,7 @@ def sweep_figure(result: SweepResult) -> Figure:
             said = ", ".join(f"{k} = {v[i]}" for k, v, i in zip(others, lines, place, strict=True))
             colour = f"C{j}" if y.shape[1] <= 10 else None
             axis.plot(result.keys[first], y[:, j], ".-", lw=1.2, color=colour, label=said)
-        axis.set_ylabel(label_of(name))
-        axis.grid(True, lw=0.4, alpha=0.6)
-    axes[-1].set_xlabel(first)
+        dress(axis, first if axis is axes[-1] else "", label_of(name), size=None)
     if others:
         handles, said = axes[0].get_legend_handles_labels()
         figure.legend(handles[:NAMED], said[:NAMED], loc="outside upper center", ncols=3, frameon=False, fontsize=8)
