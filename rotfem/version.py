@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 from functools import cache
 
-__version__ = "0.7.0"
+__version__ = "0.8.0"
 
 
 @cache
