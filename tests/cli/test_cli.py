@@ -160,7 +160,7 @@ def test_several_mistakes_are_told_at_once(rotfem: Run, here: Path) -> None:
 
 
 def test_run_writes_its_results(rotfem: Run, here: Path) -> None:
-    done = rotfem("run", "beam.toml", alone=True)
+    done = rotfem("run", "beam.toml")
     assert done.returncode == 0, done.stderr
     assert "50 time steps" in done.stdout
     assert "results/beam" in done.stdout

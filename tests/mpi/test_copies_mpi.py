@@ -55,7 +55,15 @@ def summaries(folder: Path, text: str, *arguments: str) -> list[dict[str, Any]]:
 
 
 def test_a_history_is_that_of_one_process_to_the_last_bit(tmp_path: Path) -> None:
-    one, two = summaries(tmp_path, BEAM + TIME, "run")
+    """Also of a run of two processes that goes on from its checkpoint."""
+    (tmp_path / "scene.toml").write_text(BEAM + TIME)
+    base = ("run", "scene.toml", "--no-plots")
+    whole = rotfem(tmp_path, 1, *base, "-o", "r1")
+    first = rotfem(tmp_path, 2, *base, "-o", "r2", "--checkpoint", "7", "--set", "time.end=0.1")
+    rest = rotfem(tmp_path, 2, *base, "-o", "r2", "--resume")
+    assert [whole.returncode, first.returncode, rest.returncode] == [0, 0, 0], first.stderr + rest.stderr
+    assert "2 processes each computed all of it" in rest.stdout
+    one, two = (json.loads((tmp_path / f"r{ranks}" / "summary.json").read_text()) for ranks in (1, 2))
     assert two["shared"] == "nothing"
     assert two["error"] == one["error"]
     for name in ("history.csv", "shape.csv"):
@@ -89,14 +97,3 @@ def test_frequencies_are_shared_out(tmp_path: Path) -> None:
     one, other = (read_csv(tmp_path / f"r{ranks}" / "response.csv") for ranks in (1, 2))
     for name, values in one.items():
         np.testing.assert_array_equal(other[name], values, err_msg=name)
-
-
-def test_a_run_of_copies_goes_on_from_one_process(tmp_path: Path) -> None:
-    (tmp_path / "scene.toml").write_text(BEAM + TIME)
-    base = ("run", "scene.toml", "--no-plots")
-    whole = rotfem(tmp_path, 1, *base, "-o", "whole")
-    first = rotfem(tmp_path, 2, *base, "-o", "parts", "--checkpoint", "7", "--set", "time.end=0.1")
-    rest = rotfem(tmp_path, 2, *base, "-o", "parts", "--resume")
-    assert [whole.returncode, first.returncode, rest.returncode] == [0, 0, 0], first.stderr + rest.stderr
-    assert "2 processes each computed all of it" in rest.stdout
-    assert (tmp_path / "whole" / "history.csv").read_bytes() == (tmp_path / "parts" / "history.csv").read_bytes()
