@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rotfem.results.files import json_text, rows_text
-from rotfem.results.frames import Variable, dataset, frame_of_rows
-from rotfem.results.result import Result
+from rotfem.results.result import Array, Rows, Variables
 from rotfem.results.tables import ShortTable, number, numbers
 from rotfem.results.units import ShownUnits
-
-if TYPE_CHECKING:
-    import pandas
-    import xarray
-    from matplotlib.figure import Figure
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -66,8 +55,8 @@ class Instability:
 
 
 @dataclass(repr=False)
-class CampbellResult(Result):
-    """Outcome of `rotfem campbell`.
+class CampbellResult(Rows):
+    """Outcome of `rotfem campbell`; `to_pandas()["frequency"].unstack("label")` are the frequencies over speed.
 
     Attributes:
         summary: scene, branches, critical speeds, instabilities, self-checks, warnings, timings; JSON-able.
@@ -79,7 +68,7 @@ class CampbellResult(Result):
             the fixed frame).
     """
 
-    rows: list[dict[str, Any]]
+    index = ("speed", "label")
 
     @property
     def labels(self) -> list[str]:
@@ -182,22 +171,19 @@ class CampbellResult(Result):
             }
         return out
 
-    def files(self) -> dict[str, str]:
-        """Return campbell.csv, campbell.json and summary.json."""
+    def texts(self) -> dict[str, str]:
+        """Return campbell.csv and campbell.json."""
         keys = ("branches", "critical_speeds", "instabilities", "ambiguous", "per_rev", "orders", "rated", "operating")
         return {
             "campbell.csv": rows_text(ShownUnits.of(self.summary).rows(self.rows)),
             "campbell.json": json_text({**{k: self.summary[k] for k in keys if k in self.summary}, "rows": self.rows}),
-            "summary.json": json_text(self.summary),
         }
 
-    def drawings(self) -> dict[str, Callable[[], Figure]]:
+    def drawn(self) -> dict[str, str]:
         """Return campbell.png and, of a rotor in the rotating frame, campbell_fixed.png."""
-        from rotfem.results.plots_campbell import campbell_figure
-
         both = self.summary.get("frame") != "fixed" and "whirl" in self.rows[0]
-        fixed = {"campbell_fixed.png": partial(campbell_figure, self, fixed=True)}
-        return {"campbell.png": partial(campbell_figure, self), **(fixed if both else {})}
+        fixed = {"campbell_fixed.png": "results.plots_campbell:fixed_figure"}
+        return {"campbell.png": "results.plots_campbell:campbell_figure", **(fixed if both else {})}
 
     def tables(self) -> list[ShortTable]:
         """Return the branches, with frequencies at the first and the last speed, and the critical speeds."""
@@ -226,22 +212,11 @@ class CampbellResult(Result):
             out.append(ShortTable((f"critical speed ({units.speed})", "what happens there"), critical))
         return out
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return one row a speed and branch, indexed by `speed` (rad/s) and `label`, as in campbell.csv.
-
-        `to_pandas()["frequency"].unstack("label")` is the table of frequencies over speed.
-        """
-        return frame_of_rows(self.rows, ["speed", "label"])
-
-    def to_xarray(self) -> xarray.Dataset:
+    def arrays(self) -> tuple[Variables, Variables]:
         """Return the numbers of campbell.csv over `speed` (rad/s) and `branch`, whose coordinate are the labels.
 
         NaN where a branch is lost; `refined` marks the speeds that were not asked for.
         """
-        over: dict[str, Variable] = {name: (("speed", "branch"), self.column(name)) for name in self._numbers()}
-        coordinates: dict[str, Variable] = {
-            "speed": (("speed",), self.speeds),
-            "branch": (("branch",), np.array(self.labels, dtype=str)),
-            "refined": (("speed",), self.refined),
-        }
-        return dataset(over, coordinates, self._attributes())
+        coordinates: Variables = {"speed": (("speed",), self.speeds), "refined": (("speed",), self.refined)}
+        coordinates["branch"] = ("branch",), np.array(self.labels, dtype=str)
+        return {name: (("speed", "branch"), self.column(name)) for name in self._numbers()}, coordinates

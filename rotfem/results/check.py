@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.results.files import csv_text, json_text
-from rotfem.results.frames import Variable, dataset, frame
-from rotfem.results.result import Result
+from rotfem.results.files import csv_text
+from rotfem.results.result import Array, Result, Variables, frame
 from rotfem.results.tables import ShortTable, number, numbers
 
 if TYPE_CHECKING:
     import pandas
-    import xarray
-    from matplotlib.figure import Figure
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(repr=False)
@@ -56,16 +49,13 @@ class CheckResult(Result):
         """Inertia tensor about the clamp, kg·m², shape (3, 3)."""
         return np.array(self.summary["inertia_root"])
 
-    def files(self) -> dict[str, str]:
-        """Return check.csv, of a beam, and summary.json."""
-        table = {"check.csv": csv_text(self.columns)} if self.columns else {}
-        return {**table, "summary.json": json_text(self.summary)}
+    def texts(self) -> dict[str, str]:
+        """Return check.csv, of a beam."""
+        return {"check.csv": csv_text(self.columns)} if self.columns else {}
 
-    def drawings(self) -> dict[str, Callable[[], Figure]]:
+    def drawn(self) -> dict[str, str]:
         """Return check.png."""
-        from rotfem.results.plots_scene import check_figure
-
-        return {"check.png": partial(check_figure, self)}
+        return {"check.png": "results.plots_scene:check_figure"}
 
     def tables(self) -> list[ShortTable]:
         """Return length, mass and inertia about the axis of rotation, then vectors and tensors in frame axes."""
@@ -94,9 +84,8 @@ class CheckResult(Result):
         columns = self.columns or self.nodes
         return frame(columns, next(iter(columns)))
 
-    def to_xarray(self) -> xarray.Dataset:
+    def arrays(self) -> tuple[Variables, Variables]:
         """Return the properties along a beam over `x`; of a plate the coordinates over `node`."""
         columns = self.columns or {"node": np.arange(len(next(iter(self.nodes.values()))), dtype=float), **self.nodes}
         name, *others = columns
-        over: dict[str, Variable] = {other: ((name,), columns[other]) for other in others}
-        return dataset(over, {name: ((name,), columns[name])}, self._attributes())
+        return {other: ((name,), columns[other]) for other in others}, {name: ((name,), columns[name])}

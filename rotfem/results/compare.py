@@ -7,9 +7,8 @@ Brown, "A correlation coefficient for modal vector analysis", Proc. 1st Int. Mod
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import partial
 from math import inf
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,19 +21,15 @@ from scipy.optimize import linear_sum_assignment
 
 from rotfem.errors import InputError
 from rotfem.results.columns import described, label
-from rotfem.results.files import json_text, read_csv, rows_text
-from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows
-from rotfem.results.result import Result
+from rotfem.results.files import read_csv, rows_text
+from rotfem.results.result import Result, Row, Rows, Variables, column_of_rows
 from rotfem.results.result_set import read_summary
 from rotfem.results.tables import ShortTable, largest, number, per_cent
 
 if TYPE_CHECKING:
-    import pandas
-    import xarray
     from matplotlib.figure import Figure
 
 Values = npt.NDArray[Any]
-Row = dict[str, Any]
 
 #: Commands whose results can be compared ↦ the file that is read.
 COMPARABLE = {"run": "history.csv", "modes": "modes.json", "campbell": "campbell.json", "response": "response.csv"}
@@ -111,7 +106,7 @@ class Compared:
 
 
 @dataclass(repr=False)
-class CompareResult(Result):
+class CompareResult(Rows):
     """Outcome of `rotfem compare`.
 
     Attributes:
@@ -122,16 +117,16 @@ class CompareResult(Result):
         compared: what is drawn, the reference first.
     """
 
-    rows: list[Row]
     compared: list[Compared]
+    index = ("result", "quantity")
 
-    def files(self) -> dict[str, str]:
-        """Return compare.csv and summary.json."""
-        return {"compare.csv": rows_text(self.rows), "summary.json": json_text(self.summary)}
+    def texts(self) -> dict[str, str]:
+        """Return compare.csv."""
+        return {"compare.csv": rows_text(self.rows)}
 
-    def drawings(self) -> dict[str, Callable[[], Figure]]:
+    def drawn(self) -> dict[str, str]:
         """Return compare.png: the results over each other."""
-        return {"compare.png": partial(compare_figure, self)}
+        return {"compare.png": "results.compare:compare_figure"}
 
     def tables(self) -> list[ShortTable]:
         """Return a table for each result but the reference; differences relative to the largest of the reference."""
@@ -146,15 +141,10 @@ class CompareResult(Result):
             out.append(ShortTable((f"{title}", self.summary["name"], "value", "difference (%)", of), rows))
         return out
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return the rows, indexed by `result` and `quantity`; raise ImportError without pandas."""
-        return frame_of_rows(self.rows, ["result", "quantity"])
-
-    def to_xarray(self) -> xarray.Dataset:
-        """Return the columns of the rows over `row`; raise ImportError without xarray."""
+    def arrays(self) -> tuple[Variables, Variables]:
+        """Return the columns of the rows over `row`."""
         names = dict.fromkeys(name for row in self.rows for name in row)
-        over: dict[str, Variable] = {name: (("row",), column_of_rows(self.rows, name)) for name in names}
-        return dataset(over, {}, self._attributes())
+        return {name: (("row",), column_of_rows(self.rows, name)) for name in names}, {}
 
 
 def compare(*results: Result | str | Path) -> CompareResult:

@@ -2,28 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotfem.results.files import json_text
-from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows
-from rotfem.results.result import Result
+from rotfem.results.result import Row, Rows, Variables, column_of_rows
 from rotfem.results.tables import ShortTable, per_cent
-
-if TYPE_CHECKING:
-    import pandas
-    import xarray
-    from matplotlib.figure import Figure
-
-Row = dict[str, Any]
 
 
 @dataclass(repr=False)
-class ExplainResult(Result):
+class ExplainResult(Rows):
     """Outcome of `rotfem explain`.
 
     Attributes:
@@ -35,7 +24,7 @@ class ExplainResult(Result):
             of the full models).
     """
 
-    rows: list[Row]
+    index = ("name",)
 
     @property
     def effects(self) -> dict[str, Row]:
@@ -57,16 +46,14 @@ class ExplainResult(Result):
         """Names of the outputs whose changes were estimated."""
         return list(self.summary["outputs"])
 
-    def files(self) -> dict[str, str]:
-        """Return explain.json and summary.json."""
+    def texts(self) -> dict[str, str]:
+        """Return explain.json."""
         explained = {name: self.summary[name] for name in ("groups", "outputs", "resolution")} | {"rows": self.rows}
-        return {"explain.json": json_text(explained), "summary.json": json_text(self.summary)}
+        return {"explain.json": json_text(explained)}
 
-    def drawings(self) -> dict[str, Callable[[], Figure]]:
+    def drawn(self) -> dict[str, str]:
         """Return explain.png."""
-        from rotfem.results.plots_scene import explain_figure
-
-        return {"explain.png": partial(explain_figure, self)}
+        return {"explain.png": "results.plots_scene:explain_figure"}
 
     def tables(self) -> list[ShortTable]:
         """Return the dimensionless groups, then how much every effect, theory and discretisation changes the outputs.
@@ -95,29 +82,26 @@ class ExplainResult(Result):
             return "<" + per_cent(resolution)
         return ("<" if output in row.get("bounds", ()) else "") + per_cent(estimate)
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return one row an effect and a theory, indexed by `name`; changes are columns `estimate_…` and `truth_…`."""
+    def flat_rows(self) -> list[Row]:
+        """Return one row an effect and a theory; changes are columns `estimate_…` and `truth_…`."""
         rows = []
         for row in self.rows:
             flat = {name: row[name] for name in ("name", "kind", "included", "worst", "verdict", "why")}
             for what in ("estimate", "truth"):
                 flat |= {f"{what}_{output}": value for output, value in row.get(what, {}).items()}
             rows.append(flat)
-        return frame_of_rows(rows, "name")
+        return rows
 
-    def to_xarray(self) -> xarray.Dataset:
+    def arrays(self) -> tuple[Variables, Variables]:
         """Return `estimate` and, with a check, `truth` over `name` and `output`, and the other columns over `name`.
 
         Infinite where a model fails, NaN where the truth was not computed.
         """
         names = ("kind", "included", "worst", "verdict", "why")
-        over: dict[str, Variable] = {name: (("name",), column_of_rows(self.rows, name)) for name in names}
+        over: Variables = {name: (("name",), column_of_rows(self.rows, name)) for name in names}
         for what in ("estimate", "truth"):
             if any(what in row for row in self.rows):
                 values = [[row.get(what, {}).get(output, np.nan) for output in self.outputs] for row in self.rows]
                 over[what] = (("name", "output"), np.array(values, dtype=np.float64))
-        coordinates: dict[str, Variable] = {
-            "name": (("name",), column_of_rows(self.rows, "name")),
-            "output": (("output",), np.array(self.outputs, dtype=str)),
-        }
-        return dataset(over, coordinates, self._attributes())
+        names_of = {"name": [row["name"] for row in self.rows], "output": self.outputs}
+        return over, {key: ((key,), np.array(values, dtype=str)) for key, values in names_of.items()}

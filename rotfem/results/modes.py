@@ -8,26 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rotfem.errors import InputError
 from rotfem.results.files import csv_text, json_text, rows_text
-from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows, nodes_of
-from rotfem.results.result import Result
+from rotfem.results.result import Array, Rows, Variables, column_of_rows, nodes_of
 from rotfem.results.surfaces import Surface
 from rotfem.results.tables import ShortTable, numbers, per_cent
 from rotfem.results.units import ShownUnits, in_unit
-
-if TYPE_CHECKING:
-    import pandas
-    import xarray
-    from matplotlib.figure import Figure
-
 
 #: Powers of ξ in a mode polynomial.
 POWERS = (2, 3, 4, 5, 6)
@@ -98,11 +90,8 @@ def _of(columns: dict[str, Array], direction: str) -> tuple[Array, Array] | None
     return None
 
 
-Array = npt.NDArray[np.float64]
-
-
 @dataclass(repr=False)
-class ModesResult(Result):
+class ModesResult(Rows):
     """Outcome of `rotfem modes`.
 
     Attributes:
@@ -124,7 +113,6 @@ class ModesResult(Result):
         analysis, spinning: the compiled scene and its eigenpairs, for further work in Python.
     """
 
-    rows: list[dict[str, Any]]
     shapes: dict[str, dict[str, Array]] = field(default_factory=dict)
     sensitivities: list[dict[str, Any]] = field(default_factory=list)
     blade_tables: bool = False
@@ -133,6 +121,7 @@ class ModesResult(Result):
     fields: Callable[[Path], list[Path]] | None = field(default=None, repr=False)
     analysis: Any = field(default=None, repr=False)
     spinning: Any = field(default=None, repr=False)
+    index = ("mode",)
 
     @property
     def speed(self) -> float:
@@ -191,8 +180,8 @@ class ModesResult(Result):
         said = [f"{units.frequencies(row['frequency']):.5g} {units.frequency}" for row in rows]
         return list(zip(rows, self.shapes.values(), said, strict=True))
 
-    def files(self) -> dict[str, str]:
-        """Return modes.csv, mode_shapes.csv, modes.json, summary.json, and what else is wanted.
+    def texts(self) -> dict[str, str]:
+        """Return modes.csv, mode_shapes.csv, modes.json, and what else is wanted.
 
         Raises:
             InputError: tables over the span are wanted of a plate.
@@ -206,7 +195,6 @@ class ModesResult(Result):
             "modes.csv": rows_text(ShownUnits.of(self.summary).rows(self.rows)),
             "mode_shapes.csv": csv_text(shapes),
             "modes.json": json_text({"speed": self.summary["speed"], "modes": self.rows}),
-            "summary.json": json_text(self.summary),
         }
 
     def _blade_files(self) -> dict[str, str]:
@@ -273,14 +261,10 @@ class ModesResult(Result):
             out.append(first | named | terms | errors)
         return out
 
-    def drawings(self) -> dict[str, Callable[[], Figure]]:
+    def drawn(self) -> dict[str, str]:
         """Return modes.png, the shapes of all modes."""
-        from rotfem.results import plots, plots_plate
-
-        if not self.shapes:
-            return {}
-        draw = plots.shapes_figure if self.triangles is None else plots_plate.modes_figure
-        return {"modes.png": partial(draw, self)}
+        draw = "plots:shapes_figure" if self.triangles is None else "plots_plate:modes_figure"
+        return {"modes.png": f"results.{draw}"} if self.shapes else {}
 
     def tables(self) -> list[ShortTable]:
         """Return one row a mode: name, frequency, damping ratio and estimated error of the frequency."""
@@ -297,33 +281,23 @@ class ModesResult(Result):
         head = ("mode", "name", f"frequency ({first})", "(Hz)", "damping (%)", "error (%)")
         return [ShortTable(head, list(zip(*columns, strict=True)))]
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return one row a mode, indexed by `mode`: label, frequency (rad/s), damping, shares, …, as in modes.csv."""
-        return frame_of_rows(self.rows, "mode")
-
-    def to_xarray(self) -> xarray.Dataset:
+    def arrays(self) -> tuple[Variables, Variables]:
         """Return the columns of modes.csv over `mode`, and the shapes over `mode` and `node`.
 
         Shapes `shape_u1`, … are complex, scaled as `shapes`, NaN for the rigid-body mode, which has none.
         Coordinates are the modes' labels, the speed (rad/s), the nodes' `x` (m), of a plate `y` and `triangles` too.
         """
         names = [name for name in (self.rows[0] if self.rows else ()) if name not in ("mode", "label")]
-        over: dict[str, Variable] = {name: (("mode",), column_of_rows(self.rows, name)) for name in names}
-        coordinates: dict[str, Variable] = {
+        over: Variables = {name: (("mode",), column_of_rows(self.rows, name)) for name in names}
+        coordinates: Variables = {
             "mode": (("mode",), np.array([row["mode"] for row in self.rows], dtype=np.int64)),
             "label": (("mode",), np.array(self.labels, dtype=str)),
             "speed": ((), np.array(self.speed)),
         }
         first = next(iter(self.shapes.values()), {})
-        coordinates |= nodes_of(first, self.triangles)
-        return dataset({**over, **self._shape_variables(first)}, coordinates, self._attributes())
-
-    def _shape_variables(self, first: dict[str, Array]) -> dict[str, Variable]:
-        """Return `shape_…` ↦ complex shapes over modes and nodes; the rigid-body mode comes first and has none."""
-        out: dict[str, Variable] = {}
         for name in (name for name in first if f"{name}_imag" in first):
             values = np.full((len(self.rows), len(first[name])), np.nan, dtype=np.complex128)
             for i, columns in enumerate(self.shapes.values(), start=len(self.rows) - len(self.shapes)):
                 values[i] = columns[name] + 1j * columns[f"{name}_imag"]
-            out[f"shape_{name}"] = (("mode", "node"), values)
-        return out
+            over[f"shape_{name}"] = (("mode", "node"), values)
+        return over, coordinates | nodes_of(first, self.triangles)

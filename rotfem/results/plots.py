@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rotfem.results.modes import ModesResult
     from rotfem.results.response import ResponseResult
     from rotfem.results.result import Result
-    from rotfem.results.run import RunResult, StationHistory
+    from rotfem.results.run import RunResult
 
 Array = npt.NDArray[np.float64]
 
@@ -160,8 +160,10 @@ def shape_figure(result: RunResult) -> Figure:
     return stacked("x", result.shape["x"], components, result.title + ", steady state")
 
 
-def stations_figure(stations: StationHistory, title: str) -> Figure:
+def stations_figure(result: RunResult) -> Figure:
     """Return every quantity along a beam at the last time, and of a motion the range it has had."""
+    stations, title = result.stations, result.title
+    assert stations is not None
     last = {name: values[-1] for name, values in stations.values.items()}
     if len(stations.t) < 2:
         return stacked("x", stations.x, last, title)

@@ -112,6 +112,11 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     return figure
 
 
+def fixed_figure(result: CampbellResult) -> Figure:
+    """Return the diagram of a rotor as the fixed frame sees it."""
+    return campbell_figure(result, fixed=True)
+
+
 def drawn_branches(result: CampbellResult, fixed: bool) -> list[Branch]:
     """Return the branches in the units shown; each passes through its critical speeds, where it may touch 0."""
     units, out = ShownUnits.of(result.summary), []

@@ -2,30 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.results.files import json_text, rows_text
-from rotfem.results.frames import Variable, dataset, frame_of_rows
-from rotfem.results.result import Result
+from rotfem.results.files import rows_text
+from rotfem.results.result import Array, Rows, Variables
 from rotfem.results.tables import ShortTable, by_unit, named, number
 from rotfem.results.units import ShownUnits
 
-if TYPE_CHECKING:
-    import pandas
-    import xarray
-    from matplotlib.figure import Figure
-
-Array = npt.NDArray[np.float64]
-
 
 @dataclass(repr=False)
-class ResponseResult(Result):
+class ResponseResult(Rows):
     """Outcome of `rotfem response`.
 
     Attributes:
@@ -39,9 +28,9 @@ class ResponseResult(Result):
         modal: the same by modes.
     """
 
-    rows: list[dict[str, Any]]
     direct: npt.NDArray[np.complex128]
     modal: npt.NDArray[np.complex128]
+    index = ("frequency",)
 
     @property
     def outputs(self) -> list[str]:
@@ -61,18 +50,13 @@ class ResponseResult(Result):
         """Return the phase of an output over the frequencies, rad, from −π to π."""
         return np.asarray(np.angle(self.direct[:, self.outputs.index(output)]), dtype=np.float64)
 
-    def files(self) -> dict[str, str]:
-        """Return response.csv and summary.json."""
-        return {
-            "response.csv": rows_text(ShownUnits.of(self.summary).rows(self.rows)),
-            "summary.json": json_text(self.summary),
-        }
+    def texts(self) -> dict[str, str]:
+        """Return response.csv."""
+        return {"response.csv": rows_text(ShownUnits.of(self.summary).rows(self.rows))}
 
-    def drawings(self) -> dict[str, Callable[[], Figure]]:
+    def drawn(self) -> dict[str, str]:
         """Return response.png: amplitudes and phases over frequency."""
-        from rotfem.results.plots import response_figure
-
-        return {"response.png": partial(response_figure, self)}
+        return {"response.png": "results.plots:response_figure"}
 
     def tables(self) -> list[ShortTable]:
         """Return where every output is largest."""
@@ -84,16 +68,8 @@ class ResponseResult(Result):
         ]
         return [ShortTable(("output", "largest amplitude", f"at ({units.frequency})"), rows)]
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return one row a frequency, indexed by `frequency` (rad/s), as in response.csv."""
-        return frame_of_rows(self.rows, "frequency")
-
-    def to_xarray(self) -> xarray.Dataset:
+    def arrays(self) -> tuple[Variables, Variables]:
         """Return the complex responses `direct` and `modal` over `frequency` (rad/s) and `output`."""
-        over = ("frequency", "output")
-        variables: dict[str, Variable] = {"direct": (over, self.direct), "modal": (over, self.modal)}
-        coordinates: dict[str, Variable] = {
-            "frequency": (("frequency",), self.frequencies),
-            "output": (("output",), np.array(self.outputs, dtype=str)),
-        }
-        return dataset(variables, coordinates, self._attributes())
+        over, outputs = ("frequency", "output"), np.array(self.outputs, dtype=str)
+        coordinates: Variables = {"frequency": (over[:1], self.frequencies), "output": (over[1:], outputs)}
+        return {"direct": (over, self.direct), "modal": (over, self.modal)}, coordinates

@@ -4,21 +4,34 @@ from __future__ import annotations
 
 import base64
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from html import escape
+from importlib import import_module
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+import numpy.typing as npt
 
 from rotfem.errors import printable
+from rotfem.registry import resolved
+from rotfem.results.columns import described
+from rotfem.results.files import json_text
 from rotfem.results.tables import ShortTable
 
 if TYPE_CHECKING:
     import pandas
     import xarray
     from matplotlib.figure import Figure
+
+Array = npt.NDArray[np.float64]
+Row = dict[str, Any]
+
+#: Name of a labelled array ↦ its dimensions and values.
+Variables = dict[str, tuple[tuple[str, ...], npt.NDArray[Any]]]
 
 
 @dataclass(repr=False)
@@ -64,17 +77,25 @@ class Result(ABC):
         words = printable(": ".join(self.summary[key] for key in ("name", "theory") if key in self.summary))
         return words if self.status == "done" else f"{words} ({self.status})"
 
-    @abstractmethod
     def files(self) -> dict[str, str]:
-        """Return file name ↦ text, in the order they are written."""
+        """Return file name ↦ text, in the order they are written: tables, then summary.json."""
+        return {**self.texts(), "summary.json": json_text(self.summary)}
+
+    @abstractmethod
+    def texts(self) -> dict[str, str]:
+        """Return file name ↦ text of the tables."""
 
     def large(self) -> list[Callable[[Path], object]]:
         """Return what writes files that are not text into a folder, each one whole or none; none here."""
         return []
 
-    @abstractmethod
     def drawings(self) -> dict[str, Callable[[], Figure]]:
         """Return file name ↦ what draws that figure, the main one first; empty where there is nothing to draw."""
+        return {name: partial(resolved(f"rotfem.{function}"), self) for name, function in self.drawn().items()}
+
+    @abstractmethod
+    def drawn(self) -> dict[str, str]:
+        """Return file name ↦ "module:function", below rotfem, of the figures there are."""
 
     @abstractmethod
     def tables(self) -> list[ShortTable]:
@@ -88,13 +109,18 @@ class Result(ABC):
             ImportError: pandas is not installed.
         """
 
-    @abstractmethod
     def to_xarray(self) -> xarray.Dataset:
-        """Return the result as labelled arrays with `units` and `long_name` among their attributes.
+        """Return the result (see `arrays`) as labelled arrays with `units` and `long_name` among their attributes.
 
         Raises:
             ImportError: xarray is not installed.
         """
+        names = ("command", "name", "theory", "frame", "kind", "status")
+        return dataset(*self.arrays(), {name: self.summary[name] for name in names if name in self.summary})
+
+    @abstractmethod
+    def arrays(self) -> tuple[Variables, Variables]:
+        """Return variables and coordinates of the labelled arrays."""
 
     def write(self, folder: str | Path) -> list[Path]:
         """Write the files into a folder, in the place of the results that are there; return their paths.
@@ -131,10 +157,32 @@ class Result(ABC):
             save(figure, Path(path))
         return figure
 
-    def _attributes(self) -> dict[str, Any]:
-        """Return what labelled arrays say of themselves as a whole."""
-        names = ("command", "name", "theory", "frame", "kind", "status")
-        return {name: self.summary[name] for name in names if name in self.summary}
+
+@dataclass(repr=False)
+class Rows(Result):
+    """A result that is a table of rows.
+
+    Attributes:
+        rows: name ↦ value of each row; what a row does not have is absent.
+    """
+
+    rows: list[Row]
+
+    #: Names that label the rows.
+    index: ClassVar[tuple[str, ...]] = ()
+
+    def flat_rows(self) -> list[Row]:
+        """Return the rows as a table has them, with one value a name."""
+        return self.rows
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the rows as a table, labelled by `index`; what a row does not have is NaN.
+
+        Raises:
+            ImportError: pandas is not installed.
+        """
+        table = optional("pandas").DataFrame(self.flat_rows())
+        return table.set_index(list(self.index)) if self.index and not table.empty else table
 
 
 def png(figure: Figure) -> bytes:
@@ -142,3 +190,48 @@ def png(figure: Figure) -> bytes:
     file = BytesIO()
     figure.savefig(file, format="png", dpi=72)
     return file.getvalue()
+
+
+# --- pandas and xarray, which nothing else needs ----------------------------------------------------------------------
+
+
+def optional(name: str) -> Any:
+    """Return a package that rotfem can do without."""
+    try:
+        return import_module(name)
+    except ModuleNotFoundError as error:
+        missing = error.name or name
+        raise ImportError(f"to_{name}() needs {missing}, which is not installed: pip install {missing}") from error
+
+
+def frame(columns: Mapping[str, Any], *index: str) -> pandas.DataFrame:
+    """Return named columns as a table indexed by one or several of them."""
+    return optional("pandas").DataFrame(dict(columns)).set_index(list(index))
+
+
+def dataset(variables: Variables, coordinates: Variables, attributes: Mapping[str, Any]) -> xarray.Dataset:
+    """Return variables over coordinates, each with its `long_name` and `units` as far as they are known."""
+    out = optional("xarray").Dataset(variables, coordinates, dict(attributes))
+    for name, array in out.variables.items():
+        what, unit = described(name)
+        array.attrs |= {"long_name": what, "units": unit} if unit else {}
+    return out
+
+
+def column_of_rows(rows: Sequence[Mapping[str, Any]], name: str) -> npt.NDArray[Any]:
+    """Return the values of one name over rows: truth values, text, or numbers; "" or NaN stand for what is absent."""
+    values = [row.get(name) for row in rows]
+    there = [value for value in values if value is not None]
+    if there and all(isinstance(value, bool | np.bool_) for value in values):
+        return np.array(values, dtype=bool)
+    if any(isinstance(value, str) for value in there):
+        return np.array(["" if value is None else str(value) for value in values], dtype=str)
+    if all(isinstance(value, int) for value in values):
+        return np.array(values, dtype=np.int64)
+    return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
+
+
+def nodes_of(columns: Mapping[str, npt.NDArray[Any]], triangles: Any) -> Variables:
+    """Return where the nodes of columns are and, of a plate, the triangles between them."""
+    out: Variables = {name: (("node",), columns[name]) for name in ("x", "y") if name in columns}
+    return out if triangles is None else {**out, "triangles": (("triangle", "corner"), np.asarray(triangles))}

@@ -5,25 +5,21 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from rotfem.results.columns import described
-from rotfem.results.files import csv_text, json_text, line, write_text, writing
-from rotfem.results.frames import Variable, dataset, frame, nodes_of
-from rotfem.results.result import Result
+from rotfem.results.files import csv_text, line, write_text, writing
+from rotfem.results.result import Array, Result, Variables, dataset, frame, nodes_of
 from rotfem.results.tables import ShortTable, by_unit, largest, named, number
 from rotfem.short import short_fields
 
 if TYPE_CHECKING:
     import pandas
     import xarray
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -61,16 +57,12 @@ class StationHistory:
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return the columns as a table indexed by `t` (s) and `x` (m)."""
-        return frame(self.columns(), ["t", "x"])
+        return frame(self.columns(), "t", "x")
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the quantities over `t` (s) and `x` (m)."""
-        over: dict[str, Variable] = {name: (("t", "x"), values) for name, values in self.values.items()}
+        over: Variables = {name: (("t", "x"), values) for name, values in self.values.items()}
         return dataset(over, {"t": (("t",), self.t), "x": (("x",), self.x)}, {})
-
-    def text(self) -> str:
-        """Return the columns as CSV."""
-        return csv_text(self.columns())
 
     def write_hdf5(self, path: Path) -> Path:
         """Write t, x and the quantities as HDF5 datasets with their units; return the path.
@@ -85,15 +77,6 @@ class StationHistory:
                 data = file.create_dataset(name, data=values, compression="gzip" if values.ndim > 1 else None)
                 data.attrs["long_name"], data.attrs["units"] = described(name)
         return path
-
-    def figure(self, title: str) -> Figure:
-        """Return every quantity along the beam at the last time, and of a motion the range it has had."""
-        from rotfem.results.plots import stations_figure
-
-        return stations_figure(self, title)
-
-
-Array = npt.NDArray[np.float64]
 
 
 class Table:
@@ -174,13 +157,12 @@ class RunResult(Result):
             raise KeyError(f"no column {name!r} in the history; there are {', '.join(self.history)}")
         return self.history[name]
 
-    def files(self) -> dict[str, str]:
-        """Return history.csv, shape.csv and stations.csv, as far as there is one, and summary.json."""
+    def texts(self) -> dict[str, str]:
+        """Return history.csv, shape.csv, resultants.csv and stations.csv, as far as there is one."""
         tables = {"history.csv": self.history, "shape.csv": self.shape, "resultants.csv": self.resultants}
-        texts = {name: csv_text(columns) for name, columns in tables.items() if columns}
         if self.stations is not None and self.stations.format == "csv":
-            texts["stations.csv"] = self.stations.text()
-        return {**texts, "summary.json": json_text(self.summary)}
+            tables["stations.csv"] = self.stations.columns()
+        return {name: csv_text(columns) for name, columns in tables.items() if columns}
 
     def large(self) -> list[Callable[[Path], object]]:
         """Return what writes stations.h5 and files for ParaView, where these are asked for."""
@@ -189,25 +171,19 @@ class RunResult(Result):
             return list(self.further)
         return [lambda folder: stations.write_hdf5(folder / "stations.h5"), *self.further]
 
-    def drawings(self) -> dict[str, Callable[[], Figure]]:
+    def drawn(self) -> dict[str, str]:
         """Return history.png and loads.png of a time history, shape.png of a steady state and of plates."""
-        from rotfem.results import plots, plots_plate
-
-        over_time = len(self.history.get("t", ())) > 1
-        out: dict[str, Callable[[], Figure]] = {}
-        if over_time:
-            out["history.png"] = partial(plots.history_figure, self)
-            if any(name.startswith("root_") for name in self.history):
-                out["loads.png"] = partial(plots.loads_figure, self)
-        if self.shape and self.triangles is not None:
-            out["shape.png"] = partial(plots_plate.shape_figure, self)
-        elif self.shape and not over_time:
-            out["shape.png"] = partial(plots.shape_figure, self)
-        if self.resultants:
-            out["resultants.png"] = partial(plots_plate.resultants_figure, self)
-        if self.stations is not None and len(self.stations.t):
-            out["stations.png"] = partial(self.stations.figure, self.title)
-        return out
+        over_time, is_plate = len(self.history.get("t", ())) > 1, self.triangles is not None
+        there = {
+            "history": over_time,
+            "loads": over_time and any(name.startswith("root_") for name in self.history),
+            "shape": bool(self.shape) and (is_plate or not over_time),
+            "resultants": bool(self.resultants),
+            "stations": self.stations is not None and len(self.stations.t) > 0,
+        }
+        of_plates = ("shape", "resultants") if is_plate else ()
+        module = {name: "plots_plate" if name in of_plates else "plots" for name in there}
+        return {f"{name}.png": f"results.{module[name]}:{name}_figure" for name, drawn in there.items() if drawn}
 
     def tables(self) -> list[ShortTable]:
         """Return extremes and last values of the tip's displacement; of a steady state all of tip and root."""
@@ -229,17 +205,15 @@ class RunResult(Result):
         """Return the history, one row a time, indexed by `t` (s)."""
         return frame(self.history, "t")
 
-    def to_xarray(self) -> xarray.Dataset:
+    def arrays(self) -> tuple[Variables, Variables]:
         """Return the history over `t` (s), and the shape at its end over `node` with the nodes' `x` (m).
 
         A plate has the nodes' `y` and the `triangles` between them too.
         """
-        over: dict[str, Variable] = {name: (("t",), values) for name, values in self.history.items() if name != "t"}
+        over: Variables = {name: (("t",), values) for name, values in self.history.items() if name != "t"}
         nodes = nodes_of(self.shape, self.triangles)
-        along: dict[str, Variable] = {
-            name: (("node",), values) for name, values in self.shape.items() if name not in nodes
-        }
-        return dataset({**over, **along}, {"t": (("t",), self.t), **nodes}, self._attributes())
+        over |= {name: (("node",), values) for name, values in self.shape.items() if name not in nodes}
+        return over, {"t": (("t",), self.t), **nodes}
 
 
 class LiveTable:

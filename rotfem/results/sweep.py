@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,14 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.results.columns import ZERO, label_of
-from rotfem.results.files import json_text, rows_text, writing
-from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows
-from rotfem.results.result import Result
+from rotfem.results.files import rows_text, writing
+from rotfem.results.result import Rows, Variables, column_of_rows
 from rotfem.results.tables import ShortTable, numbers
 
 if TYPE_CHECKING:
-    import pandas
-    import xarray
     from matplotlib.figure import Figure
 
 #: Panels of the figure, lines named in its legend, and quantities in the table that is printed, at most.
@@ -47,7 +43,7 @@ def quantities(summary: Mapping[str, Any]) -> dict[str, float]:
 
 
 @dataclass(repr=False)
-class SweepResult(Result):
+class SweepResult(Rows):
     """Outcome of `rotfem sweep`.
 
     Attributes:
@@ -56,7 +52,10 @@ class SweepResult(Result):
             `status`, `reason` where it failed, `seconds` it took, `folder` with its results.
     """
 
-    rows: list[dict[str, Any]]
+    @property
+    def index(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Swept keys."""
+        return tuple(self.keys)
 
     @property
     def keys(self) -> dict[str, list[Any]]:
@@ -77,9 +76,9 @@ class SweepResult(Result):
         """Return a quantity over the swept keys, one axis a key; NaN where there is none."""
         return column_of_rows(self.rows, name).astype(np.float64).reshape(self._shape)
 
-    def files(self) -> dict[str, str]:
-        """Return sweep.csv and summary.json."""
-        return {"sweep.csv": rows_text(self.rows), "summary.json": json_text(self.summary)}
+    def texts(self) -> dict[str, str]:
+        """Return sweep.csv."""
+        return {"sweep.csv": rows_text(self.rows)}
 
     def large(self) -> list[Callable[[Path], object]]:
         """Return what writes sweep.nc, where xarray is installed."""
@@ -89,9 +88,9 @@ class SweepResult(Result):
         with writing(folder / "sweep.nc"):
             self.to_xarray().to_netcdf(folder / "sweep.nc", engine="scipy")
 
-    def drawings(self) -> dict[str, Callable[[], Figure]]:
+    def drawn(self) -> dict[str, str]:
         """Return sweep.png; nothing where no quantity varies."""
-        return {"sweep.png": partial(sweep_figure, self)} if self.varying() else {}
+        return {"sweep.png": "results.sweep:sweep_figure"} if self.varying() else {}
 
     def varying(self) -> list[str]:
         """Return the names of what changes from point to point by more than round-off, without times."""
@@ -112,15 +111,11 @@ class SweepResult(Result):
         columns.append([row["status"] for row in self.rows])
         return [ShortTable((*self.keys, *map(label_of, names), "status"), list(zip(*columns, strict=True)))]
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return one row a point, indexed by the swept keys."""
-        return frame_of_rows(self.rows, list(self.keys))
-
-    def to_xarray(self) -> xarray.Dataset:
+    def arrays(self) -> tuple[Variables, Variables]:
         """Return what was computed over the swept keys, each a dimension."""
-        over: dict[str, Variable] = {name: (tuple(self.keys), self.array(name)) for name in self.names}
-        over["status"] = tuple(self.keys), column_of_rows(self.rows, "status").reshape(self._shape)
-        return dataset(over, {k: ((k,), np.array(v)) for k, v in self.keys.items()}, self._attributes())
+        over: Variables = {name: (self.index, self.array(name)) for name in self.names}
+        over["status"] = self.index, column_of_rows(self.rows, "status").reshape(self._shape)
+        return over, {k: ((k,), np.array(v)) for k, v in self.keys.items()}
 
 
 def sweep_figure(result: SweepResult) -> Figure:

@@ -12,11 +12,12 @@ import pytest
 
 from rotfem.commands.advice import advise, estimates
 from rotfem.commands.cost.bench import Measurement, Record, fingerprint
-from rotfem.commands.cost.result import ERRORS, Row, pareto, recommend, write_tuned
+from rotfem.commands.cost.result import ERRORS, pareto, recommend, write_tuned
 from rotfem.commands.cost.settings import OUTPUTS, allowed_by, check_choice, grid, own_setting
 from rotfem.errors import SceneError
 from rotfem.refinement.distance import distance, distance_each
 from rotfem.refinement.refine import Setting
+from rotfem.results.result import Row
 from rotfem.scene import Scene, load_scene
 from tests.beams import SPIN_UP
 

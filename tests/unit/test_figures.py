@@ -177,7 +177,8 @@ def test_section_forces_along_a_beam_with_their_range() -> None:
     x, t = np.linspace(0.0, 10.0, 6), np.linspace(0.0, 1.0, 11)
     names = [*FORCES["spatial_beam"], *STRAINS["spatial_beam"], "u1", "u2", "u3", "theta1", "theta2", "theta3"]
     values = {name: 10.0**i * np.outer(np.sin(np.pi * t), 1 + x) for i, name in enumerate(names)}
-    figure = StationHistory(t, x, values).figure("blade")
+    result = RunResult(said(kind="history"), {"t": t}, stations=StationHistory(t, x, values))
+    figure = result.plot(drawing="stations")
     check(figure)
     assert len(figure.axes) == len(names) == 18
     extent = figure.axes[0].collections[0].get_paths()[0].get_extents()

@@ -4,34 +4,26 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 import tomli_w
 
 from rotfem.commands.accuracy import changes_of
 from rotfem.errors import ComputationError, SceneError
 from rotfem.refinement.estimate import percent
 from rotfem.refinement.refine import Setting
-from rotfem.results import Result
 from rotfem.results.files import json_text, rows_text, write_text
-from rotfem.results.frames import Variable, column_of_rows, dataset, frame_of_rows
+from rotfem.results.result import Array, Row, Rows, Variables, column_of_rows
 from rotfem.results.tables import ShortTable, per_cent
 from rotfem.scene import Scene
 from rotfem.scene.span_tables import is_path
 
 if TYPE_CHECKING:
-    import pandas
-    import xarray
     from matplotlib.figure import Figure
-
-Array = npt.NDArray[np.float64]
-Row = dict[str, Any]
 
 #: Accuracies a setting is recommended for besides the wanted one.
 DECADES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
@@ -185,7 +177,7 @@ class CostPoint:
 
 
 @dataclass(repr=False)
-class CostResult(Result):
+class CostResult(Rows):
     """Outcome of `rotfem cost`.
 
     Attributes:
@@ -197,7 +189,6 @@ class CostResult(Result):
         references: theory ↦ its finest output.
     """
 
-    rows: list[Row]
     scene: Scene = field(repr=False)
     references: dict[str, Reference] = field(default_factory=dict, repr=False)
 
@@ -285,33 +276,27 @@ class CostResult(Result):
         ordered = sorted(rows, key=lambda r: (r["status"] != "done", r["cost"]))
         return [ShortTable(head, [_cells(row) for row in ordered])]
 
-    def _flat_rows(self) -> list[Row]:
+    def flat_rows(self) -> list[Row]:
         """Return the rows with numbers of elements as text where they are two."""
         return [{k: "x".join(map(str, v)) if isinstance(v, list) else v for k, v in row.items()} for row in self.rows]
 
-    def files(self) -> dict[str, str]:
-        """Return cost.csv, cost.json and summary.json."""
+    def texts(self) -> dict[str, str]:
+        """Return cost.csv and cost.json."""
         keys = ("output", "references", "model_errors", "recommended", "recommendations")
         return {
-            "cost.csv": rows_text(self._flat_rows()),
+            "cost.csv": rows_text(self.flat_rows()),
             "cost.json": json_text({**{k: self.summary[k] for k in keys}, "rows": self.rows}),
-            "summary.json": json_text(self.summary),
         }
 
-    def drawings(self) -> dict[str, Callable[[], Figure]]:
+    def drawn(self) -> dict[str, str]:
         """Return cost.png."""
-        return {"cost.png": partial(cost_figure, self)}
+        return {"cost.png": "commands.cost.result:cost_figure"}
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """Return one row a setting, as in cost.csv."""
-        return frame_of_rows(self._flat_rows())
-
-    def to_xarray(self) -> xarray.Dataset:
+    def arrays(self) -> tuple[Variables, Variables]:
         """Return the columns of cost.csv over `setting`, the number of the row from 0 on."""
-        rows = self._flat_rows()
-        over: dict[str, Variable] = {name: (("setting",), column_of_rows(rows, name)) for name in rows[0]}
-        coordinates: dict[str, Variable] = {"setting": (("setting",), np.arange(len(rows)))}
-        return dataset(over, coordinates, self._attributes())
+        over, rows = ("setting",), self.flat_rows()
+        coordinates: Variables = {"setting": (over, np.arange(len(rows)))}
+        return {name: (over, column_of_rows(rows, name)) for name in rows[0]}, coordinates
 
 
 def _cost(row: Row) -> str:

@@ -25,7 +25,7 @@ from mpi4py import MPI
 
 from rotfem import registry
 from rotfem.commands.cost.bench import Array, Bench, Measurement, Record, bytes_of, fingerprint
-from rotfem.commands.cost.result import CostResult, Reference, Row, pareto, recommend, recommendations, setting_of
+from rotfem.commands.cost.result import CostResult, Reference, pareto, recommend, recommendations, setting_of
 from rotfem.commands.cost.settings import (
     MESHES,
     Chosen,
@@ -59,6 +59,7 @@ from rotfem.refinement.refine import (
     is_known,
     refine,
 )
+from rotfem.results.result import Row
 from rotfem.scene import Scene, as_scene
 from rotfem.version import versions
 
