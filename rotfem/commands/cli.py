@@ -88,7 +88,7 @@ def modes(
                 serial(result.analysis, "the export of matrices")
                 further.append(lambda folder: write_matrices(result.analysis, result.spinning, folder))
     if animate is not None:
-        from rotfem.results.animation import animate as draw
+        from rotfem.results.surfaces import animate as draw
 
         further.append(lambda folder: draw(result, animate, folder))
     todo.finish(result, further)

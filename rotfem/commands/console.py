@@ -161,7 +161,7 @@ class Session:
         unit = self.speed_unit
         if unit == "rad/s":
             return line
-        from rotfem.results.units import in_unit
+        from rotfem.results.columns import in_unit
 
         return ANGULAR.sub(lambda found: f"{found[0]} ({in_unit(float(found[1]), unit):.6g} {unit})", line)
 

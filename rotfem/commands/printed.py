@@ -6,7 +6,7 @@ from typing import Any
 
 from rotfem.refinement.estimate import error_line, percent
 from rotfem.results import Result
-from rotfem.results.units import ShownUnits
+from rotfem.results.columns import ShownUnits
 
 
 def report(result: Result) -> list[str]:

@@ -36,7 +36,7 @@ from rotfem.commands.processes import shared_out
 from rotfem.commands.summary import modal_summary
 from rotfem.errors import SceneError, input_of
 from rotfem.results.columns import described
-from rotfem.results.response import ResponseResult
+from rotfem.results.modes import ResponseResult
 from rotfem.scene import Scene, as_scene
 from rotfem.units import quantity
 

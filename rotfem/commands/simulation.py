@@ -42,8 +42,7 @@ from rotfem.numerics.newton import Newton
 from rotfem.refinement.discretisation import HistoryErrors, richer_problem
 from rotfem.refinement.distance import OUTPUTS
 from rotfem.refinement.refine import Setting
-from rotfem.results.columns import figures
-from rotfem.results.run import RunResult
+from rotfem.results.run import RunResult, figures
 from rotfem.scene import Scene, Time
 from rotfem.structures.symmetry import inactive_unknowns
 

@@ -3,8 +3,7 @@
 from rotfem.results.campbell import CampbellResult, CriticalSpeed, Instability
 from rotfem.results.check import CheckResult
 from rotfem.results.explain import ExplainResult
-from rotfem.results.modes import ModesResult
-from rotfem.results.response import ResponseResult
+from rotfem.results.modes import ModesResult, ResponseResult
 from rotfem.results.result import Result
 from rotfem.results.run import RunResult
 

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.results.columns import ShortTable, ShownUnits, number, numbers
 from rotfem.results.files import json_text, rows_text
 from rotfem.results.result import Array, Rows, Variables
-from rotfem.results.tables import ShortTable, number, numbers
-from rotfem.results.units import ShownUnits
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from rotfem.results.columns import ShortTable, number, numbers
 from rotfem.results.files import csv_text
 from rotfem.results.result import Array, Result, Variables, frame
-from rotfem.results.tables import ShortTable, number, numbers
 
 if TYPE_CHECKING:
     import pandas

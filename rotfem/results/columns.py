@@ -1,48 +1,25 @@
-"""What the columns of results are and their units: the axis labels of figures, the attributes of labelled arrays."""
+"""What the columns of results are, their units and numbers as text, and short tables of them.
+
+Speeds and frequencies are printed and drawn in the units that a scene asks for. Files have SI units, and those of modes
+these units too.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from itertools import zip_longest
+from textwrap import wrap
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from rotfem.registry import outputs
+from rotfem.units import quantity
 
 Array = npt.NDArray[np.float64]
-
-
-def figures(history: dict[str, Array]) -> dict[str, float]:
-    """Return the figures of merit of a history: extremes of tip and root, with times, final values, Jacobi drift.
-
-    Extremes inside the history are those of the parabola through three neighbouring samples.
-    """
-    out: dict[str, float] = {}
-    t = history["t"]
-    if len(t) == 0:
-        return out
-    for name in [n for n in history if n.startswith(("tip_", "root_"))]:
-        out[f"{name}_final"] = history[name][-1]
-        if len(t) > 1:
-            out[f"{name}_min_time"], out[f"{name}_min"] = extreme(t, history[name], -1)
-            out[f"{name}_max_time"], out[f"{name}_max"] = extreme(t, history[name], 1)
-    if len(t) > 1:
-        scale = max(float(np.max(np.abs(history["kinetic"]))), float(np.max(np.abs(history["strain"]))), 1e-300)
-        out["jacobi_change"] = (history["jacobi"][-1] - history["jacobi"][0]) / scale
-    return {key: float(value) for key, value in out.items()}
-
-
-def extreme(t: Array, y: Array, sign: int) -> tuple[float, float]:
-    """Return (time, value) of the largest sign·y, by a parabola through the largest sample and its neighbours."""
-    i = int(np.argmax(sign * y))
-    if i in (0, len(y) - 1):
-        return float(t[i]), float(y[i])
-    c = np.polyfit(t[i - 1 : i + 2] - t[i], y[i - 1 : i + 2], 2)
-    if c[0] * sign >= 0:
-        return float(t[i]), float(y[i])
-    s = -c[1] / (2 * c[0])
-    return float(t[i] + s), float(np.polyval(c, s))
-
 
 #: Part of the largest number of its unit below which one is shown as 0.
 ZERO = 1e-9
@@ -50,12 +27,9 @@ ZERO = 1e-9
 
 def zeros(columns: Mapping[str, Array]) -> list[str]:
     """Return the columns of which every number is shown as 0, `ZERO` of the largest of its unit and below."""
-    largest: dict[str, float] = {}
     sizes = {name: float(np.max(np.abs(values), initial=0.0)) for name, values in columns.items()}
-    units = {name: described(name)[1] or name for name in columns}
-    for name, size in sizes.items():
-        largest[units[name]] = max(largest.get(units[name], 0.0), size)
-    return [name for name, size in sizes.items() if size <= ZERO * largest[units[name]]]
+    scales = by_unit(sizes)
+    return [name for name, size in sizes.items() if size <= ZERO * scales[name]]
 
 
 _SUB = {"1": "₁", "2": "₂", "3": "₃"}
@@ -165,3 +139,139 @@ def shown_unit(column: str, shown: str = "") -> str:
     """Return the unit of a column, or the one that it is shown in, as "(m)"; "" of one without."""
     unit = shown or described(column)[1]
     return f"({'–' if unit == '1' else unit})" if unit else ""
+
+
+# --- the units that are shown -----------------------------------------------------------------------------------------
+
+SI = "rad/s"
+
+
+@dataclass(frozen=True)
+class ShownUnits:
+    """Units of speeds and frequencies, as `[output]` of a scene names them.
+
+    Attributes:
+        speed: of the hub.
+        frequency: of modes.
+    """
+
+    speed: str = SI
+    frequency: str = SI
+
+    @classmethod
+    def of(cls, summary: Mapping[str, Any]) -> Self:
+        """Return the units that the scene of a summary asks for."""
+        scene = summary.get("scene", {})
+        output = scene.get("output", {}) if isinstance(scene, Mapping) else {}
+        return cls(output.get("speed", SI), output.get("frequency", SI))
+
+    def speeds(self, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Return speeds (rad/s) of any shape in the unit of speeds."""
+        return in_unit(values, self.speed)
+
+    def frequencies(self, values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Return frequencies (rad/s) of any shape in the unit of frequencies."""
+        return in_unit(values, self.frequency)
+
+    def rows(self, rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+        """Return rows of modes with columns more, such as `speed_rpm`, where another unit than SI is asked for."""
+        named = {"speed": self.speed, "frequency": self.frequency}
+        wanted = [(f"{n}_{unit.lower().replace('/', '_')}", n, unit) for n, unit in named.items() if unit != SI]
+        return [
+            dict(row) | {c: float(in_unit(row[n], unit)) for c, n, unit in wanted if n in row and c not in row}
+            for row in rows
+        ]
+
+
+def in_unit(values: npt.ArrayLike, unit: str) -> npt.NDArray[np.float64]:
+    """Return angular speeds or frequencies (rad/s) of any shape in another unit."""
+    found = np.asarray(values, dtype=np.float64)
+    return found if unit == SI else np.divide(found, quantity(f"1 {unit}", SI), dtype=np.float64)
+
+
+# --- short tables -----------------------------------------------------------------------------------------------------
+
+#: Columns of characters that a table is made for, and fewest that a column of text is given.
+WIDTH, NARROWEST = 80, 16
+
+#: Rows that a notebook shows of a table.
+SHORT = 12
+
+
+@dataclass(frozen=True)
+class ShortTable:
+    """A short table.
+
+    Attributes:
+        head: heading of each column, with its unit.
+        rows: texts in the order of the headings; fewer where the last ones are empty.
+    """
+
+    head: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+
+    def lines(self, width: int = WIDTH) -> list[str]:
+        """Return the table as lines, numbers to the right; where they are too long the last column is folded."""
+        columns = list(zip_longest(self.head, *self.rows, fillvalue=""))
+        sizes = [max(map(len, column)) for column in columns]
+        left = [not any(map(_is_number, column[1:])) for column in columns]
+        room = width - sum(sizes[:-1]) - 2 * (len(sizes) - 1)
+        out = []
+        for row in (*([self.head] if any(self.head) else []), *self.rows):
+            cells = [*row, *[""] * (len(sizes) - len(row))]
+            folded = wrap(cells[-1], max(room, NARROWEST)) or [""]
+            *most, size = sizes
+            one = zip([*cells[:-1], folded[0]], [*most, size if size <= room else 0], left, strict=True)
+            out.append("  ".join(text.ljust(n) if to_left else text.rjust(n) for text, n, to_left in one).rstrip())
+            out += [" " * (sum(most) + 2 * len(most)) + text for text in folded[1:]]
+        return out
+
+    def html(self) -> str:
+        """Return the table as HTML, its first rows where there are many."""
+        more = len(self.rows) - SHORT
+        rows = self.rows if more <= 0 else [*self.rows[:SHORT], (f"… and {more} more",)]
+        cells = "".join("<tr>" + "".join(f"<td>{escape(text)}</td>" for text in row) + "</tr>" for row in rows)
+        head = "".join(f"<th>{escape(text)}</th>" for text in self.head)
+        return f"<table><thead><tr>{head}</tr></thead><tbody>{cells}</tbody></table>"
+
+
+def number(value: float | None, scale: float = 1.0, digits: int = 6) -> str:
+    """Return a number as text; 0 if it is below `ZERO` of a scale, and – where there is none."""
+    if value is None:
+        return "–"
+    return "0" if abs(value) <= ZERO * scale else f"{value:.{digits}g}"
+
+
+def numbers(values: Sequence[float | None], digits: int = 6) -> list[str]:
+    """Return the numbers of one column as text, relative to the largest of them."""
+    scale = largest(values)
+    return [number(value, scale, digits) for value in values]
+
+
+def largest(values: Iterable[float | None]) -> float:
+    """Return the largest size of numbers."""
+    return max((abs(value) for value in values if value is not None), default=0.0)
+
+
+def per_cent(ratio: float | None) -> str:
+    """Return a ratio as a number of per cent with two digits, of large ones three."""
+    return number(None if ratio is None else 100 * ratio, 100.0, 2 if ratio is None or abs(ratio) < 0.1 else 3)
+
+
+def named(column: str) -> str:
+    """Return what a column is called, with its unit."""
+    return label(column).removesuffix(" (–)")
+
+
+def by_unit(values: dict[str, float]) -> dict[str, float]:
+    """Return for every column the largest size among those that have its unit."""
+    units = {name: described(name)[1] or name for name in values}
+    return {name: largest(values[other] for other in values if units[other] == units[name]) for name in values}
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text.lstrip("<"))
+    except ValueError:
+        return False
+    return True

@@ -20,11 +20,10 @@ from scipy.interpolate import CubicSpline, NearestNDInterpolator
 from scipy.optimize import linear_sum_assignment
 
 from rotfem.errors import InputError
-from rotfem.results.columns import described, label
+from rotfem.results.columns import ShortTable, described, label, largest, number, per_cent
 from rotfem.results.files import read_csv, rows_text
 from rotfem.results.result import Result, Row, Rows, Variables, column_of_rows
 from rotfem.results.result_set import read_summary
-from rotfem.results.tables import ShortTable, largest, number, per_cent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rotfem.results.columns import ShortTable, per_cent
 from rotfem.results.files import json_text
 from rotfem.results.result import Row, Rows, Variables, column_of_rows
-from rotfem.results.tables import ShortTable, per_cent
 
 
 @dataclass(repr=False)

@@ -1,4 +1,4 @@
-"""What the analysis of modes returns.
+"""What analyses of small motions return: modes, and the response to harmonic loads.
 
 ElastoDyn takes the displacement of a mode as Σ c_k ξ^k, k = 2 … 6, ξ = x/L, with Σ c_k = 1, so 1 at the tip (Jonkman &
 Buhl, FAST User's Guide, NREL/EL-500-38230, 2005, "blade input file").
@@ -15,11 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.errors import InputError
+from rotfem.results.columns import ShortTable, ShownUnits, by_unit, in_unit, named, number, numbers, per_cent
 from rotfem.results.files import csv_text, json_text, rows_text
 from rotfem.results.result import Array, Rows, Variables, column_of_rows, nodes_of
 from rotfem.results.surfaces import Surface
-from rotfem.results.tables import ShortTable, numbers, per_cent
-from rotfem.results.units import ShownUnits, in_unit
 
 #: Powers of ξ in a mode polynomial.
 POWERS = (2, 3, 4, 5, 6)
@@ -225,14 +224,14 @@ class ModesResult(Rows):
             InputError: the structure is no beam.
         """
         out = []
-        for named, columns, found in self._of_beam():
+        for mode, columns, found in self._of_beam():
             values: dict[str, Array] = {"span": columns["x"] / columns["x"][-1]}
             for direction, pair in found.items():
                 values |= dict(zip((f"{direction}_displacement", f"{direction}_slope"), pair, strict=True))
             if "theta1" in columns:
                 values["twist"] = columns["theta1"] / columns["x"][-1]
             rows = zip(*(column.tolist() for column in values.values()), strict=True)
-            out += [named | dict(zip(values, row, strict=True)) for row in rows]
+            out += [mode | dict(zip(values, row, strict=True)) for row in rows]
         return out
 
     def mode_polynomials(self) -> list[dict[str, Any]]:
@@ -247,7 +246,7 @@ class ModesResult(Rows):
             InputError: the structure is no beam.
         """
         out: list[dict[str, Any]] = []
-        for named, columns, found in self._of_beam():
+        for mode, columns, found in self._of_beam():
             sizes = {name: float(np.max(np.abs(shape))) for name, (shape, _) in found.items()}
             direction = max(sizes, key=lambda name: sizes[name])
             shape = found[direction][0]
@@ -257,14 +256,14 @@ class ModesResult(Rows):
             number = 1 + sum(other["direction"] == direction for other in out)
             terms = {f"c{k}": float(c) for k, c in zip(POWERS, coefficients, strict=True)}
             errors = {"fit_error": float(np.max(np.abs(off))), "fit_rms": float(np.sqrt(np.mean(off**2)))}
-            first = {"mode": named["mode"], "label": named["label"], "direction": direction, "number": number}
-            out.append(first | named | terms | errors)
+            first = {"mode": mode["mode"], "label": mode["label"], "direction": direction, "number": number}
+            out.append(first | mode | terms | errors)
         return out
 
     def drawn(self) -> dict[str, str]:
         """Return modes.png, the shapes of all modes."""
-        draw = "plots:shapes_figure" if self.triangles is None else "plots_plate:modes_figure"
-        return {"modes.png": f"results.{draw}"} if self.shapes else {}
+        draw = "shapes_figure" if self.triangles is None else "plate_modes_figure"
+        return {"modes.png": f"results.plots:{draw}"} if self.shapes else {}
 
     def tables(self) -> list[ShortTable]:
         """Return one row a mode: name, frequency, damping ratio and estimated error of the frequency."""
@@ -301,3 +300,65 @@ class ModesResult(Rows):
                 values[i] = columns[name] + 1j * columns[f"{name}_imag"]
             over[f"shape_{name}"] = (("mode", "node"), values)
         return over, coordinates | nodes_of(first, self.triangles)
+
+
+@dataclass(repr=False)
+class ResponseResult(Rows):
+    """Outcome of `rotfem response`.
+
+    Attributes:
+        summary: scene, speed, outputs, modes, peaks, warnings, timings; JSON-able.
+        rows: one dictionary a frequency: `frequency` (rad/s), `frequency_hz`, `per_rev` (frequency over speed, of what
+            spins); of every output, as `tip_u2`, `root_m3` or, at a station, `M@2.5`, the amplitude `tip_u2` (in its
+            unit), `tip_u2_phase` (rad, how far it is ahead of a load of phase 0) and `tip_u2_modal`, the amplitude by
+            modes; `difference` of the two responses, relative to the direct one, at the tip, and `worst_difference` of
+            all outputs; `peak` (1 at frequencies that were added to see a peak).
+        direct: complex amplitudes of the outputs, shape (frequencies, outputs).
+        modal: the same by modes.
+    """
+
+    direct: npt.NDArray[np.complex128]
+    modal: npt.NDArray[np.complex128]
+    index = ("frequency",)
+
+    @property
+    def outputs(self) -> list[str]:
+        """Names of the outputs: of the tip `tip_u1`, …, of the root `root_f1`, …, of stations `M@2.5`, …."""
+        return list(self.summary["outputs"])
+
+    @property
+    def frequencies(self) -> Array:
+        """Frequencies, rad/s, increasing."""
+        return np.array([row["frequency"] for row in self.rows])
+
+    def amplitude(self, output: str) -> Array:
+        """Return the amplitude of an output over the frequencies, in its unit."""
+        return np.asarray(np.abs(self.direct[:, self.outputs.index(output)]), dtype=np.float64)
+
+    def phase(self, output: str) -> Array:
+        """Return the phase of an output over the frequencies, rad, from −π to π."""
+        return np.asarray(np.angle(self.direct[:, self.outputs.index(output)]), dtype=np.float64)
+
+    def texts(self) -> dict[str, str]:
+        """Return response.csv."""
+        return {"response.csv": rows_text(ShownUnits.of(self.summary).rows(self.rows))}
+
+    def drawn(self) -> dict[str, str]:
+        """Return response.png: amplitudes and phases over frequency."""
+        return {"response.png": "results.plots:response_figure"}
+
+    def tables(self) -> list[ShortTable]:
+        """Return where every output is largest."""
+        units, peaks = ShownUnits.of(self.summary), self.summary["peaks"]
+        scales = by_unit({name: peak["amplitude"] for name, peak in peaks.items()})
+        rows = [
+            (named(name), number(peak["amplitude"], scales[name]), f"{units.frequencies(peak['frequency']):.8g}")
+            for name, peak in peaks.items()
+        ]
+        return [ShortTable(("output", "largest amplitude", f"at ({units.frequency})"), rows)]
+
+    def arrays(self) -> tuple[Variables, Variables]:
+        """Return the complex responses `direct` and `modal` over `frequency` (rad/s) and `output`."""
+        over, outputs = ("frequency", "output"), np.array(self.outputs, dtype=str)
+        coordinates: Variables = {"frequency": (over[:1], self.frequencies), "output": (over[1:], outputs)}
+        return {"direct": (over, self.direct), "modal": (over, self.modal)}, coordinates

@@ -13,9 +13,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from scipy.optimize import isotonic_regression
 
-from rotfem.results.columns import ZERO, label
+from rotfem.results.columns import ZERO, ShownUnits, label
 from rotfem.results.plots import dress
-from rotfem.results.units import ShownUnits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -25,11 +25,10 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import FixedLocator
 
 from rotfem.errors import InputError
-from rotfem.results.columns import ZERO, described, label, label_of
+from rotfem.results.columns import ZERO, ShownUnits, described, label, label_of
 from rotfem.results.files import json_text, write_text
 from rotfem.results.modes import ModesResult
 from rotfem.results.result import Result
-from rotfem.results.units import ShownUnits
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -18,9 +18,8 @@ import numpy.typing as npt
 
 from rotfem.errors import printable
 from rotfem.registry import resolved
-from rotfem.results.columns import described
+from rotfem.results.columns import ShortTable, described
 from rotfem.results.files import json_text
-from rotfem.results.tables import ShortTable
 
 if TYPE_CHECKING:
     import pandas

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotfem.results.columns import described
+from rotfem.results.columns import ShortTable, by_unit, described, largest, named, number
 from rotfem.results.files import csv_text, line, write_text, writing
 from rotfem.results.result import Array, Result, Variables, dataset, frame, nodes_of
-from rotfem.results.tables import ShortTable, by_unit, largest, named, number
 from rotfem.short import short_fields
 
 if TYPE_CHECKING:
@@ -181,9 +180,8 @@ class RunResult(Result):
             "resultants": bool(self.resultants),
             "stations": self.stations is not None and len(self.stations.t) > 0,
         }
-        of_plates = ("shape", "resultants") if is_plate else ()
-        module = {name: "plots_plate" if name in of_plates else "plots" for name in there}
-        return {f"{name}.png": f"results.{module[name]}:{name}_figure" for name, drawn in there.items() if drawn}
+        draw = {name: "plate" if name == "shape" and is_plate else name for name in there}
+        return {f"{name}.png": f"results.plots:{draw[name]}_figure" for name, drawn in there.items() if drawn}
 
     def tables(self) -> list[ShortTable]:
         """Return extremes and last values of the tip's displacement; of a steady state all of tip and root."""
@@ -214,6 +212,38 @@ class RunResult(Result):
         nodes = nodes_of(self.shape, self.triangles)
         over |= {name: (("node",), values) for name, values in self.shape.items() if name not in nodes}
         return over, {"t": (("t",), self.t), **nodes}
+
+
+def figures(history: dict[str, Array]) -> dict[str, float]:
+    """Return the figures of merit of a history: extremes of tip and root, with times, final values, Jacobi drift.
+
+    Extremes inside the history are those of the parabola through three neighbouring samples.
+    """
+    out: dict[str, float] = {}
+    t = history["t"]
+    if len(t) == 0:
+        return out
+    for name in [n for n in history if n.startswith(("tip_", "root_"))]:
+        out[f"{name}_final"] = history[name][-1]
+        if len(t) > 1:
+            out[f"{name}_min_time"], out[f"{name}_min"] = extreme(t, history[name], -1)
+            out[f"{name}_max_time"], out[f"{name}_max"] = extreme(t, history[name], 1)
+    if len(t) > 1:
+        scale = max(float(np.max(np.abs(history["kinetic"]))), float(np.max(np.abs(history["strain"]))), 1e-300)
+        out["jacobi_change"] = (history["jacobi"][-1] - history["jacobi"][0]) / scale
+    return {key: float(value) for key, value in out.items()}
+
+
+def extreme(t: Array, y: Array, sign: int) -> tuple[float, float]:
+    """Return (time, value) of the largest sign·y, by a parabola through the largest sample and its neighbours."""
+    i = int(np.argmax(sign * y))
+    if i in (0, len(y) - 1):
+        return float(t[i]), float(y[i])
+    c = np.polyfit(t[i - 1 : i + 2] - t[i], y[i - 1 : i + 2], 2)
+    if c[0] * sign >= 0:
+        return float(t[i]), float(y[i])
+    s = -c[1] / (2 * c[0])
+    return float(t[i] + s), float(np.polyval(c, s))
 
 
 class LiveTable:

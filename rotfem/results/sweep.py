@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.results.columns import ZERO, label_of
+from rotfem.results.columns import ZERO, ShortTable, label_of, numbers
 from rotfem.results.files import rows_text, writing
 from rotfem.results.result import Rows, Variables, column_of_rows
-from rotfem.results.tables import ShortTable, numbers
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -15,8 +15,8 @@ from matplotlib.tri import Triangulation
 
 from rotfem.results import CampbellResult, ExplainResult, ModesResult, RunResult
 from rotfem.results.check import CheckResult
+from rotfem.results.modes import ResponseResult
 from rotfem.results.plots_campbell import campbell_figure, spread
-from rotfem.results.response import ResponseResult
 from rotfem.results.run import StationHistory
 from rotfem.section_quantities import FORCES, STRAINS
 from tests.figures import check

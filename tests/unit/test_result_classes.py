@@ -15,9 +15,8 @@ from matplotlib.figure import Figure
 from rotfem.commands.cost.result import CostResult
 from rotfem.errors import OutputError
 from rotfem.results import CampbellResult, CriticalSpeed, ExplainResult, Instability, ModesResult, Result, RunResult
-from rotfem.results.columns import described, label
+from rotfem.results.columns import SHORT, ShortTable, described, label, numbers
 from rotfem.results.plots import plot
-from rotfem.results.tables import SHORT, ShortTable, numbers
 from rotfem.scene import Scene
 
 T = np.array([0.0, 0.5, 1.0])

@@ -9,7 +9,7 @@ import pytest
 
 from rotfem import Scene, SceneError
 from rotfem.commands.campbell import parse_speeds
-from rotfem.results.units import ShownUnits
+from rotfem.results.columns import ShownUnits
 from rotfem.scene import beams, loads, motion, plates, section, settings
 from rotfem.scene.units import DEPENDING, UNITS, in_si
 from rotfem.units import quantity

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rotfem
-from rotfem.results.animation import FRAMES, animate
+from rotfem.results.surfaces import FRAMES, animate
 from tests.beams import SPIN_UP, STRUCTURE
 
 pyvista = pytest.importorskip("pyvista")

@@ -16,9 +16,9 @@ from rotfem.commands.accuracy import changes_of
 from rotfem.errors import ComputationError, SceneError
 from rotfem.refinement.estimate import percent
 from rotfem.refinement.refine import Setting
+from rotfem.results.columns import ShortTable, per_cent
 from rotfem.results.files import json_text, rows_text, write_text
 from rotfem.results.result import Array, Row, Rows, Variables, column_of_rows
-from rotfem.results.tables import ShortTable, per_cent
 from rotfem.scene import Scene
 from rotfem.scene.span_tables import is_path
 
