@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import cache, lru_cache
 from typing import Any
 
-from rotfem.errors import InputError
+from rotfem.errors import InputError, SceneError
 
 _NUMBER = r"(?>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 #: A name with a power of one digit: what a user writes is given to pint, which would compute 9**9**9 as well.
@@ -79,6 +80,24 @@ def split_unit(text: str, unit: str = "rad/s") -> tuple[str, float]:
     if found is None:
         raise ValueError("must be numbers, with a unit at the end of them all or without")
     return found[1], quantity(f"1 {found[2]}", unit) if found[2] else 1.0
+
+
+def seconds_of(text: str | float, file: str = "", key: str = "cost --budget") -> float:
+    """Return seconds from a number, or text such as "60s", "2min", "1h".
+
+    Args:
+        text: what was given.
+        file: name for error messages.
+        key: what it was given for.
+
+    Raises:
+        SceneError: it is neither, or not greater than 0.
+    """
+    with suppress(ValueError):
+        number, unit = split_unit(str(text), "s")
+        if 0.0 < (value := float(number) * unit) < 1e9:
+            return value
+    raise SceneError(file, key, text, "must be a time greater than 0, such as 60s, 2min or 1h")
 
 
 def shown(unit: str) -> str:

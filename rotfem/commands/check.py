@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from scipy.spatial.transform import Rotation
 
 from rotfem.commands.problem import Problem
 from rotfem.commands.processes import communicator
@@ -120,21 +121,15 @@ def places(knots: tuple[float, ...], length: float) -> Array:
 
 def axes_along(beam: Any, x: Array) -> tuple[Array, Array]:
     """Return (r, T) in the frame: position of the axis (m), (n, 3), and the section axes as columns, (n, 3, 3)."""
-    c, s = np.cos(beam.precone), np.sin(beam.precone)
-    coned = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
+    coned = Rotation.from_euler("Y", -beam.precone)
     line = beam.reference_line
     if line is not None:
         position, (chi, zeta) = line.at(x)[0], line.angles(x)
     else:
         chi = zeta = np.zeros(len(x))
         position = x[:, None] * np.eye(3)[0]
-    zero, one = np.zeros(len(x)), np.ones(len(x))
-    twist = evaluate(beam.pretwist, x)
-    swept = _stacked([[np.cos(chi), -np.sin(chi), zero], [np.sin(chi), np.cos(chi), zero], [zero, zero, one]])
-    bent = _stacked([[np.cos(zeta), zero, -np.sin(zeta)], [zero, one, zero], [np.sin(zeta), zero, np.cos(zeta)]])
-    turned = _stacked([[one, zero, zero], [zero, np.cos(twist), -np.sin(twist)], [zero, np.sin(twist), np.cos(twist)]])
-    r = np.array(beam.root_position) + position @ coned.T
-    return r, coned @ swept @ bent @ turned
+    turned = Rotation.from_euler("ZYX", np.column_stack([chi, -zeta, evaluate(beam.pretwist, x)]))
+    return np.array(beam.root_position) + coned.apply(position), (coned * turned).as_matrix()
 
 
 def columns_of(structure: Any, at: Array | None = None) -> dict[str, Array]:
@@ -193,8 +188,3 @@ def doubts(columns: Mapping[str, Array]) -> list[str]:
                     f"at x = {x[i]:.4g} m {center} lies {away[i]:.3g} radii of gyration from the axis in {other}"
                 )
     return sorted(out)
-
-
-def _stacked(rows: list[list[Array]]) -> Array:
-    """Return matrices (n, 3, 3) of rows of entries (n,)."""
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

@@ -10,8 +10,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rotfem.commands.console import Session, missing
-from rotfem.commands.job import Debug, Job, Json, NoPlots, Quiet, SceneFile, app, command, folder_option
-from rotfem.commands.options import as_path, listed, speeds_of
+from rotfem.commands.job import (
+    Debug,
+    Job,
+    Json,
+    NoPlots,
+    Quiet,
+    SceneFile,
+    app,
+    as_path,
+    command,
+    folder_option,
+    listed,
+    speeds_of,
+)
 from rotfem.errors import input_of
 
 if TYPE_CHECKING:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
@@ -81,7 +80,7 @@ class ResultFolder:
             OutputError: the small files cannot be written.
         """
         fields: Writer | None = getattr(result, "fields", None)
-        of_first: list[Writer] = [*result.large(), *further, *([partial(_plot, result)] if plots else [])]
+        of_first: list[Writer] = [*result.large(), *further, *([result.draw] if plots else [])]
         writers = [(write, False) for write in of_first]
         if fields is not None:
             writers.append((fields, result.summary.get("shared") == "mesh"))
@@ -112,9 +111,3 @@ class ResultFolder:
             raise OutputError(self.path / Path(str(problem.path)).name, problem.reason)
         if problem is not None:
             raise problem
-
-
-def _plot(result: Result, folder: Path) -> None:
-    from rotfem.results.plots import plot
-
-    plot(result, folder)

@@ -1,27 +1,342 @@
-"""`rotfem run`: the steady state or the time history of a scene."""
+"""`rotfem run`: the steady state or the time history of a scene.
+
+A run is the compiled system, what yields its states, the observers that see them, and a summary of it all.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.equilibrium import check_steady
+from rotfem.analysis.critical_speed import critical_speed
+from rotfem.analysis.dense_output import RowTimes
+from rotfem.analysis.equilibrium import check_steady, steady_state
+from rotfem.analysis.fixed_frame import check_rotating
+from rotfem.analysis.march import March, Steps
+from rotfem.analysis.reduced.response import Response
+from rotfem.analysis.schemes import State
+from rotfem.analysis.stability import stability_of
+from rotfem.analysis.stepper import Stepper
+from rotfem.analysis.switching import SMOOTHER, watched_switches
+from rotfem.analysis.theory_error import said_of
+from rotfem.commands import monitor
 from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy, within_tolerance
-from rotfem.commands.error_report import check_rotations
-from rotfem.commands.problem import Problem
+from rotfem.commands.advice import advise
+from rotfem.commands.checkpoint import Log, Parts
+from rotfem.commands.error_report import RunErrors, check_rotations, output_of
+from rotfem.commands.first_state import Start, first_state, hints_of_start
+from rotfem.commands.interrupts import together
+from rotfem.commands.loads import frozen_inputs
+from rotfem.commands.monitor import Monitor
+from rotfem.commands.problem import Problem, scheme_of
+from rotfem.commands.processes import communicator
+from rotfem.commands.recorder import Recorder
+from rotfem.commands.reduced_history import reduced_history
 from rotfem.commands.result_folder import ResultFolder
 from rotfem.commands.run_store import Interval, RunStore
-from rotfem.commands.simulation import Simulation
+from rotfem.commands.summary import summary, timings
+from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, Stopped, input_of
 from rotfem.listeners import Hint, Progress, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Functional
+from rotfem.mechanics.problem import Problem as ProblemData
+from rotfem.numerics.newton import Newton
+from rotfem.refinement.discretisation import HistoryErrors, richer_problem
+from rotfem.refinement.distance import OUTPUTS
 from rotfem.refinement.refine import Clock, Setting
-from rotfem.results.run import RunResult
-from rotfem.scene import Scene, as_scene
+from rotfem.results.run import RunResult, figures
+from rotfem.scene import Scene, Time, as_scene
+from rotfem.structures.symmetry import inactive_unknowns
+
+Array = npt.NDArray[np.float64]
+
+
+class Simulation:
+    """One run of a scene.
+
+    Args:
+        scene: the scene as it was asked for.
+        problem: its problem, with the model it is run with.
+        store: what is kept of it on disk while it goes on, and the processes that run it.
+        setting: of the refinement that it is an answer of, if it is.
+        clock: called with the number of steps and the part of the history that is done.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        problem: ProblemData,
+        store: RunStore,
+        setting: Setting | None = None,
+        clock: Callable[[int, float], None] | None = None,
+    ):
+        self.scene, self.setting, self.clock = scene, setting, clock
+        self.comm, self.store, self.log = store.comm, store, Log()
+        if scene.time is None and problem.frame == "inertial":
+            problem = problem.replace(frame="rotating")
+            self.log.warnings.append("a steady state is one only in the rotating frame, where it was computed")
+        check_rotating(problem, "a run")
+        by_basis = scene.time is not None and bool(scene.model.reduced)
+        if scene.time is not None and not (by_basis or scene.model.all_unknowns or scene.initial.first is not None):
+            problem = problem.replace(inactive=inactive_unknowns(problem))
+        self.problem, there = problem, communicator(problem, self.comm)
+        self.system: Any = compile_system(problem, there, moving=scene.time is not None)
+        self.system.compile_readings()
+        self.compiled = perf_counter() - self.log.started
+        self.record = Recorder(self.system, scene.output)
+        critical = None if by_basis else critical_speed(self.system)
+        self.monitor = Monitor(self.system, critical)
+        self.iteration = Newton.of(scene.solver)
+        self.start = Start()
+        #: What the states came from: of a march its stepper, companions and rows between steps; or a reduced model.
+        self.stepper: Stepper | None = None
+        self.companions: HistoryErrors | None = None
+        self.rows: RowTimes | None = None
+        self.last: State | None = None
+        self.reduced: Response | None = None
+        self.shape: Array | None = None
+
+    def advise(self, hint: Hint | None) -> None:
+        """Give the hints that there are before the computation starts."""
+        also = hints_of_start(self.scene, self.problem)
+        self.log.advice = advise(self.scene, "run", hint, critical=self.monitor.critical, also=also)
+
+    def run(self, progress: Progress | None = None) -> RunResult:
+        """Return the result of the scene (see `rotfem.run`).
+
+        Raises:
+            ComputationError: it failed; its attribute `result` holds what was computed until then.
+            Stopped: it was interrupted; likewise.
+        """
+        progress = progress or (lambda share: None)
+        try:
+            if self.scene.time is None:
+                self._steady()
+            else:
+                self.start = Start() if self.store.goes_on else self._start(self.system)
+                self.monitor.stability = self.start.stability
+                self.log.warnings += self.start.warnings
+                if not (self.scene.model.reduced and self._by_reduced_model(progress)):
+                    self._march(self.scene.time, progress)
+        except ComputationError as error:
+            failure = self._with_cause(error)
+            failure.result = self.result("failed", failure)
+            raise failure from (None if failure is error else error)
+        except KeyboardInterrupt as stop:
+            if not together(self.comm, stop):
+                raise
+            raise Stopped(self.result("interrupted")) from stop
+        return self.result("done")
+
+    # --- what yields states -----------------------------------------------------------------------------------------
+
+    def _steady(self) -> None:
+        """Compute the equilibrium at the speed of t = 0."""
+        system, log, speed = self.system, self.log, self.problem.motion.speed(0.0)
+        log.warnings += frozen_inputs(self.problem)
+        past_limits = self.scene.solver.past_limits
+        self.shape = steady_state(system, speed, self.iteration, past_limits=past_limits, notes=log.warnings)
+        stability = self.monitor.stability = stability_of(system, self.shape, speed)
+        self._recorded(State.at_rest(system, *system.start(self.shape)))
+        critical = self.monitor.critical
+        if said := stability.warning():
+            if critical is not None and abs(speed) > critical:
+                said += (
+                    f"; {abs(speed):g} rad/s is above the speed {critical:.6g} rad/s at which the "
+                    f"{self.problem.theory.name} stiffness is singular"
+                )
+            log.warnings.append(said)
+
+    def _by_reduced_model(self, progress: Progress) -> bool:
+        """Record the history of a reduced model; return whether one serves; a warning says where it does not."""
+        self.store.start(self._parts())
+        with self.store.interrupts():
+            self.reduced = reduced_history(
+                self.scene, self.system, self.start.q, self.record, self.monitor, self.log, self.setting is not None
+            )
+        if self.reduced is None:
+            self.monitor.critical = critical_speed(self.system)
+            return False
+        progress(1.0)
+        return True
+
+    def _march(self, time: Time, progress: Progress) -> None:
+        """March through the history."""
+        scheme, newton = scheme_of(time), self.iteration
+        march = March(self.system, scheme, Steps.of(time), newton, self.start.q, self.start.v)
+        self.stepper = march.stepper
+        if self._wants_error:
+            of = OUTPUTS[output_of(self.scene)], time.output_step, richer_problem(self.problem)
+            self.companions = HistoryErrors(self.problem, self.system, scheme, newton, self._start_there, *of)
+            self.stepper.observer = self.companions
+        march.reached = self.store.start(self._parts())
+        if time.output_step is not None:
+            passed = max(len(self.record.history) - 1, 0)
+            self.rows = self.stepper.observer = RowTimes(
+                time.output_step, time.end, scheme.order, self.stepper.observer, passed
+            )
+        with self.store.interrupts():
+            first = 0 if march.reached is None else self.log.steps + 1
+            for self.log.steps, state in enumerate(march, first):
+                self._stepped(state, time, progress)
+
+    def _start(self, system: Any) -> Start:
+        """Return what the history starts from in a system, which may be of another mesh or theory."""
+        there = system.model.problem
+        problem = self.problem.replace(mesh=there.mesh, theory=there.theory)
+        return first_state(self.scene, problem, system, judged=system is self.system)
+
+    def _start_there(self, system: Any) -> tuple[Array | None, Array | None]:
+        """Return the shape and the velocities that a companion starts from."""
+        nodes = [s.V.dofmap.index_map.size_global for s in (system, self.system)]
+        same = nodes[0] == nodes[1] and system.model.problem.theory == self.problem.theory
+        start = self.start if self.store.goes_on or same else self._start(system)
+        return start.q, start.v
+
+    # --- what sees them ---------------------------------------------------------------------------------------------
+
+    def _stepped(self, state: State, time: Time, progress: Progress) -> None:
+        """Show a state of the march to all that observe it."""
+        steps = self.log.steps
+        if (why := self.scene.limits.refusal("steps", steps)) is not None:
+            raise ComputationError(f"the motion {why}", time=state.t)
+        self.monitor.step(state)
+        self.last = state
+        rows = [state]
+        if self.rows is not None and state.t > 0.0:
+            rows = self.rows.taken()
+        elif steps % time.output_every and state.t < time.end * (1 - 1e-9):
+            rows = []
+        for row in rows:
+            self._recorded(row)
+            progress(row.t / time.end)
+        self.store.stepped(state)
+        if self.clock is not None:
+            self.clock(steps, state.t / time.end)
+
+    def _recorded(self, state: State) -> None:
+        self.monitor.row(state)
+        self.record(state)
+
+    def _parts(self) -> Parts:
+        """Return what a checkpoint holds."""
+        assert self.scene.time is not None
+        companions = [] if self.companions is None else self.companions.companions
+        return Parts(
+            *(self.scene.time, self.system, self.stepper, self.record, self.monitor, self.log),
+            *(companions, self.setting),
+        )
+
+    # --- the result -------------------------------------------------------------------------------------------------
+
+    def result(self, status: str, failure: ComputationError | None = None) -> RunResult:
+        """Return everything computed so far with a summary of how it went."""
+        history, log = self.record.history.arrays(), self.log
+        log.warnings += self._said_of_steps(history, failure)
+        watched = self.monitor
+        if status == "done" and watched.since is not None:
+            log.warnings.append(
+                f"the speed is above {watched.critical:.6g} rad/s, where the {self.problem.theory.name} stiffness is "
+                f"no longer definite, since t = {watched.since:.4g} s"
+            )
+        errors = RunErrors(
+            *(self.scene, self.problem, self.system, history, self._wants_error, watched.farthest, watched.stability),
+            *(self.shape, self.reduced, self.companions, self.stepper, self._start),
+        )
+        theory, lost = errors.theory, said_of(watched.farthest.conditioning() or 0.0)
+        log.warnings += [line for line in ("" if theory is None else theory.warning(), lost) if line]
+        error = None if failure is not None else errors.estimate()
+        log.warnings += [] if error is None else errors.warnings(error)
+        found = self._summary(status, history) | {
+            name: part.summary()
+            for name, part in (
+                ("stress", self.record.resultants),
+                ("reduced", self.reduced),
+                ("error", error),
+                ("theory_error", theory),
+                ("stability", watched.stability),
+            )
+            if part is not None
+        }
+        if failure is not None:
+            found["failure"] = {"what": failure.what, "time": failure.time, "advice": failure.advice}
+        return self.record.result(found, history)
+
+    def _with_cause(self, error: ComputationError) -> ComputationError:
+        """Return a failure, with what was wrong before it as its cause if something was."""
+        if self.stepper is None:
+            return error
+        if self.log.steps == 0:
+            self.system.held.model.check_smooth()
+        switches, step = watched_switches(self.system), self.scene.time and self.scene.time.step
+        if switches is not None and step and self.last is not None and switches.ahead(self.last, step):
+            what = f"{error.what}; the torque jumps there, so that the equations of a step may have no solution"
+            return ComputationError(what, error.time, SMOOTHER)
+        return monitor.with_cause(error, self.system, self.record.history.arrays(), self.rows is not None)
+
+    def _said_of_steps(self, history: dict[str, Array], failure: ComputationError | None) -> list[str]:
+        """Return what is to be known of the steps and their iterations."""
+        out = [] if self.stepper is None else self.stepper.warnings()
+        if self.iteration.roundoff > 0:
+            out.append(f"Newton stopped at round-off, increments {self.iteration.roundoff:.1e} (relative)")
+        if failure is None and self.stepper is not None:
+            grown = monitor.energy_warning(self.system, history, self.rows is not None)
+            out += [grown] if grown else []
+        return out
+
+    @property
+    def _wants_error(self) -> bool:
+        return self.scene.output.error or self.setting is not None
+
+    def _summary(self, status: str, history: dict[str, Array]) -> dict[str, Any]:
+        """Return what was computed and how it went."""
+        scene, system, log, stepper = self.scene, self.system, self.log, self.stepper
+        space, mesh = system.V.dofmap, system.structure.mesh
+        parts = {"compile": self.compiled, **(system.seconds if stepper else {})}
+        if self.reduced is not None:
+            parts["reduce"] = self.reduced.seconds["wall"]
+        before = {"before": log.elapsed} if log.resumed else {}
+        out = {
+            **summary("run", scene, self.comm, system.comm),
+            "status": status,
+            "kind": "steady" if scene.time is None else "history",
+            "theory": self.problem.theory.name,
+            "frame": self.problem.frame,
+            "effects": list(system.model.effects),
+            "integrals": system.integrals,
+            "dofs": space.index_map.size_global * space.index_map_bs,
+            "elements": mesh.topology.index_map(mesh.topology.dim).size_global,
+            "steps": log.steps,
+            "newton_iterations": self.iteration.iterations,
+            "factorisations": system.factorisations if stepper else self.iteration.iterations,
+            "timings": timings(parts, log.started, before),
+            "figures": figures(history),
+            "warnings": log.warnings,
+            "advice": log.advice,
+            "root": {"place": [float(c) for c in system.root.place]},
+        }
+        if scene.time is None and len(history["t"]):
+            out["root"] |= {name: float(x[-1]) for name, x in history.items() if name.startswith("root_")}
+        if self.monitor.critical is not None:
+            out["figures"]["critical_speed"] = self.monitor.critical
+        if log.resumed:
+            out["resumed"] = log.resumed
+        if stepper is not None and stepper.rejected:
+            out["rejected_steps"] = stepper.rejected
+        if self.problem.inactive:
+            why = "structure, loads and spin are symmetric, so that nothing moves them"
+            out["left_out"] = {"unknowns": list(self.problem.inactive), "why": why}
+        return out
+
+
+# --- the verb -----------------------------------------------------------------------------------------------------
 
 
 def run(

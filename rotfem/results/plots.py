@@ -1,13 +1,11 @@
-"""Figures of results: every function that draws takes a result and returns a figure, one function writes them.
+"""Figures of results: every function that draws takes a result and returns a figure.
 
 What is 0 everywhere (see `zeros`) has no panel; a line below the title names it.
 """
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,36 +16,17 @@ from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from matplotlib.tri import Triangulation
 
 from rotfem.results.columns import ZERO, ShownUnits, described, label, shown_unit, zeros
-from rotfem.results.files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from rotfem.results.modes import ModesResult, ResponseResult
-    from rotfem.results.result import Result
     from rotfem.results.run import RunResult
 
 Array = npt.NDArray[np.float64]
 
 #: Part of the largest displacement below which a line cannot be distinguished from 0.
 VISIBLE = 1e-3
-
-
-def plot(result: Result, folder: Path) -> list[Path]:
-    """Write all figures of a result into a folder; return their paths."""
-    return [save(draw(), folder / name) for name, draw in result.drawings().items()]
-
-
-def save(figure: Figure, path: Path) -> Path:
-    """Write a figure whole or not at all, in the format of the file's ending, PNG if it has none; return the path.
-
-    Raises:
-        ValueError: Matplotlib does not write that format.
-        OutputError: it cannot be written.
-    """
-    content = io.BytesIO()
-    figure.savefig(content, dpi=100, format=path.suffix[1:] or "png")
-    return write_whole(path, content.getvalue())
 
 
 # --- panels -----------------------------------------------------------------------------------------------------------

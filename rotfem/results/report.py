@@ -6,8 +6,6 @@ script is in the file; what is drawn in three dimensions stays a picture.
 
 from __future__ import annotations
 
-import base64
-import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
@@ -28,7 +26,7 @@ from rotfem.errors import InputError
 from rotfem.results.columns import ZERO, ShownUnits, described, label, label_of
 from rotfem.results.files import json_text, write_text
 from rotfem.results.modes import ModesResult
-from rotfem.results.result import Result
+from rotfem.results.result import Result, data_url
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -266,10 +264,7 @@ def _title(figure: Figure) -> str:
 
 def picture(figure: Figure) -> str:
     """Return a figure as an image in the page."""
-    content = io.BytesIO()
-    figure.savefig(content, dpi=110, format="png")
-    data = base64.b64encode(content.getvalue()).decode()
-    return f'<img alt="{escape(_title(figure))}" src="data:image/png;base64,{data}">'
+    return f'<img alt="{escape(_title(figure))}" src="{data_url(figure, 110)}">'
 
 
 def interactive(figure: Figure) -> Any:

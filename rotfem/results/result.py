@@ -19,7 +19,7 @@ import numpy.typing as npt
 from rotfem.errors import printable
 from rotfem.registry import resolved
 from rotfem.results.columns import ShortTable, described
-from rotfem.results.files import json_text
+from rotfem.results.files import json_text, write_whole
 
 if TYPE_CHECKING:
     import pandas
@@ -56,8 +56,7 @@ class Result(ABC):
         parts = [f"<b>{escape(self.title)}</b>", *(f"<br>warning: {escape(line)}" for line in self.warnings)]
         parts += [table.html() for table in self.tables()]
         if self.drawings():
-            image = base64.b64encode(png(self.plot())).decode()
-            parts.append(f'<img src="data:image/png;base64,{image}" style="max-width: 100%">')
+            parts.append(f'<img src="{data_url(self.plot(), 72)}" style="max-width: 100%">')
         return "\n".join(parts)
 
     @property
@@ -132,6 +131,14 @@ class Result(ABC):
         with ResultSet(Path(folder), self.summary.get("command", "")) as results:
             return results.publish(self)
 
+    def draw(self, folder: Path) -> list[Path]:
+        """Write all figures into a folder; return their paths.
+
+        Raises:
+            OutputError: one cannot be written.
+        """
+        return [save(draw(), folder / name) for name, draw in self.drawings().items()]
+
     def plot(self, path: str | Path | None = None, drawing: str = "") -> Figure:
         """Return a figure, a Matplotlib one of its own that pyplot does not know of. A notebook shows it.
 
@@ -143,15 +150,13 @@ class Result(ABC):
             ValueError: there is no such drawing, or the format is not one of Matplotlib's.
             OutputError: the file cannot be written.
         """
-        from rotfem.results.plots import save
-
         drawings = {name.removesuffix(".png"): draw for name, draw in self.drawings().items()}
         name = drawing.removesuffix(".png") or next(iter(drawings), "")
         if name not in drawings:
             there = ", ".join(drawings) or "none, as too little was computed"
             raise ValueError(f"drawing {drawing!r} is not among those of this result; there is {there}")
         figure = drawings[name]()
-        vars(figure)["_repr_png_"] = partial(png, figure)  # Matplotlib has none without a magic of the notebook
+        vars(figure)["_repr_png_"] = partial(image, figure, 72)  # Matplotlib has none without a magic of the notebook
         if path is not None:
             save(figure, Path(path))
         return figure
@@ -184,11 +189,30 @@ class Rows(Result):
         return table.set_index(list(self.index)) if self.index and not table.empty else table
 
 
-def png(figure: Figure) -> bytes:
-    """Return a figure as PNG of a size that suits a notebook."""
+def image(figure: Figure, dpi: int, format: str = "png") -> bytes:
+    """Return a figure as an image of so many dots per inch.
+
+    Raises:
+        ValueError: Matplotlib does not write that format.
+    """
     file = BytesIO()
-    figure.savefig(file, format="png", dpi=72)
+    figure.savefig(file, format=format, dpi=dpi)
     return file.getvalue()
+
+
+def data_url(figure: Figure, dpi: int) -> str:
+    """Return a figure as a PNG image inside a page."""
+    return f"data:image/png;base64,{base64.b64encode(image(figure, dpi)).decode()}"
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """Write a figure whole or not at all, in the format of the file's ending, PNG if it has none; return the path.
+
+    Raises:
+        ValueError: Matplotlib does not write that format.
+        OutputError: it cannot be written.
+    """
+    return write_whole(path, image(figure, 100, path.suffix[1:] or "png"))
 
 
 # --- pandas and xarray, which nothing else needs ----------------------------------------------------------------------

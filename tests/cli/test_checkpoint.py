@@ -23,8 +23,8 @@ import pytest
 
 import rotfem
 from rotfem import SceneError
+from rotfem.commands.run import Simulation
 from rotfem.commands.run_store import Interval
-from rotfem.commands.simulation import Simulation
 from rotfem.results import checkpoint_file
 from rotfem.results.files import read_csv
 from rotfem.scene import as_scene
@@ -160,7 +160,7 @@ def test_where_steps_land_on_what_is_prescribed_a_later_end_keeps_the_rows_there
 
 SIGNALLED = """
 import os, signal, sys
-from rotfem.commands.simulation import Simulation
+from rotfem.commands.run import Simulation
 from rotfem.commands.cli import main
 
 stepped = Simulation._stepped

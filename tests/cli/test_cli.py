@@ -263,7 +263,7 @@ def test_debug_shows_the_traceback(rotfem: Run) -> None:
 #: Runs the command line with a signal to itself after the step numbered 30.
 SIGNALLED = """
 import os, signal, sys
-from rotfem.commands.simulation import Simulation
+from rotfem.commands.run import Simulation
 from rotfem.commands.cli import main
 
 stepped = Simulation._stepped

@@ -16,7 +16,6 @@ from rotfem.commands.cost.result import CostResult
 from rotfem.errors import OutputError
 from rotfem.results import CampbellResult, CriticalSpeed, ExplainResult, Instability, ModesResult, Result, RunResult
 from rotfem.results.columns import SHORT, ShortTable, described, label, numbers
-from rotfem.results.plots import plot
 from rotfem.scene import Scene
 
 T = np.array([0.0, 0.5, 1.0])
@@ -413,7 +412,7 @@ def test_every_axis_has_a_label_with_its_unit(make: Any) -> None:
 @ALL
 def test_drawings_are_written_under_their_names(make: Any, tmp_path: Path) -> None:
     result: Result = make()
-    paths = plot(result, tmp_path)
+    paths = result.draw(tmp_path)
     assert [path.name for path in paths] == list(result.drawings()) != []
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
 

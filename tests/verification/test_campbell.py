@@ -15,7 +15,6 @@ from rotfem import SceneError, campbell, modes
 from rotfem.analysis.branches import AMBIGUOUS, SURE
 from rotfem.commands.campbell import parse_speeds
 from rotfem.results import CampbellResult
-from rotfem.results.plots import plot
 
 Array = npt.NDArray[np.float64]
 
@@ -231,7 +230,7 @@ def test_results_read_back(unit_beam: Any, tmp_path: Path) -> None:
     assert summary["speeds"] == 4
     assert summary["speeds_solved"] >= 4
     assert set(result.branches()) == {b["label"] for b in diagram["branches"]}
-    (figure,) = plot(result, tmp_path)
+    (figure,) = result.draw(tmp_path)
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 

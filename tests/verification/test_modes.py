@@ -29,7 +29,6 @@ from rotfem.commands.problem import Problem
 from rotfem.numerics import eigenproblem as pencil
 from rotfem.numerics.linear import transposed
 from rotfem.results import ModesResult
-from rotfem.results.plots import plot
 
 Array = npt.NDArray[Any]
 
@@ -454,7 +453,7 @@ def test_free_hub(unit_beam: Any, tmp_path: Path) -> None:
     assert [row["mode"] for row in result.rows] == [1, 2, 3]
     assert [row["label"] for row in result.rows] == ["rigid body", "lag 1", "lag 2"]
     assert list(result.shapes) == ["mode 2: lag 1", "mode 3: lag 2"]
-    assert plot(result, tmp_path)[0].is_file()
+    assert result.draw(tmp_path)[0].is_file()
     with pytest.raises(SceneError, match="free hub"):
         modes(unit_beam(motion=torque), sensitivities=True)
     for refused in (

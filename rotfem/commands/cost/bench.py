@@ -26,8 +26,8 @@ from rotfem.commands.cost.settings import sweep_speeds
 from rotfem.commands.interrupts import held_back
 from rotfem.commands.modes import analysis_of
 from rotfem.commands.problem import Problem
+from rotfem.commands.run import Simulation
 from rotfem.commands.run_store import RunStore
-from rotfem.commands.simulation import Simulation
 from rotfem.errors import ComputationError, InputError, OutputError, input_of
 from rotfem.refinement.distance import COLUMNS
 from rotfem.refinement.refine import Clock, Setting, TooDear, cpu_time

@@ -39,7 +39,6 @@ from rotfem.commands.cost.settings import (
     with_theory,
     without_choices,
 )
-from rotfem.commands.options import seconds_of
 from rotfem.commands.problem import Problem
 from rotfem.equations.model import Model
 from rotfem.errors import ComputationError, InputError, SceneError
@@ -61,6 +60,7 @@ from rotfem.refinement.refine import (
 )
 from rotfem.results.result import Row
 from rotfem.scene import Scene, as_scene
+from rotfem.units import seconds_of
 from rotfem.version import versions
 
 #: Default CPU time of a study, s.
