@@ -35,12 +35,6 @@ from rotfem.units import split_unit
 
 Array = npt.NDArray[Any]
 
-#: What a row of a diagram has of the row of its mode.
-KEPT = ("frequency", "frequency_hz", "damping", "growth", "residual", "error_bound")
-
-#: What it has of the row of a rotor's mode.
-OF_ROTORS = ("turning", "whirl", "frequency_fixed")
-
 
 def parse_speeds(text: str, limits: Limits | None = None) -> list[float]:
     """Return speeds (rad/s) from "first:last:number" or "s1,s2,…", with the unit of all of them at the end.
@@ -192,7 +186,14 @@ def diagram(
     summary = {
         **modal_summary("campbell", analysis, scene, started),
         "branches": [
-            {"branch": b + 1, "label": labels[b], "name": engineers_name(labels[b]), **branch_summary(sweep, b)}
+            {
+                "branch": b + 1,
+                "label": labels[b],
+                "name": engineers_name(labels[b]),
+                "confidence": min(float(node.confidence[b]) for node in sweep.nodes),
+                "frequency_first": _finite(sweep.nodes[0].value(b).imag),
+                "frequency_last": _finite(sweep.nodes[-1].value(b).imag),
+            }
             for b in range(count)
         ],
         "per_rev": max(orders, default=0),
@@ -272,12 +273,9 @@ def branch_labels(analysis: ModalAnalysis, sweep: Sweep, count: int) -> list[str
     return distinct([names[node.order[b]] for b in range(count)])
 
 
-def branch_summary(sweep: Sweep, b: int) -> dict[str, float | None]:
-    """Return the least confidence of a branch and its frequency at both ends (rad/s), None at one where it is lost."""
-    confidence = min(float(n.confidence[b]) for n in sweep.nodes)
-    ends = [float(sweep.nodes[i].value(b).imag) for i in (0, -1)]
-    first, last = (value if np.isfinite(value) else None for value in ends)
-    return {"confidence": confidence, "frequency_first": first, "frequency_last": last}
+def _finite(value: float) -> float | None:
+    """Return a number; None for one that is none, as of a branch that is lost."""
+    return float(value) if np.isfinite(value) else None
 
 
 def branch_errors(analysis: ModalAnalysis, sweep: Sweep, count: int) -> list[float | None]:
@@ -288,8 +286,7 @@ def branch_errors(analysis: ModalAnalysis, sweep: Sweep, count: int) -> list[flo
         # What the mesh does to modes far above would be taken for errors of these.
         there = errors(node.spinning.first(1 + max(order)))
         found.append([np.nan if i < 0 or (e := there[i]) is None else e for i in order])
-    larger = np.fmax(*np.array(found))
-    return [float(x) if np.isfinite(x) else None for x in larger]
+    return list(map(_finite, np.fmax(*np.array(found))))
 
 
 def node_rows(
@@ -304,20 +301,20 @@ def node_rows(
         mesh: their relative errors by the mesh; None where they are not wanted.
     """
     columns, rows = mode_rows(analysis, node.spinning.first(1 + max(node.order[: len(labels)]))), []
+    own, of_rotors = "frequency frequency_hz damping growth residual error_bound", "turning whirl frequency_fixed"
     for b, label in enumerate(labels):
         if node.order[b] < 0:
             continue
         row = columns[node.order[b]]
-        kept = {k: row[k] for k in KEPT} | ({} if mesh is None else {"mesh_error": mesh[b]})
-        shares = {k: v for k, v in row.items() if k.startswith("share_") or k in OF_ROTORS}
         rows.append(
             {
                 "speed": node.speed,
                 "branch": b + 1,
                 "label": label,
                 "mode": row["label"],
-                **kept,
-                **shares,
+                **{name: row[name] for name in own.split()},
+                **({} if mesh is None else {"mesh_error": mesh[b]}),
+                **{k: v for k, v in row.items() if k.startswith("share_") or k in of_rotors.split()},
                 "confidence": float(node.confidence[b]),
                 "refined": int(not node.requested),
             }

@@ -30,10 +30,6 @@ from rotfem.scene import Scene
 
 Array = npt.NDArray[np.float64]
 
-#: What the error of a theory is estimated by, where its foreshortening is computed and where a phase counts.
-OF_FORESHORTENING = "the foreshortening by bending that it neglects, computed afterwards, is that large"
-OF_DRIFT = "its frequencies and strains compared with the exact ones"
-
 #: What the contributions are called in warnings.
 NAMES = {"time": "time steps", "space": "mesh", "model": "theory"}
 
@@ -111,7 +107,8 @@ class RunErrors:
     def theory(self) -> TheoryError | None:
         """Error of the theory; None where it is unknown, not wanted, or nothing was computed."""
         if self.reduced is not None and self.reduced.foreshortening is not None:
-            return TheoryError(self.reduced.foreshortening, OF_FORESHORTENING, self.problem.theory.name)
+            basis = "the foreshortening by bending that it neglects, computed afterwards, is that large"
+            return TheoryError(self.reduced.foreshortening, basis, self.problem.theory.name)
         if not len(self.history["t"]):
             return None
         names, moves = self._names, self._moves
@@ -154,7 +151,8 @@ class RunErrors:
         except (ComputationError, InputError):
             return None
         part = _relative(off, self._scale)
-        return replace(found, estimate=found.estimate + part, basis=OF_DRIFT) if part > 0.0 else found
+        basis = "its frequencies and strains compared with the exact ones"
+        return replace(found, estimate=found.estimate + part, basis=basis) if part > 0.0 else found
 
     def _apart(self, richer: Problem) -> tuple[Any, float, Array] | None:
         """Return the system of a richer theory, how far its tip is from the run's, relative, and by components, m.
@@ -228,7 +226,13 @@ class RunErrors:
             return said
         cures = []
         if steps >= NOTICED / 2 and self.stepper is not None:
-            cures.append(self._finer_steps(steps))
+            assert time is not None
+            factor = min(1.0, NOTICED / 2 / steps)
+            if time.tolerance is not None:
+                cures.append(f"time.tolerance = {time.tolerance * factor:.1g}")
+            else:
+                step = time.step * factor ** (1 / self.stepper.scheme.order)
+                cures.append(f"time.step = {step:.1g} or shorter")
         if mesh >= NOTICED / 2:
             cures.append("a higher mesh.degree" if scene.structure.mesh_file else "more mesh.elements")
         if model >= NOTICED / 2:
@@ -237,15 +241,6 @@ class RunErrors:
         parts = ", ".join(f"{percent(size)} by the {name}" for name, size in named if size > sum(sizes) / 10)
         off = f"the tip may be in error by {percent(error.total)} of its largest displacement (estimated: {parts})"
         return [f"{off}; to reduce it: {', '.join(cures)}" if cures else off, *said]
-
-    def _finer_steps(self, share: float) -> str:
-        """Return which steps would have a contribution that is not noticed."""
-        time = self.scene.time
-        assert time is not None
-        factor = min(1.0, NOTICED / 2 / share)
-        if time.tolerance is not None:
-            return f"time.tolerance = {time.tolerance * factor:.1g}"
-        return f"time.step = {time.step * factor ** (1 / self.stepper.scheme.order):.1g} or shorter"
 
     def _why_unknown(self, error: ErrorEstimate) -> str:
         """Return why a contribution is unknown."""

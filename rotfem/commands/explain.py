@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -182,7 +182,7 @@ def check_changes(scene: Scene, of: Explanation, changes: list[Change], progress
         if item.name == "time.tolerance":
             continue  # adaptive steps have no common times
         if item.kind == "discretisation":
-            other = finer_steps(scene) if item.name == "time.step" else finer_mesh(scene)
+            other = finer(scene, item.name)
         elif item.kind == "effect":
             kept = set(of.own) ^ {item.name}
             other = scene.replace({"model.effects": [name for name in of.effects if name in kept]})
@@ -198,25 +198,15 @@ def check_changes(scene: Scene, of: Explanation, changes: list[Change], progress
         progress(i / len(changes))
 
 
-def finer_steps(scene: Scene) -> Scene:
-    """Return a scene with shorter steps, its rows where they were."""
+def finer(scene: Scene, name: str) -> Scene:
+    """Return a scene with shorter steps and rows where they were, or on a finer mesh; of a file, of a higher degree."""
     time = scene.time
-    assert time is not None
-    assert time.step is not None
-    return scene.replace({"time.step": time.step / FINER, "time.output_every": time.output_every * FINER})
-
-
-def finer_mesh(scene: Scene) -> Scene:
-    """Return a scene with twice the elements in each direction; of a mesh file, of a higher degree."""
+    if name == "time.step" and time is not None and time.step is not None:
+        return scene.replace({"time.step": time.step / FINER, "time.output_every": time.output_every * FINER})
     if scene.structure.mesh_file is not None:
         return scene.replace({"mesh.degree": scene.mesh.degree + 1})
     elements = scene.mesh.elements
     return scene.replace({"mesh.elements": [2 * n for n in elements] if isinstance(elements, tuple) else 2 * elements})
-
-
-def compared(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Return the rows of modes that models are compared by: no rigid body, of an overdamped mode the slow one."""
-    return [row for row in rows if row["label"] != "rigid body" and not row["label"].endswith(", fast")]
 
 
 def full_outputs(scene: Scene, of: Explanation) -> tuple[dict[str, Any], dict[str, str]]:
@@ -229,8 +219,9 @@ def full_outputs(scene: Scene, of: Explanation) -> tuple[dict[str, Any], dict[st
     for name in of.wanted:
         try:
             if name == MODES:
-                rows = compared(modes(turning, comm=comm).rows)
-                out[name] = np.array([complex(row["growth"], row["frequency"]) for row in rows])
+                rows = modes(turning, comm=comm).rows  # no rigid body, of an overdamped mode the slow one
+                kept = [r for r in rows if r["label"] != "rigid body" and not r["label"].endswith(", fast")]
+                out[name] = np.array([complex(row["growth"], row["frequency"]) for row in kept])
             else:
                 history = run(scene, comm=comm).history
                 out[name] = np.column_stack([x for key, x in history.items() if key.startswith("tip_u")])

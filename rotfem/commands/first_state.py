@@ -92,8 +92,12 @@ def _equilibrium(scene: Scene, problem: Problem, system: Any, judged: bool) -> S
     solver, start, speed = scene.solver, Start(), problem.motion.speed(0.0)
     if problem.frame == "inertial":
         system = compile_system(problem.replace(frame="rotating"), system.comm, moving=False)
-    if speed == 0.0 and not _is_loaded(system.held):
-        return start
+    if speed == 0.0:
+        held = system.held
+        held.set_time(0.0, held.motion.at_speed(0.0))
+        held.set_state(held.zeros())
+        if not held.residual().norm() > 0.0:  # nothing acts on it
+            return start
 
     def found(system: Any, notes: list[str]) -> Array:
         return steady_state(system, speed, Newton.of(solver), past_limits=solver.past_limits, notes=notes)
@@ -112,10 +116,3 @@ def _equilibrium(scene: Scene, problem: Problem, system: Any, judged: bool) -> S
     if said:
         start.warnings.append(f"what the history starts from: {said}")
     return start
-
-
-def _is_loaded(system: Any) -> bool:
-    """Return whether any force acts on the undeformed structure at rest at t = 0."""
-    system.set_time(0.0, system.motion.at_speed(0.0))
-    system.set_state(system.zeros())
-    return bool(system.residual().norm() > 0.0)

@@ -18,9 +18,6 @@ from rotfem.users_functions import checked
 
 Array = npt.NDArray[np.float64]
 
-#: Places along the structure at which a function of the place is sampled to see how it changes with time.
-PROBES = 9
-
 
 def loads_of(scene: Scene, motion: Motion) -> Loads:
     """Return the loads of a scene, under a motion that says how its hub turns."""
@@ -54,7 +51,10 @@ def load_of(name: str, given: Any, structure: Any, motion: Motion, kind: str) ->
         timed = given.over_span_and_time is not None
         function = checked(place, key, size, "place and time" if timed else "place", planar)
         at = function if timed else (lambda x, t: function(x))
-        return PlaceLoad(kind, at, _probes(structure), constant=not timed)
+        # Places along the structure, of a plate from a file one, that show how the load changes with time.
+        probes = np.linspace(0.0, structure.length, 9) if structure.length is not None else np.zeros(1)
+        places = tuple((float(x), 0.0) if structure.type == "plate" else float(x) for x in probes)
+        return PlaceLoad(kind, at, places, constant=not timed)
     terms = [_harmonic(harmonic, motion) for harmonic in given.harmonic]
     if given.value is not None:
         terms.append(Term(Shapes.uniform([given.value])))
@@ -79,13 +79,6 @@ def _harmonic(harmonic: Any, motion: Motion) -> Term:
     if per_rev is None:
         return Term.harmonic(shapes, lambda t: harmonic.frequency * t, harmonic.phase)
     return Term.harmonic(shapes, lambda t: per_rev * np.array([motion.angle(float(s)) for s in t]), harmonic.phase)
-
-
-def _probes(structure: Any) -> tuple[Any, ...]:
-    """Return places along the structure; of a plate from a file one."""
-    length = structure.length
-    x = np.linspace(0.0, length, PROBES) if length is not None else np.zeros(1)
-    return tuple((float(s), 0.0) if structure.type == "plate" else float(s) for s in x)
 
 
 def frozen_inputs(problem: Problem) -> list[str]:

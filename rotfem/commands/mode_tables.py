@@ -16,18 +16,6 @@ from rotfem.structures.mode_names import Wave, distinct, engineers_name
 Array = npt.NDArray[Any]
 
 
-#: Relative error that round-off may cause in a frequency before it is reported.
-RELIABLE = 1e-4
-
-
-#: Relative error that the mesh may cause in a frequency before it is reported.
-RESOLVED = 0.02
-
-
-#: Part of the speed below which the frequency of forward whirl counts as zero: the speed is critical to 0.1 %.
-CRITICAL = 1e-3
-
-
 @dataclass(frozen=True)
 class ModeTables:
     """Rows and warnings of the modes at one speed.
@@ -71,7 +59,11 @@ def mode_tables(analysis: ModalAnalysis, speed: float, count: int, *, keep: bool
     scaled = spinning.pairs.right / scales(analysis, spinning)
     titles = [f"mode {row['mode']}: {row['label']}" for row in rows]
     shapes = {title: scaled_shape(analysis, x) for title, x in zip(titles, scaled.T, strict=True)}
-    return ModeTables(spinning, [rigid_row(rows), *rows] if rigid else rows, shapes, scaled, warnings)
+    if rigid:  # hub and structure turn together, λ = 0
+        first: dict[str, Any] = dict.fromkeys(rows[0] if rows else (), 0.0)
+        named = dict.fromkeys(("label", "name"), "rigid body")
+        rows = [{**first, "mode": 1, **named, "stability": "neutral", "share_hub": 1.0}, *rows]
+    return ModeTables(spinning, rows, shapes, scaled, warnings)
 
 
 def mode_rows(
@@ -115,12 +107,6 @@ def whirl(wave: Wave, omega: float, speed: float) -> dict[str, Any]:
     return {"turning": wave.share, "whirl": direction or "standing", "frequency_fixed": fixed}
 
 
-def rigid_row(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return the row of the rigid-body mode: hub and structure turn together, λ = 0."""
-    row: dict[str, Any] = dict.fromkeys(rows[0] if rows else (), 0.0)
-    return {**row, "mode": 1, "label": "rigid body", "name": "rigid body", "stability": "neutral", "share_hub": 1.0}
-
-
 def instabilities(rows: list[dict[str, Any]]) -> list[str]:
     """Return a warning for every unstable mode."""
     return [
@@ -131,48 +117,33 @@ def instabilities(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def critical(rows: list[dict[str, Any]], speed: float, fixed: bool) -> list[str]:
-    """Return a warning for every mode of a rotor whose forward critical speed is this one, but for CRITICAL of it.
+    """Return a warning for every mode of a rotor whose forward critical speed is this one, but for 0.1 % of it.
 
     Args:
         rows: of the modes.
         speed: rad/s.
         fixed: whether frequencies are those in the fixed frame.
     """
-    in_rotor = {
-        row["label"]: abs(row["frequency"] - fixed * abs(speed)) for row in rows if row.get("whirl") == "forward"
-    }
     return [
-        f"critical speed: {label} has {omega:.3g} rad/s in the rotor at {abs(speed):.6g} rad/s; an unbalance meets no "
-        "stiffness there"
-        for label, omega in in_rotor.items()
-        if omega < CRITICAL * abs(speed)
+        f"critical speed: {row['label']} has {omega:.3g} rad/s in the rotor at {abs(speed):.6g} rad/s; an unbalance "
+        "meets no stiffness there"
+        for row in rows
+        if row.get("whirl") == "forward" and (omega := abs(row["frequency"] - fixed * abs(speed))) < 1e-3 * abs(speed)
     ]
 
 
 def doubtful(rows: list[dict[str, Any]]) -> list[str]:
-    """Return warnings of frequencies that round-off or the mesh may have changed."""
-    return [*unreliable(rows), *coarse(rows)]
-
-
-def coarse(rows: list[dict[str, Any]]) -> list[str]:
-    """Return a warning if the mesh may have changed frequencies by more than RESOLVED of them."""
-    found = {row["label"]: row["mesh_error"] for row in rows if (row.get("mesh_error") or 0.0) > RESOLVED}
-    if not found:
-        return []
-    listed = ", ".join(f"{label} by about {100 * error:.2g} %" for label, error in found.items())
-    return [f"coarse: the mesh may have changed {listed} (mesh_error); more mesh.elements, or a higher mesh.degree"]
-
-
-def unreliable(rows: list[dict[str, Any]]) -> list[str]:
-    """Return a warning if round-off may have changed frequencies by more than RELIABLE of them."""
-    found = {row["label"]: row["error_bound"] for row in rows if row["error_bound"] > RELIABLE}
-    if not found:
-        return []
-    listed = ", ".join(f"{label} by up to {100 * min(bound, 9.99):.2g} %" for label, bound in found.items())
-    return [
-        f"unreliable: round-off may have changed {listed} (error_bound), as axial or shear stiffness outweighs what "
-        "these modes feel; fewer elements, or stiffnesses that are lower but still without influence"
-    ]
+    """Return warnings of frequencies that round-off may have changed by 0.01 %, or the mesh by 2 %, and more."""
+    lost = [(row["label"], min(row["error_bound"], 9.99)) for row in rows if row["error_bound"] > 1e-4]
+    off = [(row["label"], error) for row in rows if (error := row.get("mesh_error") or 0.0) > 0.02]
+    unreliable = ", ".join(f"{label} by up to {100 * bound:.2g} %" for label, bound in lost)
+    coarse = ", ".join(f"{label} by about {100 * error:.2g} %" for label, error in off)
+    texts = {
+        unreliable: f"unreliable: round-off may have changed {unreliable} (error_bound), as axial or shear stiffness "
+        "outweighs what these modes feel; fewer elements, or stiffnesses that are lower but still without influence",
+        coarse: f"coarse: the mesh may have changed {coarse} (mesh_error); more mesh.elements, or a higher mesh.degree",
+    }
+    return [text for found, text in texts.items() if found]
 
 
 def advice(analysis: ModalAnalysis, speed: float) -> list[str]:

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.modal import participation as masses_of
-from rotfem.analysis.stability import Stability, stability_of_pencil
+from rotfem.analysis.stability import stability_of_pencil
 from rotfem.analysis.theory_error import TheoryCheck, TheoryError
 from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.advice import advise
@@ -77,7 +77,9 @@ def modes(
         found = _modes(variant, Problem.of(variant, terms=terms), comm, sensitivities, hint)
         found.blade_tables = blade_tables
         if participation:
-            add_participation(found)
+            masses, found.summary["mass"] = masses_of(found.analysis, found.spinning)
+            for row, mass in zip(found.rows[len(found.rows) - len(masses) :], masses, strict=True):
+                row |= mass
         return found
 
     return answered(scene, compute, comm, "modes")
@@ -120,7 +122,11 @@ def _modes(scene: Scene, problem: ProblemData, comm: MPI.Comm, sensitivities: bo
     spinning = found.spinning
     stability, off = stability_of_pencil(spinning.pencil, spinning.clamped), theory_error(analysis, spinning)
     warnings = [*frozen_inputs(problem), *analysis.notes, *found.warnings]
-    warnings += [*_of_stability(stability, found.rows), *([off.warning()] if off and off.warning() else [])]
+    # An instability that grows by more than those of the modes that are asked for is none of them.
+    known = 1.001 * max((row["growth"] for row in found.rows if row["stability"] != "neutral"), default=0.0)
+    if stability.stable is None or stability.held_by_spin or stability.growth > max(known, 0.0):
+        warnings.append(stability.warning())
+    warnings += [off.warning()] if off and off.warning() else []
     result = {
         **modal_summary("modes", analysis, scene, started),
         "speed": speed,
@@ -151,14 +157,6 @@ def _modes(scene: Scene, problem: ProblemData, comm: MPI.Comm, sensitivities: bo
     return done
 
 
-def _of_stability(stability: Stability, rows: list[dict[str, Any]]) -> list[str]:
-    """Return the warning of a state that is not stable, if the rows of the modes do not say it."""
-    # An instability that grows by more than those of the modes that are asked for is none of them.
-    known = 1.001 * max((row["growth"] for row in rows if row["stability"] != "neutral"), default=0.0)
-    unsaid = stability.stable is None or stability.held_by_spin or stability.growth > max(known, 0.0)
-    return [stability.warning()] if unsaid else []
-
-
 def check_animated(scene: Scene, mode: int) -> None:
     """See that a mode of a scene can be animated, before anything is computed.
 
@@ -167,14 +165,6 @@ def check_animated(scene: Scene, mode: int) -> None:
     """
     if not 1 <= mode <= scene.modes.count:
         raise SceneError("command line", "--animate", mode, f"must be from 1 to modes.count, {scene.modes.count}")
-
-
-def add_participation(found: ModesResult) -> None:
-    """Add modal and effective masses to the rows of a result, and the mass that there is to its summary."""
-    masses, found.summary["mass"] = masses_of(found.analysis, found.spinning)
-    first = len(found.rows) - len(masses)
-    for row, mass in zip(found.rows[first:], masses, strict=True):
-        row |= mass
 
 
 def theory_error(analysis: ModalAnalysis, spinning: Spinning) -> TheoryError | None:

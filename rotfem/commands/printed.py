@@ -52,11 +52,6 @@ def of_run(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     return [*lines, f"{how}, reduction {time['reduce']:.2f} s; its error: {errors}"], []
 
 
-def of_modes(s: dict[str, Any]) -> tuple[list[str], list[str]]:
-    """Return what `modes` prints before and after its table."""
-    return [about(s), effects(s), *choice_report(s)], []
-
-
 def of_campbell(s: dict[str, Any]) -> tuple[list[str], list[str]]:
     """Return what `campbell` prints before and after its tables."""
     line = (
@@ -93,7 +88,7 @@ def of_sweep(s: dict[str, Any]) -> tuple[list[str], list[str]]:
 _AROUND = {
     "run": of_run,
     "check": lambda s: ([f"{s['name']}: {s['type']} of {s['elements']} elements"], []),
-    "modes": of_modes,
+    "modes": lambda s: ([about(s), effects(s), *choice_report(s)], []),
     "campbell": of_campbell,
     "response": of_response,
     "explain": of_explain,

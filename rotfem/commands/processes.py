@@ -20,20 +20,23 @@ from rotfem.registry import resolved, structures
 Item = TypeVar("Item")
 Found = TypeVar("Found")
 
-#: Environment variable with another number of unknowns for each process from which a mesh is shared.
-VARIABLE = "ROTFEM_SHARED_FROM"
-
-#: That number. Below 5000 unknowns two processes lose, as PETSc's own LU is quicker than MUMPS; they gain 1.3 on modes
-#: of a plate of 99 405 (docs/scaling.md). Memory is no reason here: a copy takes 17 kB for each unknown.
+#: Unknowns for each process from which a mesh is shared. Below 5000 two processes lose, as PETSc's own LU is quicker
+#: than MUMPS; they gain 1.3 on modes of a plate of 99 405 (docs/scaling.md). A copy takes 17 kB for each unknown.
 SHARED_FROM = 10_000
-
-#: Command ↦ what is shared out where every process has a copy.
-SHARED_OUT = {"campbell": "speeds", "response": "frequencies"}
 
 
 def communicator(problem: Problem, comm: MPI.Comm) -> MPI.Comm:
-    """Return what a problem is discretised on: all processes where it is large, else each one by itself."""
-    return comm if comm.size == 1 or unknowns(problem) >= _least() * comm.size else MPI.COMM_SELF
+    """Return what a problem is discretised on: all processes where it is large, else each one by itself.
+
+    Raises:
+        InputError: the environment variable ROTFEM_SHARED_FROM, another bound than `SHARED_FROM`, is no number.
+    """
+    given = os.environ.get("ROTFEM_SHARED_FROM", "")
+    try:
+        least = float(given or SHARED_FROM)
+    except ValueError:
+        raise InputError("ROTFEM_SHARED_FROM", given, "must be a number of unknowns") from None
+    return comm if comm.size == 1 or unknowns(problem) >= least * comm.size else MPI.COMM_SELF
 
 
 def unknowns(problem: Problem) -> float:
@@ -46,14 +49,6 @@ def unknowns(problem: Problem) -> float:
     return float(len(kind.components) * math.prod(n * mesh.degree + 1 for n in cells))
 
 
-def _least() -> float:
-    given = os.environ.get(VARIABLE, "")
-    try:
-        return float(given or SHARED_FROM)
-    except ValueError:
-        raise InputError(VARIABLE, given, "must be a number of unknowns") from None
-
-
 def what_is_shared(command: str, comm: MPI.Comm, inner: MPI.Comm) -> dict[str, Any]:
     """Return `ranks`, and on several of them `shared`: "mesh", "speeds", "frequencies" or "nothing".
 
@@ -64,7 +59,8 @@ def what_is_shared(command: str, comm: MPI.Comm, inner: MPI.Comm) -> dict[str, A
     """
     if comm.size == 1:
         return {"ranks": 1}
-    return {"ranks": comm.size, "shared": "mesh" if inner.size > 1 else SHARED_OUT.get(command, "nothing")}
+    copies = {"campbell": "speeds", "response": "frequencies"}.get(command, "nothing")
+    return {"ranks": comm.size, "shared": "mesh" if inner.size > 1 else copies}
 
 
 def shared_out(items: Sequence[Item], work: Callable[[Item], Found], comm: MPI.Comm) -> list[Found]:

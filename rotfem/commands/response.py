@@ -42,19 +42,9 @@ from rotfem.units import quantity
 
 Array = npt.NDArray[Any]
 
-#: Modes that a warning names.
-NAMED = 3
-
-#: Default number of frequencies of a response, and the part beyond the highest mode asked for that they reach to.
-NUMBER, BEYOND = 200, 1.2
-
 #: Change of the log of an amplitude that bends its curve visibly; least distance of frequencies added for it, in parts
 #: of the range; part of the largest amplitude below which one is too small to matter.
 BEND, NARROW, DEEP = 0.2, 2e-4, 1e-6
-
-#: Median difference of the direct response and that by modes above which a warning asks for more modes; the
-#: largest one is found between peaks, where what modes do cancels and little is left to be relative to.
-NOTABLE = 1e-2
 
 
 def response(
@@ -62,7 +52,7 @@ def response(
     low: float | str | None = None,
     high: float | str | None = None,
     *,
-    number: int = NUMBER,
+    number: int = 200,
     per_rev: Sequence[float] = (),
     comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> ResponseResult:
@@ -143,7 +133,7 @@ def frequencies_of(
         raise SceneError("command line", "--per-rev", list(per_rev), "orders must be above 0, of a hub that spins")
     if len(lines) and low is None and high is None:
         return np.unique(lines), np.zeros(len(np.unique(lines)), dtype=bool), []
-    last = angular(high, "--to", BEYOND * float(np.max(spinning.pairs.values.imag)))
+    last = angular(high, "--to", 1.2 * float(np.max(spinning.pairs.values.imag)))  # a fifth beyond the highest mode
     free = answers.analysis.free
     first = angular(low, "--from", last / max(number, 1) if free else 0.0)
     if free and first == 0.0:
@@ -232,14 +222,22 @@ def result_of(
     warnings += [stability.warning()] if not stability.stable else []
     warnings += [theory.warning()] if theory and theory.warning() else []
     usual = float(np.median(off))
-    warnings += [*remarks(modes, undamped, usual, scene.modes.count), *not_pursued(scene)]
+    warnings += remarks(modes, undamped, usual, scene.modes.count)
+    warnings += [
+        f"{name} = {value:g} is not pursued: a frequency response is of the scene's own model and mesh"
+        for name, value in (("accuracy", scene.accuracy), ("model.tolerance", scene.model.tolerance))
+        if value is not None
+    ]
     summary = {
         **modal_summary("response", analysis, scene, started),
         "speed": spinning.speed,
         "stability": stability.summary(),
         "outputs": outputs,
         "frequencies": len(omegas),
-        "peaks": {name: peak_of(omegas, np.abs(direct[:, i])) for i, name in enumerate(outputs)},
+        "peaks": {
+            name: {"frequency": float(omegas[i]), "amplitude": float(abs(direct[i, j]))}
+            for j, (name, i) in enumerate(zip(outputs, np.argmax(np.abs(direct), axis=0), strict=True))
+        },
         "difference": {"median": usual, "largest": float(np.max(off)), "worst": float(np.max(worst))},
         "modes": modes[: scene.modes.count],
         **({} if theory is None else {"theory_error": theory.summary()}),
@@ -278,30 +276,17 @@ def differences(outputs: Sequence[str], direct: Array, modal: Array, kind: str) 
     return out
 
 
-def peak_of(omegas: Array, amplitude: Array) -> dict[str, float]:
-    """Return largest amplitude and where it is (rad/s)."""
-    i = int(np.argmax(amplitude))
-    return {"frequency": float(omegas[i]), "amplitude": float(amplitude[i])}
-
-
-def not_pursued(scene: Scene) -> list[str]:
-    """Return a warning where a scene asks for an accuracy, which chooses nothing here."""
-    asked = {"accuracy": scene.accuracy, "model.tolerance": scene.model.tolerance}
-    names = [f"{name} = {value:g}" for name, value in asked.items() if value is not None]
-    return [f"{name} is not pursued: a frequency response is of the scene's own model and mesh" for name in names]
-
-
 def remarks(modes: Sequence[Mapping[str, Any]], undamped: Sequence[int], off: float, count: int) -> list[str]:
     """Return warnings of modes without damping, and of a response by too few modes."""
     out = []
     if undamped:
-        named = ", ".join(f"{modes[j]['label']} at {modes[j]['frequency']:.6g} rad/s" for j in undamped[:NAMED])
-        named += f" and {len(undamped) - NAMED} more" if len(undamped) > NAMED else ""
+        named = ", ".join(f"{modes[j]['label']} at {modes[j]['frequency']:.6g} rad/s" for j in undamped[:3])
+        named += f" and {len(undamped) - 3} more" if len(undamped) > 3 else ""
         out.append(
             f"no damping: the response is infinite at {named}; peaks there only show how near a frequency came; "
             "give [structure.damping]"
         )
-    if off > NOTABLE:
+    if off > 1e-2:  # half of them: the largest is between peaks, where little is left to be relative to
         why = f"it differs by {100 * off:.2g} % or more at half of the frequencies; use a larger modes.count"
         out.append(f"{count} modes are too few for the response by modes: {why}")
     return out

@@ -172,8 +172,10 @@ class RunStore:
         """
         if self._live is not None:
             self._live.update()
-        asked, due = self._agreed()
-        if asked or due or self._is_last(state):
+        (asked, due), left = self._agreed(), self._left(state)
+        fixed = self._parts is not None and self._parts.time.step is not None
+        # The last state that a run with a later end would have met, too, is kept; none after it.
+        if left >= 1 - 1e-6 and (asked or due or (fixed and left < 2 - 1e-6)):
             self._save(state)
         if asked and self._interrupts.active:
             raise Stopped
@@ -203,14 +205,9 @@ class RunStore:
         time = self._parts.time
         return (time.end - state.t) / (time.step or 1e-9 * time.end)
 
-    def _is_last(self, state: State) -> bool:
-        """Return whether this is the last state that a run with a later end would have met, too."""
-        fixed = self._parts is not None and self._parts.time.step is not None
-        return fixed and 1 - 1e-6 <= self._left(state) < 2 - 1e-6
-
     def _save(self, state: State) -> None:
-        """Write a checkpoint, unless the last step is shorter than it would be in a run with a later end."""
-        if self._memory is None or self._parts is None or self.every is None or self._left(state) < 1 - 1e-6:
+        """Write a checkpoint."""
+        if self._memory is None or self._parts is None or self.every is None:
             return
         tree = self._memory.taken(state, self._identity) | {"every": vars(self.every)}
         if self.folder is not None and self.folder.set is not None:
