@@ -21,8 +21,7 @@ import numpy.typing as npt
 
 from rotfem.analysis.load_steps import Growth, balance, recounted
 from rotfem.errors import ComputationError
-from rotfem.numerics.inertia import surely_negative
-from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.linear import DirectSolver, Increment, surely_negative
 from rotfem.numerics.newton import Newton
 
 Array = npt.NDArray[np.float64]

@@ -11,8 +11,7 @@ from slepc4py import SLEPc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics.balance import unknown_scale
-from rotfem.numerics.inertia import negative_eigenvalues
-from rotfem.numerics.linear import use_direct_solver
+from rotfem.numerics.linear import negative_eigenvalues, use_direct_solver
 from rotfem.numerics.projection import summed, times
 
 #: Part of the largest stiffening by spin, over speed squared, below which a softening is none.

@@ -29,8 +29,7 @@ from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.loads import ConstantLoad, Loads
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.problem import Problem
-from rotfem.numerics.inertia import surely_negative
-from rotfem.numerics.linear import DirectSolver, Increment
+from rotfem.numerics.linear import DirectSolver, Increment, surely_negative
 from rotfem.numerics.newton import Newton
 
 Array = npt.NDArray[np.float64]

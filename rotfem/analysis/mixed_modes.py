@@ -30,8 +30,8 @@ from rotfem.mechanics import work
 from rotfem.mechanics.work import Variation
 from rotfem.numerics import forms
 from rotfem.numerics.balance import power_of_two
-from rotfem.numerics.eigenproblem import ROUNDED, Eigenpairs, Pencil, RoundOff, relative
-from rotfem.numerics.linear import set_diagonal
+from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, relative
+from rotfem.numerics.linear import ROUNDED, set_diagonal
 from rotfem.numerics.low_rank import sparse_part
 from rotfem.numerics.projection import summed
 

@@ -19,7 +19,8 @@ from scipy.linalg import eigh
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning
 from rotfem.numerics.damped import heavily_damped, quadratic
-from rotfem.numerics.eigenproblem import ROUNDED, Eigenpairs, Pencil, RoundOff, relative
+from rotfem.numerics.eigenproblem import Eigenpairs, Pencil, RoundOff, relative
+from rotfem.numerics.linear import ROUNDED
 from rotfem.numerics.projection import orthonormal, summed, times
 
 Array = npt.NDArray[Any]

@@ -28,7 +28,7 @@ from rotfem.equations.compiled import with_all_unknowns
 from rotfem.errors import ComputationError
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.eigenproblem import SAME, ZERO, Eigenpairs, Pencil
-from rotfem.numerics.inertia import negative_eigenvalues, surely_negative, symmetric
+from rotfem.numerics.linear import negative_eigenvalues, surely_negative, symmetric
 from rotfem.numerics.newton import Newton
 
 Array = npt.NDArray[np.float64]

@@ -20,19 +20,19 @@ from petsc4py import PETSc
 from rotfem.errors import ComputationError
 from rotfem.numerics.linear import DirectSolver
 from rotfem.numerics.low_rank import sparse_part
-from rotfem.numerics.projection import new_directions, times
+from rotfem.numerics.projection import new_directions, summed, times
 
 Array = npt.NDArray[Any]
 Matrices: TypeAlias = tuple[Any, Any, Any]
 
-#: A size that is none, and that of an eigenvalue whose square, times anything, may be no number any more.
-TINY, BEYOND = 1e-300, 1e140
+#: A size that is none.
+TINY = 1e-300
 
 #: Undamped modes, and Ritz pairs, beyond those wanted.
 MORE = 4
 
-#: Backward error at which a pair is done, most rounds, and most columns of the basis.
-DONE, ROUNDS, COLUMNS = 1e-13, 12, 400
+#: Backward error at which a pair is done.
+DONE = 1e-13
 
 #: Relative distance of real eigenvalues that are one.
 EQUAL = 1e-9
@@ -154,9 +154,6 @@ class RitzPairs:
                 P.axpy(factor, sparse_part(A))
         return DirectSolver(P)
 
-    def _sum(self, local: Array) -> Array:
-        return np.asarray(self.comm.allreduce(local) if self.comm.size > 1 else local)
-
     def add(self, columns: Array) -> int:
         """Put what is new in real columns into the orthonormal basis; return how many directions that were."""
         W = new_directions(self.comm, self.V, columns)
@@ -171,10 +168,11 @@ class RitzPairs:
         Raises:
             ComputationError: no eigenvalue is one that can be computed with.
         """
-        m, c, k = (self._sum(self.V.T @ P) for P in self._products)
+        m, c, k = (summed(self.comm, self.V.T @ P) for P in self._products)
         values, x, y = quadratic(m, c, k, self.target)
         turn_equal(values, (x, y), (m, c, k))
-        upper = (values.imag >= 0.0) & (np.abs(np.sum(x.conj() * (m @ x), axis=0)) > 0.0) & (np.abs(values) < BEYOND)
+        # The square of a larger eigenvalue, times anything, may be no number any more.
+        upper = (values.imag >= 0.0) & (np.abs(np.sum(x.conj() * (m @ x), axis=0)) > 0.0) & (np.abs(values) < 1e140)
         if not self.fast:
             upper &= ~are_fast(values, shape_frequencies(x, m @ x, k @ x))
         if not np.any(upper):
@@ -187,7 +185,9 @@ class RitzPairs:
         size = self.norms @ np.abs(np.array([self.values**2, self.values, np.ones_like(self.values)]))
         self._residual = (self.values**2 * MX + self.values * CX + KX) / size
         self._left_residual = self._transposed(self.left) / size
-        both = [np.sqrt(self._sum(np.sum(np.abs(r) ** 2, axis=0))) for r in (self._residual, self._left_residual)]
+        both = [
+            np.sqrt(summed(self.comm, np.sum(np.abs(r) ** 2, axis=0))) for r in (self._residual, self._left_residual)
+        ]
         self.errors = np.maximum(*both)
 
     def _transposed(self, Y: Array) -> Array:
@@ -225,7 +225,7 @@ class RitzPairs:
                     solver.solve(self._b, self._x)
                     columns.append(self._x.array.copy())
         # by largest entries, whose squares may be no numbers any more; lengths are made one by `add`
-        sizes = self._sum(np.array([np.abs(c).max(initial=0.0) for c in columns]))
+        sizes = summed(self.comm, np.array([np.abs(c).max(initial=0.0) for c in columns]))
         new = [c / size for c, size in zip(columns, sizes, strict=True) if 0.0 < size < np.inf]
         return self.add(np.array(new).T) if new else 0
 
@@ -244,10 +244,10 @@ def damped_pairs(
     """
     start = np.hstack([undamped.real, undamped.imag])
     ritz = RitzPairs(matrices, start, target, fast)
-    for number in range(ROUNDS):
+    for number in range(12):
         ritz.solve(count)
-        done = float(np.max(ritz.errors)) <= DONE or ritz.V.shape[1] > COLUMNS
-        if done or ritz.grow(own=number >= ROUNDS // 2) == 0:
+        done = float(np.max(ritz.errors)) <= DONE or ritz.V.shape[1] > 400
+        if done or ritz.grow(own=number >= 6) == 0:
             break
     ritz.solve(count)
     return ritz.values, ritz.right, ritz.left, ritz.errors

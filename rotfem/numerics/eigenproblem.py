@@ -33,65 +33,9 @@ from rotfem.errors import ComputationError
 from rotfem.numerics.balance import balanced, least_frequency, power_of_two, unknown_scale
 from rotfem.numerics.damped import MORE, damped_pairs, heavily_damped, quadratic
 from rotfem.numerics.gyroscopic import gyroscopic_pairs
-from rotfem.numerics.linear import SMALL, DirectSolver, transposed, use_direct_solver
+from rotfem.numerics.linear import ROUNDED, SMALL, DirectSolver, transposed, use_direct_solver
 from rotfem.numerics.low_rank import Sendable, sparse_part
-from rotfem.numerics.projection import times
-
-#: Random vectors by which norms of large matrices are estimated.
-PROBES = 4
-
-#: Relative asymmetry that is round-off of assembly.
-ROUND_OFF = 1e-14
-
-
-def asymmetries(pencil: Pencil) -> dict[str, float]:
-    """Return estimates of relative ‖M − Mᵀ‖, ‖C + Cᵀ‖ and ‖K − Kᵀ‖ (Frobenius).
-
-    They are those by a few random signs r: the mean of ‖A r‖² is the norm's square.
-    """
-    out, matrices = {}, (pencil.M, pencil.C, pencil.K)
-    with balanced(*matrices, scale=pencil.unknowns):  # else the unit of length would say which entries count
-        for name, A, sign in zip("MCK", matrices, (-1.0, 1.0, -1.0), strict=True):
-            distance, size = _by_probes(A, sign)
-            out[name] = distance / size if size > 0 else 0.0
-    return out
-
-
-def is_symmetric(A: Any) -> bool:
-    """Return whether a PETSc matrix is symmetric to round-off, by random probes."""
-    distance, size = _by_probes(A, -1.0)
-    return distance <= ROUND_OFF * size
-
-
-def _by_probes(A: Any, sign: float) -> tuple[float, float]:
-    """Return estimates of ‖Aᵀ + sign A‖ and ‖A‖."""
-    r, y = A.createVecs()
-    z, squares, random = y.duplicate(), np.zeros(2), np.random.default_rng(A.comm.rank)
-    for _ in range(PROBES):
-        r.array[:] = random.choice([-1.0, 1.0], r.getLocalSize())
-        A.mult(r, y)
-        A.multTranspose(r, z)
-        size = y.norm()
-        z.axpy(sign, y)
-        squares += z.norm() ** 2, size**2
-    distance, size = np.sqrt(squares / PROBES)
-    return float(distance), float(size)
-
-
-#: Units of round-off in an entry of an assembled matrix, in those of √(K_ii K_jj): sums over quadrature points.
-ROUNDED = 2 * float(np.finfo(np.float64).eps)
-
-#: Largest bound that is reported; above it the value is unknown.
-LARGEST = 1e6
-
-#: What is left of the residual's part once it is taken off: at most this times its square, of isolated modes.
-SECOND = 10.0
-
-#: Relative distance of λ² within which two eigenvalues are one, or a conjugate pair.
-SAME_MODE = 1e-3
-
-#: Part of an eigenvalue above which a correction says that its vectors are none.
-TRUSTED = 1e-4
+from rotfem.numerics.projection import summed, times
 
 
 class RoundOff:
@@ -113,7 +57,7 @@ class RoundOff:
         rows = self.sizes[:, None] * np.sqrt(self._along_rows(squares))
         if self.factors is not None:
             rows += np.real(self.pencil.apply(self.factors, np.abs(X).astype(complex)))
-        return ROUNDED * self._sum((np.abs(Y) * rows).sum(axis=0))
+        return np.asarray(ROUNDED * summed(self.pencil.comm, (np.abs(Y) * rows).sum(axis=0)))
 
     def _along_rows(self, values: Array) -> Array:
         """Return for every row the sum of values (n, m) over the columns that K has entries in."""
@@ -139,9 +83,6 @@ class RoundOff:
         first = np.repeat(indptr[:-1:block] - block * ends[:-1], lengths) + block * np.arange(ends[-1])
         return csr_array((np.ones(len(first)), indices[first] // block, ends))
 
-    def _sum(self, local: Array) -> Array:
-        return np.asarray(self.pencil.comm.allreduce(local) if self.pencil.comm.size > 1 else local)
-
     def corrected(self, values: Array, left: Array, right: Array) -> tuple[Array, Array]:
         """Return (λ, bound of |δλ|/|λ|): the eigenvalues without the residual's part, and how far they can be off.
 
@@ -149,17 +90,20 @@ class RoundOff:
         """
         p = self.pencil
         MX, CX, KX = (p.apply(A, right) for A in (p.M, p.C, p.K))
-        n = self._sum(np.sum(left.conj() * (2 * values * MX + CX), axis=0))
+        n = summed(p.comm, np.sum(left.conj() * (2 * values * MX + CX), axis=0))
         residual = values**2 * MX + values * CX + KX
         with np.errstate(divide="ignore", invalid="ignore"):
-            step = -self._sum(np.sum(left.conj() * residual, axis=0)) / n
-            values = np.where(np.abs(step) < TRUSTED * np.abs(values), values + step, values)
+            step = -summed(p.comm, np.sum(left.conj() * residual, axis=0)) / n
+            values = np.where(np.abs(step) < 1e-4 * np.abs(values), values + step, values)  # larger: no eigenvectors
             residual = values**2 * MX + values * CX + KX
             inertia = np.abs(values) ** 2 * np.abs(MX) + np.abs(values) * np.abs(CX)
             size = np.abs(n * values)
-            solved = self._sum(np.sum(np.abs(left) * np.abs(residual), axis=0)) / size
-            rounded = (self.stiffness(left, right) + self._sum(np.sum(np.abs(left) * ROUNDED * inertia, axis=0))) / size
-            first_order = rounded + solved * np.minimum(1.0, SECOND * solved / isolation(values))
+            solved = summed(p.comm, np.sum(np.abs(left) * np.abs(residual), axis=0)) / size
+            rounded = (
+                self.stiffness(left, right) + summed(p.comm, np.sum(np.abs(left) * ROUNDED * inertia, axis=0))
+            ) / size
+            # Of the residual's part at most ten times its square is left, of isolated modes.
+            first_order = rounded + solved * np.minimum(1.0, 10.0 * solved / isolation(values))
         return values, relative(np.where(np.isfinite(first_order), first_order, np.inf))
 
 
@@ -167,7 +111,7 @@ def isolation(values: Array) -> Array:
     """Return the distance of every λ² from the next one, relative to |λ²|, shape (m,); large for a small λ."""
     squares = values**2
     distance = np.minimum(*(np.abs(squares[:, None] - other[None, :]) for other in (squares, squares.conj())))
-    distance[distance <= SAME_MODE * np.abs(squares)[:, None]] = np.inf
+    distance[distance <= 1e-3 * np.abs(squares)[:, None]] = np.inf  # they are one, or a conjugate pair
     return np.asarray(distance.min(axis=1) / np.maximum(np.abs(squares), np.finfo(float).tiny))
 
 
@@ -175,10 +119,10 @@ def relative(first_order: Array) -> Array:
     """Return how far λ can be off, relative to |λ|, by a first-order estimate of it.
 
     Where λ² is what is perturbed, by a part t of it, λ moves by 1 − √(1 − t), and past t = 1, where it changes from a
-    frequency to a growth, by √t. The first-order estimate is t/2.
+    frequency to a growth, by √t, up to 1e6 (unknown). The first-order estimate is t/2.
     """
     t = 2 * first_order
-    return np.where(t < 1.0, 1.0 - np.sqrt(np.maximum(1.0 - t, 0.0)), np.sqrt(np.minimum(t, LARGEST**2)))
+    return np.where(t < 1.0, 1.0 - np.sqrt(np.maximum(1.0 - t, 0.0)), np.sqrt(np.minimum(t, 1e12)))
 
 
 Array = npt.NDArray[Any]
@@ -216,9 +160,6 @@ def _pick(vectors: Array, values: Array, wanted: Array) -> Array:
 
 #: Largest accepted backward error of an eigenpair; one above it is an error, not a row.
 BACKWARD_TOLERANCE = 1e-8
-
-#: Backward error below which a solution need not be done again in a better unit of time.
-GOOD = 1e-10
 
 #: Part of the median |λ| below which an eigenvalue counts as zero where zero is an eigenvalue.
 ZERO = 1e-3
@@ -327,13 +268,29 @@ class Pencil(Sendable):
     def gram(self, Y: Array, lam: Array, X: Array, mu: Array) -> Array:
         """Return y_i^H [(λ_i + μ_j) M + C] x_j for all i, j, over all ranks."""
         local = np.stack([Y.conj().T @ self.apply(self.M, X), Y.conj().T @ self.apply(self.C, X)])
-        mass, gyroscopic = self.comm.allreduce(local) if self.comm.size > 1 else local
+        mass, gyroscopic = summed(self.comm, local)
         return np.asarray((lam[:, None] + mu[None, :]) * mass + gyroscopic)
 
     @cached_property
     def asymmetries(self) -> dict[str, float]:
-        """How far M and K are from symmetric and C from skew (see `rotfem.numerics.eigenproblem`)."""
-        return asymmetries(self)
+        """Estimates of relative ‖M − Mᵀ‖, ‖C + Cᵀ‖ and ‖K − Kᵀ‖ (Frobenius).
+
+        They are those by four random vectors of signs r: the mean of ‖A r‖² is the norm's square.
+        """
+        out, matrices = {}, (self.M, self.C, self.K)
+        with balanced(*matrices, scale=self.unknowns):  # else the unit of length would say which entries count
+            for name, A, sign in zip("MCK", matrices, (-1.0, 1.0, -1.0), strict=True):
+                r, y = A.createVecs()
+                z, squares, random = y.duplicate(), np.zeros(2), np.random.default_rng(A.comm.rank)
+                for _ in range(4):
+                    r.array[:] = random.choice([-1.0, 1.0], r.getLocalSize())
+                    A.mult(r, y)
+                    A.multTranspose(r, z)
+                    size = y.norm()
+                    z.axpy(sign, y)
+                    squares += z.norm() ** 2, size**2
+                out[name] = float(np.sqrt(squares[0] / squares[1])) if squares[1] > 0 else 0.0
+        return out
 
     @cached_property
     def conservative(self) -> bool:
@@ -385,7 +342,7 @@ class Pencil(Sendable):
                 return self._damped(count, target)
             raise
         unit = power_of_two(float(np.median(np.abs(values))))
-        if float(np.max(errors)) > GOOD and not 0.25 <= unit / (self.unit or unit) <= 4.0:
+        if float(np.max(errors)) > 1e-10 and not 0.25 <= unit / (self.unit or unit) <= 4.0:
             self.unit = unit
             values, right, errors = self._right(self.M, self.C, self.K, count, target)
         self._smallest = float(np.median(np.abs(values)))

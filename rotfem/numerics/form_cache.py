@@ -36,9 +36,6 @@ INDEX = "index"
 #: How files of a cache are opened: a link is not followed.
 NO_LINK = os.O_NOFOLLOW | os.O_CLOEXEC
 
-#: Bytes that a cache must have room for to be of use.
-ROOM = 1 << 20
-
 #: The plug-ins of all packages installed, which setuptools looks for some six times with every form.
 plug_ins: Any = cache(importlib.metadata.entry_points)
 
@@ -272,10 +269,10 @@ def _replace(path: Path, content: bytes) -> None:
 
 
 def _has_room(place: Path) -> bool:
-    """Return whether a cache can take another form."""
+    """Return whether a cache can take another form, a megabyte at most."""
     try:
         with tempfile.TemporaryFile(dir=place) as file:
-            file.write(bytes(ROOM))
+            file.write(bytes(1 << 20))
         return True
     except OSError:
         return False

@@ -24,9 +24,6 @@ Array = npt.NDArray[Any]
 #: Relative error of a vector at which a pair is done: that of its eigenvalue is of second order in it.
 DONE = 1e-7
 
-#: Error that round-off may leave where it stagnates, and most rounds.
-STAGNATED, ROUNDS = 1e-5, 12
-
 
 def gyroscopic_pairs(
     matrices: tuple[Any, Any, Any], scale: Array, solver: DirectSolver, count: int, near: Array | None = None
@@ -52,7 +49,7 @@ def gyroscopic_pairs(
     Q: Array = np.zeros((len(d), 0))
     projected: list[Array] = [np.zeros((0, 0)) for _ in matrices]
     before = np.inf
-    for _ in range(ROUNDS):
+    for _ in range(12):
         W = new_directions(comm, Q, W / d)
         for i, (A, sign) in enumerate(zip(matrices, (1.0, -1.0, 1.0), strict=True)):
             AW = times(A, d * W)
@@ -75,7 +72,7 @@ def gyroscopic_pairs(
         )
         errors = np.sqrt(change / lengths)
         worst = float(np.max(errors[:count]))
-        if worst < DONE or 0.5 * before < worst < STAGNATED:
+        if worst < DONE or 0.5 * before < worst < 1e-5:  # round-off may leave that
             chosen, imaginary = np.flatnonzero(errors <= max(DONE, worst)), len(values) + np.cumsum(swings) - 1
             X -= W  # a step of inverse iteration
             x, swings = X[:, chosen] + 1j * swings[chosen] * X[:, imaginary[chosen]], swings[chosen]

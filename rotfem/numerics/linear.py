@@ -1,4 +1,6 @@
-"""Linear and Newton solvers over PETSc; no physics.
+"""Direct solvers over PETSc, and the inertia of a symmetric matrix; no physics.
+
+The inertia is how many eigenvalues are negative: as many as pivots of A = L D Lᵀ (Sylvester).
 
 A complex system (A + iB)(x + iy) = f + ig is [[A, −B], [B, A]] (x, y) = (f, g), whose unknowns stand side by side,
 x₁ y₁ x₂ y₂ …, so that the factor fills in as that of A does.
@@ -24,20 +26,14 @@ Array = npt.NDArray[np.float64]
 #: Up to this size, on one process, PETSc's own LU is quicker than MUMPS (findings: 43 against 377 µs at 603 dofs).
 SMALL = 5000
 
-#: Where a symmetric matrix has so many entries in a row, as of plates, MUMPS is quicker from this size on already.
-MANY, MIDDLE = 50, 1000
+#: Where a symmetric matrix has 50 entries in a row, as of plates, MUMPS is quicker from this size on already.
+MIDDLE = 1000
 
-#: What makes a factor of its own, with which many right-hand sides are solved at once.
-FACTORS = (PETSc.PC.Type.LU, PETSc.PC.Type.CHOLESKY)
-
-#: What MUMPS needs to count negative pivots: a look-out for null ones, and the last front not left to ScaLAPACK.
-COUNTING = {24: 1, 13: 1}
+#: Units of round-off in an entry of an assembled matrix, in those of √(K_ii K_jj): sums over quadrature points.
+ROUNDED = 2 * float(np.finfo(np.float64).eps)
 
 #: What is said of a singular matrix.
 SINGULAR = "the tangent is singular: the factorisation met a zero pivot"
-
-#: Relative difference of two solutions from which a matrix is singular.
-LOST = 1e-2
 
 
 def combine(target: Any, matrices: list[Any], weights: Array) -> Any:
@@ -107,6 +103,7 @@ class DirectSolver:
     Args:
         A: assembled PETSc matrix, or `PlusLowRank`, of which the sparse part is factorised.
         symmetric: whether it is symmetric.
+        counting: whether its negative eigenvalues are counted whatever its size.
 
     Attributes:
         negative: number of negative eigenvalues of A, by the signs of its pivots (Sylvester); None where none are
@@ -115,7 +112,7 @@ class DirectSolver:
 
     negative: int | None = None
 
-    def __init__(self, A: Any, symmetric: bool = False):
+    def __init__(self, A: Any, symmetric: bool = False, counting: bool = False):
         self._whole, self.A, self.factorisations = A, sparse_part(A), 0
         self._update: Update | None = None
         A = self.A
@@ -123,8 +120,8 @@ class DirectSolver:
         if symmetric:
             A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         size = A.getSize()[0]
-        wide = symmetric and A.comm.size == 1 and A.getInfo()["nz_used"] > MANY * size
-        use_direct_solver(self._ksp, size, symmetric, small=MIDDLE if wide else SMALL)
+        wide = symmetric and A.comm.size == 1 and A.getInfo()["nz_used"] > 50 * size
+        use_direct_solver(self._ksp, size, symmetric, small=0 if counting else MIDDLE if wide else SMALL)
         self._ksp.setErrorIfNotConverged(False)
         self._counting = self._ksp.getPC().getType() == PETSc.PC.Type.CHOLESKY
         self._stale = True
@@ -148,8 +145,8 @@ class DirectSolver:
                 self._ksp.reset()  # PETSc makes a new factor for another matrix, which does not know the controls
             self._ksp.setOperators(self.A)
             pc.setFactorSetUpSolverType()
-            for control, value in COUNTING.items():
-                pc.getFactorMatrix().setMumpsIcntl(control, value)
+            for control in (24, 13):  # a look-out for null pivots, and the last front not left to ScaLAPACK
+                pc.getFactorMatrix().setMumpsIcntl(control, 1)
         else:
             self._ksp.setOperators(self.A)
         self._ksp.setUp()
@@ -184,7 +181,7 @@ class DirectSolver:
         if self._stale:
             self.factorise()
         pc = self._ksp.getPC()
-        if pc.getType() not in FACTORS:
+        if pc.getType() not in (PETSc.PC.Type.LU, PETSc.PC.Type.CHOLESKY):  # no factor of its own
             out, (x, b) = np.empty_like(right), self.A.createVecs()
             for column, solved in zip(right.T, out.T, strict=True):
                 b.array[:] = column
@@ -208,6 +205,69 @@ class DirectSolver:
         right.array[:] = b
         self._apply(right, x)
         return np.array(x.array)
+
+
+def symmetric(A: Any) -> bool:
+    """Return whether a PETSc matrix, or one with a part B Bᵀ, is symmetric to round-off, whatever its units."""
+    scaled = sparse_part(A).copy()
+    d = scaled.getDiagonal()
+    d.array[:] = 1.0 / np.sqrt(np.where(d.array == 0.0, 1.0, np.abs(d.array)))
+    scaled.diagonalScale(d, d)
+    return bool(scaled.isSymmetric(1e-13))
+
+
+def negative_eigenvalues(A: Any) -> int:
+    """Return how many eigenvalues of a symmetric PETSc matrix are negative, on every rank.
+
+    Without pivoting, as PETSc factors small matrices, positive pivots are a proof; where one is not, MUMPS counts,
+    which pivots.
+
+    Raises:
+        ComputationError: the matrix is singular or not finite.
+    """
+    A = A.copy()  # its entries may be those of another matrix next, that is not symmetric
+    if A.comm.size == 1 and A.getSize()[0] <= SMALL and _positive(A):
+        return 0
+    solver = DirectSolver(A, symmetric=True, counting=True)
+    solver.factorise()
+    assert solver.negative is not None
+    return solver.negative
+
+
+def _positive(A: Any) -> bool:
+    """Return whether PETSc's factor of a symmetric matrix of one process has positive pivots alone."""
+    A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    pc = PETSc.PC().create(A.comm)
+    pc.setOperators(A)
+    pc.setType(PETSc.PC.Type.CHOLESKY)
+    pc.setFactorSolverType(PETSc.Mat.SolverType.PETSC)
+    pc.setFactorPivot(0.0)
+    pc.setFactorOrdering("rcm")
+    try:
+        pc.setUp()
+        return bool(pc.getFactorMatrix().getInertia()[2] == A.getSize()[0])
+    except PETSc.Error:
+        return False
+    finally:
+        pc.destroy()
+
+
+def surely_negative(K: Any) -> int | None:
+    """Return how many eigenvalues of a stiffness are negative whatever rounding did to it; None where none are counted.
+
+    The error of an entry is at most ROUNDED √(K_ii K_jj) (`rotfem.numerics.eigenproblem`). Ten entries of a row, as the
+    root of their number, err together, so that of K is at most 10 ROUNDED of its diagonal: with that added no
+    eigenvalue that exact arithmetic has positive is negative.
+    """
+    if not symmetric(K):
+        return None
+    d, righted = K.getDiagonal(), K.copy()
+    d.array[:] *= 1.0 + 10.0 * ROUNDED
+    righted.setDiagonal(d)
+    try:
+        return negative_eigenvalues(righted)
+    except ComputationError:
+        return None
 
 
 class SingularSolver:
@@ -243,7 +303,7 @@ def is_regular(A: Any, solver: DirectSolver) -> bool:
     except ComputationError:
         return False
     found.axpy(-1.0, x)
-    return bool(found.norm() <= LOST * x.norm())
+    return bool(found.norm() <= 1e-2 * x.norm())
 
 
 class Increment:

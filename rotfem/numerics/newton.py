@@ -11,9 +11,6 @@ import numpy as np
 
 from rotfem.errors import ComputationError
 
-#: Further iterations with an old factor that a new one would cost, and tangents after which the way is no good.
-WORTH, MOST = 7.0, 3
-
 
 class OldFactor:
     """Decides for every iteration whether the factor of an earlier tangent serves, or a new one pays.
@@ -37,7 +34,7 @@ class OldFactor:
     @property
     def hopeless(self) -> bool:
         """Whether new tangents have not helped."""
-        return self.made > MOST
+        return self.made > 3
 
     def took(self) -> bool:
         """Return whether the iteration that begins is one with the factor at hand, and count it."""
@@ -53,33 +50,12 @@ class OldFactor:
         if len(self._sizes) < 3 or size <= wanted:
             return
         rate = math.sqrt(size / self._sizes[-3])
-        self.serves = rate < 1.0 and math.log(size / wanted) <= WORTH * -math.log(rate)
+        self.serves = rate < 1.0 and math.log(size / wanted) <= 7.0 * -math.log(rate)  # a tangent costs 7 iterations
 
-
-#: Part of the tolerance up to which iterations with an old factor go on. Newton's last increment leaves an error of its
-#: square; theirs leave a part of themselves, the same way in every step, which adds up.
-CHORD = 1e-2
-
-
-#: Increment, in the units of the unknowns, that round-off lets an old factor reach.
-SMALLEST = 1e-12
-
-#: Increment, relative to the unknowns, that may be round-off where it shrinks no more; larger ones wander.
-LOST = 1e-5
 
 #: Longest correction that is taken whole, in the units of the unknowns (the length of a structure, 1 rad): of what is
 #: farther away a tangent says nothing.
 REACH = 0.5
-
-#: Correction, in these units, after which a root may be another than the one that was close to the start.
-FAR = 0.1
-
-#: How many times longer than any increment that the quadratic constant was found with one may be for it to be used: of
-#: increments that are far shorter it says nothing, as along an axis on which the equations are linear.
-KNOWN = 2.0
-
-#: Increment, in the units of the unknowns, below which growth is no matter of another root.
-STRAYS = 1e-3
 
 
 @dataclass
@@ -141,7 +117,9 @@ class Newton:
                 self._kappa = max(0.5 * self._kappa if np.isfinite(self._kappa) else 0.0, d / first**2)
                 self._longest = max(first, 0.5 * self._longest)
             if chord is not None:
-                enough = max(CHORD * self.tolerance, min(self.tolerance, SMALLEST))
+                # Newton's last increment leaves an error of its square; those with an old factor leave a part of
+                # themselves, the same way in every step, which adds up. Round-off lets them reach 1e-12.
+                enough = max(1e-2 * self.tolerance, min(self.tolerance, 1e-12))
                 if d <= enough or (d <= self.tolerance and d > 0.3 * previous):
                     return k
                 chord.judge(d, enough)
@@ -150,10 +128,10 @@ class Newton:
             stalled = stalled + 1 if d > 0.3 * previous and (chord is None or not chord.serves) else 0
             if chord is not None and chord.hopeless:
                 raise ComputationError(f"the old factor gives increments that stay at {d:.1e} (scaled)")
-            if stalled >= 3 and d <= LOST * max(size(), self.tolerance):
+            if stalled >= 3 and d <= 1e-5 * max(size(), self.tolerance):  # larger ones wander
                 self.roundoff = max(self.roundoff, d)
                 return k
-            self.diverging |= d > FAR or (k > 1 and d > max(previous, STRAYS))
+            self.diverging |= d > 0.1 or (k > 1 and d > max(previous, 1e-3))  # the root may be another one
             self.wandered |= k > 1 and d > REACH
             if k > 4 and d > 10 * first and d > 1:
                 raise ComputationError(f"Newton diverged: increments grew from {first:.1e} to {d:.1e} (scaled)")
@@ -164,5 +142,9 @@ class Newton:
         )
 
     def _successor(self, d: float) -> float:
-        """Return the most that the next increment after one of size d may be: anything, after a long one."""
-        return 4 * self._kappa * d**2 if d <= KNOWN * self._longest else np.inf
+        """Return the most that the next increment after one of size d may be: anything, after a long one.
+
+        Of increments twice as long as any that kappa was found with it says nothing, as along an axis on which the
+        equations are linear.
+        """
+        return 4 * self._kappa * d**2 if d <= 2.0 * self._longest else np.inf

@@ -12,16 +12,6 @@ from petsc4py import PETSc
 
 Array = npt.NDArray[Any]
 
-#: Directions whose energy is below this part of the largest are dropped: the others hold them to round-off. A larger
-#: part would drop what makes the small differences between modes at two speeds.
-DEPENDENT = 1e-13
-
-#: Part of a column's length below which it is no new direction.
-NEW = 1e-8
-
-#: Kinds of matrices that are multiplied by all columns at once, which reads each entry once.
-ENTRIES = ("seqaij", "mpiaij")
-
 
 def summed(comm: MPI.Comm, local: Any) -> Any:
     """Return the sum over all ranks of an array of each."""
@@ -32,7 +22,7 @@ def times(A: Any, X: Array) -> Array:
     """Return A X of a matrix and columns (n, m)."""
     if not isinstance(A, PETSc.Mat):
         return np.asarray(A.times(X))
-    if X.shape[1] > 1 and A.getType() in ENTRIES:
+    if X.shape[1] > 1 and A.getType() in ("seqaij", "mpiaij"):  # all columns at once, which reads each entry once
         right, product = dense(A.comm, X), PETSc.Mat()
         return np.array(A.matMult(right, product).getDenseArray())
     x, y = A.createVecs()
@@ -51,9 +41,9 @@ def dense(comm: Any, X: Array) -> Any:
 
 
 def new_directions(comm: MPI.Comm, V: Array, W: Array) -> Array:
-    """Return an orthonormal basis of what columns W add to the orthonormal V."""
+    """Return an orthonormal basis of what columns W add to the orthonormal V: parts of 1e-8 of a column and more."""
     W = W / np.sqrt(np.maximum(summed(comm, np.einsum("ij,ij->j", W, W)), 1e-300))
-    for limit in (NEW**2, 0.5):  # twice, as once leaves round-off of what was taken away
+    for limit in (1e-16, 0.5):  # twice, as once leaves round-off of what was taken away
         W = W - V @ summed(comm, V.T @ W)
         sizes, turns = np.linalg.eigh(summed(comm, W.T @ W))
         W = W @ (turns[:, sizes > limit] / np.sqrt(sizes[sizes > limit]))
@@ -62,6 +52,9 @@ def new_directions(comm: MPI.Comm, V: Array, W: Array) -> Array:
 
 def orthonormal(comm: MPI.Comm, columns: Array, product: Callable[[Array], Array]) -> Array:
     """Return an orthonormal basis of what columns (n, m) span, shape (n, k) with k ≤ m.
+
+    Directions whose energy is below 1e-13 of the largest are dropped: the others hold them to round-off. A larger part
+    would drop what makes the small differences between modes at two speeds.
 
     Args:
         comm: communicator that the rows are distributed over.
@@ -73,6 +66,6 @@ def orthonormal(comm: MPI.Comm, columns: Array, product: Callable[[Array], Array
     for _ in range(2):  # once more, as what is left of nearly equal columns is orthogonal only roughly
         gram = summed(comm, V.T @ product(V))
         energies, turns = np.linalg.eigh(0.5 * (gram + gram.T))
-        keep = energies > DEPENDENT * energies[-1]
+        keep = energies > 1e-13 * energies[-1]
         V = np.asarray(V @ (turns[:, keep] / np.sqrt(energies[keep])))
     return V

@@ -22,12 +22,6 @@ from ufl.core.terminal import Terminal
 from ufl.integral import Integral
 from ufl.utils.counted import Counted
 
-#: Classes whose instances in an expression have no operands, operators on forms apart.
-LEAVES = (Terminal, BaseArgument, BaseCoefficient, Counted)
-
-#: Key of the hashes of nodes.
-NODES = "nodes"
-
 _extract_type: Any = analysis.extract_type
 #: Identity of an expression that is in use ↦ (reference to it, its terminals).
 _known: dict[int, tuple[Any, list[Any] | None]] = {}
@@ -36,7 +30,8 @@ _known: dict[int, tuple[Any, list[Any] | None]] = {}
 def extract_type(a: Any, ufl_types: Any) -> set[Any]:
     """Return the objects of some classes in a form, an integral or an expression, as UFL's function of this name."""
     types = tuple(ufl_types) if isinstance(ufl_types, list | tuple) else (ufl_types,)
-    if all(issubclass(t, LEAVES) for t in types) and isinstance(a, ufl.Form | Integral | Expr):
+    leaves = (Terminal, BaseArgument, BaseCoefficient, Counted)  # without operands, operators on forms apart
+    if all(issubclass(t, leaves) for t in types) and isinstance(a, ufl.Form | Integral | Expr):
         parts = a.integrals() if isinstance(a, ufl.Form) else [a]
         found = [terminals(part.integrand() if isinstance(part, Integral) else part) for part in parts]
         if None not in found:
@@ -77,7 +72,7 @@ def compute_expression_hashdata(expression: Any, terminal_hashdata: dict[Any, An
         expression: what is hashed.
         terminal_hashdata: terminal ↦ what it counts as, the same for all integrands of a form: it keeps their hashes.
     """
-    hashes, left = terminal_hashdata.setdefault(NODES, dict[Any, bytes]()), [expression]
+    hashes, left = terminal_hashdata.setdefault("nodes", dict[Any, bytes]()), [expression]
     while left:
         node = left[-1]
         missing = [operand for operand in node.ufl_operands if operand not in hashes]

@@ -7,7 +7,7 @@ import pytest
 from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
-from rotfem.numerics import inertia
+from rotfem.numerics import linear
 
 
 def matrix(A: np.ndarray) -> PETSc.Mat:
@@ -22,19 +22,19 @@ def matrix(A: np.ndarray) -> PETSc.Mat:
 @pytest.mark.parametrize("shift", [-20.0, 0.0, 0.4, 20.0])
 def test_as_many_as_eigenvalues(monkeypatch: pytest.MonkeyPatch, small: int, shift: float) -> None:
     # By MUMPS alone, and by PETSc's factor first.
-    monkeypatch.setattr(inertia, "SMALL", small)
+    monkeypatch.setattr(linear, "SMALL", small)
     A = np.random.default_rng(3).standard_normal((40, 40))
     A = A + A.T + shift * np.eye(40)
-    assert inertia.negative_eigenvalues(matrix(A)) == np.sum(np.linalg.eigvalsh(A) < 0.0)
+    assert linear.negative_eigenvalues(matrix(A)) == np.sum(np.linalg.eigvalsh(A) < 0.0)
 
 
 @pytest.mark.parametrize("small", [0, 10_000])
 def test_zero_diagonal(monkeypatch: pytest.MonkeyPatch, small: int) -> None:
     # A saddle point: without pivoting there is no factor.
-    monkeypatch.setattr(inertia, "SMALL", small)
-    assert inertia.negative_eigenvalues(matrix(np.array([[0.0, 1.0], [1.0, 0.0]]))) == 1
+    monkeypatch.setattr(linear, "SMALL", small)
+    assert linear.negative_eigenvalues(matrix(np.array([[0.0, 1.0], [1.0, 0.0]]))) == 1
 
 
 def test_singular_matrix_has_no_count() -> None:
     with pytest.raises(ComputationError, match="singular|factored"):
-        inertia.negative_eigenvalues(matrix(np.diag([1.0, 0.0, 2.0])))
+        linear.negative_eigenvalues(matrix(np.diag([1.0, 0.0, 2.0])))

@@ -10,8 +10,8 @@ from petsc4py import PETSc
 
 from rotfem.errors import ComputationError
 from rotfem.numerics import linear
-from rotfem.numerics.eigenproblem import is_symmetric, mirror_error
-from rotfem.numerics.linear import DirectSolver, SingularSolver, combine, is_regular
+from rotfem.numerics.eigenproblem import mirror_error
+from rotfem.numerics.linear import DirectSolver, SingularSolver, combine, is_regular, symmetric
 from rotfem.numerics.low_rank import LowRank, PlusLowRank
 from rotfem.numerics.newton import Newton, OldFactor
 from rotfem.numerics.projection import times
@@ -196,10 +196,10 @@ def test_a_matrix_with_a_part_of_low_rank_is_scaled_and_bounded_as_one() -> None
 def test_a_small_skew_part_is_none_of_round_off() -> None:
     """Symmetric to round-off is A; with 1e-9 of its largest entry in one corner only it is not."""
     A = spread(np.random.default_rng(7), 40)
-    assert is_symmetric(A)
+    assert symmetric(A)
     A.setValue(0, 39, A[0, 39] + 1e-9 * np.abs(A[:, :]).max())
     A.assemble()
-    assert not is_symmetric(A)
+    assert not symmetric(A)
 
 
 def test_combine() -> None:

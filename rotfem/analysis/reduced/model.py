@@ -18,8 +18,7 @@ import numpy.typing as npt
 from dolfinx import fem
 
 from rotfem.equations.pieces import PRESTRESS
-from rotfem.numerics.eigenproblem import is_symmetric
-from rotfem.numerics.linear import MIDDLE, DirectSolver, combine
+from rotfem.numerics.linear import MIDDLE, DirectSolver, combine, symmetric
 from rotfem.numerics.projection import orthonormal, summed, times
 
 Array = npt.NDArray[np.float64]
@@ -142,7 +141,7 @@ class ReducedModel:
             return solver
         A = self.system.A.duplicate()
         combine(A, [pieces[i].operator for i in there], c[there])
-        return DirectSolver(A, symmetric=A.getSize()[0] > MIDDLE and is_symmetric(A))
+        return DirectSolver(A, symmetric=A.getSize()[0] > MIDDLE and symmetric(A))
 
     def solve(self, solver: DirectSolver, right: Array) -> Array:
         """Return the solutions (local dof arrays (n, k)) with right-hand sides of owned rows, (n, k)."""
