@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.equilibrium import steady_state
-from rotfem.analysis.phase_drift import drift
 from rotfem.analysis.reduced.response import Response, reduced_response
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability, stability_of
@@ -26,6 +25,7 @@ from rotfem.refinement.coarser import on_other_mesh
 from rotfem.refinement.discretisation import HistoryErrors, error_of_shape, richer_problem
 from rotfem.refinement.distance import COLUMNS, OUTPUTS, largest, tip
 from rotfem.refinement.estimate import NOTICED, ErrorEstimate, percent
+from rotfem.refinement.frequencies import phase_drift
 from rotfem.scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -147,8 +147,10 @@ class RunErrors:
         start = self.start(system)
         q, v = (system.zeros() if x is None else x for x in (start.q, start.v))
         try:
-            off = drift(self.problem, system, (q, v), self.history["t"][-1], Newton.of(self.scene.solver))
+            off = phase_drift(self.problem, system, (q, v), self.history["t"][-1], Newton.of(self.scene.solver))
         except (ComputationError, InputError):
+            off = None
+        if off is None:
             return None
         part = _relative(off, self._scale)
         basis = "its frequencies and strains compared with the exact ones"
