@@ -92,16 +92,10 @@ class AlphaFamily(Scheme):
         It stands for q̈ at t + h (α_m − α_f), so it moves when h does; without this a change of step would cost an
         order. Where a step grows by more than steps do it would be an extrapolation, and starts afresh.
         """
-        last = new.t - old.t
+        last, (alpha_m, alpha_f, _, _) = new.t - old.t, self.coefficients
         if h > self.growth * last * (1 + 1e-9):
             return self.start(new)
-        return new.changed(memory=new.memory + self.lag * (1 - h / last) * (new.memory - old.memory))
-
-    @property
-    def lag(self) -> float:
-        """How many steps the auxiliary acceleration is behind, α_f − α_m: 0 to 1, 0 with ρ∞ = 1."""
-        alpha_m, alpha_f, _, _ = self.coefficients
-        return alpha_f - alpha_m
+        return new.changed(memory=new.memory + (alpha_f - alpha_m) * (1 - h / last) * (new.memory - old.memory))
 
 
 @dataclass(frozen=True)
@@ -165,7 +159,6 @@ class EnergyConserving(Scheme):
 
     name: ClassVar[str] = "energy_conserving"
     order: ClassVar[int] = 2
-    balanced_at_end: ClassVar[bool] = False
 
     def stage(self, i: int, state: State, h: float, end: float, done: Sequence[Stage]) -> Stage:
         """Return the middle of the step, predicted by the acceleration of the last one."""

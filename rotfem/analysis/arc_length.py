@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import brentq
 
 from rotfem.analysis.load_steps import Growth, balance, recounted
 from rotfem.errors import ComputationError
@@ -35,8 +36,8 @@ STRAIGHT = 0.9
 #: Steps before the path is given up, and iterations of a step.
 MOST_STEPS, ITERATIONS = 500, 8
 
-#: Relative accuracy of the load at a limit point.
-LOCATED = 1e-8
+#: Accuracy of the place of a limit point, as a part of the step that it is in.
+LOCATED = 1e-5
 
 
 @dataclass
@@ -204,20 +205,14 @@ class Tracer:
     def _limit(self, point: Point, length: float) -> float:
         """Return the load where the tangent of the path has none in s, between a point and one at a distance.
 
-        ds/dl = t_s has a simple zero there, which is enclosed; the load itself is then accurate to the square.
+        ds/dl = t_s has a simple zero there, so that the load itself is accurate to the square.
         """
-        low, high, share = 0.0, length, point.s
-        for _ in range(60):
-            middle = (low + high) / 2
-            new = self._step(point, middle)[0]
-            change, share = abs(new.s - share), new.s
-            if new.t_s * point.t_s < 0.0:
-                high = middle
-            else:
-                low = middle
-            if change <= LOCATED * abs(share) and abs(new.t_s) < np.sqrt(LOCATED):
-                break
-        return share
+        slopes = {0.0: point.t_s}
+
+        def slope(distance: float) -> float:
+            return slopes[distance] if distance in slopes else self._step(point, distance)[0].t_s
+
+        return self._step(point, float(brentq(slope, 0.0, length, xtol=LOCATED * length)))[0].s
 
     def _end(self, before: Point, after: Point) -> Array:
         """Return q at the full load, between two points of the path."""

@@ -104,58 +104,61 @@ def _compliance_lost(system: Any, omega: float) -> bool:
 
 
 def _grown(system: Any, growth: Growth, newton: Newton, past_limits: bool, notes: list[str]) -> Array:
-    """Return the equilibrium at the full load, in a nonlinear theory."""
-    if past_limits:
-        return _followed(system, growth, newton, notes)
-    try:
-        found = raised(system, growth, newton)
-    except ComputationError as error:
-        path = _path(system, growth, newton, False, notes)
-        if path is None or path.share < 1.0:
-            raise error if path is None or not path.limits else _at_limit(system, growth, path) from None
-        return counted(system, growth, 1.0, path.q, newton)
-    return _judged(system, growth, newton, found, notes)
+    """Return the equilibrium at full load that the growing load leads to, in a nonlinear theory.
 
-
-def _judged(system: Any, growth: Growth, newton: Newton, found: Raised, notes: list[str]) -> Array:
-    """Return the equilibrium that the growing load leads to, which is the one found unless Newton left the path.
+    It is the one that is found first unless Newton left the path, or past maxima of the load its end.
 
     Raises:
-        ComputationError: the path ends at a limit point.
+        ComputationError: none was found, or the path ends at a limit point or elsewhere before the full load.
     """
-    if found.sure and not _has_descent(system):
-        return found.q
+    found: Raised | None = None
+    failure: ComputationError | None = None
+    total: Array = np.empty(0)
+    if not past_limits:
+        try:
+            found = raised(system, growth, newton)
+        except ComputationError as error:
+            failure = error
+        else:
+            # the tangent of Newton's last iteration is at hand, and as good as that of the equilibrium
+            if found.sure and not surely_negative(system.A):
+                return found.q
+            system.count_rotations_from(found.reference)
+            total = system.structure.total(found.q)
+            if found.sure and system.size(total) <= newton.tolerance:
+                return found.q  # nothing bends it, as a shaft that spins about its axis: one state at all speeds
+    path = _path(system, growth, newton, past_limits, notes)
+    if path.share == 1.0:
+        if found is not None and system.size(system.structure.total(path.q) - total) > SAME_STATE:
+            notes.append("Newton met another equilibrium first; this is the one that the growing load leads to")
+        return counted(system, growth, 1.0, path.q, newton)
+    if past_limits:
+        limits = f", past limit points at {_shares(path.limits)} of it" if path.limits else ""
+        raise ComputationError(
+            f"no steady state at {growth.omega:g} rad/s: the path of equilibria ends at {path.share:.6g} of the load"
+            f"{limits}: {path.why}",
+            advice=less(system),
+        )
+    if path.limits:
+        raise ComputationError(
+            f"no steady state at {growth.omega:g} rad/s to which a growing load leads: it has a maximum, a limit "
+            f"point, at {growth.where(path.limits[0])}, where the structure snaps",
+            advice=f'solver.continuation = "arc_length" to follow the path past it, or {less(system)}',
+        ) from None
+    if found is None:
+        raise failure or ComputationError(path.why)
+    if not found.sure:
+        notes.append("whether this is the equilibrium that the growing load leads to, or another one, is not known")
     system.count_rotations_from(found.reference)
-    total = system.structure.total(found.q)
-    if found.sure and system.size(total) <= newton.tolerance:
-        return found.q  # nothing bends it, as a shaft that spins about its axis: the path is one state at all speeds
-    path = _path(system, growth, newton, False, notes)
-    if path is not None and path.limits:
-        raise _at_limit(system, growth, path)
-    if path is None or path.share < 1.0:
-        if not found.sure:
-            notes.append("whether this is the equilibrium that the growing load leads to, or another one, is not known")
-        system.count_rotations_from(found.reference)
-        return balance(system, growth, 1.0, found.q, newton)
-    if system.size(system.structure.total(path.q) - total) > SAME_STATE:
-        notes.append("Newton met another equilibrium first; this is the one that the growing load leads to")
-    return counted(system, growth, 1.0, path.q, newton)
+    return balance(system, growth, 1.0, found.q, newton)
 
 
-def _has_descent(system: Any) -> bool:
-    """Return whether the energy falls in some direction from the equilibrium just found; not, where it has none.
-
-    The tangent of Newton's last iteration is at hand, and as good as that of the equilibrium.
-    """
-    return bool(surely_negative(system.A))
-
-
-def _path(system: Any, growth: Growth, newton: Newton, past_limits: bool, notes: list[str]) -> LoadPath | None:
-    """Return the path and note what there is on it; None where it cannot be followed."""
+def _path(system: Any, growth: Growth, newton: Newton, past_limits: bool, notes: list[str]) -> LoadPath:
+    """Return the path and note what there is on it."""
     try:
         path = Tracer(system, growth, newton).follow(past_limits)
     except ComputationError:
-        return None
+        return LoadPath(system.zeros(), why="its first step failed")
     if path.branches:
         notes.append(f"another path of equilibria crosses at {_shares(path.branches)} of the load: a bifurcation")
     if path.limits and path.share == 1.0:
@@ -164,35 +167,8 @@ def _path(system: Any, growth: Growth, newton: Newton, past_limits: bool, notes:
     return path
 
 
-def _followed(system: System, growth: Growth, newton: Newton, notes: list[str]) -> Array:
-    """Return the equilibrium at full load at the end of the path, past maxima of the load.
-
-    Raises:
-        ComputationError: the path does not lead there.
-    """
-    path = _path(system, growth, newton, True, notes)
-    if path is None or path.share < 1.0:
-        share, why = (0.0, "its first step failed") if path is None else (path.share, path.why)
-        limits = "" if path is None or not path.limits else f", past limit points at {_shares(path.limits)} of it"
-        raise ComputationError(
-            f"no steady state at {growth.omega:g} rad/s: the path of equilibria ends at {share:.6g} of the load"
-            f"{limits}: {why}",
-            advice=less(system),
-        )
-    return counted(system, growth, 1.0, path.q, newton)
-
-
 def _shares(shares: list[float]) -> str:
     return ", ".join(f"{share:.6g}" for share in shares)
-
-
-def _at_limit(system: Any, growth: Growth, path: LoadPath) -> ComputationError:
-    """Return the warning of a path with a maximum of the load."""
-    return ComputationError(
-        f"no steady state at {growth.omega:g} rad/s to which a growing load leads: it has a maximum, a limit point, at "
-        f"{growth.where(path.limits[0])}, where the structure snaps",
-        advice=f'solver.continuation = "arc_length" to follow the path past it, or {less(system)}',
-    )
 
 
 def gravity_turns(problem: Problem) -> bool:

@@ -182,8 +182,6 @@ class Scheme(ABC):
     name: ClassVar[str]
     order: ClassVar[int]
     stages: ClassVar[int] = 1
-    #: Whether the equations hold with the q, v, a that a step ends in; otherwise with its mean q and v, and that a.
-    balanced_at_end: ClassVar[bool] = True
     #: Whether a step of a free hub starts with only as much of a jump of accelerations as it resolves (see `Stepper`).
     filters_jumps: ClassVar[bool] = False
 
@@ -255,11 +253,6 @@ class Scheme(ABC):
     def resized(self, new: State, old: State, h: float) -> State:
         """Return a state after which steps of another length h (s) follow than the one that led there from old."""
         return new
-
-    @property
-    def lag(self) -> float:
-        """How many steps the memory of a step is behind its start."""
-        return 0.0
 
     @classmethod
     def check(cls, parameters: dict[str, Any]) -> dict[str, str]:
