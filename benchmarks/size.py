@@ -33,9 +33,9 @@ CAPABILITIES = {
     "reduced models": "analysis.reduced commands.reduced_history",
     "time integration": """
         analysis.time analysis.march analysis.alpha_family analysis.dense_output
-        analysis.dense_output analysis.energy_conserving analysis.esdirk analysis.first_motion
+        analysis.dense_output analysis.energy_conserving analysis.first_motion
         analysis.march analysis.stepper analysis.time_grid
-        analysis.radau analysis.schemes
+        analysis.runge_kutta analysis.schemes
         analysis.turning mechanics.courses
     """,
     "loads": """

@@ -19,7 +19,7 @@ from rotfem.version import __version__
 
 if TYPE_CHECKING:
     from rotfem.analysis.alpha_family import GeneralisedAlpha, Newmark
-    from rotfem.analysis.esdirk import ESDIRK4
+    from rotfem.analysis.runge_kutta import ESDIRK4
     from rotfem.analysis.schemes import Scheme, Stage, State
     from rotfem.commands.campbell import campbell
     from rotfem.commands.check import check

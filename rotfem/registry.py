@@ -83,9 +83,7 @@ class Registry(Generic[E]):
 # The registries themselves are here, on the ground, so that a scene knows the names of what lies above it.
 theories: Registry[Any] = Registry("theory", "rotfem.mechanics.theories")
 effects: Registry[Any] = Registry("effect", "rotfem.mechanics.effects")
-schemes: Registry[Any] = Registry(
-    "scheme", "rotfem.analysis.alpha_family", "rotfem.analysis.esdirk", "rotfem.analysis.radau"
-)
+schemes: Registry[Any] = Registry("scheme", "rotfem.analysis.alpha_family", "rotfem.analysis.runge_kutta")
 shapes: Registry[Any] = Registry("section shape", "rotfem.scene.section_shapes")
 outputs: Registry[Any] = Registry("output", "rotfem.mechanics.problem")
 blade_formats: Registry[Any] = Registry(

@@ -14,10 +14,9 @@ from typing import Any, TypeVar
 
 from mpi4py import MPI
 
-from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.modal import ModalAnalysis, Spinning, self_checks
 from rotfem.analysis.modal import participation as masses_of
-from rotfem.analysis.stability import stability_of_pencil
+from rotfem.analysis.stability import critical_speed, stability_of_pencil
 from rotfem.analysis.theory_error import TheoryCheck, TheoryError
 from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.advice import advise

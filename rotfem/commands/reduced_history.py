@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rotfem.analysis.critical_speed import critical_speed_within
 from rotfem.analysis.march import Steps, grid
 from rotfem.analysis.reduced.response import ACCURACY, Response, reduced_response
 from rotfem.analysis.schemes import State
+from rotfem.analysis.stability import critical_speed_within
 from rotfem.commands.accuracy import ROWS
 from rotfem.commands.checkpoint import Log
 from rotfem.commands.monitor import Monitor

@@ -14,16 +14,14 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.dense_output import RowTimes
 from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.fixed_frame import check_rotating
-from rotfem.analysis.march import March, Steps
+from rotfem.analysis.march import SMOOTHER, March, Steps, watched_switches
 from rotfem.analysis.reduced.response import Response
 from rotfem.analysis.schemes import State
-from rotfem.analysis.stability import stability_of
+from rotfem.analysis.stability import critical_speed, stability_of
 from rotfem.analysis.stepper import Stepper
-from rotfem.analysis.switching import SMOOTHER, watched_switches
 from rotfem.analysis.theory_error import said_of
 from rotfem.commands import monitor
 from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy, within_tolerance

@@ -23,7 +23,7 @@ from rotfem.analysis.stepper import Stepper
 from rotfem.analysis.time_grid import Leg
 from rotfem.errors import ComputationError
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.carrier import carrier
+from rotfem.refinement.coarser import carrier
 from rotfem.refinement.distance import Output, tip
 
 

@@ -34,8 +34,7 @@ from rotfem.numerics.eigenproblem import Pencil
 from rotfem.numerics.linear import SMALL
 from rotfem.numerics.newton import Newton
 from rotfem.numerics.projection import summed
-from rotfem.refinement.carrier import interpolation
-from rotfem.refinement.coarser import on_other_mesh
+from rotfem.refinement.coarser import interpolation, on_other_mesh
 
 Array = npt.NDArray[Any]
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 
 from rotfem import run
-from rotfem.analysis.radau import A, C
+from rotfem.analysis.runge_kutta import A, C
 from tests.beams import STRUCTURE
 
 Array = npt.NDArray[np.float64]

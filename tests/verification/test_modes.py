@@ -21,8 +21,8 @@ from scipy.io import mmread
 from scipy.optimize import brentq, minimize_scalar, newton
 
 from rotfem import ComputationError, InputError, Scene, SceneError, modes
-from rotfem.analysis.critical_speed import critical_speed
 from rotfem.analysis.modal import ModalAnalysis, linearisation_error
+from rotfem.analysis.stability import critical_speed
 from rotfem.analysis.state_space import state_space, write_matrices
 from rotfem.commands.campbell import campbell
 from rotfem.commands.problem import Problem
