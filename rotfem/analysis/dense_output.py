@@ -18,6 +18,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from rotfem.analysis.schemes import Array, Observer, State
 
@@ -35,12 +36,15 @@ class RowTimes:
         interval: from one row to the next, s.
         end: last time, s.
         order: of the scheme that steps.
+        comm: MPI communicator of the processes that share the unknowns.
         further: a further observer of the steps; None without one.
         passed: rows there are already, without that at t = 0.
     """
 
-    def __init__(self, interval: float, end: float, order: int, further: Observer | None = None, passed: int = 0):
-        self.interval, self.end, self.order, self.further = interval, end, order, further
+    def __init__(
+        self, interval: float, end: float, order: int, comm: MPI.Comm, further: Observer | None = None, passed: int = 0
+    ):
+        self.interval, self.end, self.order, self.comm, self.further = interval, end, order, comm, further
         self._next, self._last = 1 + passed, int(np.ceil(end / interval - CLOSE))
         self._reached: list[State] = []
 
@@ -53,7 +57,7 @@ class RowTimes:
             times.append(t)
             self._next += 1
         ends = [new] if times and times[-1] > new.t - close else []
-        self._reached += between(old, new, times[: len(times) - len(ends)], self.order) + ends
+        self._reached += between(old, new, times[: len(times) - len(ends)], self.order, self.comm) + ends
 
     def taken(self) -> list[State]:
         """Return the states of the rows since the last call."""
@@ -61,7 +65,7 @@ class RowTimes:
         return found
 
 
-def between(old: State, new: State, times: list[float], order: int) -> list[State]:
+def between(old: State, new: State, times: list[float], order: int, comm: MPI.Comm) -> list[State]:
     """Return the states at times (s) within a step; work and impulse of a free hub are linear in it.
 
     Args:
@@ -69,10 +73,11 @@ def between(old: State, new: State, times: list[float], order: int) -> list[Stat
         new: state that it ends in.
         times: between them, s.
         order: of the scheme that made it.
+        comm: MPI communicator of the processes that share the unknowns, all of which take the same polynomials.
     """
     if not times:
         return []
-    h, curve = new.t - old.t, polynomial(old, new, order)
+    h, curve = new.t - old.t, polynomial(old, new, order, comm)
     shares = (np.array(times, dtype=np.float64) - old.t) / np.float64(h)
     moved = [monomials(shares, len(curve), k) @ curve / h**k for k in range(3)]
     out = []
@@ -84,20 +89,22 @@ def between(old: State, new: State, times: list[float], order: int) -> list[Stat
     return out
 
 
-def polynomial(old: State, new: State, order: int) -> Array:
+def polynomial(old: State, new: State, order: int, comm: MPI.Comm) -> Array:
     """Return the coefficients of q in a step, by powers of the share of it that has passed, (powers, unknowns).
 
     Args:
         old: state that the step starts from.
         new: state that it ends in.
         order: of the scheme that made it.
+        comm: see `between`.
     """
     h, mean = new.t - old.t, (new.q - old.q) / (new.t - old.t)
     known = [[s.q, h * s.v] for s in (old, new)]
     if order > 2:
         cubic = np.array([6 * mean - 4 * old.v - 2 * new.v, 2 * old.v + 4 * new.v - 6 * mean]) / h
-        off = np.abs([old.a, new.a] - cubic)
-        if off.max(initial=0.0) <= KNOWN * np.abs(cubic).max(initial=0.0):
+        sizes = [float(np.abs(x).max(initial=0.0)) for x in ([old.a, new.a] - cubic, cubic)]
+        off, size = sizes if comm.size == 1 else (comm.allreduce(x, MPI.MAX) for x in sizes)
+        if off <= KNOWN * size:
             known = [[*data, h * h * s.a] for data, s in zip(known, (old, new), strict=True)]
     return np.asarray(_coefficients(len(known[0])) @ np.array([x for end in known for x in end]))
 

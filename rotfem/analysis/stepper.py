@@ -9,6 +9,7 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from rotfem.analysis.schemes import Array, Observer, Scheme, Shifts, Stage, State
 from rotfem.errors import ComputationError
@@ -159,8 +160,9 @@ class Stepper:
         with seen(s, before):
             old = s.driven(t)
         with seen(s, after):
-            if np.allclose(s.driven(t), old, rtol=1e-7, atol=0.0):
-                return self.scheme.kinked(state)
+            same = np.allclose(s.driven(t), old, rtol=1e-7, atol=0.0)
+        if s.comm.allreduce(same, MPI.LAND):  # what moves a clamp is on the processes that hold it
+            return self.scheme.kinked(state)
         return self._accelerated(state, after)
 
     def _accelerated(self, state: State, view: View) -> State:

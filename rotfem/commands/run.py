@@ -176,10 +176,9 @@ class Simulation:
             self.stepper.observer = self.companions
         march.reached = self.store.start(self._parts())
         if time.output_step is not None:
-            passed = max(len(self.record.history) - 1, 0)
-            self.rows = self.stepper.observer = RowTimes(
-                time.output_step, time.end, scheme.order, self.stepper.observer, passed
-            )
+            passed, further = max(len(self.record.history) - 1, 0), self.stepper.observer
+            self.rows = RowTimes(time.output_step, time.end, scheme.order, self.system.comm, further, passed)
+            self.stepper.observer = self.rows
         with self.store.interrupts():
             first = 0 if march.reached is None else self.log.steps + 1
             for self.log.steps, state in enumerate(march, first):

@@ -15,6 +15,7 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from rotfem.analysis.dense_output import between, polynomial
 from rotfem.analysis.march import started, travel
@@ -59,10 +60,10 @@ class Followed:
         leg = replace(other.leg, length=self.leg.length + other.leg.length)
         return Followed(leg, self.steps + other.steps)
 
-    def state_at(self, t: float, order: int) -> State:
+    def state_at(self, t: float, order: int, comm: MPI.Comm) -> State:
         """Return the state at a time (s) as a row of a history has it."""
         old, new = next(pair for pair in self.steps if t <= pair[1].t)
-        return between(old, new, [t], order)[0] if t < new.t else new
+        return between(old, new, [t], order, comm)[0] if t < new.t else new
 
 
 class FollowingStepper(Stepper):
@@ -106,7 +107,7 @@ class FollowingStepper(Stepper):
         if not old.t < t < new.t:
             return old.q if t <= old.t else new.q
         if new.t not in self._curves:
-            self._curves[new.t] = polynomial(old, new, self.scheme.order)
+            self._curves[new.t] = polynomial(old, new, self.scheme.order, self.system.comm)
         curve, share = self._curves[new.t], (t - old.t) / (new.t - old.t)
         return np.asarray(share ** np.arange(len(curve)) @ curve)
 
@@ -232,7 +233,8 @@ class Companion:
             row = round((old.t + new.t) / (2 * self.interval)) * self.interval
             if old.t < row < new.t:
                 order = self.stepper.scheme.order
-                self._compare(between(old, new, [row], order)[0], step.state_at(row, order))
+                comm = self.system.comm
+                self._compare(between(old, new, [row], order, comm)[0], step.state_at(row, order, comm))
         for companion in self.further:
             companion(old, new, leg)
 

@@ -80,6 +80,22 @@ def test_adaptive_steps_are_those_of_one_process(tmp_path: Path) -> None:
         np.testing.assert_allclose(parallel[column], serial[column], rtol=0, atol=1e-6 * scale, err_msg=column)
 
 
+def test_all_processes_restart_where_a_clamp_is_accelerated_anew(tmp_path: Path) -> None:
+    """The clamp that turns is on one of them. Rows lie between steps, and stages take the quintics of all or none."""
+    scene = SCENE.replace(
+        'type = "spin_up"\nspeed = 6.0\nduration = 2.0', 'type = "table"\ntable = [[0, 1], [0.1, 2], [1, 1]]'
+    )
+    time = 'tolerance = 0.1\nscheme = "esdirk4"\noutput_step = 0.002\n[model]\nframe = "inertial"'
+    (tmp_path / "beam.toml").write_text(scene.replace("step = 0.01", time))
+    for ranks in (1, 2):
+        done = run(tmp_path, ranks)
+        assert done.returncode == 0, done.stderr
+    serial, parallel = (read_csv(tmp_path / f"r{ranks}" / "history.csv") for ranks in (1, 2))
+    for column in ("t", "tip_u1", "tip_u2", "tip_alpha"):
+        scale = float(np.max(np.abs(serial[column])))
+        np.testing.assert_allclose(parallel[column], serial[column], rtol=0, atol=1e-5 * scale, err_msg=column)
+
+
 def test_errors_are_told_once(tmp_path: Path) -> None:
     (tmp_path / "beam.toml").write_text(SCENE)
     bad = run(tmp_path, 2, "--set", "structure.length=-1")

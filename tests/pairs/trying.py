@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from tests.pairs.scenes import ACTIVE, ALSO, LEVELS, as_toml, shuffled, tables_o
 
 #: What no row has.
 CONFLICTS: list[Levels] = [*(refusal.choices for refusal in REFUSALS), *WHOLE]
-#: Seconds that rows of two processes may take each, compilation included, before one of them is taken to hang.
+#: Seconds that a row of two processes may take, compilation included, before its processes are taken to hang.
 PATIENCE = 180.0
 #: Error of an answer on two processes: of sums in another order and Newton's last increment, of adaptive steps, which
 #: may be others then, and of what is computed to an accuracy.
@@ -124,7 +124,10 @@ def compute_on_ranks(rows: Sequence[Row], folder: Path) -> None:
     listed.write_text(json.dumps(rows))
     command = [str(MPIRUN), "-n", "2", "--oversubscribe", sys.executable, "-m", "tests.pairs.on_ranks"]
     while left := [i for i in range(len(rows)) if not any((folder / f"{i}.{end}").exists() for end in ("npz", "txt"))]:
-        with suppress(subprocess.TimeoutExpired):
-            patience = PATIENCE * (len(left) + 1)
-            subprocess.run([*command, str(listed), str(folder)], env=environment(), check=False, timeout=patience)
+        processes = subprocess.Popen([*command, str(listed), str(folder)], env=environment())
+        while processes.poll() is None:
+            time.sleep(0.1)
+            if time.time() - folder.stat().st_mtime > PATIENCE:  # of the last row that was begun or done
+                processes.terminate()
+                processes.wait(timeout=PATIENCE)
         (folder / f"{left[0]}.txt").touch()  # of processes that did not even start

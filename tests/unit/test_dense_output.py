@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from rotfem.analysis.dense_output import RowTimes, between
 from rotfem.analysis.schemes import State
@@ -23,7 +24,7 @@ def test_polynomials_are_met_exactly(order: int, degree: int) -> None:
     for extra in (0, 1):
         p = np.polynomial.Polynomial(rng.uniform(0.5, 1.0, degree + 1 + extra))
         old, new, times = of_polynomial(p, 1.0), of_polynomial(p, 1.5), [1.1, 1.25, 1.4]
-        for state in between(old, new, times, order):
+        for state in between(old, new, times, order, MPI.COMM_SELF):
             exact = of_polynomial(p, state.t)
             off = max(abs(float(x[0] - y[0])) for x, y in zip((state.q, state.v), (exact.q, exact.v), strict=True))
             assert (off < 1e-12) == (extra == 0)
@@ -38,7 +39,7 @@ def test_what_holds_linearly_at_the_ends_holds_between() -> None:
     slow = [np.array([p.deriv(k)(t) for k in range(3)]) for t in (1.0, 1.5)]
     noise = [np.array([0.1, 0.0, 1e3]), np.array([0.2, 0.0, -1e3])]
     ends = [State(t, *np.array([a, b, a + b]).T) for t, a, b in zip((1.0, 1.5), slow, noise, strict=True)]
-    for state in between(*ends, [1.1, 1.25, 1.4], 4):
+    for state in between(*ends, [1.1, 1.25, 1.4], 4, MPI.COMM_SELF):
         assert state.q[2] == pytest.approx(state.q[0] + state.q[1], rel=1e-12)
         assert 0.1 <= state.q[1] <= 0.2
 
@@ -46,7 +47,7 @@ def test_what_holds_linearly_at_the_ends_holds_between() -> None:
 def test_rows_are_at_multiples_of_the_interval_and_at_the_end() -> None:
     """Whether steps are longer or shorter; a row at the end of a step is the state itself."""
     p = np.polynomial.Polynomial([0.0, 1.0])
-    rows, found, t = RowTimes(0.25, 2.1, 4), [], 0.0
+    rows, found, t = RowTimes(0.25, 2.1, 4, MPI.COMM_SELF), [], 0.0
     for h in (0.1, 0.15, 0.9, 0.05, 0.9):
         old, new = of_polynomial(p, t), of_polynomial(p, t := t + h)
         rows(old, new, Leg(t, h))
