@@ -12,6 +12,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
+from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from time import perf_counter
@@ -36,12 +37,6 @@ from rotfem.version import versions
 #: Positions of nodes that differ by this part of the structure's size are those of another mesh.
 MOVED = 1e-9
 
-#: Shape of what a free hub and its structure were given (see `State`).
-GIVEN = (3,)
-
-#: What a run counts and has to say, and what its monitor has seen, that changes while it goes on.
-OF_LOG, OF_MONITOR = ("steps", "warnings", "resumed"), ("since",)
-
 #: By class, attributes that a run makes anew or that have a place of their own in a checkpoint.
 _STEPPER = ("system", "newton", "back_off", "scheme", "scheme_back_off", "observer", "_linearised", "_about")
 APART = {
@@ -54,7 +49,7 @@ Tree = dict[str, Any]
 
 #: Parts of a checkpoint, and the types they may have.
 PARTS: dict[str, Any] = {
-    **dict.fromkeys(("identity", "versions", "state", "stepper", "run", "seen", "every"), dict),
+    **dict.fromkeys(("identity", "versions", "state", "stepper", "log", "monitor", "every"), dict),
     **dict.fromkeys(("factored", "stations", "resultants", "snapshots", "settings"), (dict, NoneType)),
     **dict.fromkeys(("positions", "rows"), np.ndarray),
     **dict.fromkeys(("t", "elapsed"), float),
@@ -209,7 +204,7 @@ class Log:
 
 
 @dataclass
-class Parts:
+class Memory:
     """What of a run a checkpoint holds: what marches, and what observes it; without a stepper nothing can be kept."""
 
     time: Time
@@ -221,18 +216,10 @@ class Parts:
     companions: Sequence[Companion]
     setting: Setting | None
 
-
-class Memory:
-    """What one run knows.
-
-    Args:
-        run: its parts.
-    """
-
-    def __init__(self, run: Parts):
-        self.run = run
-        self.numbering = Numbering(run.system.V)
-        self.packing = Packing(self.numbering)
+    @cached_property
+    def packing(self) -> Packing:
+        """What packs arrays over the mesh; all processes come here together."""
+        return Packing(Numbering(self.system.V))
 
     def taken(self, state: State, mine: Tree) -> Tree:
         """Return what the run knows at a state, on rank 0 in the common order of nodes.
@@ -241,35 +228,38 @@ class Memory:
             state: the state at the end of the last step.
             mine: identity of the run.
         """
-        run, snapshots = self.run, self.run.record.snapshots
-        assert run.stepper is not None
+        record, packed = self.record, self.packing.packed
+        assert self.stepper is not None
         return {
             "identity": mine,
             "versions": versions(),
-            "positions": self.numbering.positions,
+            "positions": self.packing.numbering.positions,
             "t": state.t,
             "given": state.given,
-            "state": self.packing.packed({k: v for k, v in vars(state).items() if k not in ("given", "inner")}),
-            "factored": self.packing.packed(run.system.held.factored),
-            "stepper": of_stepper(run.stepper, self.packing),
-            "run": self._changing(),
-            "seen": self.packing.packed({"farthest": run.monitor.farthest.seen, "stability": run.monitor.stability}),
-            "companions": self._of_companions(),
-            "elapsed": run.log.elapsed + perf_counter() - run.log.started,
-            "factorisations": run.system.factorisations,
-            "columns": list(run.record.history.columns),
-            "rows": np.array(run.record.history.rows()).reshape(len(run.record.history), -1),
-            "stations": None if run.record.stations is None else run.record.stations.kept_arrays(),
-            "resultants": None if run.record.resultants is None else run.record.resultants.kept_arrays(),
-            "snapshots": None if snapshots is None else self.packing.packed(vars(snapshots)),
-            "settings": None if run.setting is None else vars(run.setting),
+            "state": packed({k: v for k, v in vars(state).items() if k not in ("given", "inner")}),
+            "factored": packed(self.system.held.factored),
+            "stepper": of_stepper(self.stepper, self.packing),
+            "log": self._counted(),
+            "monitor": packed(self._seen()),
+            "companions": [of_companion(companion, self.packing) for companion in self.companions],
+            "elapsed": self.log.elapsed + perf_counter() - self.log.started,
+            "factorisations": self.system.factorisations,
+            "columns": list(record.history.columns),
+            "rows": np.array(record.history.rows()).reshape(len(record.history), -1),
+            "stations": None if record.stations is None else record.stations.kept_arrays(),
+            "resultants": None if record.resultants is None else record.resultants.kept_arrays(),
+            "snapshots": None if record.snapshots is None else packed(vars(record.snapshots)),
+            "settings": None if self.setting is None else vars(self.setting),
         }
 
-    def _changing(self) -> Tree:
-        log, monitor = self.run.log, self.run.monitor
+    def _counted(self) -> Tree:
+        return {name: getattr(self.log, name) for name in ("steps", "warnings", "resumed")}
+
+    def _seen(self) -> Tree:
         return {
-            "log": {name: getattr(log, name) for name in OF_LOG},
-            "monitor": {name: getattr(monitor, name) for name in OF_MONITOR},
+            "since": self.monitor.since,
+            "farthest": self.monitor.farthest.seen,
+            "stability": self.monitor.stability,
         }
 
     def put_back(self, path: Path, tree: Tree) -> State:
@@ -279,53 +269,47 @@ class Memory:
             SceneError: the mesh is another one, or something in the tree is not what a run has.
         """
         try:
-            self._check_mesh(path, tree["positions"])
+            here, there = self.packing.numbering.comm.bcast(self.packing.numbering.positions), tree["positions"]
+            size = float(np.max(np.ptp(here, axis=0)))
+            if there.shape != here.shape or np.max(np.abs(there - here)) > MOVED * size:
+                raise SceneError("command line", "--resume", path, "is of another mesh")
             self._check_rows(tree)
             return self._put_back(tree)
         except SceneError:
             raise
-        except (
-            ArithmeticError,
-            AttributeError,
-            ImportError,
-            LookupError,
-            RuntimeError,
-            TypeError,
-            ValueError,
-        ) as error:
+        except Exception as error:  # of any kind, as anything may lie anywhere
             raise damaged(path, " ".join(f"{type(error).__name__}: {error}".split())) from None
 
     def _put_back(self, tree: Tree) -> State:
-        run, stepper = self.run, self.run.stepper
+        stepper, unpacked, monitor, record = self.stepper, self.packing.unpacked, self.monitor, self.record
         assert stepper is not None
-        state, system = State(**self.packing.unpacked(tree["state"]), given=tree["given"]), run.system.held
-        check_state(run.system, stepper, state)
+        state, system = State(**unpacked(tree["state"]), given=tree["given"]), self.system.held
+        check_state(self.system, stepper, state)
         if state.t != tree["t"]:
             raise ValueError("t")
-        alike(self._changing(), tree["run"], "run")
-        seen = self.packing.unpacked(tree["seen"])
-        alike({"farthest": run.monitor.farthest.seen, "stability": None}, {**seen, "stability": None}, "seen")
-        if not suits(seen["stability"], Stability | None) or len(seen["farthest"]) != len(run.monitor.farthest.seen):
-            raise TypeError("seen")
+        seen, rows = unpacked(tree["monitor"]), tree["rows"]
+        alike(self._counted(), tree["log"], "log")
+        alike(self._seen() | {"stability": None}, {**seen, "stability": None}, "monitor")
+        if not suits(seen["stability"], Stability | None) or len(seen["farthest"]) != len(monitor.farthest.seen):
+            raise TypeError("monitor")
         for name, kind in (("warnings", str), ("resumed", dict)):
-            if not all(isinstance(entry, kind) for entry in tree["run"]["log"][name]):
+            if not all(isinstance(entry, kind) for entry in tree["log"][name]):
                 raise TypeError(name)
-        restored(run.system, self.packing.unpacked(tree["factored"]), state)
+        restored(self.system, unpacked(tree["factored"]), state)
         system.factored_before = tree["factorisations"] - system.factorisations
-        vars(run.log).update(tree["run"]["log"])
-        vars(run.monitor).update(tree["run"]["monitor"])
+        vars(self.log).update(tree["log"], elapsed=tree["elapsed"])
+        monitor.since, monitor.farthest.seen, monitor.stability = seen["since"], seen["farthest"], seen["stability"]
         put_back_stepper(stepper, self.packing, tree["stepper"], state)
-        run.monitor.farthest.seen, run.monitor.stability = seen["farthest"], seen["stability"]
-        self._put_back_companions(tree["companions"])
-        for row in tree["rows"]:
-            run.record.history.append(row)
-        if run.record.stations is not None:
-            run.record.stations.put_back(tree["stations"], len(tree["rows"]))
-        if run.record.resultants is not None:
-            run.record.resultants.put_back(tree["resultants"], len(tree["rows"]))
-        if run.record.snapshots is not None:
-            run.record.snapshots.put_back(self.packing.unpacked(tree["snapshots"]), len(tree["rows"]))
-        run.log.elapsed = tree["elapsed"]
+        for companion, known in zip(self.companions, tree["companions"], strict=True):
+            put_back_companion(companion, self.system, self.packing, known)
+        for row in rows:
+            record.history.append(row)
+        if record.stations is not None:
+            record.stations.put_back(tree["stations"], len(rows))
+        if record.resultants is not None:
+            record.resultants.put_back(tree["resultants"], len(rows))
+        if record.snapshots is not None:
+            record.snapshots.put_back(unpacked(tree["snapshots"]), len(rows))
         return state
 
     def _check_rows(self, tree: Tree) -> None:
@@ -334,11 +318,11 @@ class Memory:
         Raises:
             ValueError: it is.
         """
-        rows, t, time = tree["rows"], tree["t"], self.run.time
-        if tree["columns"] != list(self.run.record.history.columns) or tree["run"]["log"]["steps"] < 0:
+        rows, t, time = tree["rows"], tree["t"], self.time
+        if tree["columns"] != list(self.record.history.columns) or tree["log"]["steps"] < 0:
             raise ValueError("columns")
         if time.output_step is None:
-            due = 1 + tree["run"]["log"]["steps"] // time.output_every
+            due = 1 + tree["log"]["steps"] // time.output_every
         else:
             due = 1 + int(min(t, time.end) / time.output_step * (1 + 1e-9))
         if rows.ndim != 2 or rows.shape[1] != len(tree["columns"]) or not due <= len(rows) <= due + 1:
@@ -346,48 +330,39 @@ class Memory:
         if rows[0, 0] != 0.0 or np.any(np.diff(rows[:, 0]) <= 0.0) or rows[-1, 0] > t or not np.all(np.isfinite(rows)):
             raise ValueError("rows")
 
-    def _companions(self) -> list[tuple[Companion, Packing]]:
-        """Return the companions of the march, each with what packs arrays over its own mesh."""
-        return [(c, Packing(Numbering(c.system.V))) for c in self.run.companions]
 
-    def _of_companions(self) -> list[Tree]:
-        """Return what the companions know: steps that wait are of the run's mesh, the state of their own."""
-        return [
-            {
-                "state": own.packed(companion.state and companion.state.changed(given=None, inner=())),
-                "given": companion.state and companion.state.given,
-                "waiting": self.packing.packed(companion.waiting),
-                "differences": own.packed(companion.stepper.differences),
-                "factored": own.packed(companion.system.held.factored),
-                "known": plain(companion),
-                "stepper": of_stepper(companion.stepper, own),
-            }
-            for companion, own in self._companions()
-        ]
+def of_companion(companion: Companion, packing: Packing) -> Tree:
+    """Return what a companion knows: steps that wait are of the run's mesh (packing), the state of its own."""
+    own, state = Packing(Numbering(companion.system.V)), companion.state
+    return {
+        "state": own.packed(state and state.changed(given=None, inner=())),
+        "given": state and state.given,
+        "waiting": packing.packed(companion.waiting),
+        "differences": own.packed(companion.stepper.differences),
+        "factored": own.packed(companion.system.held.factored),
+        "known": plain(companion),
+        "stepper": of_stepper(companion.stepper, own),
+    }
 
-    def _put_back_companions(self, trees: list[Tree]) -> None:
-        for (companion, own), tree in zip(self._companions(), trees, strict=True):
-            state, waiting = own.unpacked(tree["state"]), self.packing.unpacked(tree["waiting"])
-            stepper, differences = companion.stepper, own.unpacked(tree["differences"])
-            alike(plain(companion), tree["known"], "known")
-            if not suits(state, State | None) or not suits(tuple(waiting), tuple[Followed | None, Followed | None]):
-                raise TypeError("companions")
-            for end in (end for step in waiting if step is not None for pair in step.steps for end in pair):
-                check_motion(self.run.system, vars(end))
-            alike([(0.0, companion.system.zeros())] * min(len(differences), 2), differences, "differences")
-            companion.state, companion.waiting, stepper.differences = state, waiting, differences
-            vars(companion).update(tree["known"])
-            if state is not None:
-                state.given = tree["given"]
-                check_state(companion.system, stepper, state)
-                restored(companion.system, own.unpacked(tree["factored"]), state)
-                put_back_stepper(stepper, own, tree["stepper"], state)
 
-    def _check_mesh(self, path: Path, there: Any) -> None:
-        here = self.numbering.comm.bcast(self.numbering.positions)
-        size = float(np.max(np.ptp(here, axis=0)))
-        if there.shape != here.shape or np.max(np.abs(there - here)) > MOVED * size:
-            raise SceneError("command line", "--resume", path, "is of another mesh")
+def put_back_companion(companion: Companion, followed: Any, packing: Packing, tree: Tree) -> None:
+    """Make a companion know what it knew (see `of_companion`) of the system that it follows."""
+    own = Packing(Numbering(companion.system.V))
+    state, waiting = own.unpacked(tree["state"]), packing.unpacked(tree["waiting"])
+    stepper, differences = companion.stepper, own.unpacked(tree["differences"])
+    alike(plain(companion), tree["known"], "known")
+    if not suits(state, State | None) or not suits(tuple(waiting), tuple[Followed | None, Followed | None]):
+        raise TypeError("companions")
+    for end in (end for step in waiting if step is not None for pair in step.steps for end in pair):
+        check_motion(followed, vars(end))
+    alike([(0.0, companion.system.zeros())] * min(len(differences), 2), differences, "differences")
+    companion.state, companion.waiting, stepper.differences = state, waiting, differences
+    vars(companion).update(tree["known"])
+    if state is not None:
+        state.given = tree["given"]
+        check_state(companion.system, stepper, state)
+        restored(companion.system, own.unpacked(tree["factored"]), state)
+        put_back_stepper(stepper, own, tree["stepper"], state)
 
 
 def check_state(system: Any, stepper: Stepper, state: State) -> None:
@@ -399,7 +374,7 @@ def check_state(system: Any, stepper: Stepper, state: State) -> None:
     check_motion(system, vars(state))
     if not 0.0 <= state.t < np.inf or not isinstance(state.balanced, bool):
         raise ValueError("state")
-    if (state.given is None) != (system.hub is None) or (state.given is not None and state.given.shape != GIVEN):
+    if (state.given is None) != (system.hub is None) or (state.given is not None and state.given.shape != (3,)):
         raise ValueError("given")
     if not suits(state.reference, ReferenceRotation | None):
         raise ValueError("reference")

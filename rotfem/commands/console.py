@@ -19,6 +19,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from textwrap import wrap
 from time import monotonic, sleep
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NoReturn, TextIO
 
 from rotfem.commands.interrupts import together
@@ -56,20 +57,6 @@ def fitted(text: str, stream: TextIO) -> str:
     return "\n".join("\n".join(wrap(x, width, **folds)) if len(x) > width else x for x in text.split("\n"))
 
 
-class _Alone:
-    """The communicator of a process where there is no MPI."""
-
-    rank, size = 0, 1
-
-    def bcast(self, value: Any) -> Any:
-        """Return what is sent to all."""
-        return value
-
-    def allgather(self, value: Any) -> list[Any]:
-        """Return what all send."""
-        return [value]
-
-
 class Session:
     """One command under one set of flags: speaks on rank 0 only, and turns errors into messages and exit status.
 
@@ -81,8 +68,8 @@ class Session:
     """
 
     def __init__(self, as_json: bool, quiet: bool, debug: bool):
-        self.comm: Any = _Alone()
-        with suppress(ImportError):  # some commands do without FEniCSx
+        self.comm: Any = SimpleNamespace(rank=0, size=1, bcast=lambda value: value, allgather=lambda value: [value])
+        with suppress(ImportError):  # some commands do without FEniCSx, and so without MPI
             from mpi4py import MPI
 
             self.comm = MPI.COMM_SELF if ALONE.get() else MPI.COMM_WORLD

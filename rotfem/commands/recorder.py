@@ -71,10 +71,7 @@ class ResultantRows:
 
     def kept_arrays(self) -> dict[str, Any]:
         """Return what a checkpoint has of it."""
-        kept = self.frames.kept
-        frames = {"t": [t for t, _ in kept], "values": np.array([x for _, x in kept])}
-        more = {name: value for name, value in vars(self.frames).items() if name != "kept"}
-        return {"frames": frames, "more": more, "last": self.last, "largest": list(self.largest)}
+        return {"frames": vars(self.frames), "last": self.last, "largest": list(self.largest)}
 
     def put_back(self, known: dict[str, Any], rows: int) -> None:
         """Take what a checkpoint has, where the history has so many rows.
@@ -82,11 +79,12 @@ class ResultantRows:
         Raises:
             ValueError: it is not what there is after so many.
         """
-        frames, last = known["frames"], known["last"]
-        kept = [(float(t), x) for t, x in zip(frames["t"], frames["values"], strict=True)]
-        if any(x.shape != last.shape for _, x in kept) or len(known["largest"]) != 4:  # value, x, y, t
+        last = known["last"]
+        if (
+            any(x.shape != last.shape for _, x in known["frames"]["kept"]) or len(known["largest"]) != 4
+        ):  # value, x, y, t
             raise ValueError("resultants")
-        self.frames.put_back({**known["more"], "kept": kept}, rows)
+        self.frames.put_back(known["frames"], rows)
         self.last, self.largest = last, tuple(known["largest"])
 
 

@@ -26,7 +26,7 @@ from rotfem.analysis.theory_error import said_of
 from rotfem.commands import monitor
 from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.advice import advise
-from rotfem.commands.checkpoint import Log, Parts
+from rotfem.commands.checkpoint import Log, Memory
 from rotfem.commands.error_report import RunErrors, check_rotations, output_of
 from rotfem.commands.first_state import Start, first_state, hints_of_start
 from rotfem.commands.interrupts import together
@@ -154,7 +154,7 @@ class Simulation:
 
     def _by_reduced_model(self, progress: Progress) -> bool:
         """Record the history of a reduced model; return whether one serves; a warning says where it does not."""
-        self.store.start(self._parts())
+        self.store.start(self._memory())
         with self.store.interrupts():
             self.reduced = reduced_history(
                 self.scene, self.system, self.start.q, self.record, self.monitor, self.log, self.setting is not None
@@ -174,7 +174,7 @@ class Simulation:
             of = OUTPUTS[output_of(self.scene)], time.output_step, richer_problem(self.problem)
             self.companions = HistoryErrors(self.problem, self.system, scheme, newton, self._start_there, *of)
             self.stepper.observer = self.companions
-        march.reached = self.store.start(self._parts())
+        march.reached = self.store.start(self._memory())
         if time.output_step is not None:
             passed, further = max(len(self.record.history) - 1, 0), self.stepper.observer
             self.rows = RowTimes(time.output_step, time.end, scheme.order, self.system.comm, further, passed)
@@ -222,11 +222,11 @@ class Simulation:
         self.monitor.row(state)
         self.record(state)
 
-    def _parts(self) -> Parts:
+    def _memory(self) -> Memory:
         """Return what a checkpoint holds."""
         assert self.scene.time is not None
         companions = [] if self.companions is None else self.companions.companions
-        return Parts(
+        return Memory(
             *(self.scene.time, self.system, self.stepper, self.record, self.monitor, self.log),
             *(companions, self.setting),
         )

@@ -11,7 +11,7 @@ from typing import Any
 from mpi4py import MPI
 
 from rotfem.analysis.schemes import State
-from rotfem.commands.checkpoint import Memory, Parts, Tree, check_end, check_identity, check_parts, comparable, identity
+from rotfem.commands.checkpoint import Memory, Tree, check_end, check_identity, check_parts, comparable, identity
 from rotfem.commands.interrupts import Interrupts
 from rotfem.commands.result_folder import ResultFolder
 from rotfem.errors import OutputError, SceneError, Stopped
@@ -71,8 +71,7 @@ class RunStore:
     ):
         self.comm, self.folder, self.every, self.resume = comm, folder, every, resume
         self._live: LiveTable | None = None
-        self._parts: Parts | None = None
-        self._memory: Memory | None = None
+        self._run: Memory | None = None
         self._tree: Tree | None = None
         self._identity: Tree = {}
         self._written = monotonic()
@@ -137,21 +136,19 @@ class RunStore:
         self._interrupts = Interrupts(self.comm, self._secure, self.comm.size > 1 or self.every is not None)
         return self._interrupts
 
-    def start(self, run: Parts) -> State | None:
+    def start(self, run: Memory) -> State | None:
         """Begin the set of a run; return the state that it goes on from, if it does.
 
         Raises:
             OutputError: the folder cannot be written.
             SceneError: the checkpoint does not fit.
         """
-        self._parts, self._talked, self._next = run, (monotonic(), run.log.steps), 0
+        self._run, self._talked, self._next = run, (monotonic(), run.log.steps), 0
         if self.folder is None:
             return None
         state, path = None, self.folder.path / CHECKPOINT
-        if self.every is not None or self._tree is not None:
-            self._memory = Memory(run)
-        if self._tree is not None and self._memory is not None:
-            state = self._memory.put_back(path, self._tree)
+        if self._tree is not None:
+            state = run.put_back(path, self._tree)
             run.log.resumed.append({"time": state.t, "ranks": self.comm.size})
         keep = (CHECKPOINT,) if self._tree is not None else ()
         self._tree = None  # a richer model would start afresh
@@ -173,7 +170,7 @@ class RunStore:
         if self._live is not None:
             self._live.update()
         (asked, due), left = self._agreed(), self._left(state)
-        fixed = self._parts is not None and self._parts.time.step is not None
+        fixed = self._run is not None and self._run.time.step is not None
         # The last state that a run with a later end would have met, too, is kept; none after it.
         if left >= 1 - 1e-6 and (asked or due or (fixed and left < 2 - 1e-6)):
             self._save(state)
@@ -186,7 +183,7 @@ class RunStore:
         Ranks talk to each other after so many steps only as take about `TALK` on rank 0: they need not meet in between.
         """
         asked, every = self._interrupts.asked, self.every or Interval()
-        steps = 0 if self._parts is None else self._parts.log.steps
+        steps = 0 if self._run is None else self._run.log.steps
         due = every.steps is not None and steps > 0 and steps % every.steps == 0
         if self.comm.size > 1 and steps < self._next:
             return False, due
@@ -201,21 +198,21 @@ class RunStore:
 
     def _left(self, state: State) -> float:
         """Return how many more steps there are at least; of adaptive ones whether there is one."""
-        assert self._parts is not None
-        time = self._parts.time
+        assert self._run is not None
+        time = self._run.time
         return (time.end - state.t) / (time.step or 1e-9 * time.end)
 
     def _save(self, state: State) -> None:
         """Write a checkpoint."""
-        if self._memory is None or self._parts is None or self.every is None:
+        if self.folder is None or self._run is None or self.every is None:
             return
-        tree = self._memory.taken(state, self._identity) | {"every": vars(self.every)}
-        if self.folder is not None and self.folder.set is not None:
+        tree = self._run.taken(state, self._identity) | {"every": vars(self.every)}
+        if self.folder.set is not None:
             try:
                 write_checkpoint(self.folder.path / CHECKPOINT, tree)
             except OutputError as error:
                 if not self._failed:
-                    self._parts.log.warnings.append(
+                    self._run.log.warnings.append(
                         f"a checkpoint could not be written at t = {state.t:.6g} s: {error.reason}"
                     )
                 self._failed = True

@@ -82,10 +82,9 @@ def values_of(text: str) -> list[Any]:
 
 
 def _number(text: str) -> Any:
-    with suppress(ValueError):
-        return int(text)
-    with suppress(ValueError):
-        return float(text)
+    for kind in (int, float):
+        with suppress(ValueError):
+            return kind(text)
     return text
 
 
