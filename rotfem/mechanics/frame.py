@@ -27,6 +27,10 @@ class Frame:
         fixed: the frame translates with the hub but does not rotate (the inertial-frame form).
         gravity: inertial components, m/s^2.
         pitching: the frame pitches over time.
+
+    Attributes:
+        constants: name ↦ constant in the forms.
+        slices: name ↦ which components of a vector of the frame it has.
     """
 
     def __init__(
@@ -42,8 +46,8 @@ class Frame:
         self.constants: dict[str, fem.Constant] = {}
         self._entries: dict[str, Array] = {}  # of the constants, where they are
         turn, plane = (slice(2, 3), slice(0, 2)) if planar else (slice(0, 3), slice(0, 3))
-        self._slices = {"w": turn, "dw": turn, "a_o": plane, "v_o": plane, "gravity": plane}
-        self._slices |= dict.fromkeys(("pitch", "pitch_rate"), slice(0, 2)) | {"psi": slice(0, 1)}
+        self.slices = {"w": turn, "dw": turn, "a_o": plane, "v_o": plane, "gravity": plane}
+        self.slices |= dict.fromkeys(("pitch", "pitch_rate"), slice(0, 2)) | {"psi": slice(0, 1)}
 
     def _constant(self, name: str, size: int) -> fem.Constant:
         if name not in self.constants:
@@ -94,7 +98,7 @@ class Frame:
                 value = motion.angle(t) * motion.axis[2:]
             else:
                 value = motion.rotation(t) @ moved[name] if self.fixed and name == "a_o" else moved[name]
-            out[name] = value[self._slices[name]]
+            out[name] = value[self.slices[name]]
         return out
 
     def set(self, values: dict[str, Array]) -> None:

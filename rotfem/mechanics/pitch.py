@@ -45,6 +45,12 @@ def _parts_of_turn(*axis: float) -> tuple[Array, Array, Array]:
     return np.eye(3), cross, cross @ cross
 
 
+def in_turned_frame(axis: Array, phi: Any, v: Array) -> Array:
+    """Return the components Rᵀ v of vectors (…, 3) in a frame that is turned by φ (rad, (…, 1)) about a unit vector."""
+    _, cross, twice = _parts_of_turn(*axis)
+    return np.asarray(v - np.sin(phi) * (v @ cross.T) + (1 - np.cos(phi)) * (v @ twice.T))
+
+
 def is_beside(root: npt.ArrayLike, axis: npt.ArrayLike) -> bool:
     """Return whether the line through the root (m) along an axis misses the origin."""
     arm, along = np.asarray(root, dtype=float), np.asarray(axis, dtype=float)
@@ -113,7 +119,7 @@ class Pitch:
         c, s, e, r = np.cos(phi), np.sin(phi), self.axis, self.root
         of_hub = self.seen(phi, w)
         spin = of_hub + rate * e
-        change = self.seen(phi, dw) - rate * (of_hub @ self._crossed.T) + acceleration * e
+        change = self.seen(phi, dw) - rate * np.cross(e, of_hub) + acceleration * e
         origin, velocity = self.seen(phi, a_o), np.zeros_like(spin)
         if self.moves_origin:
             of_root: Any = np.cross(dw, r) + np.cross(w, np.cross(w, r))
@@ -125,13 +131,7 @@ class Pitch:
 
     def seen(self, phi: Array, v: Array) -> Array:
         """Return the components Rᵀ v of vectors (…, 3) of the hub's frame at turns φ (…, 1)."""
-        across = v @ self._crossed.T
-        return np.asarray(v - np.sin(phi) * across + (1 - np.cos(phi)) * (across @ self._crossed.T))
-
-    @cached_property
-    def _crossed(self) -> Array:
-        """The matrix of e×."""
-        return np.asarray(np.cross(self.axis, np.eye(3)).T)
+        return in_turned_frame(self.axis, phi, v)
 
     def in_hub_axes(self, values: Array, t: float) -> Array:
         """Return vectors (…, 3 n), n of them one after the other, with components in the hub's frame."""

@@ -24,6 +24,7 @@ from rotfem.analysis.reduced.model import ReducedModel
 from rotfem.analysis.reduced.solution import Solution, States
 from rotfem.analysis.time_grid import find_jumps
 from rotfem.errors import InputError
+from rotfem.mechanics.pitch import in_turned_frame
 from rotfem.mechanics.time_signals import POINTS, WEIGHTS
 from rotfem.mechanics.time_signals import SAME as RESOLVED
 from rotfem.numerics.projection import summed
@@ -94,11 +95,8 @@ class Excitation:
             turn: angle (rad), speed and rate of the frame about its axis, (n, 3).
             loads: those of the loads, where they are known.
         """
-        about = slice(2, 3) if self.frame.planar else slice(0, 3)
-        along = slice(0, 2) if self.frame.planar else slice(0, 3)
-        slices = {"w": about, "dw": about, "a_o": along, "v_o": along, "gravity": along}
         moved = self._moved(t, *turn.T)
-        values = {name: moved[name][:, slices.get(name, slice(None))] for name in self.frame.constants}
+        values = {name: moved[name][:, self.frame.slices[name]] for name in self.frame.constants}
         return values | (self.loads(t) if loads is None else loads)
 
     def loads(self, t: Array) -> dict[str, Array]:
@@ -114,32 +112,21 @@ class Excitation:
     def _moved(self, t: Array, angle: Array, speed: Array, rate: Array) -> dict[str, Array]:
         """Return what the frame's constants are at times, by name, as far as there are such, (n, components)."""
         axis, names, pitch = self.motion.axis, self.frame.constants, self.motion.pitch
-        values = {"w": np.outer(speed, axis), "dw": np.outer(rate, axis)}
+        values: dict[str, Array] = {"w": np.outer(speed, axis), "dw": np.outer(rate, axis)}
         if "a_o" in names or pitch is not None:
             values["a_o"] = self._signal("motion.base_acceleration", self.motion.base_acceleration, t)
-        if "gravity" in names:
-            values["gravity"] = self._gravity(angle)
+        gravity = in_turned_frame(axis, angle[:, None], np.asarray(self.system.model.problem.loads.gravity))
         if pitch is None:
-            return values
+            return values | {"gravity": gravity}
         beta, d_beta, dd_beta = (self._signal(name, at, t)[:, 0] for name, at in pitch.signals.items())
-        beta = beta - pitch.start
-        if "gravity" in names:
-            values["gravity"] = pitch.seen(beta[:, None], values["gravity"])
-        values |= pitch.moved((beta, d_beta, dd_beta), values["w"], values["dw"], values["a_o"])
-        return values
+        values = pitch.moved((beta - pitch.start, d_beta, dd_beta), values["w"], values["dw"], values["a_o"])
+        return values | {"gravity": pitch.seen((beta - pitch.start)[:, None], gravity)}
 
     def _signal(self, name: str, at: Any, t: Array) -> Array:
         """Return the values of a signal, or of what does not change, at times (n,), shape (n, components)."""
         known = self._signals.get(name)
         values = known.values(t) if known else np.tile(np.atleast_1d(np.asarray(at(0.0), dtype=float)), (len(t), 1))
         return np.asarray(values, dtype=float)
-
-    def _gravity(self, angle: Array) -> Array:
-        """Return gravity in the turning frame (Rodrigues' formula, backwards), shape (n, 3)."""
-        e, g = self.motion.axis, np.asarray(self.system.model.problem.loads.gravity, dtype=float)
-        along = e * (e @ g)
-        turned = along + np.outer(np.cos(angle), g - along) - np.outer(np.sin(angle), np.cross(e, g))
-        return np.asarray(turned)
 
 
 class HeldEquations:
@@ -157,7 +144,7 @@ class HeldEquations:
 
     def __init__(self, model: ReducedModel, excitation: Excitation):
         self.model, self.excitation, self.within = model, excitation, excitation.within
-        matrices = model.operators(excitation.factors(excitation.samples()))[:3]
+        matrices = model.operators(excitation.factors(excitation.samples()))
         self.constant = all(np.all(np.ptp(A, axis=0) <= 1e-12 * np.abs(A).max(initial=0.0)) for A in matrices)
 
     def start(self, shape: Array | None) -> tuple[Array, Array]:
@@ -180,18 +167,16 @@ class HeldEquations:
 
     def reference(self, t: float, y: Array, v: Array) -> tuple[Array, Array, Array]:
         """Return M, C, K (m, m) at a time, s."""
-        M, C, K, _ = self.model.operators(self.excitation.factors(np.array([t])))
+        M, C, K = self.model.operators(self.excitation.factors(np.array([t])))
         return M[0], C[0], K[0]
 
     def at(self, t: Array) -> Callable[[Array, Array, Array], Array]:
         """Return M a + C v + K q + f and further forces (n, m), a function of q, v and a (n, m)."""
-        M, C, K, f = self.model.operators(self.excitation.factors(t))
-        f = f if self.further is None else f + self.further(t)
+        own, further = self.model.residual(self.excitation.factors(t)), self._further(t)
+        return lambda q, v, a: own(q, v, a) + further
 
-        def residual(q: Array, v: Array, a: Array) -> Array:
-            return np.asarray(f + sum(np.einsum("nij,nj->ni", A, x) for A, x in ((M, a), (C, v), (K, q))))
-
-        return residual
+    def _further(self, t: Array) -> Array | float:
+        return 0.0 if self.further is None else self.further(t)
 
     def second_order(self, manifold: Manifold, solution: Solution) -> Forces:
         """Return the forces (n, unknowns) of a linear solution on a manifold, a function of times; none on a hub.
@@ -293,7 +278,8 @@ class FreeHubEquations(HeldEquations):
         m, turn = self.model.size, np.array([[y[-1], v[-1], 0.0]])
         there = np.array([t])
         rates = turn + np.array([[0.0, 0.0, 1.0]])
-        (*small, f), (*_, pushed) = (self.model.operators(self.excitation.factors(there, x)) for x in (turn, rates))
+        factors = [self.excitation.factors(there, x) for x in (turn, rates)]
+        small, (f, pushed) = self.model.operators(factors[0]), (self.model.load(c) for c in factors)
         inertia = self.hub.inertia + self._inertia
         M, C, K = (np.zeros((m + 1, m + 1)) for _ in range(3))
         for whole, own, corner in zip((M, C, K), small, (inertia, self.hub.damping, inertia), strict=True):
@@ -304,14 +290,12 @@ class FreeHubEquations(HeldEquations):
     def at(self, t: Array) -> Callable[[Array, Array, Array], Array]:
         """Return what the equations of structure and hub leave of states, (n, m + 1) each, with the angle last."""
         loads, torque = self.excitation.loads(t), self.hub.torque.many(t, after=True)
-        further = 0.0 if self.further is None else self.further(t)
+        further = self._further(t)
 
         def residual(y: Array, dy: Array, ddy: Array) -> Array:
             turn, (q, v, a) = np.stack([x[:, -1] for x in (y, dy, ddy)], axis=1), (x[:, :-1] for x in (y, dy, ddy))
             constants = self.excitation.constants(t, turn, loads)
-            c = np.asarray(self.model.system.factors(constants, len(t)))
-            M, C, K, f = self.model.operators(c)
-            out = f + sum(np.einsum("nij,nj->ni", A, x) for A, x in ((M, a), (C, v), (K, q)))
+            out = self.model.residual(np.asarray(self.model.system.factors(constants, len(t))))(q, v, a)
             own = self.hub.inertia * turn[:, 2] + self.hub.damping * turn[:, 1] - torque
             own = own + self._of_momentum(turn, q, v, a) - self._outside(constants, q)
             return np.column_stack([out, own]) + further

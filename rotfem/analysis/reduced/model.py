@@ -11,6 +11,7 @@ the centrifugal force is ∂T0/∂q and that of Euler's acceleration Ω̇ d(∂T
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -111,10 +112,19 @@ class ReducedModel:
 
     # --- the equations -----------------------------------------------------------------------------------------------
 
-    def operators(self, c: Array) -> tuple[Array, Array, Array, Array]:
-        """Return M, C, K (n, m, m) and f (n, m) from the factors of all pieces (n, pieces)."""
+    def operators(self, c: Array) -> tuple[Array, Array, Array]:
+        """Return M, C and K (n, m, m) from the factors of all pieces (n, pieces)."""
         M, C, K = (np.asarray(np.tensordot(c[:, self.kinds[k]], self.small[k], 1)) for k in "MCK")
-        return M, C, K, c[:, self.kinds["f"]] @ self.small["f"]
+        return M, C, K
+
+    def load(self, c: Array) -> Array:
+        """Return f (n, m) likewise."""
+        return np.asarray(c[:, self.kinds["f"]] @ self.small["f"])
+
+    def residual(self, c: Array) -> Callable[[Array, Array, Array], Array]:
+        """Return M a + C v + K q + f (n, m) as a function of q, v and a (n, m), from the factors (n, pieces)."""
+        (M, C, K), f = self.operators(c), self.load(c)
+        return lambda q, v, a: f + sum(np.einsum("nij,nj->ni", A, x) for A, x in ((M, a), (C, v), (K, q)))
 
     def residuals(self, c: Array, q: Array, v: Array, a: Array) -> Array:
         """Return M V a + C V v + K V q + f of the full system at k instants, owned rows (n, k).

@@ -21,9 +21,8 @@ other terms in r its first iterate is the solution.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import factorial
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -43,23 +42,6 @@ ITERATIONS, WINDOW, LARGEST = 16, 64, 1024
 
 #: States (n, m) at the times asked for: coordinates, rates, accelerations.
 States = tuple[Array, Array, Array]
-
-
-class Equations(Protocol):
-    """Equations r(t, y, ẏ, ÿ) = 0 of few unknowns."""
-
-    @property
-    def constant(self) -> bool:
-        """Whether r is linear with constant matrices."""
-
-    def within(self, begin: Array, end: Array, shares: Array) -> Array:
-        """Return the times (n, shares) at these shares of intervals, on the right side of their ends, s."""
-
-    def reference(self, t: float, y: Array, v: Array) -> tuple[Array, Array, Array]:
-        """Return M, C, K (m, m) at a time (s), coordinates and rates (m,)."""
-
-    def at(self, t: Array) -> Callable[[Array, Array, Array], Array]:
-        """Return r (n, m) at times (n,) as a function of coordinates, rates and accelerations (n, m)."""
 
 
 class Modes:
@@ -129,7 +111,7 @@ class Window:
         iterations: how many were needed.
     """
 
-    def __init__(self, equations: Equations, ends: Array, x: Array):
+    def __init__(self, equations: Any, ends: Array, x: Array):
         m, h = len(x) // 2, np.diff(ends)
         self.ends, self._powers = ends, h[:, None] ** -np.arange(len(NODES))
         self._modes = modes = Modes(*equations.reference(0.5 * float(ends[0] + ends[-1]), x[:m], x[m:]))
@@ -192,7 +174,7 @@ class Solution:
     """The solution over steps, window by window.
 
     Args:
-        equations: that are solved.
+        equations: that are solved, with `constant`, `within`, `reference` and `at` as `HeldEquations` has them.
         ends: of the steps, the first the start, s.
         y: coordinates at the start, (m,).
         v: rates there.
@@ -201,7 +183,7 @@ class Solution:
         ComputationError: the iteration converges in no window, or to nothing finite.
     """
 
-    def __init__(self, equations: Equations, ends: Array, y: Array, v: Array):
+    def __init__(self, equations: Any, ends: Array, y: Array, v: Array):
         self.ends, self._windows, x = ends, list[Window](), np.concatenate([y, v])
         n = len(ends) - 1 if len(y) else 0
         first, width = 0, LARGEST if equations.constant else WINDOW
