@@ -22,8 +22,8 @@ from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
-from rotfem.refinement.discretisation import HistoryErrors, error_of_shape, richer_problem
-from rotfem.refinement.distance import COLUMNS, OUTPUTS, largest, tip
+from rotfem.refinement.discretisation import HistoryErrors, richer_problem
+from rotfem.refinement.distance import COLUMNS, OUTPUTS, Output, largest, tip
 from rotfem.refinement.estimate import NOTICED, ErrorEstimate, percent
 from rotfem.refinement.frequencies import phase_drift
 from rotfem.scene import Scene
@@ -92,15 +92,12 @@ class RunErrors:
         scale = largest(np.column_stack([x for name, x in self.history.items() if name.startswith(COLUMNS[of])]))
         contributions: dict[str, float | None] = {"time": None, "space": None}
         found: dict[str, Any] = {"scale": scale}
-        if self.reduced is not None:
-            time = self.reduced.time_error + self.reduced.basis_error
-            contributions = {"time": time, "space": self._space_of_reduced(scale)}
-        elif self.shape is not None:
-            space = error_of_shape(self.problem, self.system, self.shape, self._resting, OUTPUTS[of])
-            contributions = {"time": 0.0, "space": space}
-        elif self.companions is not None:
+        if self.companions is not None:
             contributions = self.companions.errors(scale)
             found["time_at"] = self.companions.steps.difference[1]
+        elif self.reduced is not None or self.shape is not None:
+            time = 0.0 if self.reduced is None else self.reduced.time_error + self.reduced.basis_error
+            contributions = {"time": time, "space": self._of_mesh(OUTPUTS[of])}
         return ErrorEstimate({**contributions, "model": None if self.theory is None else self.theory.estimate}, found)
 
     @cached_property
@@ -172,43 +169,48 @@ class RunErrors:
                 return None
             apart = _relative(companion.difference[0], self._scale)
             return companion.system, apart, np.array(companion.components)
-        system = compile_system(richer.replace(outputs={}), self.system.comm, moving=self.scene.time is not None)
-        if self.reduced is not None:
-            response = self.reduced
-            there = reduced_response(system, response.times, self.start(system).q, accuracy_of(self.scene))
-            differences = (there.tips - response.tips)[:, self._moves]
-            return system, _relative(largest(differences), self._scale), np.abs(differences).max(axis=0)
-        if self.shape is None:
+        if self.reduced is None and self.shape is None:
             return None
-        shapes = ((self.system, self.shape), (system, self._resting(system)))
-        own, other = (tip(s, State.at_rest(s, *s.start(q.copy()))) for s, q in shapes)
-        smaller = min(float(np.linalg.norm(other)), self._scale)
-        return system, _relative(float(np.linalg.norm(other - own)), smaller), np.abs(other - own)
+        system = compile_system(richer.replace(outputs={}), self.system.comm, moving=self.scene.time is not None)
+        own, there = self._answer(self.system), self._answer(system)
+        scale = largest(own) if self.shape is None else min(largest(own), largest(there))
+        return system, _relative(largest(there - own), scale), np.abs(there - own).max(axis=0)
 
-    def _resting(self, system: Any) -> Array:
-        """Return the equilibrium in another system."""
+    def _answer(self, system: Any, output: Output = tip) -> Array:
+        """Return an output (n, components) of a reduced model or an equilibrium in the run's system or another one.
+
+        Raises:
+            ComputationError: there is none.
+        """
+        own, same = self.reduced, system is self.system
+        if own is not None:
+            accuracy, bent = accuracy_of(self.scene), own.manifold is not None
+            there = own if same else reduced_response(system, own.times, self.start(system).q, accuracy, bent)
+            return there.tips[:, self._moves]
         solver, speed = self.scene.solver, self.problem.motion.speed(0.0)
-        return steady_state(system, speed, Newton.of(solver), past_limits=solver.past_limits)
+        if same and self.shape is not None:
+            q = self.shape.copy()
+        else:
+            q = steady_state(system, speed, Newton.of(solver), past_limits=solver.past_limits)
+        return output(system, State.at_rest(system, *system.start(q)))[None, :]
+
+    def _of_mesh(self, output: Output) -> float | None:
+        """Return the error of an output by the mesh: its difference to the one on another mesh; None if unknown."""
+        own, other = self._answer(self.system, output), on_other_mesh(self.problem, self.system, self.shape is None)
+        if self.reduced is not None and not np.any(own):
+            return 0.0  # nothing moves it, on no mesh
+        if other is None:
+            return None
+        try:
+            there = self._answer(other.system, output)
+        except ComputationError:
+            return None
+        return other.error(largest(there - own) / (largest(own) or np.inf))
 
     def _buckles(self, system: Any) -> bool:
         """Return whether a richer theory has no stable equilibrium where the run's is stable; its state is set."""
         there = stability_of(system, system.held.q.x.array.copy(), self.problem.motion.speed(0.0))
         return there.stable is False and self.stability is not None and self.stability.stable is True
-
-    def _space_of_reduced(self, scale: float) -> float | None:
-        """Return the error of a reduced answer by the mesh: its difference to a reduced answer on another one."""
-        other = on_other_mesh(self.problem, self.system)
-        if not scale > 0.0:
-            return 0.0  # nothing moves it, on no mesh
-        if self.reduced is None or other is None:
-            return None
-        own = self.reduced
-        try:
-            start, bent = self.start(other.system).q, own.manifold is not None
-            there = reduced_response(other.system, own.times, start, accuracy_of(self.scene), bent)
-        except ComputationError:
-            return None
-        return other.error(own.model.largest(there.tips - own.tips) / scale)
 
     def warnings(self, error: ErrorEstimate) -> list[str]:
         """Return what is to be known of an error; nothing where it is small, asked for, or reported already."""

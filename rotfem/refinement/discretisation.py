@@ -1,4 +1,4 @@
-"""The errors of a history and of a steady state by steps and mesh, as differences of two computed answers.
+"""The errors of a history by steps and mesh, as differences of two computed answers.
 
 Differences become errors by an order (see `rotfem.refinement.estimate`): that of elements, or that of the scheme. Stiff
 components reduce the order of a scheme to that of its stages (Hairer & Wanner 1996, section IV.15), or below: no order
@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
-
-import numpy as np
 
 from rotfem.analysis.schemes import Array, Scheme, State
 from rotfem.analysis.time_grid import Leg
@@ -115,29 +113,6 @@ class HistoryErrors:
         if self.mesh is None or self.other is None or not self.steps.sound or not self.mesh.sound:
             return None
         return self.other.error(_relative(self.mesh.difference[0], scale))
-
-
-def error_of_shape(
-    problem: Problem, system: Any, q: Array, solve: Callable[[Any], Array], output: Output = tip
-) -> float | None:
-    """Return the relative error of an equilibrium's output by the mesh; None where it is not known.
-
-    Args:
-        problem: what is computed.
-        system: its system, its rotations counted as in q.
-        q: the equilibrium, a local dof array.
-        solve: returns the equilibrium of another system.
-        output: of a state.
-    """
-    here = output(system, State.at_rest(system, *system.start(q.copy())))
-    other = on_other_mesh(problem, system, moving=False)
-    if other is None:
-        return None
-    try:
-        there = output(other.system, State.at_rest(other.system, *other.system.start(solve(other.system))))
-    except ComputationError:
-        return None
-    return other.error(_relative(float(np.linalg.norm(there - here)), float(np.linalg.norm(here))))
 
 
 def _relative(size: float, scale: float) -> float:
