@@ -23,12 +23,8 @@ R = TypeVar("R", bound=Result)
 #: What `accuracy_of` calls the moment at the root.
 ROOT_MOMENT = "root_moment"
 
-#: Rows of a history that does not say it, and scheme of its adaptive steps.
-ROWS, ADAPTIVE = 1000, "esdirk4"
-
-#: Nodes along a structure to start from, and for every mode that is wanted; along the longer edge of a plate, whose
-#: cells along the other are no fewer than FEWEST if the scene has as many.
-NODES, NODES_A_MODE, NODES_OF_PLATES, FEWEST = 30, 4, 24, 3
+#: Rows of a history that does not say it.
+ROWS = 1000
 
 
 class Missed(ComputationError):
@@ -42,7 +38,7 @@ def first_setting(scene: Scene, modes: int = 0) -> Setting:
         scene: with an accuracy.
         modes: number of modes that are wanted; 0 of a run.
     """
-    mesh, nodes, time = scene.mesh, max(NODES, NODES_A_MODE * modes), None if modes else scene.time
+    mesh, nodes, time = scene.mesh, max(30, 4 * modes), None if modes else scene.time  # four nodes for every mode
     elements: Any = None
     if scene.structure.mesh_file is None:
         if isinstance(mesh.elements, tuple):
@@ -54,13 +50,13 @@ def first_setting(scene: Scene, modes: int = 0) -> Setting:
         return first
     assert scene.accuracy is not None
     least = 0.0 if scene.accuracy_budget is None else COARSE
-    return replace(first, scheme=ADAPTIVE, tolerance=max(scene.accuracy / SAFETY, least))
+    return replace(first, scheme="esdirk4", tolerance=max(scene.accuracy / SAFETY, least))
 
 
 def coarsened(elements: tuple[int, int], degree: int) -> tuple[int, int]:
-    """Return cells of a plate as those of a scene, but no more than its motion needs to be known at first."""
-    growth = min(1.0, NODES_OF_PLATES / degree / max(elements))
-    x, y = (max(math.ceil(n * growth), min(n, FEWEST)) for n in elements)
+    """Return cells of a plate as those of a scene, with 24 nodes along the longer edge and three cells at most."""
+    growth = min(1.0, 24 / degree / max(elements))
+    x, y = (max(math.ceil(n * growth), min(n, 3)) for n in elements)
     return x, y
 
 

@@ -73,11 +73,7 @@ def check(scene: Scene | str | Path | Mapping[str, Any], *, comm: MPI.Comm = MPI
 
 # --- along the span ---------------------------------------------------------------------------------------------------
 
-#: What is doubtful: pretwist (rad), ratio of a property from row to row, of radii of gyration of stiffness and
-#: mass, and distance of a centre in radii of gyration.
-LARGE_TWIST, LARGE_STEP, UNLIKE, OUTSIDE = 2.0, 30.0, 10.0, 4.0
-
-#: Places between two rows of the tables.
+#: Places from one row of the tables to the next.
 BETWEEN = 4
 
 
@@ -112,13 +108,6 @@ def central_properties(stiffness: Array, mass: Array) -> dict[str, Array]:
     }
 
 
-def places(knots: tuple[float, ...], length: float) -> Array:
-    """Return the rows of the tables, and places between them (m)."""
-    ends = np.array([0.0, *knots, length])
-    steps = np.linspace(0.0, 1.0, BETWEEN, endpoint=False)
-    return np.append((ends[:-1, None] + np.diff(ends)[:, None] * steps).ravel(), length)
-
-
 def axes_along(beam: Any, x: Array) -> tuple[Array, Array]:
     """Return (r, T) in the frame: position of the axis (m), (n, 3), and the section axes as columns, (n, 3, 3)."""
     coned = Rotation.from_euler("Y", -beam.precone)
@@ -142,7 +131,11 @@ def columns_of(structure: Any, at: Array | None = None) -> dict[str, Array]:
     section = getattr(structure, "section", None)
     if section is None:
         return {}
-    x = places(structure.knots, structure.length) if at is None else at
+    if at is None:  # the rows, and places between them
+        ends = np.array([0.0, *structure.knots, structure.length])
+        steps = np.linspace(0.0, 1.0, BETWEEN, endpoint=False)
+        at = np.append((ends[:-1, None] + np.diff(ends)[:, None] * steps).ravel(), structure.length)
+    x = at
     if structure.is_planar:
         return {"x": x, **section.at(x)}
     r, T = axes_along(structure, x)
@@ -157,15 +150,19 @@ def columns_of(structure: Any, at: Array | None = None) -> dict[str, Array]:
 
 
 def doubts(columns: Mapping[str, Array]) -> list[str]:
-    """Return what looks like a slip: degrees for radians, another unit, a point that is missing."""
+    """Return what looks like a slip: degrees for radians, another unit, a point that is missing.
+
+    It is a pretwist above 2 rad, a property that changes 30 times from row to row, radii of gyration of stiffness and
+    mass 10 times apart, or a centre 4 radii of gyration away.
+    """
     out = []
     x = columns.get("x", np.zeros(0))
-    if "pretwist" in columns and (most := np.max(np.abs(columns["pretwist"]))) > LARGE_TWIST:
+    if "pretwist" in columns and (most := np.max(np.abs(columns["pretwist"]))) > 2.0:
         out.append(f"the pretwist reaches {most:.4g} rad at x = {x[np.argmax(np.abs(columns['pretwist']))]:.4g} m")
     for name in columns.keys() & {"EA", "GJ", "EI", "EI2", "EI3", "GA", "GA2", "GA3", "mass_per_length"}:
         rows, values = x[::BETWEEN], columns[name][::BETWEEN]
         ratio = np.abs(np.log(values[1:] / values[:-1])) if np.all(values > 0.0) else np.zeros(0)
-        if ratio.size and (most := float(np.exp(ratio.max()))) > LARGE_STEP:
+        if ratio.size and (most := float(np.exp(ratio.max()))) > 30.0:
             i = int(np.argmax(ratio))
             out.append(f"{name} changes {most:.3g} times from x = {rows[i]:.4g} to {rows[i + 1]:.4g} m")
     for axis, other in (("2", "z"), ("3", "y")):
@@ -174,7 +171,7 @@ def doubts(columns: Mapping[str, Array]) -> list[str]:
         stiff = np.sqrt(columns[f"EI{axis}"] / columns["EA"])
         heavy = np.sqrt(np.abs(columns[f"rotary_inertia{axis}"]) / columns["mass_per_length"])
         far = np.where(heavy > 0.0, np.maximum(heavy / stiff, stiff / np.where(heavy > 0.0, heavy, 1.0)), 1.0)
-        if np.max(far) > UNLIKE:
+        if np.max(far) > 10.0:
             i = int(np.argmax(far))
             out.append(
                 f"at x = {x[i]:.4g} m the radius of gyration about axis {axis} is {stiff[i]:.3g} m of the stiffness, "
@@ -182,7 +179,7 @@ def doubts(columns: Mapping[str, Array]) -> list[str]:
             )
         for center in ("mass_center", "tension_center", "shear_center"):
             away = np.abs(columns[f"{center}_{other}"]) / stiff
-            if np.max(away) > OUTSIDE:
+            if np.max(away) > 4.0:
                 i = int(np.argmax(away))
                 out.append(
                     f"at x = {x[i]:.4g} m {center} lies {away[i]:.3g} radii of gyration from the axis in {other}"

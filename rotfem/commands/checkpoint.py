@@ -34,9 +34,6 @@ from rotfem.structures.numbering import Numbering
 from rotfem.structures.reference_rotation import ReferenceRotation
 from rotfem.version import versions
 
-#: Positions of nodes that differ by this part of the structure's size are those of another mesh.
-MOVED = 1e-9
-
 #: By class, attributes that a run makes anew or that have a place of their own in a checkpoint.
 _STEPPER = ("system", "newton", "back_off", "scheme", "scheme_back_off", "observer", "_linearised", "_about")
 APART = {
@@ -271,7 +268,7 @@ class Memory:
         try:
             here, there = self.packing.numbering.comm.bcast(self.packing.numbering.positions), tree["positions"]
             size = float(np.max(np.ptp(here, axis=0)))
-            if there.shape != here.shape or np.max(np.abs(there - here)) > MOVED * size:
+            if there.shape != here.shape or np.max(np.abs(there - here)) > 1e-9 * size:
                 raise SceneError("command line", "--resume", path, "is of another mesh")
             self._check_rows(tree)
             return self._put_back(tree)

@@ -34,9 +34,6 @@ LONG = 10.0
 #: A number with the unit of angular speeds.
 ANGULAR = re.compile(r"(\d[\d.]*(?:e[-+]?\d+)?) rad/s(?!²)")
 
-#: File of a result folder with what a study has measured so far.
-STUDY = "cost.jsonl"
-
 #: Whether commands run on this process alone, whatever others mpirun has started.
 ALONE: ContextVar[bool] = ContextVar("ALONE", default=False)
 
@@ -126,7 +123,7 @@ class Session:
         if self._folder is None or self._folder.set is None:
             return ""
         path = self._folder.path
-        if (path / STUDY).exists():
+        if (path / "cost.jsonl").exists():
             return f"; what was measured is in {path}, and the same command goes on from there"
         found = kept_in(path) if self._folder.set.begun else []
         return "; ".join(["", f"results until then are in {path}", *found]) if found else ""

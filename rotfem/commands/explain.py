@@ -26,7 +26,7 @@ from rotfem.mechanics.theories import Theory
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.dimensionless import MEANING, groups
 from rotfem.refinement.distance import distance, distance_each
-from rotfem.refinement.explain import HISTORY, MODES, RESOLVED, STEADY, Case, Change, Explanation
+from rotfem.refinement.explain import MODES, RESOLVED, Case, Change, Explanation
 from rotfem.results import ExplainResult
 from rotfem.scene import Scene, as_scene
 
@@ -38,14 +38,8 @@ ENOUGH = {"negligible": "good enough", "noticeable": "good to {:.1%}", "large": 
 FINE = {"negligible": "fine enough", "noticeable": "off by {:.1%}", "large": "too coarse: off by {:.1%}"}
 FINER = 4
 
-#: The same where nothing is known, of models and of steps or mesh.
-UNKNOWN = ("these steps do not show it", "the error is unknown")
-
-#: What the notes of a check are marked with, and where its Newton's method stops: small differences are wanted.
-FULL, INCREMENT = " of the full model", 1e-10
-
-#: How far two answers are apart, by the name of the output.
-MEASURES = {HISTORY: distance, STEADY: distance, MODES: distance_each}
+#: What the notes of a check are marked with.
+FULL = " of the full model"
 
 
 def explain(
@@ -150,7 +144,7 @@ def why(item: Change, own: Theory) -> str:
     """
     failed = "".join(f"; {name}: {text}" for name, text in item.notes.items() if FULL not in name)
     if item.verdict == "unknown":
-        return UNKNOWN[item.kind == "discretisation"] + failed
+        return ("the error is unknown" if item.kind == "discretisation" else "these steps do not show it") + failed
     if item.kind == "effect":
         reason = Effect.registry[item.name].reasons[0]
         if not item.included:
@@ -174,7 +168,7 @@ def check_changes(scene: Scene, of: Explanation, changes: list[Change], progress
         changes: the rows.
         progress: called with the share of the rows that are done.
     """
-    increment = min(INCREMENT, scene.solver.increment_tolerance)
+    increment = min(1e-10, scene.solver.increment_tolerance)  # small differences are wanted
     exact = {"model.frame": "rotating", "model.tolerance": None, "solver.increment_tolerance": increment}
     scene = scene.replace({**exact, "model.effects": list(of.own), "output.error": False})
     own, own_notes = full_outputs(scene, of)
@@ -190,10 +184,9 @@ def check_changes(scene: Scene, of: Explanation, changes: list[Change], progress
             prestress = scene.model.prestress if Theory.registry[item.name].prestress else None
             other = scene.replace({"model.theory": item.name, "model.prestress": prestress})
         there, notes = full_outputs(other, of)
-        item.truth = {
-            name: np.inf if x is None or there[name] is None else MEASURES[name](x, there[name])
-            for name, x in own.items()
-        }
+        for name, x in own.items():
+            apart = distance_each if name == MODES else distance
+            item.truth[name] = np.inf if x is None or there[name] is None else apart(x, there[name])
         item.notes |= {f"{name}{FULL}": text for name, text in (own_notes | notes).items()}
         progress(i / len(changes))
 

@@ -24,9 +24,6 @@ Array = npt.NDArray[np.float64]
 #: Growth of the Jacobi integral, relative to the energy exchanged, that is reported.
 GROWN = 0.02
 
-#: Angular momentum from nowhere, relative to the largest that there was or was given, that is reported.
-TURNED = 0.01
-
 
 class Monitor:
     """Sees that the theory of a run holds for its states; an observer of these.
@@ -140,7 +137,7 @@ def energy_warning(system: Any, history: dict[str, Array], between: bool = False
     momentum, impulse = history["angular_momentum"], history["impulse"]
     largest = max(np.max(np.abs(momentum), initial=0.0), np.max(np.abs(impulse), initial=0.0))
     off = float(np.ptp(momentum - impulse)) if len(momentum) else 0.0
-    if off > TURNED * largest:
+    if off > 0.01 * largest:  # of what there was or was given
         return (
             f"the angular momentum of hub and structure differs by {100 * off / largest:.2g} % from the impulse of the "
             f'torque: {cause}; give a smaller time.step, or time.scheme = "radau5" or "energy_conserving"'

@@ -33,9 +33,6 @@ from rotfem.scene.settings import estimates_error, usual
 from rotfem.units import si
 from rotfem.users_functions import checked, number_of
 
-#: Steps in which differences of a user's function have one step of their own, and parts of a history of adaptive steps.
-CELL, CELLS = 16, 64
-
 
 class Problem(ProblemData):
     """A problem and the verbs of a script (its parts: `rotfem.mechanics.problem`)."""
@@ -274,10 +271,13 @@ def with_pitch(scene: Scene, motion: Motion) -> Motion:
 
 
 def cell_of(time: Time | None) -> float | None:
-    """Return the length of time (s) in which differences of a user's function have one step; None without [time]."""
+    """Return the length of time (s) in which differences of a user's function have one step; None without [time].
+
+    It is that of 16 steps, or a 64th of a history of adaptive steps.
+    """
     if time is None:
         return None
-    return CELL * time.step if time.step else time.end / CELLS
+    return 16 * time.step if time.step else time.end / 64
 
 
 def _turn(harmonic: Any, motion: Motion) -> tuple[Scalar, Scalar, Scalar]:

@@ -40,9 +40,6 @@ from rotfem.version import versions
 #: Verbs that can be swept.
 VERBS = ("run", "modes", "campbell", "response", "check")
 
-#: Seconds from one look to the next at points that others are computing.
-PAUSE = 0.2
-
 RANGE = re.compile(r"([^:,]+):([^:,]+):(\d+)\s*([^\d\s].*)?")
 WITH_UNIT = re.compile(r"\s*([-+.\d]+(?:[eE][-+]?\d+)?)\s*([^-+.\d\s].*)")
 
@@ -147,7 +144,7 @@ def work(points: Sequence[Point], scene: Path, verb: Sequence[str], progress: Pr
                 left.remove(point)
                 progress(1.0 - len(left) / len(points))
         if left:
-            sleep(PAUSE)
+            sleep(0.2)  # others are computing these
 
 
 def sweep(

@@ -191,8 +191,8 @@ def in_unit(values: npt.ArrayLike, unit: str) -> npt.NDArray[np.float64]:
 
 # --- short tables -----------------------------------------------------------------------------------------------------
 
-#: Columns of characters that a table is made for, and fewest that a column of text is given.
-WIDTH, NARROWEST = 80, 16
+#: Characters that a table is made for in a line.
+WIDTH = 80
 
 #: Rows that a notebook shows of a table.
 SHORT = 12
@@ -219,7 +219,7 @@ class ShortTable:
         out = []
         for row in (*([self.head] if any(self.head) else []), *self.rows):
             cells = [*row, *[""] * (len(sizes) - len(row))]
-            folded = wrap(cells[-1], max(room, NARROWEST)) or [""]
+            folded = wrap(cells[-1], max(room, 16)) or [""]
             *most, size = sizes
             one = zip([*cells[:-1], folded[0]], [*most, size if size <= room else 0], left, strict=True)
             out.append("  ".join(text.ljust(n) if to_left else text.rjust(n) for text, n, to_left in one).rstrip())

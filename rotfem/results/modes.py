@@ -29,9 +29,6 @@ DIRECTIONS: dict[str, tuple[tuple[str, str, float], ...]] = {
     "lag": (("u2", "theta3", 1.0), ("u2", "alpha", 1.0)),
 }
 
-#: Part of a mode's largest displacement below which its tip does not move: there is no polynomial that is 1 there.
-NODE = 1e-3
-
 #: What ElastoDyn calls the modes it takes: (direction, number among them) ↦ name.
 ELASTODYN = {("flap", 1): "BldFl1Sh", ("flap", 2): "BldFl2Sh", ("lag", 1): "BldEdgSh"}
 
@@ -250,7 +247,7 @@ class ModesResult(Rows):
             sizes = {name: float(np.max(np.abs(shape))) for name, (shape, _) in found.items()}
             direction = max(sizes, key=lambda name: sizes[name])
             shape = found[direction][0]
-            if sizes[direction] < 0.5 or abs(shape[-1]) < NODE * sizes[direction]:
+            if sizes[direction] < 0.5 or abs(shape[-1]) < 1e-3 * sizes[direction]:
                 continue  # torsion and stretch, and shapes with a node at the tip
             coefficients, off = fit(columns["x"] / columns["x"][-1], shape / shape[-1])
             number = 1 + sum(other["direction"] == direction for other in out)

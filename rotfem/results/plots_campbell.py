@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
-#: Height of a name at the end of a line, and width of one of a line kΩ, inch.
-NAME_HEIGHT, ORDER_WIDTH = 0.16, 0.42
+#: Height of a name at the end of a line, inch.
+NAME_HEIGHT = 0.16
 
-#: Width of the diagram, and height of the frequencies over the damping ratios, inch.
-WIDTH, HEIGHT, DAMPING_HEIGHT = 9.0, 4.8, 1.6
+#: Width of the diagram, inch.
+WIDTH = 9.0
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def campbell_figure(result: CampbellResult, *, fixed: bool = False) -> Figure:
     shown = branches if fixed or not orders else of_interest(branches, max(orders) * rise)
     top = 1.06 * max(float(np.max(b.frequency)) for b in shown)
     damped = any(np.nanmax(np.abs(b.damping)) > 0.0 for b in shown)
-    heights = [max(HEIGHT, (len(shown) + len(orders) + 1) * NAME_HEIGHT), DAMPING_HEIGHT][: 1 + damped]
+    heights = [max(4.8, (len(shown) + len(orders) + 1) * NAME_HEIGHT), 1.6][: 1 + damped]
     figure = Figure(figsize=(WIDTH, sum(heights)), layout=ConstrainedLayoutEngine(w_pad=0.1))
     panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     axis = panels[0]
@@ -232,7 +232,7 @@ def name_lines(axis: Axes, branches: list[Branch], rays: list[tuple[str, float]]
         beside: dict[str, Any] = {"xytext": (1.02, place), "textcoords": axis.get_yaxis_transform(), "va": "center"}
         axis.annotate(name, (x, y), color=color, arrowprops=line, **beside, **text)
     leaving = [(name, top / slope) for name, slope in rays if slope * last > top]
-    at = spread([x for _, x in leaving], ORDER_WIDTH / (WIDTH - 3.0) * last, (0.0, last))
+    at = spread([x for _, x in leaving], 0.42 / (WIDTH - 3.0) * last, (0.0, last))  # a name is 0.42 inch wide
     for (name, _), place in zip(leaving, at, strict=True):
         axis.annotate(name, (place, top), (0, 3), textcoords="offset points", color="0.4", ha="center", **text)
 

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
-#: Points of a line, at most; numbers of all modes that move, at most; rows of a table, at most.
-POINTS, NUMBERS, ROWS = 2000, 60_000, 2000
+#: Points of a line, and rows of a table, at most.
+MOST = 2000
 
 #: Largest displacement of a mode that moves, part of the length.
 AMPLITUDE = 0.15
@@ -178,7 +178,7 @@ def tables(result: Result) -> Iterator[tuple[str, list[dict[str, Any]]]]:
 
 def table(title: str, rows: Sequence[Mapping[str, Any]]) -> str:
     """Return a table that a click on a heading sorts; dictionaries in a row become columns of their own."""
-    flat = [dict(_flat(row)) for row in rows[:ROWS]]
+    flat = [dict(_flat(row)) for row in rows[:MOST]]
     names = list(dict.fromkeys(name for row in flat for name in row))
     if not flat:
         return ""
@@ -197,7 +197,7 @@ def table(title: str, rows: Sequence[Mapping[str, Any]]) -> str:
             data = f' data-value="{value!r}"' if number and np.isfinite(float(str(value))) else ""
             cells += f"<td{_kind(flat, n)}{data}>{shown(0 if small else value)}</td>"
         body += f"<tr>{cells}</tr>"
-    more = f"<p>the first {ROWS} of {len(rows)} rows</p>" if len(rows) > ROWS else ""
+    more = f"<p>the first {MOST} of {len(rows)} rows</p>" if len(rows) > MOST else ""
     inner = f'<table class="sortable"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
     return f'<h3>{escape(title)}</h3><div class="scroll">{inner}</div>{more}'
 
@@ -359,9 +359,9 @@ def _text_at(axes: Any, line: Line2D, colour: str) -> str:
 
 
 def thinned(x: Array, y: Array) -> tuple[Any, Any]:
-    """Return a line by `POINTS` at most: of every stretch its lowest and highest point."""
-    if len(x) > POINTS:
-        parts = np.array_split(np.arange(len(x)), POINTS // 2)
+    """Return a line by `MOST` at most: of every stretch its lowest and highest point."""
+    if len(x) > MOST:
+        parts = np.array_split(np.arange(len(x)), MOST // 2)
         kept = sorted({int(part[i]) for part in parts for i in (np.argmin(y[part]), np.argmax(y[part]))})
         x, y = x[kept], y[kept]
     return x.astype(np.float32), y.astype(np.float32)
@@ -383,7 +383,7 @@ def animated(result: Result) -> tuple[dict[str, Any], str]:
         pairs = np.concatenate([result.triangles[:, [i, j]] for i, j in ((0, 1), (1, 2), (2, 0))])
         lines = np.unique(np.sort(pairs, axis=1), axis=0)
     moves, cards = [], ""
-    for row, columns, frequency in result.with_shapes()[: max(1, NUMBERS // (6 * n))]:
+    for row, columns, frequency in result.with_shapes()[: max(1, 10_000 // n)]:  # of 60 000 numbers
         u = np.stack([columns.get(f"u{i}", np.zeros(n)) for i in (1, 2, 3)], axis=-1)
         v = np.stack([columns.get(f"u{i}_imag", np.zeros(n)) for i in (1, 2, 3)], axis=-1)
         scale = AMPLITUDE * length / max(float(np.max(np.hypot(u, v))), 1e-300)

@@ -18,9 +18,6 @@ from rotfem.results.result import Rows, Variables, column_of_rows
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Panels of the figure, lines named in its legend, and quantities in the table that is printed, at most.
-PANELS, NAMED, COLUMNS = 6, 12, 2
-
 
 def quantities(summary: Mapping[str, Any]) -> dict[str, float]:
     """Return the numbers that stand for the result of a summary in a table of many."""
@@ -103,8 +100,8 @@ class SweepResult(Rows):
         return out
 
     def tables(self) -> list[ShortTable]:
-        """Return one row a point: its place on the grid and the first quantities that vary."""
-        names = self.varying()[:COLUMNS]
+        """Return one row a point: its place on the grid and the first two quantities that vary."""
+        names = self.varying()[:2]
         columns = [[str(row[key]) for row in self.rows] for key in self.keys]
         columns += [numbers([row.get(name) for row in self.rows]) for name in names]
         columns.append([row["status"] for row in self.rows])
@@ -118,12 +115,12 @@ class SweepResult(Rows):
 
 
 def sweep_figure(result: SweepResult) -> Figure:
-    """Return the first quantities that vary over the first swept key, a line for each value of the others."""
+    """Return the first six quantities that vary over the first swept key, a line for each value of the others."""
     from matplotlib.figure import Figure
 
     from rotfem.results.plots import dress
 
-    names, (first, *others) = result.varying()[:PANELS], list(result.keys)
+    names, (first, *others) = result.varying()[:6], list(result.keys)
     figure = Figure(figsize=(9, 1.9 * len(names) + 0.8), layout="constrained")
     axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     lines = list(result.keys.values())[1:]
@@ -136,5 +133,5 @@ def sweep_figure(result: SweepResult) -> Figure:
         dress(axis, first if axis is axes[-1] else "", label_of(name), size=None)
     if others:
         handles, said = axes[0].get_legend_handles_labels()
-        figure.legend(handles[:NAMED], said[:NAMED], loc="outside upper center", ncols=3, frameon=False, fontsize=8)
+        figure.legend(handles[:12], said[:12], loc="outside upper center", ncols=3, frameon=False, fontsize=8)
     return figure

@@ -13,7 +13,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter, process_time
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -75,16 +74,6 @@ class Measurement:
     def cost(self) -> float:
         """CPU time (s) of set-up and computation, by which settings are ranked; that of other programs is not in it."""
         return self.median("setup_cpu") + self.median("cpu")
-
-    def to_json(self) -> dict[str, Any]:
-        """Return a JSON-able dictionary, without loss."""
-        return {**vars(self), "values": None if self.values is None else self.values.tolist()}
-
-    @classmethod
-    def from_json(cls, data: dict[str, Any]) -> Measurement:
-        """Return what `to_json` wrote."""
-        values = data["values"]
-        return cls(**{**data, "values": None if values is None else np.array(values, dtype=np.float64)})
 
 
 class Bench:
@@ -269,7 +258,8 @@ class Record:
             try:
                 entry = json.loads(line)
                 if entry["study"] == identity:
-                    self.found[entry["setting"]] = Measurement.from_json(entry["measurement"])
+                    found = self.found[entry["setting"]] = Measurement(**entry["measurement"])
+                    found.values = None if found.values is None else np.array(found.values, dtype=np.float64)
             except (ValueError, KeyError, TypeError):
                 continue
 
@@ -280,8 +270,8 @@ class Record:
             OutputError: the file cannot be written.
         """
         self.found[key] = measurement
-        entry = {"study": self.identity, "setting": key, "measurement": measurement.to_json()}
-        self._append(json.dumps(entry) + "\n")
+        entry = {"study": self.identity, "setting": key, "measurement": vars(measurement)}
+        self._append(json.dumps(entry, default=np.ndarray.tolist) + "\n")
 
     def _append(self, text: str) -> None:
         if self.path is None:

@@ -25,14 +25,8 @@ from rotfem.scene.span_tables import is_path
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Accuracies a setting is recommended for besides the wanted one.
-DECADES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
-
 #: Rows of a table that is printed in full.
 LONGEST_TABLE = 40
-
-#: A marker a scheme, or, where there are none, a degree.
-MARKERS = "osD^Pv*X<>"
 
 #: What an output's error is relative to.
 ERRORS = {
@@ -123,9 +117,10 @@ def recommendations(
 
     `recommended` is the row for the accuracy, `promise` its error as measured, the bound of it, times (s) and memory
     (bytes). Where there is none, `closest` is the least accuracy that is known to be met, with its row, and `missing`
-    says what was reached and what the budget left out. `recommendations` are those for DECADES, too.
+    says what was reached and what the budget left out. `recommendations` are those for powers of ten, too.
     """
-    best = {a: recommend(rows, a, uncertainty) for a in sorted({*DECADES, accuracy}, reverse=True)}
+    wanted = sorted({1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, accuracy}, reverse=True)
+    best = {a: recommend(rows, a, uncertainty) for a in wanted}
     row, promise, closest, missing = best[accuracy], None, None, ""
     if row is not None:
         names = ("time", "cpu_time", "setup", "setup_cpu", "cost", "memory")
@@ -353,7 +348,7 @@ def cost_figure(result: CostResult) -> Figure:
     kinds = list(dict.fromkeys(str(row["scheme"] or f"degree {row['degree']}") for row in result.rows))
     for i, theory in enumerate(dict.fromkeys(row["theory"] for row in result.rows)):
         colour, own = f"C{i}", [row for row in result.rows if row["theory"] == theory]
-        for kind, marker in zip(kinds, MARKERS, strict=False):
+        for kind, marker in zip(kinds, "osD^Pv*X<>", strict=False):
             done = [r for r in own if kind in (r["scheme"], f"degree {r['degree']}") and judged(r) < math.inf]
             style: dict[str, Any] = {"marker": marker, "color": colour, "ls": "none"}
             costs = [r["cost"] for r in done]

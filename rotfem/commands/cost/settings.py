@@ -22,9 +22,6 @@ STEPS = {False: (8.0, 4.0, 2.0, 1.0, 0.5), True: (8.0, 4.0, 2.0, 1.0)}
 TOLERANCES = {False: (1000.0, 100.0, 10.0, 1.0, 0.1), True: (100.0, 10.0, 1.0)}
 MESHES = {False: (0.25, 0.5, 1.0, 2.0), True: (0.5, 1.0)}
 
-#: Keys of a scene by which it chooses its setting, which a study does itself.
-CHOICES = ("accuracy", "accuracy_of", "accuracy_budget", "model.tolerance", "model.reduced", "model.foreshortening")
-
 #: Lists of values that take the place of the default ones, None where none are given.
 Chosen = Mapping[str, Sequence[Any] | None]
 
@@ -48,14 +45,6 @@ def own_setting(scene: Scene, output: str = "tip") -> Setting:
         elements, degree = None, degree if "degree" in mesh.model_fields_set else 3
     own = Setting(({"theory": scene.model.theory},), elements, degree)
     return own if time is None else replace(own, scheme=time.scheme, tolerance=time.tolerance, step=time.step)
-
-
-def default_output(scene: Scene) -> str:
-    """Return "tip" for a history or a steady state that the scene asks for, "frequencies" otherwise."""
-    if scene.time is not None:
-        return "tip"
-    steady = scene.motion.is_steady and not scene.modes.model_fields_set
-    return "tip" if steady and (scene.motion.is_spinning or scene.loads.model_fields_set) else "frequencies"
 
 
 def grid(scene: Scene, output: str, quick: bool, chosen: Chosen, step: float | None) -> list[Setting]:
@@ -132,7 +121,8 @@ def sweep_speeds(scene: Scene) -> list[float]:
 
 def without_choices(scene: Scene) -> Scene:
     """Return a scene in its own setting."""
-    changes: dict[str, Any] = dict.fromkeys(CHOICES)
+    names = ("accuracy", "accuracy_of", "accuracy_budget", "model.tolerance", "model.reduced", "model.foreshortening")
+    changes: dict[str, Any] = dict.fromkeys(names)
     if scene.time is not None:  # an accuracy may have given its steps
         changes |= {"time.tolerance": scene.time.tolerance, "time.step": scene.time.step}
     return scene.replace(changes)
@@ -148,7 +138,10 @@ def checked(scene: Scene, accuracy: float, repeat: int, output: str | None) -> s
         raise SceneError(scene.file, "cost --accuracy", accuracy, "must be a number greater than 0")
     if repeat < 1:
         raise SceneError(scene.file, "cost --repeat", repeat, "must be an integer at least 1")
-    output = default_output(scene) if output is None else output
+    if output is None:  # what the scene computes
+        steady = scene.motion.is_steady and not scene.modes.model_fields_set
+        at_rest = not (scene.motion.is_spinning or scene.loads.model_fields_set)
+        output = "frequencies" if scene.time is None and (at_rest or not steady) else "tip"
     if output not in OUTPUTS:
         raise SceneError(scene.file, "cost --of", output, f"allowed: {', '.join(OUTPUTS)}")
     if output == "tip":

@@ -63,15 +63,6 @@ from rotfem.scene import Scene, as_scene
 from rotfem.units import seconds_of
 from rotfem.version import versions
 
-#: Default CPU time of a study, s.
-DEFAULT = {False: 1200.0, True: 120.0}
-
-#: Name of the file that keeps what has been measured.
-RECORD = "cost.jsonl"
-
-#: Scheme of the adaptive steps that references are made with.
-ADAPTIVE = "esdirk4"
-
 
 def cost(
     scene: Scene | str | Path | Mapping[str, Any],
@@ -119,26 +110,17 @@ def cost(
     scene = without_choices(as_scene(scene))
     output = checked(scene, accuracy, repeat, output)
     chosen = {"theories": theories, "elements": elements, "degrees": degrees, "steps": steps, "schemes": schemes}
-    seconds = DEFAULT[quick] if budget is None else seconds_of(budget, scene.file)
+    seconds = (120.0 if quick else 1200.0) if budget is None else seconds_of(budget, scene.file)
     check_choice(scene, chosen)
-    check_degrees(scene, degrees or (), comm)
-    path = None if folder is None or comm.rank > 0 else Path(folder) / RECORD
-    record = Record(path, fingerprint(scene, output, comm.size), fresh=not resume)
-    study = Study(scene, output, chosen, repeat, Clock(seconds, comm, key="the budget"), record)
-    return study.run(quick, accuracy, progress or (lambda share: None))
-
-
-def check_degrees(scene: Scene, degrees: Sequence[int], comm: MPI.Comm) -> None:
-    """Check that elements of these degrees may be used; of a mesh file only the file says of what shape they are.
-
-    Raises:
-        SceneError: they may not.
-    """
-    for degree in degrees if scene.structure.mesh_file is not None else ():
-        try:
+    for degree in degrees or () if scene.structure.mesh_file is not None else ():
+        try:  # only the file says of what shape elements are
             Model(Problem.of(scene.replace({"mesh.degree": degree})).replace(effects=()), comm)
         except InputError as error:
             raise SceneError(scene.file, "cost --degrees", degree, error.allowed) from None
+    path = None if folder is None or comm.rank > 0 else Path(folder) / "cost.jsonl"
+    record = Record(path, fingerprint(scene, output, comm.size), fresh=not resume)
+    study = Study(scene, output, chosen, repeat, Clock(seconds, comm, key="the budget"), record)
+    return study.run(quick, accuracy, progress or (lambda share: None))
 
 
 class Study:
@@ -177,8 +159,15 @@ class Study:
         """Return the result (see `cost`)."""
         self._refer(quick, accuracy, self.chosen["theories"] or default_theories(self.scene, quick))
         progress(0.4)
-        self._explore(grid(self.scene, self.output, quick, self.chosen, self._own_step()), accuracy, progress)
-        self._repeat(accuracy)
+        step, time = self.own.step, self.scene.time
+        if time is not None and self.own.tolerance is not None:  # the mean of its adaptive steps
+            found = self.get(self.own, "grid")
+            step = None if found is None or found.values is None else time.end / found.steps
+        self._explore(grid(self.scene, self.output, quick, self.chosen, step), accuracy, progress)
+        rows = self.rows()
+        best = recommend(rows, accuracy, self.uncertainty)
+        for row in sorted((row for row in rows if row["pareto"]), key=lambda row: row is not best):
+            self.get(setting_of(row), row["purpose"], self.repeat)  # timed as often as was asked for
         progress(1.0)
         rows = self.rows()
         self._check_computed(rows)
@@ -279,7 +268,7 @@ class Study:
         else:
             first = replace(first, elements=grown(grown(first.elements, min(MESHES[quick])), 2.0))
         if first.moving:
-            first = replace(first, scheme=ADAPTIVE, tolerance=max(accuracy, COARSE), step=None)
+            first = replace(first, scheme="esdirk4", tolerance=max(accuracy, COARSE), step=None)
         try:
             self.bench.compiled(first)  # so that the first answer shows what the next ones take
             refine(first, self._paired, AIM * accuracy, self.clock, found)
@@ -325,14 +314,6 @@ class Study:
 
     # --- the grid ----------------------------------------------------------------------------------------------------
 
-    def _own_step(self) -> float | None:
-        """Return the scene's fixed step (s), or the mean of its adaptive ones; None where there is none."""
-        time = self.scene.time
-        if time is None or self.own.tolerance is None:
-            return self.own.step
-        found = self.get(self.own, "grid")
-        return None if found is None or found.values is None else time.end / found.steps
-
     def _explore(self, settings: Sequence[Setting], accuracy: float, progress: Progress) -> None:
         """Compute the settings of a grid.
 
@@ -356,13 +337,6 @@ class Study:
             left.remove(following)
             self.get(following[0], "grid")
             progress(0.4 + 0.5 * number / len(settings))
-
-    def _repeat(self, accuracy: float) -> None:
-        """Time the recommended setting and the front as often as was asked for."""
-        rows = self.rows()
-        best = recommend(rows, accuracy, self.uncertainty)
-        for row in sorted((row for row in rows if row["pareto"]), key=lambda row: row is not best):
-            self.get(setting_of(row), row["purpose"], self.repeat)
 
     @property
     def uncertainty(self) -> float:
