@@ -9,7 +9,7 @@ What an effect adds to the strains is apart from the rest, so that it can be lef
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations_with_replacement
@@ -197,7 +197,15 @@ class Pieces:
         self.constants: dict[str, Any] = {**model.frame.constants, **loads}
         self.axis: Array = model.motion.axis[2:] if self.structure.planar else model.motion.axis
         self.at_rest, self._forms = model.derived_forms("pieces", self._made)
+        symbols = self.structure.section | self.structure.scalars | model.switches
+        purpose = " ".join(("geometric", model.theory.name, str(model.problem.prestress), *model.effects, *symbols))
+        known, compiled = model.derived_forms(purpose, self._made_geometric, (self.prestressed, *symbols.values()))
+        self._geometric = known.get("G", 0)
+        self._forms |= compiled
         self.assembler = Assembler(self._forms["K"], self.bcs)
+        large = self.assembler.pattern.getSize()[0] > SMALL
+        if large:
+            self._narrow()
         self.stiffness = self.assembler.zero()
         self.all: list[Piece] = []
         self.not_polynomial: list[str] = []
@@ -206,14 +214,9 @@ class Pieces:
         self._set_switches(model.switches)
         if self.not_polynomial:
             model.check_smooth()
-        symbols = self.structure.section | self.structure.scalars | model.switches
-        purpose = " ".join(("geometric", model.theory.name, str(model.problem.prestress), *model.effects, *symbols))
-        known, compiled = model.derived_forms(purpose, self._made_geometric, (self.prestressed, *symbols.values()))
-        self._geometric = known.get("G", 0)
         if compiled:
-            self._forms |= compiled
             self._prestress()
-        if self.assembler.pattern.getSize()[0] > SMALL:  # a factor and a matrix, which are hardly needed again
+        if large:  # a factor and a matrix, which are hardly needed again
             self.__dict__.pop("material_solver", None)
             self.assembler.release()
 
@@ -228,9 +231,23 @@ class Pieces:
         form = self.geometric(ufl.TestFunction(self.V), ufl.TrialFunction(self.V), self.prestressed)
         return ({}, {}) if isinstance(form, int) else ({"G": form}, {"G": forms.form(form, once=True)})
 
-    def _zero_constants(self) -> None:
+    def _narrow(self) -> None:
+        """Take out of the pattern what no matrix has: they are seen at constants, and a state, of no special size."""
+        started, random = perf_counter(), np.random.default_rng(1)
+        self._set_switches(self.model.switches)
+        self._set_constants({e: random.uniform(0.5, 1.5) for name in self.constants for e in self._entries(name)})
+        self.prestressed.x.array[:] = random.uniform(0.5, 1.5, len(self.prestressed.x.array))
+        self.assembler.narrow(form for kind, form in self._forms.items() if kind != "f")
+        self._set_constants({})
+        self.assembled += perf_counter() - started
+
+    def _set_constants(self, values: Mapping[tuple[str, int], float]) -> None:
+        """Set components of constants, all others zero."""
         for constant in self.constants.values():
             constant.value[...] = 0.0
+        for (name, i), value in values.items():
+            self.constants[name].value.flat[i] = value
+        self.structure.update_loads()
 
     def _set_switches(self, on: Collection[str]) -> None:
         """Switch these on and all others off."""
@@ -353,13 +370,9 @@ class Pieces:
 
     def assemble_at(self, kind: str, values: dict[tuple[str, int], float]) -> Any:
         """Return one of the forms with these components of constants, all others zero."""
-        constants = self.constants
-        self._zero_constants()
-        for (name, i), value in values.items():
-            constants[name].value.flat[i] = value
-        self.structure.update_loads()
+        self._set_constants(values)
         operator = self.assemble(self._forms[kind], kind)
-        self._zero_constants()
+        self._set_constants({})
         return operator
 
     def assemble(self, form: Any, kind: str) -> Any:

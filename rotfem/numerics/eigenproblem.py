@@ -69,7 +69,7 @@ class RoundOff:
 
     @cached_property
     def _ones(self) -> Any:
-        """One for each entry of K; on one process for each of its full blocks."""
+        """One for each entry of K; on one process for each two nodes that it has any of."""
         K = self.pencil.K
         if self.pencil.comm.size > 1:
             ones = K.duplicate()
@@ -78,10 +78,12 @@ class RoundOff:
             ones.assemble()
             return ones
         block, (indptr, indices) = K.getBlockSize(), K.getRowIJ()
-        ends = indptr[::block] // block**2  # of the blocks of all nodes before
-        lengths = np.diff(ends)
-        first = np.repeat(indptr[:-1:block] - block * ends[:-1], lengths) + block * np.arange(ends[-1])
-        return csr_array((np.ones(len(first)), indices[first] // block, ends))
+        lengths = np.diff(indptr)
+        nodes = indices[np.repeat(np.arange(len(lengths)) % block == 0, lengths)] // block  # in the first row of each
+        starts = np.append(0, np.cumsum(lengths[::block]))
+        new = np.diff(nodes, prepend=-1) != 0
+        new[starts[:-1]] = True
+        return csr_array((np.ones(np.count_nonzero(new)), nodes[new], np.append(0, np.cumsum(new))[starts]))
 
     def corrected(self, values: Array, left: Array, right: Array) -> tuple[Array, Array]:
         """Return (λ, bound of |δλ|/|λ|): the eigenvalues without the residual's part, and how far they can be off.

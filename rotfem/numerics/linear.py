@@ -188,10 +188,8 @@ class DirectSolver:
                 self.solve(b, x)
                 solved[:] = x.array
             return out
-        columns = dense(self.A.comm, right)
-        found = columns.duplicate()
-        pc.getFactorMatrix().matSolve(columns, found)
-        out = np.array(found.getDenseArray())
+        out = np.empty_like(right, order="F")
+        pc.getFactorMatrix().matSolve(dense(self.A.comm, right), dense(self.A.comm, out))
         return out if self._update is None else self._update(out)
 
     def _apply(self, b: Any, x: Any) -> None:

@@ -23,8 +23,9 @@ def times(A: Any, X: Array) -> Array:
     if not isinstance(A, PETSc.Mat):
         return np.asarray(A.times(X))
     if X.shape[1] > 1 and A.getType() in ("seqaij", "mpiaij"):  # all columns at once, which reads each entry once
-        right, product = dense(A.comm, X), PETSc.Mat()
-        return np.array(A.matMult(right, product).getDenseArray())
+        out: Array = np.empty((A.getLocalSize()[0], X.shape[1]), order="F")
+        A.matMult(dense(A.comm, X), dense(A.comm, out))
+        return out
     x, y = A.createVecs()
     out = np.empty_like(X)
     for j in range(X.shape[1]):
@@ -35,8 +36,8 @@ def times(A: Any, X: Array) -> Array:
 
 
 def dense(comm: Any, X: Array) -> Any:
-    """Return columns of owned rows (n, m) as a dense PETSc matrix over a communicator."""
-    columns = np.array(X, dtype=PETSc.ScalarType, order="F")
+    """Return columns of owned rows (n, m) as a dense PETSc matrix; those in Fortran order are not copied."""
+    columns = np.asarray(X, dtype=PETSc.ScalarType, order="F")
     return PETSc.Mat().createDense(((len(X), None), (None, X.shape[1])), array=columns, comm=comm)
 
 

@@ -168,3 +168,30 @@ def test_known_forms_are_those_made_anew(theory: str, monkeypatch: pytest.Monkey
     monkeypatch.setattr(model_module, "_KNOWN", {})
     for known, made in zip(shared, matrices(5, 7.0), strict=True):
         np.testing.assert_array_equal(known, made)
+
+
+def test_a_large_flat_plate_has_no_entries_between_what_is_in_and_across_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """M, C and K are the same numbers; of 25 entries for each two nodes 4 in the plane and 9 across it stay.
+
+    Coriolis forces about an axis in the plane couple one of both.
+    """
+    from rotfem.equations import pieces
+
+    plate = {"type": "plate", "length": 1.0, "width": 1.0, "thickness": 0.01, "E": 7e10, "nu": 0.3, "rho": 2700.0}
+
+    def matrices(axis: list[int]) -> list[Any]:
+        motion = {"type": "constant", "speed": 77.0, "axis": axis}
+        model = {"theory": "consistent_linear"}
+        tables = {"structure": plate, "motion": motion, "model": model, "mesh": {"elements": [3, 2]}}
+        system = compile_system(Problem.of(tables).spinning(), moving=False)
+        system.set_time(0.0, system.motion.at_speed(77.0))
+        return list(system.mass_damping_stiffness())
+
+    for axis, part in (([0, 0, 1], 13 / 25), ([0, 1, 0], 15 / 25)):
+        monkeypatch.undo()
+        whole = matrices(axis)
+        monkeypatch.setattr(pieces, "SMALL", 0)
+        for A, B in zip(whole, matrices(axis), strict=True):
+            assert B.getInfo()["nz_used"] == pytest.approx(part * A.getInfo()["nz_used"])
+            entries = [X.convert("dense").getDenseArray() for X in (A, B)]
+            np.testing.assert_allclose(*entries, rtol=1e-12, atol=1e-15 * np.max(entries))
