@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from rotfem.analysis.schemes import Array, Observer, State
+from rotfem.analysis.schemes import Array, State
 
 #: Part of the cubic's largest acceleration by which those of the states may differ from its own.
 KNOWN = 0.5
@@ -37,21 +37,16 @@ class RowTimes:
         end: last time, s.
         order: of the scheme that steps.
         comm: MPI communicator of the processes that share the unknowns.
-        further: a further observer of the steps; None without one.
         passed: rows there are already, without that at t = 0.
     """
 
-    def __init__(
-        self, interval: float, end: float, order: int, comm: MPI.Comm, further: Observer | None = None, passed: int = 0
-    ):
-        self.interval, self.end, self.order, self.comm, self.further = interval, end, order, comm, further
+    def __init__(self, interval: float, end: float, order: int, comm: MPI.Comm, passed: int = 0):
+        self.interval, self.end, self.order, self.comm = interval, end, order, comm
         self._next, self._last = 1 + passed, int(np.ceil(end / interval - CLOSE))
         self._reached: list[State] = []
 
     def __call__(self, old: State, new: State, leg: Any) -> None:
         """Find the rows in a step from an old to a new state."""
-        if self.further is not None:
-            self.further(old, new, leg)
         close, times = CLOSE * self.interval, []
         while self._next <= self._last and (t := min(self._next * self.interval, self.end)) <= new.t + close:
             times.append(t)

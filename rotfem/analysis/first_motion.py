@@ -15,7 +15,7 @@ from rotfem.errors import ComputationError, InputError
 from rotfem.numerics.eigenproblem import Pencil
 from rotfem.numerics.linear import DirectSolver
 from rotfem.numerics.newton import Newton
-from rotfem.numerics.projection import summed
+from rotfem.numerics.projection import summed, with_ghosts
 
 Array = npt.NDArray[np.float64]
 
@@ -82,7 +82,7 @@ class FirstMotion:
             raise InputError("initial.mode", number, f"there are {len(spinning.pairs.values)} modes")
         structure, value = system.structure, spinning.pairs.values[number - 1]
         x = analysis.right(spinning)[:, number - 1]
-        whole = everywhere(system, x.real) + 1j * everywhere(system, x.imag)
+        whole = with_ghosts(system.V, x.real) + 1j * with_ghosts(system.V, x.imag)
         moves = [i for i, name in enumerate(structure.unknowns) if name.startswith("u")]
         tip = (structure.tip_values(whole.real) + 1j * structure.tip_values(whole.imag))[moves]
         largest = tip[np.argmax(np.abs(tip))]
@@ -93,13 +93,6 @@ class FirstMotion:
         shape, mass = (x / largest, analysis.mass_times(spinning)[:, number - 1] / largest)
         energies = summed(system.comm, np.array([shape.real @ mass.real, shape.imag @ mass.imag]))
         return signal, np.array([mass.real, mass.imag])[energies > PRESCRIBED * energies.sum()]
-
-
-def everywhere(system: Any, x: Array) -> Array:
-    """Return owned unknowns with those of other processes that are seen here, a local dof array."""
-    system.q.x.array[: len(x)] = x
-    system.q.x.scatter_forward()
-    return np.array(system.q.x.array)
 
 
 def in_mode(system: Any, state: Array, signal: Array, patterns: Array, newton: Newton) -> tuple[Array, Array]:
@@ -136,7 +129,7 @@ def in_mode(system: Any, state: Array, signal: Array, patterns: Array, newton: N
         """Return x with A x + Σ μ b = right and b·x = part."""
         y, *z = DirectSolver(A).solve_all(np.column_stack([right, *patterns])).T
         mu = np.linalg.solve(np.array([along(column) for column in z]).T, along(y) - part)
-        return everywhere(system, y - mu @ np.array(z))
+        return with_ghosts(system.V, y - mu @ np.array(z))
 
     def correction(before: Array | None) -> Array:
         system.set_state(q, rate, acceleration)

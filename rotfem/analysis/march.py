@@ -90,8 +90,8 @@ def travel(stepper: Stepper, state: State, leg: Leg, after: Leg | None) -> State
             state = stepper.advance(old, leg.length, leg.end)
     else:
         state = stepper.advance(old, leg.length, leg.end)
-    if stepper.observer is not None:
-        stepper.observer(old, state, leg)
+    for observe in stepper.observers:
+        observe(old, state, leg)
     return state if after is None else turned_to(stepper, state, old, leg, after)
 
 
@@ -236,8 +236,8 @@ class AdaptiveSteps:
                 wanted, before = min(self.longest, leg.length * factor), ratio
             if switches is not None:
                 switches.passed(number, state, new)
-            if stepper.observer is not None:
-                stepper.observer(state, new, leg)
+            for observe in stepper.observers:
+                observe(state, new, leg)
             if new.t < self.end:
                 new = turned_to(stepper, new, state, leg, self._next(new.t, wanted))
             state, stepper.pace = new, (wanted, self.largest, before)

@@ -110,7 +110,7 @@ class Stepper:
         scheme_back_off: in the scheme, where others may stand in for it.
         pace: length of the next adaptive step (s), largest displacement so far (scaled), and length that the errors so
             far allow (s); None before the first.
-        observer: an observer of every step that counts; None without one.
+        observers: of every step that counts.
     """
 
     def __init__(self, system: Any, scheme: Scheme, newton: Newton):
@@ -130,7 +130,7 @@ class Stepper:
         self.substituted: dict[str, int] = {}
         self.scheme_back_off = BackOff()
         self.pace: tuple[float, float, float] | None = None
-        self.observer: Observer | None = None
+        self.observers = list[Observer]()
         #: Jacobi integral at the first hard step, least and largest kinetic and strain energy since (J).
         self._exchange: tuple[float, ...] | None = None
 

@@ -35,7 +35,7 @@ from rotfem.structures.reference_rotation import ReferenceRotation
 from rotfem.version import versions
 
 #: By class, attributes that a run makes anew or that have a place of their own in a checkpoint.
-_STEPPER = ("system", "newton", "back_off", "scheme", "scheme_back_off", "observer", "_linearised", "_about")
+_STEPPER = ("system", "newton", "back_off", "scheme", "scheme_back_off", "observers", "_linearised", "_about")
 APART = {
     "Stepper": _STEPPER,
     "FollowingStepper": (*_STEPPER, "followed", "carried", "differences", "_there", "_curves"),

@@ -173,12 +173,12 @@ class Simulation:
         if self._wants_error:
             of = OUTPUTS[output_of(self.scene)], time.output_step, richer_problem(self.problem)
             self.companions = HistoryErrors(self.problem, self.system, scheme, newton, self._start_there, *of)
-            self.stepper.observer = self.companions
+            self.stepper.observers.append(self.companions)
         march.reached = self.store.start(self._memory())
         if time.output_step is not None:
-            passed, further = max(len(self.record.history) - 1, 0), self.stepper.observer
-            self.rows = RowTimes(time.output_step, time.end, scheme.order, self.system.comm, further, passed)
-            self.stepper.observer = self.rows
+            passed = max(len(self.record.history) - 1, 0)
+            self.rows = RowTimes(time.output_step, time.end, scheme.order, self.system.comm, passed)
+            self.stepper.observers.append(self.rows)
         with self.store.interrupts():
             first = 0 if march.reached is None else self.log.steps + 1
             for self.log.steps, state in enumerate(march, first):

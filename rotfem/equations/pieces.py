@@ -31,6 +31,7 @@ from rotfem.mechanics.theories import Theory
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import SAME, Assembler
 from rotfem.numerics.linear import SMALL, DirectSolver, combine, restrained, set_diagonal
+from rotfem.numerics.projection import with_ghosts
 from rotfem.structures.root_reaction import RootReaction
 
 
@@ -91,17 +92,11 @@ def _displaced(pieces: Pieces, material: Any, loads: list[Piece]) -> list[Array]
     """Return what each load displaces the linear structure by, local dof arrays."""
     if not loads:
         return []
-    q, out = pieces.prestressed, []
     if material is not pieces.material:
         solver = DirectSolver(material, symmetric=True)
     else:
         solver = pieces.analysed or pieces.material_solver
-    solved = solver.solve_all(np.array([load.operator.array for load in loads]).T)
-    for column in solved.T:
-        q.x.array[: len(column)] = -column
-        q.x.scatter_forward()
-        out.append(q.x.array.copy())
-    return out
+    return [*with_ghosts(pieces.V, -solver.solve_all(np.array([load.operator.array for load in loads]).T)).T]
 
 
 Array = npt.NDArray[np.float64]

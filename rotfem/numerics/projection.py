@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -16,6 +17,19 @@ Array = npt.NDArray[Any]
 def summed(comm: MPI.Comm, local: Any) -> Any:
     """Return the sum over all ranks of an array of each."""
     return comm.allreduce(local, op=MPI.SUM) if comm.size > 1 else local
+
+
+def with_ghosts(V: fem.FunctionSpace, owned: Array) -> Array:
+    """Return local dof arrays, (n,) or (n, k), of owned rows: with those of other processes that are seen here."""
+    if V.mesh.comm.size == 1:
+        return owned
+    function, columns = fem.Function(V), owned.reshape(len(owned), -1)
+    out = np.empty((len(function.x.array), columns.shape[1]))
+    for column, x in zip(out.T, columns.T, strict=True):
+        function.x.array[: len(x)] = x
+        function.x.scatter_forward()
+        column[:] = function.x.array
+    return out.reshape(-1, *owned.shape[1:])
 
 
 def times(A: Any, X: Array) -> Array:

@@ -251,7 +251,7 @@ class Companion:
             return
         stepper, start = self.stepper, self.state
         stepper.follow(step, start)
-        stepper.observer = partial(self._arrived, step)
+        stepper.observers = [partial(self._arrived, step)]
         try:
             if start.t == 0.0:
                 start = started(stepper, start, step.leg)

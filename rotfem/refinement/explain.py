@@ -27,7 +27,6 @@ from rotfem.analysis.equilibrium import check_steady, steady_state
 from rotfem.analysis.march import LARGEST_LINEAR_DEFLECTION, LONGEST, March, Steps
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.schemes import Scheme, State
-from rotfem.analysis.time_grid import Leg
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
@@ -389,12 +388,8 @@ class Explanation:
         case, times, tips = self.case, list[float](), list[Array]()
         assert case.scheme is not None
 
-        def passed_on(old: State, new: State, leg: Leg) -> None:
-            for companion in watches:
-                companion(old, new, leg)
-
         march = March(system, case.scheme, steps, case.newton(), *case.start(system))
-        march.stepper.observer = passed_on
+        march.stepper.observers = list(watches)
         for state in march:
             size = float(system.size(state.q))
             self.size = max(self.size, size) if system is self.system else self.size

@@ -329,7 +329,7 @@ def test_numbers_learnt_are_all_in_the_checkpoint(tmp_path: Path) -> None:
     stepper = result[0].stepper
     assert set(vars(stepper)) - set(plain(stepper)) == set(APART["Stepper"])
     parts = {name: part for name, part in learning(stepper).items() if part is not stepper}
-    assert {"system", "scheme", "observer", "_linearised", "_about", *parts} == set(APART["Stepper"])
+    assert {"system", "scheme", "observers", "_linearised", "_about", *parts} == set(APART["Stepper"])
     assert all(set(vars(part)) == set(plain(part)) for part in parts.values())
     stepper.newton.curvature = np.zeros(3)
     with pytest.raises(TypeError, match="cannot hold curvature of Newton"):

@@ -16,11 +16,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx import fem
 
 from rotfem.equations.pieces import PRESTRESS
 from rotfem.numerics.linear import MIDDLE, DirectSolver, combine, symmetric
-from rotfem.numerics.projection import orthonormal, summed, times
+from rotfem.numerics.projection import orthonormal, summed, times, with_ghosts
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -77,7 +76,7 @@ class ReducedModel:
         if not len(keep):
             return 0
         new = np.hstack([V, X @ (turns[:, keep] / np.sqrt(energies[keep]))])
-        self._take(self._with_ghosts(orthonormal(self.comm, new, self._strained)))
+        self._take(with_ghosts(self.system.V, orthonormal(self.comm, new, self._strained)))
         return len(keep)
 
     def _take(self, V: Array) -> None:
@@ -93,18 +92,6 @@ class ReducedModel:
     def _strained(self, X: Array) -> Array:
         """Return K₀ X of owned rows, forces of the strains."""
         return times(self.system.material, X) if X.shape[1] else X
-
-    def _with_ghosts(self, columns: Array) -> Array:
-        """Return local dof arrays (n, k) of columns of owned rows."""
-        if self.comm.size == 1:
-            return columns
-        function = fem.Function(self.system.V)
-        out = np.empty((len(function.x.array), columns.shape[1]))
-        for column, x in zip(out.T, columns.T, strict=True):
-            function.x.array[self.owned] = x
-            function.x.scatter_forward()
-            column[:] = function.x.array
-        return out
 
     def coordinates(self, shape: Array) -> Array:
         """Return the coordinates (m,) of a shape (local dof array) in the span of the basis."""
@@ -155,7 +142,7 @@ class ReducedModel:
 
     def solve(self, solver: DirectSolver, right: Array) -> Array:
         """Return the solutions (local dof arrays (n, k)) with right-hand sides of owned rows, (n, k)."""
-        return self._with_ghosts(solver.solve_all(right))
+        return with_ghosts(self.system.V, solver.solve_all(right))
 
     # --- outputs -----------------------------------------------------------------------------------------------------
 
