@@ -19,7 +19,7 @@ from rotfem.equations.model import Model
 from rotfem.errors import input_of
 from rotfem.mechanics.effects import Effect
 from rotfem.mechanics.theories import Theory
-from rotfem.results.check import CheckResult
+from rotfem.results import CheckResult
 from rotfem.scene import Scene, as_scene
 from rotfem.scene.values import Array, evaluate
 

@@ -498,22 +498,20 @@ def alike(here: Any, there: Any, name: str) -> None:
         TypeError: it has not; names it.
     """
     here, there = (x.item() if isinstance(x, np.generic) else x for x in (here, there))
-    if isinstance(here, dict) and here and isinstance(there, dict):
-        if set(here) != set(there):
-            raise TypeError(f"{name} has {', '.join(sorted(map(str, set(here) ^ set(there))))} on one side only")
-        for key, value in here.items():
-            alike(value, there[key], f"{name}.{key}")
-    elif isinstance(here, tuple) and isinstance(there, tuple) and len(here) == len(there):
-        for i, pair in enumerate(zip(here, there, strict=True)):
-            alike(*pair, f"{name}[{i}]")
-    elif isinstance(here, tuple) and isinstance(there, tuple) and len(here) > len(there):
-        raise TypeError(f"{name} has {len(there)} entries")
-    elif isinstance(here, np.ndarray) and isinstance(there, np.ndarray):
-        if here.shape != there.shape:
-            raise TypeError(f"{name} has the shape {there.shape}")
-    elif here is None:
-        for entry in there if isinstance(there, tuple) else (there,):
-            if not isinstance(entry, bool | int | float | None):
-                raise TypeError(f"{name} is a {type(there).__name__}")
-    elif type(here) is not type(there) and not (type(here) is float and type(there) is int):
-        raise TypeError(f"{name} is a {type(there).__name__}")
+    suitable = type(here) is type(there) or (type(here) is float and type(there) is int)
+    inner: list[tuple[Any, Any, Any]] = []
+    if here is None:
+        entries = there if isinstance(there, tuple) else (there,)
+        suitable = all(isinstance(entry, bool | int | float | None) for entry in entries)
+    elif suitable and isinstance(here, dict) and here:
+        suitable = set(here) == set(there)
+        inner = [(key, value, there.get(key)) for key, value in here.items()]
+    elif suitable and isinstance(here, tuple):
+        suitable = len(here) <= len(there)
+        inner = [(i, *pair) for i, pair in enumerate(zip(here, there, strict=False))] if len(here) == len(there) else []
+    elif suitable and isinstance(here, np.ndarray):
+        suitable = here.shape == there.shape
+    if not suitable:
+        raise TypeError(f"{name} is not what a run has there")
+    for key, one, other in inner:
+        alike(one, other, f"{name}.{key}")

@@ -181,17 +181,19 @@ class Session:
 
     def hint(self, unwanted: bool) -> Callable[[str], None] | None:
         """Return what prints advice on stderr, rank 0 only; None where it is not wanted."""
-        if unwanted or self.quiet:
-            return None
-        return lambda line: self.remark(f"hint: {line}")
+        return None if unwanted or self.quiet else lambda line: self.remark(f"hint: {line}")
 
-    def write(self, result: Any, plots: bool, further: Sequence[Writer] = ()) -> None:
-        """Write a result, its figures and what else is wanted; print its summary if --json asks for it.
+    def finish(self, result: Any, plots: bool, further: Sequence[Writer] = ()) -> None:
+        """Write a result, its figures and what else is wanted; print its summary if --json asks, or its report.
+
+        Of a computation that has failed nothing but warnings is reported.
 
         Raises:
             OutputError: a file cannot be written; those that can are.
             SceneError: something further cannot be made.
         """
+        from rotfem.commands.printed import report
+
         assert self._folder is not None
         self.bar.describe("writing results and figures")
         problems = self._folder.write(result, plots, further)
@@ -202,14 +204,8 @@ class Session:
                 self._error(f"warning: {warning}")
         if problems:
             raise problems[0]
-
-    def finish(self, result: Any, plots: bool, further: Sequence[Writer] = ()) -> None:
-        """Write a result (see `write`) and print its report."""
-        from rotfem.commands.printed import report
-
-        assert self._folder is not None
-        self.write(result, plots, further)
-        self.say([*report(result), f"results in {self._folder.path}"])
+        if result.status == "done":
+            self.say([*report(result), f"results in {self._folder.path}"])
 
     def print_json(self, summary: dict[str, Any]) -> None:
         """Print a summary if --json asks for it."""

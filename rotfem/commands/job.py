@@ -105,21 +105,18 @@ class Job:
         self.session.bar(share)
 
     def finish(self, result: Result, further: Sequence[Writer] = ()) -> None:
-        """Write a result, and what else is wanted, and print its report."""
-        self.session.finish(result, self.plots, [*further, *self.reports(result)])
+        """Write a result, what else is wanted, and report.html if that is; print its report."""
+        writers = list(further)
+        if self.report:
+            from rotfem.commands.check import check
+            from rotfem.results.report import write_report
 
-    def reports(self, result: Result) -> list[Writer]:
-        """Return what writes report.html, if that is wanted."""
-        if not self.report:
-            return []
-        from rotfem.commands.check import check
-        from rotfem.results.report import write_report
-
-        drawing = None
-        if result.summary["command"] != "check":
-            with suppress(InputError, ComputationError):
-                drawing = check(self.scene, comm=self.session.comm).plot()
-        return [partial(write_report, result, drawing)]
+            drawing = None
+            if result.summary["command"] != "check":
+                with suppress(InputError, ComputationError):
+                    drawing = check(self.scene, comm=self.session.comm).plot()
+            writers.append(partial(write_report, result, drawing))
+        self.session.finish(result, self.plots, writers)
 
 
 @contextmanager
@@ -173,7 +170,7 @@ def job(
             yield todo
         except (ComputationError, Stopped) as error:
             if error.result is not None:
-                session.write(error.result, not no_plots, todo.reports(error.result))
+                todo.finish(error.result)
             raise
 
 

@@ -1,9 +1,8 @@
 """What a computation returns, and how it is written, drawn and read: plain arrays, no dolfinx."""
 
 from rotfem.results.campbell import CampbellResult, CriticalSpeed, Instability
-from rotfem.results.check import CheckResult
-from rotfem.results.explain import ExplainResult
 from rotfem.results.modes import ModesResult, ResponseResult
+from rotfem.results.of_scene import CheckResult, ExplainResult
 from rotfem.results.result import Result
 from rotfem.results.run import RunResult
 

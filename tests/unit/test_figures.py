@@ -13,8 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.contour import ContourSet
 from matplotlib.tri import Triangulation
 
-from rotfem.results import CampbellResult, ExplainResult, ModesResult, RunResult
-from rotfem.results.check import CheckResult
+from rotfem.results import CampbellResult, CheckResult, ExplainResult, ModesResult, RunResult
 from rotfem.results.modes import ResponseResult
 from rotfem.results.plots_campbell import campbell_figure, spread
 from rotfem.results.run import StationHistory
