@@ -27,7 +27,7 @@ def quantity(text: str, unit: str) -> float:
 
     Args:
         text: a number with a unit.
-        unit: the unit that is wanted, in the words of pint.
+        unit: the unit that is wanted, in the words of pint; "" for that of SI, whatever is given.
 
     Raises:
         ValueError: says why it is none.
@@ -128,7 +128,8 @@ def _factor(name: str, unit: str) -> float:
     registry = _registry()
     try:
         given = registry.parse_units(_superscripts(name).translate(_POWERS))
-        return float(registry.Quantity(1.0, given).m_as(unit))
+        one = registry.Quantity(1.0, given)
+        return float(one.m_as(unit) if unit else one.to_base_units().magnitude)
     except pint.DimensionalityError:
         raise ValueError(f"{name!r} is no unit of the kind of {shown(unit)}") from None
     except Exception:  # pint has errors of its own, Python's tokenizer and parser theirs

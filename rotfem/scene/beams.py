@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
+from rotfem.scene.blades.deck import Asked, keys_of
+from rotfem.scene.files import existing_file
 from rotfem.scene.plates import PlateStructure
 from rotfem.scene.reference_line import ReferenceLine, SweptLine, as_line, line_through
 from rotfem.scene.root import Hinge, Root, SpatialRoot, Support
-from rotfem.scene.section import PlanarSection, SpatialSection
-from rotfem.scene.span_tables import with_tables
+from rotfem.scene.section import PlanarSection, SpatialSection, with_columns
+from rotfem.scene.span_tables import OF_FILE, AnyProfile, FromFile
 from rotfem.scene.structure import Damping, StructureTable, apart, check_one_hub
-from rotfem.scene.table import SceneModel, problem, problems_at
+from rotfem.scene.table import SceneModel, Unit, along, problem, problems_at
 from rotfem.scene.values import (
     DIGITS,
     ROUND_OFF,
-    AnyProfile,
     Array,
     Bounds,
     Matrix,
@@ -29,6 +31,7 @@ from rotfem.scene.values import (
     Positive,
     Profile,
     Vector,
+    as_number,
     as_rows,
     as_symmetric_matrix,
     check_magnitudes,
@@ -48,7 +51,9 @@ def _as_matrix(inertia: float | Matrix) -> Array:
     return inertia * np.eye(3) if isinstance(inertia, float) else np.array(inertia)
 
 
-Inertia = Annotated[float | Matrix, PlainValidator(_as_inertia)]
+Inertia = Annotated[float | Matrix, PlainValidator(_as_inertia), Unit("kg*m**2")]
+Length = Annotated[NonNegative, Unit("m")]
+Mass = Annotated[NonNegative, Unit("kg")]
 
 
 class PointMass(SceneModel):
@@ -62,9 +67,9 @@ class PointMass(SceneModel):
             a number, isotropic.
     """
 
-    x: Number = Field(description="a place along the beam (m)")
-    mass: NonNegative = 0.0
-    offset: PaddedVector = (0.0, 0.0, 0.0)
+    x: Annotated[Number, Unit("m")] = Field(description="a place along the beam (m)")
+    mass: Mass = 0.0
+    offset: Annotated[PaddedVector, Unit("m")] = (0.0, 0.0, 0.0)
     inertia: Inertia = 0.0
 
     @property
@@ -92,9 +97,9 @@ class BeamStructure(StructureTable):
     """
 
     type: str
-    length: Positive = Field(description="a number greater than 0 (m)")
-    hub_radius: NonNegative = 0.0
-    tip_mass: NonNegative = 0.0
+    length: Annotated[Positive, Unit("m")] = Field(description="a number greater than 0 (m)")
+    hub_radius: Length = 0.0
+    tip_mass: Mass = 0.0
     masses: tuple[PointMass, ...] = ()
     damping: Damping = Damping()
 
@@ -167,7 +172,7 @@ class PlanarBeamStructure(BeamStructure):
     """
 
     type: Literal["planar_beam"] = "planar_beam"
-    tip_inertia: NonNegative = 0.0
+    tip_inertia: Annotated[NonNegative, Unit("kg*m**2")] = 0.0
     root: Root = Root()
     section: PlanarSection = Field(description="a table of section properties")
 
@@ -180,12 +185,6 @@ class PlanarBeamStructure(BeamStructure):
     def root_position(self) -> tuple[float, float, float]:
         """Position of the root in the frame (m)."""
         return self.hub_radius + self.root.hinge_offset, 0.0, 0.0
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read_files(cls, data: Any, info: ValidationInfo) -> Any:
-        """Read the files of the section."""
-        return with_tables(data, info, None)
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -203,6 +202,10 @@ def _as_sweep(value: Any) -> Profile:
     if len(x) < 2 or x[0] != 0.0 or sorted(x) != x or max(times.values()) > 2 or times[x[0]] + times[x[-1]] > 2:
         raise problem("", value, "must be [[x, angle], …] from x = 0, x not decreasing; two rows of one x are a kink")
     return tuple((row[0], row[1]) for row in rows)
+
+
+#: Where points of a line may come from.
+LINE_FILE = FromFile((3,), "points [[x, y, z], …]")
 
 
 class SpatialBeamStructure(BeamStructure):
@@ -228,14 +231,14 @@ class SpatialBeamStructure(BeamStructure):
     """
 
     type: Literal["spatial_beam"] = "spatial_beam"
-    hub_offset: Vector | None = None
+    hub_offset: Annotated[Vector, Unit("m")] | None = None
     tip_inertia: Inertia = 0.0
-    tip_offset: Vector = (0.0, 0.0, 0.0)
+    tip_offset: Annotated[Vector, Unit("m")] = (0.0, 0.0, 0.0)
     section: SpatialSection = Field(description="a table of section properties")
-    pretwist: AnyProfile = 0.0
-    sweep: Annotated[Profile, PlainValidator(_as_sweep)] = 0.0
-    line: Annotated[Matrix, PlainValidator(as_line)] | None = None
-    precone: Number = 0.0
+    pretwist: Annotated[AnyProfile, along("rad")] = 0.0
+    sweep: Annotated[Profile, PlainValidator(_as_sweep), OF_FILE, along("rad")] = 0.0
+    line: Annotated[Matrix, PlainValidator(as_line), LINE_FILE, Unit("m")] | None = None
+    precone: Annotated[Number, Unit("rad")] = 0.0
     root: SpatialRoot = SpatialRoot()
     supports: tuple[Support, ...] = ()
 
@@ -288,13 +291,22 @@ class SpatialBeamStructure(BeamStructure):
     @model_validator(mode="before")
     @classmethod
     def _lift_from_section(cls, data: Any, info: ValidationInfo) -> Any:
-        """Read files, and move pretwist and precone, which describe the beam, out of a section that holds them."""
-        data = _with_length(with_tables(data, info, ("pretwist", "sweep", "line")))
-        section = data.get("section") if isinstance(data, dict) else None
-        if not isinstance(section, dict):
+        """Read the blade file of another program, and move pretwist and precone out of a section that holds them."""
+        section = data.get("section") if isinstance(data, Mapping) else None
+        if isinstance(section, Mapping) and "from" in section:
+            with problems_at("section.from", section["from"]):
+                path = existing_file(section["from"], info)
+            without = {key: value for key, value in data.items() if key != "section"}
+            data = keys_of(path, Asked(without, section, (info.context or {}).get("hints", [])))
+            section = data["section"]
+        data = _with_length(data, info)
+        if not isinstance(section, Mapping):
             return data
-        lifted = {}
-        readers: dict[str, Any] = {"pretwist": Bounds().profile, "precone": Bounds().number}
+        section, lifted = with_columns(section, info, "section."), dict[str, Any]()
+        readers: dict[str, Any] = {
+            "pretwist": lambda value: Bounds().profile(OF_FILE(along("rad").read(value), info)),
+            "precone": lambda value: as_number(Unit("rad").read(value)),
+        }
         for key, read in readers.items():
             if key not in section:
                 continue
@@ -302,7 +314,7 @@ class SpatialBeamStructure(BeamStructure):
                 raise problem(f"section.{key}", section[key], f"given twice; structure.{key} is also set")
             with problems_at(f"section.{key}", section[key]):
                 lifted[key] = read(section[key])
-        return data | lifted | {"section": {key: value for key, value in section.items() if key not in lifted}}
+        return {**data, **lifted, "section": {key: value for key, value in section.items() if key not in lifted}}
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -334,15 +346,17 @@ class SpatialBeamStructure(BeamStructure):
 Structure = Annotated[PlanarBeamStructure | SpatialBeamStructure | PlateStructure, Field(discriminator="type")]
 
 
-def _with_length(data: Any) -> Any:
+def _with_length(data: Any, info: ValidationInfo) -> Any:
     """Return the table with the arc length of its line as its length; raise if another one is given."""
-    if not isinstance(data, dict) or data.get("line") is None:
+    if not isinstance(data, Mapping) or data.get("line") is None:
         return data
+    with problems_at("line", data["line"]):
+        rows = LINE_FILE(Unit("m").read(data["line"]), info)
     try:
-        arc = line_through(as_line(data["line"])).length
-    except PydanticCustomError as error:
-        raise problem("line", (error.context or {}).get("value"), error.message()) from None
-    given = data.get("length", arc)
+        arc = line_through(as_line(rows)).length
+    except PydanticCustomError:
+        return {**data, "length": 1.0}  # what is wrong with the line is said at its key
+    given = Unit("m").read(data.get("length", arc))
     if isinstance(given, int | float) and not isinstance(given, bool) and abs(given - arc) > DIGITS * arc:
         raise problem("length", given, f"is not the arc length of the line, {arc:.9g}; it may be left out")
-    return data | {"length": arc}
+    return {**data, "line": rows, "length": arc}

@@ -8,7 +8,6 @@ import re
 import select
 import stat
 import tomllib
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -20,7 +19,7 @@ from pydantic import ValidationInfo
 
 from rotfem.errors import SceneError, printable, show
 from rotfem.scene.table import problem
-from rotfem.scene.values import Array, Matrix, are_numbers, as_increasing_rows, limits_in, rows_of
+from rotfem.scene.values import Matrix, limits_in
 
 #: What a pipe may keep one waiting (s) before it has anything to say.
 PATIENCE = 10.0
@@ -207,8 +206,8 @@ def apply_overrides(file: str, data: dict[str, Any], overrides: Sequence[str]) -
     return data
 
 
-#: Bytes of a table, at most, for each row that it may have.
-ROW_BYTES = 400
+#: Bytes of a table, at most, for each row that it may have: a row may have a 6×6 matrix in it.
+ROW_BYTES = 1600
 
 #: Characters of a cell that a message shows. A file may be anything that can be read here, and so a secret.
 SHOWN_CELL = 12
@@ -235,11 +234,6 @@ def existing_file(value: Any, info: ValidationInfo) -> Path:
 Reader: TypeAlias = Callable[..., Matrix]
 
 
-def as_time_table(value: Any, info: ValidationInfo, columns: Sequence[int], shape: str) -> Matrix:
-    """Return rows (t, …) with t (s) strictly increasing, at least two (see `as_table`)."""
-    return as_table(value, info, columns, shape, as_increasing_rows)
-
-
 def as_table(value: Any, info: ValidationInfo, columns: Sequence[int], shape: str, read: Reader) -> Matrix:
     """Return the rows of a table, or of the CSV file at a path, that a reader accepts; messages name the line there."""
     limits = limits_in(info)
@@ -247,15 +241,18 @@ def as_table(value: Any, info: ValidationInfo, columns: Sequence[int], shape: st
         if isinstance(value, list | tuple):
             limits.check("rows", len(value), value=value)
         return read(value, columns, shape)
-    path = existing_file(value, info)
-    text = read_text(path, ROW_BYTES * limits.rows)
-    limits.check("rows", text.count("\n"), value=str(path))
-    table = quick_rows(text) if read is as_increasing_rows else None
-    if table is not None and table.shape[1] in columns and len(table) > 1 and np.all(table[1:, 0] > table[:-1, 0]):
-        return rows_of(table)
+    path, text = table_text(value, info)
     by_line = read_rows(text, path)
     lines = tuple(by_line)
     return read(tuple(by_line.values()), columns, shape, lambda row: f"line {lines[row - 1]}")
+
+
+def table_text(value: Any, info: ValidationInfo) -> tuple[Path, str]:
+    """Return the path of a file that a scene names and its text, of no more rows than the scene's limits allow."""
+    path, limits = existing_file(value, info), limits_in(info)
+    text = read_text(path, ROW_BYTES * limits.rows)
+    limits.check("rows", text.count("\n"), value=str(path))
+    return path, text
 
 
 def read_text(path: Path, most: int) -> str:
@@ -269,22 +266,6 @@ def read_text(path: Path, most: int) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def quick_rows(text: str) -> Array | None:
-    """Return the rows of a table of finite numbers, shape (n, columns); None where `read_rows` has to look closer."""
-    lines = text.split("\n")
-    top = next((i for i, line in enumerate(lines) if _cells(line)), len(lines))
-    first = _cells(lines[top]) if top < len(lines) else []
-    rows = lines[top + all(_number(cell) is None for cell in first) :]
-    if not any(first) or not all(map(str.isascii, rows)) or any("_" in row for row in rows):
-        return None
-    try:
-        with warnings.catch_warnings(action="error"):
-            table = np.loadtxt(rows, delimiter=",", ndmin=2)
-    except (ValueError, UserWarning):
-        return None
-    return table if len(first) == table.shape[1] and are_numbers(table) else None
-
-
 def read_rows(text: str, path: Path) -> dict[int, tuple[float, ...]]:
     """Return number of the line ↦ row of a table of finite numbers, all of one length.
 
@@ -293,7 +274,16 @@ def read_rows(text: str, path: Path) -> dict[int, tuple[float, ...]]:
     """
     rows: dict[int, tuple[float, ...]] = {}
     width, top = 0, 0  # columns of the first row, and its line
+    plain = text.isascii() and "_" not in text
     for number, line in enumerate(text.split("\n"), start=1):
+        if plain and top:  # most lines hold numbers and nothing else
+            try:
+                row = tuple(map(float, line.split(",")))
+            except ValueError:
+                row = ()
+            if len(row) == width and all(map(math.isfinite, row)):
+                rows[number] = row
+                continue
         cells = _cells(line)
         if not cells:
             continue

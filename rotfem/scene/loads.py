@@ -10,16 +10,17 @@ from pydantic_core import PydanticCustomError
 
 from rotfem.scene.motion import Motion
 from rotfem.scene.signals import Given, Harmonic, TimeFunction, arguments
-from rotfem.scene.span_tables import FORCE, MOMENT, PRESSURE, Kind, Over
-from rotfem.scene.table import SceneModel, problem
-from rotfem.scene.values import ROUND_OFF, Matrix, PaddedVector, as_number, as_vector
+from rotfem.scene.span_tables import FORCE, MOMENT, PRESSURE, Kind, Over, is_path
+from rotfem.scene.table import SceneModel, Unit, problem
+from rotfem.scene.values import ROUND_OFF, Matrix, Number, PaddedVector, as_number, as_vector
 
 #: How tables are written that are not mistaken for others.
 KEYS = "write over_time = [[t, …], …], over_span = [[x, …], …] or over_span_and_time = [[x, t, …], …]"
 
 
-#: Key of a table ↦ what its rows are over.
+#: Key of a table ↦ what its rows are over, and the units of that.
 OVER = {"table": ("t",), "over_time": ("t",), "over_span": ("x",), "over_span_and_time": ("x", "t")}
+OVER_UNITS = {"t": "s", "x": "m"}
 
 
 class Load(Given):
@@ -36,6 +37,7 @@ class Load(Given):
 
     WAYS: ClassVar[tuple[str, ...]] = ("value", "table", "over_time", "function")
     VECTORS: ClassVar[Kind] = FORCE
+    UNIT: ClassVar[str] = "N"
 
     value: tuple[float, ...] | None = None
     table: Matrix | None = None
@@ -46,13 +48,13 @@ class Load(Given):
 
     @field_validator("value", mode="plain")
     @classmethod
-    def _read_value(cls, value: Any) -> tuple[float, ...] | None:
-        return None if value is None else cls.VECTORS.vector(value)
+    def _read_value(cls, value: Any, info: ValidationInfo) -> tuple[float, ...] | None:
+        return None if value is None else cls._vector(value, info)
 
     @field_validator(*OVER, mode="plain", check_fields=False)
     @classmethod
     def _read_rows(cls, value: Any, info: ValidationInfo) -> Over | None:
-        return None if value is None else cls.VECTORS.rows(OVER[str(info.field_name)], value, info)
+        return None if value is None else cls._rows(OVER[str(info.field_name)], value, info)
 
     @field_validator("harmonic", mode="after")
     @classmethod
@@ -67,7 +69,20 @@ class Load(Given):
 
     @classmethod
     def _read_amplitude(cls, value: Any, info: ValidationInfo) -> Any:
-        return cls.VECTORS.vector(value)
+        return cls._vector(value, info)
+
+    @classmethod
+    def _vector(cls, value: Any, info: ValidationInfo) -> tuple[float, ...]:
+        return cls.VECTORS.vector(Unit(cls._unit(info)).read(value))
+
+    @classmethod
+    def _rows(cls, over: tuple[str, ...], value: Any, info: ValidationInfo) -> Over:
+        units = Unit(cls._unit(info), tuple(OVER_UNITS[name] for name in over))
+        return cls.VECTORS.rows(over, units.read(value), info)
+
+    @classmethod
+    def _unit(cls, info: ValidationInfo) -> str:
+        return cls.UNIT
 
     @property
     def time_table(self) -> Matrix | None:
@@ -101,6 +116,7 @@ class MomentLoad(Load):
     """A moment over time (N·m): one component, about axis 3, for a planar beam and three for a spatial one."""
 
     VECTORS: ClassVar[Kind] = MOMENT
+    UNIT: ClassVar[str] = "N*m"
 
 
 class SpanLoad(Load):
@@ -114,13 +130,20 @@ class SpanLoad(Load):
 
     WAYS: ClassVar[tuple[str, ...]] = ("value", "over_span", "over_time", "over_span_and_time", "table", "function")
 
+    UNIT: ClassVar[str] = "N/m"
+
     over_span: Any = None
     over_span_and_time: Any = None
 
     @classmethod
+    def _unit(cls, info: ValidationInfo) -> str:
+        on_plate = cls.UNIT == "N/m" and (info.context or {}).get("type") == "plate"
+        return "N/m**2" if on_plate else cls.UNIT
+
+    @classmethod
     def _read_amplitude(cls, value: Any, info: ValidationInfo) -> Any:
         rows = isinstance(value, list | tuple) and value and isinstance(value[0], list | tuple)
-        return cls.VECTORS.rows(("x",), value, info) if rows or isinstance(value, str) else cls.VECTORS.vector(value)
+        return cls._rows(("x",), value, info) if rows or is_path(value) else cls._vector(value, info)
 
     @property
     def place_function(self) -> Callable[..., Any] | None:
@@ -157,6 +180,7 @@ class SpanMoment(SpanLoad):
     """A moment per length of a beam (N): one component, about axis 3, for a planar beam and three for a spatial one."""
 
     VECTORS: ClassVar[Kind] = MOMENT
+    UNIT: ClassVar[str] = "N"
 
 
 class Pressure(SpanLoad):
@@ -168,8 +192,9 @@ class Pressure(SpanLoad):
 
     WAYS: ClassVar[tuple[str, ...]] = (*SpanLoad.WAYS[:-2], "regions", *SpanLoad.WAYS[-2:])
     VECTORS: ClassVar[Kind] = PRESSURE
+    UNIT: ClassVar[str] = "Pa"
 
-    regions: dict[str, Annotated[float, PlainValidator(as_number)]] | None = None
+    regions: dict[str, Annotated[Number, Unit("Pa")]] | None = None
 
 
 def _as_place(value: Any) -> tuple[float, ...]:
@@ -186,7 +211,7 @@ class PointLoad(SceneModel):
         kind: "dead" or "follower", of both where they do not say it themselves.
     """
 
-    x: Annotated[tuple[float, ...], PlainValidator(_as_place)] = Field(
+    x: Annotated[tuple[float, ...], PlainValidator(_as_place), Unit("m")] = Field(
         description="a place along the beam (m), or [x, y] on a plate"
     )
     force: Load | None = None
@@ -217,7 +242,7 @@ class Loads(SceneModel):
         at: forces and moments at places of the structure.
     """
 
-    gravity: PaddedVector = (0.0, 0.0, 0.0)
+    gravity: Annotated[PaddedVector, Unit("m/s**2")] = (0.0, 0.0, 0.0)
     tip_force: Load | None = None
     tip_moment: MomentLoad | None = None
     distributed: SpanLoad | None = None

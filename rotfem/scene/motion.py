@@ -11,9 +11,10 @@ from pydantic import ConfigDict, Discriminator, Field, PlainValidator, Tag, mode
 from rotfem.errors import show
 from rotfem.registry import Registry, motion_laws, register
 from rotfem.scene.signals import Signal, TimeFunction, function_of, time_table
-from rotfem.scene.table import SceneModel, check_parameters, parameters_of, problem, with_parameters
+from rotfem.scene.table import SceneModel, Unit, check_parameters, parameters_of, problem, with_parameters
 from rotfem.scene.values import Matrix, NonNegative, Number, Positive, Vector3, as_rows, as_vector3, such
 
+Speed = Annotated[Number, Unit("rad/s")]
 Axis = Annotated[Vector3, such(as_vector3, any, "must be a direction; not all three components can be 0")]
 
 
@@ -91,7 +92,7 @@ class ConstantMotion(Motion):
     is_steady: ClassVar[bool] = True
     is_known: ClassVar[bool] = True
     type: Literal["constant"]
-    speed: Number = Field(description="a number (rad/s)")
+    speed: Speed = Field(description="a number (rad/s)")
 
     def top_speed(self, end: float | None) -> float:
         """Return |Ω| (rad/s)."""
@@ -109,8 +110,8 @@ class SpinUpMotion(Motion):
     name: ClassVar[str] = "spin_up"
     is_known: ClassVar[bool] = True
     type: Literal["spin_up"]
-    speed: Number = Field(description="a number (rad/s)")
-    duration: Positive = Field(description="a number greater than 0 (s)")
+    speed: Speed = Field(description="a number (rad/s)")
+    duration: Annotated[Positive, Unit("s")] = Field(description="a number greater than 0 (s)")
 
     def top_speed(self, end: float | None) -> float:
         """Return the |Ω| (rad/s) that is reached until `end` (s)."""
@@ -129,7 +130,7 @@ class TableMotion(Motion):
     name: ClassVar[str] = "table"
     is_known: ClassVar[bool] = True
     type: Literal["table"]
-    table: Annotated[Matrix, time_table("speed")] = Field(
+    table: Annotated[Matrix, time_table("speed"), Unit("rad/s", ("s",))] = Field(
         description="a table [[t, speed], …] or the path of a CSV file"
     )
     interpolation: Literal["pchip", "cubic", "linear"] = "pchip"
@@ -161,13 +162,13 @@ class TorqueMotion(Motion):
     name: ClassVar[str] = "torque"
     is_free: ClassVar[bool] = True
     type: Literal["torque"]
-    hub_inertia: Positive = Field(description="a number greater than 0 (kg·m²)")
-    pulses: Annotated[Matrix, PlainValidator(_as_pulses)] | None = None
-    table: Annotated[Matrix, time_table("torque")] | None = None
+    hub_inertia: Annotated[Positive, Unit("kg*m**2")] = Field(description="a number greater than 0 (kg·m²)")
+    pulses: Annotated[Matrix, PlainValidator(_as_pulses), Unit(("s", "s", "N*m"))] | None = None
+    table: Annotated[Matrix, time_table("torque"), Unit("N*m", ("s",))] | None = None
     function: Annotated[Callable[..., float], function_of("(t, psi, psi_dot, tip)", 4)] | None = None
     coupled: Annotated[bool, Field(strict=True)] = True
-    hub_damping: NonNegative = 0.0
-    speed: Number = 0.0
+    hub_damping: Annotated[NonNegative, Unit("N*m*s")] = 0.0
+    speed: Speed = 0.0
 
     @property
     def is_coupled(self) -> bool:
@@ -207,7 +208,7 @@ class LawMotion(Motion):
     """
 
     model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, Number]
+    __pydantic_extra__: dict[str, Annotated[Number, Unit("")]]
 
     type: str
 

@@ -11,7 +11,7 @@ from pydantic import Field, PlainValidator, model_validator
 
 from rotfem.scene.files import existing_file
 from rotfem.scene.structure import Damping, StructureTable, check_one_hub
-from rotfem.scene.table import Way, choose_way, problem, problems_at
+from rotfem.scene.table import Unit, Way, along, choose_way, problem, problems_at
 from rotfem.scene.values import (
     Array,
     Bounds,
@@ -53,6 +53,9 @@ def _as_point_masses(value: Any) -> Matrix:
     return rows
 
 
+Modulus = Annotated[Positive, Unit("Pa")]
+
+
 class PlateStructure(StructureTable):
     """A plate in the plane (1, 2) of the rotating frame: a rectangle clamped at x = 0, or a mesh file.
 
@@ -84,26 +87,26 @@ class PlateStructure(StructureTable):
     )
 
     type: Literal["plate"] = "plate"
-    length: Positive | None = None
-    width: Positive | None = None
+    length: Annotated[Positive, Unit("m")] | None = None
+    width: Annotated[Positive, Unit("m")] | None = None
     mesh: Annotated[str, PlainValidator(lambda value, info: str(existing_file(value, info)))] | None = None
-    thickness: Annotated[float | Taper | dict[str, float], PlainValidator(_as_thickness)] = Field(
+    thickness: Annotated[float | Taper | dict[str, float], PlainValidator(_as_thickness), along("m")] = Field(
         description="a number greater than 0 (m), a taper [[x, thickness], …], or with a mesh a table of regions"
     )
-    E: Positive | None = None
+    E: Modulus | None = None
     nu: PoissonRatio | None = None
-    E1: Positive | None = None
-    E2: Positive | None = None
+    E1: Modulus | None = None
+    E2: Modulus | None = None
     nu12: Number | None = None
-    G12: Positive | None = None
-    G13: Positive | None = None
-    G23: Positive | None = None
-    rho: Positive = Field(description="a number greater than 0 (kg/m³)")
+    G12: Modulus | None = None
+    G13: Modulus | None = None
+    G23: Modulus | None = None
+    rho: Annotated[Positive, Unit("kg/m**3")] = Field(description="a number greater than 0 (kg/m³)")
     shear_correction: ShearCorrection = 5.0 / 6.0
-    hub_radius: NonNegative = 0.0
-    hub_offset: Vector | None = None
-    point_masses: Annotated[Matrix, PlainValidator(_as_point_masses)] = ()
-    line_masses: dict[str, Positive] = Field(default_factory=dict)
+    hub_radius: Annotated[NonNegative, Unit("m")] = 0.0
+    hub_offset: Annotated[Vector, Unit("m")] | None = None
+    point_masses: Annotated[Matrix, PlainValidator(_as_point_masses), Unit(("m", "m", "kg"))] = ()
+    line_masses: dict[str, Annotated[Positive, Unit("kg/m")]] = Field(default_factory=dict)
     damping: Damping = Damping()
 
     @property

@@ -8,14 +8,14 @@ import numpy as np
 from pydantic import Field, PlainValidator, model_validator
 
 from rotfem.scene.signals import Given, Harmonic, TimeFunction, time_table
-from rotfem.scene.table import SceneModel, problem
+from rotfem.scene.table import SceneModel, Unit, problem
 from rotfem.scene.values import Bounds, Matrix, NonNegative, Number, as_rows
 
 
 class HarmonicAngle(Harmonic):
     """A harmonic part of an angle."""
 
-    amplitude: Number = Field(description="a number (rad)")
+    amplitude: Annotated[Number, Unit("rad")] = Field(description="a number (rad)")
 
 
 class PitchAngle(Given):
@@ -34,8 +34,8 @@ class PitchAngle(Given):
 
     WAYS: ClassVar[tuple[str, ...]] = ("value", "table", "function")
 
-    value: Number | None = None
-    table: Annotated[Matrix, time_table("angle")] | None = None
+    value: Annotated[Number, Unit("rad")] | None = None
+    table: Annotated[Matrix, time_table("angle"), Unit("rad", ("s",))] | None = None
     function: TimeFunction | None = None
     rate: TimeFunction | None = None
     harmonic: tuple[HarmonicAngle, ...] = ()
@@ -66,6 +66,10 @@ class Hinge(NamedTuple):
     damping: float
 
 
+Spring = Annotated[NonNegative, Unit("N*m")]
+Damper = Annotated[NonNegative, Unit("N*m*s")]
+
+
 class Root(SceneModel):
     """What holds the root of a beam: rigid but about the axes that have a stiffness; 0 is a hinge.
 
@@ -78,9 +82,9 @@ class Root(SceneModel):
     #: Name of a turn ↦ the axis that it is about.
     AXES: ClassVar[dict[str, int]] = {"lag": 3}
 
-    lag_stiffness: NonNegative | None = None
-    lag_damping: NonNegative = 0.0
-    hinge_offset: NonNegative = 0.0
+    lag_stiffness: Spring | None = None
+    lag_damping: Damper = 0.0
+    hinge_offset: Annotated[NonNegative, Unit("m")] = 0.0
 
     @property
     def hinges(self) -> dict[int, Hinge]:
@@ -112,10 +116,10 @@ class SpatialRoot(Root):
 
     AXES: ClassVar[dict[str, int]] = {"pitch": 1, "flap": 2, "lag": 3}
 
-    flap_stiffness: NonNegative | None = None
-    flap_damping: NonNegative = 0.0
-    pitch_stiffness: NonNegative | None = None
-    pitch_damping: NonNegative = 0.0
+    flap_stiffness: Spring | None = None
+    flap_damping: Damper = 0.0
+    pitch_stiffness: Spring | None = None
+    pitch_damping: Damper = 0.0
     pitch: PitchAngle = PitchAngle(value=0.0)
     driven: bool = False
 
@@ -157,9 +161,9 @@ class Support(SceneModel):
         damping: of the damper (N·s/m), likewise.
     """
 
-    x: Number = Field(description="a place along the beam (m)")
-    stiffness: Annotated[Matrix, PlainValidator(_as_two_by_two)] = ((0.0, 0.0), (0.0, 0.0))
-    damping: Annotated[Matrix, PlainValidator(_as_two_by_two)] = ((0.0, 0.0), (0.0, 0.0))
+    x: Annotated[Number, Unit("m")] = Field(description="a place along the beam (m)")
+    stiffness: Annotated[Matrix, PlainValidator(_as_two_by_two), Unit("N/m")] = ((0.0, 0.0), (0.0, 0.0))
+    damping: Annotated[Matrix, PlainValidator(_as_two_by_two), Unit("N*s/m")] = ((0.0, 0.0), (0.0, 0.0))
 
     @model_validator(mode="after")
     def _check_any(self) -> Self:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 import numpy as np
 from pydantic import BaseModel, Discriminator, Field, PlainValidator, PrivateAttr, Tag, ValidationError, model_validator
@@ -21,13 +21,13 @@ from rotfem.scene.extensions import Extensions, load_wanted
 from rotfem.scene.files import apply_overrides, check_depth, noted_files, read_toml, set_key, to_builtin
 from rotfem.scene.loads import Loads, check_loads, doubtful_table
 from rotfem.scene.motion import AnyMotion, Motion, TorqueMotion
-from rotfem.scene.settings import BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver, Time
+from rotfem.scene.settings import AngularUnit, BeamMesh, Initial, Model, Modes, OutputTable, PlateMesh, Solver, Time
 from rotfem.scene.span_tables import FORCE
-from rotfem.scene.structure import designed, is_design
-from rotfem.scene.table import SceneModel, problem, scene_error
-from rotfem.scene.units import in_si, with_shown, with_shown_speed
+from rotfem.scene.structure import designed
+from rotfem.scene.table import SceneModel, Unit, problem, scene_error
 from rotfem.scene.values import ROUND_OFF, Bounds, Limits, Matrix, limits_of
 from rotfem.short import short
+from rotfem.units import unit_of
 
 
 def abridged(value: Any, given: Any) -> Any:
@@ -49,7 +49,7 @@ def abridged(value: Any, given: Any) -> Any:
 
 #: A relative error that may be asked for, and CPU seconds that it may take.
 Accuracy = Annotated[float, PlainValidator(Bounds(ge=1e-8, le=0.5).number)]
-Budget = Annotated[float, PlainValidator(Bounds(gt=0, le=1e9).number)]
+Budget = Annotated[float, PlainValidator(Bounds(gt=0, le=1e9).number), Unit("s")]
 
 
 class _PlateTable(dict[str, Any]):
@@ -125,9 +125,12 @@ class Scene(SceneModel):
         check_depth(file, tables)
         with noted_files() as extensions:
             load_wanted(tables, file, directory)
-        whole, hints = in_si(with_shown_speed(designed(tables, file)), file), list[str]()
-        tables = {**whole, "structure": tables["structure"]} if is_design(tables) else whole
-        context = {"directory": directory, "limits": limits_of(whole), "accuracy": whole.get("accuracy")}
+        given = tables.get("motion")
+        tables = with_shown(tables, "speed", given.get("speed") if isinstance(given, Mapping) else None)
+        whole, hints = designed(tables, file), list[str]()
+        structure = whole.get("structure")
+        kind = structure.get("type") if isinstance(structure, Mapping) else None
+        context = {"directory": directory, "limits": limits_of(whole), "accuracy": whole.get("accuracy"), "type": kind}
         try:
             with noted_files() as files:
                 scene = cls.model_validate(whole, context={**context, "hints": hints})
@@ -282,6 +285,17 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
         scene = Scene._validate(tables, path.stem, path.name, str(path.parent))
     scene._inputs = tuple(files)
     return scene
+
+
+def with_shown(tables: dict[str, Any], what: str, given: object) -> dict[str, Any]:
+    """Return a scene's tables with the unit of a text as output.speed or output.frequency.
+
+    They stay as they are where they have that key, or the text has no unit that it may be.
+    """
+    output, unit = tables.get("output", {}), unit_of(given) if isinstance(given, str) else ""
+    if not isinstance(output, Mapping) or what in output or unit not in get_args(AngularUnit):
+        return tables
+    return {**tables, "output": {**output, what: unit}}
 
 
 def as_scene(scene: Scene | str | Path | Mapping[str, Any]) -> Scene:

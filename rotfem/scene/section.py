@@ -16,27 +16,36 @@ from typing import Annotated, Any, ClassVar, Self, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import ConfigDict, PlainValidator, model_validator
+from pydantic import ConfigDict, PlainValidator, ValidationInfo, model_validator
 
 from rotfem import registry
 from rotfem.scene.section_shapes import MATERIAL_AND_SHAPE, Geometry, Shape
-from rotfem.scene.span_tables import MatrixTable, Point, PointTable, as_matrix_or_table, as_point_or_table
-from rotfem.scene.table import SceneModel, Way, as_name, choose_way, problem
+from rotfem.scene.span_tables import (
+    OF_FILE,
+    AnyProfile,
+    FromFile,
+    MatrixTable,
+    NonNegativeProfile,
+    Point,
+    PointTable,
+    PositiveProfile,
+    as_matrix_or_table,
+    as_point_or_table,
+    file_columns,
+)
+from rotfem.scene.table import SceneModel, Unit, Way, along, as_name, choose_way, problem, problems_at
 from rotfem.scene.values import (
     ROUND_OFF,
-    AnyProfile,
     Array,
     Bounds,
     Matrix,
-    NonNegativeProfile,
-    PositiveProfile,
     Profile,
     evaluate,
     is_table,
 )
 
-PoissonProfile = Annotated[Profile, PlainValidator(Bounds(gt=-1.0, le=0.5).profile)]
-ShearProfile = Annotated[Profile, PlainValidator(Bounds(gt=0.0, le=1.0).profile)]
+PoissonProfile = Annotated[Profile, PlainValidator(Bounds(gt=-1.0, le=0.5).profile), OF_FILE]
+ShearProfile = Annotated[Profile, PlainValidator(Bounds(gt=0.0, le=1.0).profile), OF_FILE]
 
 
 class Section(SceneModel):
@@ -55,12 +64,12 @@ class Section(SceneModel):
     WITH_SHAPE: ClassVar[tuple[str, ...]] = ()
 
     model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, PositiveProfile | None]
+    __pydantic_extra__: dict[str, Annotated[PositiveProfile, along("m")] | None]
 
-    E: PositiveProfile | None = None
+    E: Annotated[PositiveProfile, along("Pa")] | None = None
     nu: PoissonProfile | None = None
-    rho: PositiveProfile | None = None
-    area: PositiveProfile | None = None
+    rho: Annotated[PositiveProfile, along("kg/m**3")] | None = None
+    area: Annotated[PositiveProfile, along("m**2")] | None = None
     shape: str | None = None
     shear_correction: ShearProfile | None = None
 
@@ -135,6 +144,11 @@ class Section(SceneModel):
 
     @model_validator(mode="before")
     @classmethod
+    def _read_file(cls, data: Any, info: ValidationInfo) -> Any:
+        return with_columns(data, info, "") if isinstance(data, Mapping) else data
+
+    @model_validator(mode="before")
+    @classmethod
     def _check_shape(cls, data: Any) -> Any:
         """Check the name of the shape before the keys, as it says which there are."""
         if isinstance(data, Mapping) and data.get("shape") is not None:
@@ -149,6 +163,22 @@ class Section(SceneModel):
             for key, allowed in registry.shapes[str(self.shape)].check(**dimensions).items():
                 raise problem(key, self.given[key], allowed)
         return self
+
+
+def with_columns(section: Mapping[str, Any], info: ValidationInfo, path: str) -> dict[str, Any]:
+    """Return the table of a section with the columns of its file in the place of that; `path` is before its keys."""
+    for key, why in (("from", "is only of a spatial_beam"), ("format", "has no meaning without section.from")):
+        if key in section:
+            raise problem(f"{path}{key}", section[key], why)
+    given = {key: value for key, value in section.items() if key != "file"}
+    if "file" not in section:
+        return given
+    with problems_at(f"{path}file", section["file"]):
+        columns = file_columns(section["file"], info)
+    for key in columns:
+        if key in given:
+            raise problem(f"{path}{key}", None, "given twice; section.file has a column of it too")
+    return columns | given
 
 
 class PlanarSection(Section):
@@ -169,12 +199,12 @@ class PlanarSection(Section):
     )
     WITH_SHAPE: ClassVar[tuple[str, ...]] = ("shear_correction",)
 
-    EA: PositiveProfile | None = None
-    GA: PositiveProfile | None = None
-    EI: PositiveProfile | None = None
-    mass_per_length: PositiveProfile | None = None
-    rotary_inertia: NonNegativeProfile | None = None
-    second_moment: PositiveProfile | None = None
+    EA: Annotated[PositiveProfile, along("N")] | None = None
+    GA: Annotated[PositiveProfile, along("N")] | None = None
+    EI: Annotated[PositiveProfile, along("N*m**2")] | None = None
+    mass_per_length: Annotated[PositiveProfile, along("kg/m")] | None = None
+    rotary_inertia: Annotated[NonNegativeProfile, along("kg*m")] | None = None
+    second_moment: Annotated[PositiveProfile, along("m**4")] | None = None
 
     @property
     def has_rotary_inertia(self) -> bool:
@@ -212,7 +242,12 @@ def _as_mass(value: Any) -> Matrix | MatrixTable:
     return read
 
 
-Center: TypeAlias = Annotated[Point | PointTable, PlainValidator(as_point_or_table)]
+Center: TypeAlias = Annotated[
+    Point | PointTable, PlainValidator(as_point_or_table), FromFile((3,), "a table [[x, y, z], …]"), Unit("m")
+]
+MATRICES_OF_FILE = FromFile(
+    (37, 22), "x and 36 entries row by row, or x and 21 entries of the upper triangle row by row"
+)
 
 #: What says where in a section its properties belong to, and the radius of its fibers.
 _PLACES = ("mass_center", "shear_center", "tension_center", "principal_angle", "polar_radius")
@@ -260,25 +295,28 @@ class SpatialSection(Section):
     )
     WITH_SHAPE: ClassVar[tuple[str, ...]] = ("shear_correction", *_PLACES)
 
-    EA: PositiveProfile | None = None
-    GA2: PositiveProfile | None = None
-    GA3: PositiveProfile | None = None
-    GJ: PositiveProfile | None = None
-    EI2: PositiveProfile | None = None
-    EI3: PositiveProfile | None = None
-    mass_per_length: PositiveProfile | None = None
-    rotary_inertia2: NonNegativeProfile | None = None
-    rotary_inertia3: NonNegativeProfile | None = None
-    second_moment2: PositiveProfile | None = None
-    second_moment3: PositiveProfile | None = None
-    torsion_constant: PositiveProfile | None = None
+    EA: Annotated[PositiveProfile, along("N")] | None = None
+    GA2: Annotated[PositiveProfile, along("N")] | None = None
+    GA3: Annotated[PositiveProfile, along("N")] | None = None
+    GJ: Annotated[PositiveProfile, along("N*m**2")] | None = None
+    EI2: Annotated[PositiveProfile, along("N*m**2")] | None = None
+    EI3: Annotated[PositiveProfile, along("N*m**2")] | None = None
+    mass_per_length: Annotated[PositiveProfile, along("kg/m")] | None = None
+    rotary_inertia2: Annotated[NonNegativeProfile, along("kg*m")] | None = None
+    rotary_inertia3: Annotated[NonNegativeProfile, along("kg*m")] | None = None
+    second_moment2: Annotated[PositiveProfile, along("m**4")] | None = None
+    second_moment3: Annotated[PositiveProfile, along("m**4")] | None = None
+    torsion_constant: Annotated[PositiveProfile, along("m**4")] | None = None
     mass_center: Center | None = None
     shear_center: Center | None = None
     tension_center: Center | None = None
-    polar_radius: NonNegativeProfile | None = None
-    principal_angle: AnyProfile | None = None
-    stiffness: Annotated[Matrix | MatrixTable, PlainValidator(partial(as_matrix_or_table, definite=True))] | None = None
-    mass: Annotated[Matrix | MatrixTable, PlainValidator(_as_mass)] | None = None
+    polar_radius: Annotated[NonNegativeProfile, along("m")] | None = None
+    principal_angle: Annotated[AnyProfile, along("rad")] | None = None
+    stiffness: (
+        Annotated[Matrix | MatrixTable, PlainValidator(partial(as_matrix_or_table, definite=True)), MATRICES_OF_FILE]
+        | None
+    ) = None
+    mass: Annotated[Matrix | MatrixTable, PlainValidator(_as_mass), MATRICES_OF_FILE] | None = None
 
     @property
     def has_rotary_inertia(self) -> bool:

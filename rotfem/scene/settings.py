@@ -12,8 +12,16 @@ from pydantic import ConfigDict, Field, PlainValidator, ValidationInfo, model_va
 from rotfem import registry
 from rotfem.errors import show
 from rotfem.scene.files import as_table
-from rotfem.scene.table import SceneModel, as_name, as_names, check_parameters, parameters_of, problem, with_parameters
-from rotfem.scene.units import AngularUnit
+from rotfem.scene.table import (
+    SceneModel,
+    Unit,
+    as_name,
+    as_names,
+    check_parameters,
+    parameters_of,
+    problem,
+    with_parameters,
+)
 from rotfem.scene.values import Bounds, Count, Matrix, Number, Positive, as_increasing_rows
 from rotfem.section_quantities import FORCES, RESULTANTS, STRAINS
 
@@ -99,12 +107,12 @@ class Initial(SceneModel):
         velocity: rows (x, v1, v2, v3) of a beam's axis relative to the turning frame (m, m/s), or None.
     """
 
-    tip_displacement: Number | None = None
+    tip_displacement: Annotated[Number, Unit("m")] | None = None
     state: Literal["steady", "undeformed"] = "steady"
     mode: Count | None = None
-    amplitude: Number | None = None
-    phase: Number = 0.0
-    velocity: Annotated[Matrix, PlainValidator(_as_velocities)] | None = None
+    amplitude: Annotated[Number, Unit("m")] | None = None
+    phase: Annotated[Number, Unit("rad")] = 0.0
+    velocity: Annotated[Matrix, PlainValidator(_as_velocities), Unit(("m", "m/s"))] | None = None
 
     @property
     def moves(self) -> bool:
@@ -233,6 +241,9 @@ def _as_times(value: Any) -> tuple[float, ...]:
     return tuple(sorted(float(t) for t in value))
 
 
+Seconds = Annotated[Positive, Unit("s")]
+
+
 class Time(SceneModel):
     """The [time] table. Either step or tolerance is given; the parameters of the scheme are keys as well.
 
@@ -251,15 +262,15 @@ class Time(SceneModel):
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, Number]
 
-    end: Positive = Field(description="a number greater than 0 (s)")
-    step: Positive | None = None
+    end: Seconds = Field(description="a number greater than 0 (s)")
+    step: Seconds | None = None
     tolerance: Positive | None = None
-    max_step: Positive | None = None
-    min_step: Positive | None = None
+    max_step: Seconds | None = None
+    min_step: Seconds | None = None
     scheme: str = "generalised_alpha"
-    breakpoints: Annotated[tuple[float, ...], PlainValidator(_as_times)] = ()
+    breakpoints: Annotated[tuple[float, ...], PlainValidator(_as_times), Unit("s")] = ()
     output_every: Count = 1
-    output_step: Positive | None = None
+    output_step: Seconds | None = None
 
     @classmethod
     def keys(cls) -> list[str]:
@@ -344,8 +355,8 @@ class Modes(SceneModel):
     count: Count = 6
     about: Literal["steady", "undeformed"] = "steady"
     orders: Annotated[tuple[int, ...] | None, PlainValidator(_as_orders)] = None
-    rated: Positive | None = None
-    operating: Annotated[tuple[float, float] | None, PlainValidator(_as_speed_range)] = None
+    rated: Annotated[Positive, Unit("rad/s")] | None = None
+    operating: Annotated[tuple[float, float] | None, PlainValidator(_as_speed_range), Unit("rad/s")] = None
 
 
 class Solver(SceneModel):
@@ -387,6 +398,9 @@ def _as_stations(value: Any) -> int | tuple[float, ...]:
 
 _FIELDS = ("vtx", "xdmf")
 
+#: Units in which speeds and frequencies can be printed and drawn.
+AngularUnit = Literal["rad/s", "rpm", "Hz", "deg/s"]
+
 
 class OutputTable(SceneModel):
     """The [output] table.
@@ -405,7 +419,7 @@ class OutputTable(SceneModel):
     """
 
     quantities: Annotated[tuple[str, ...], PlainValidator(_as_quantities)] = ()
-    stations: Annotated[int | tuple[float, ...] | None, PlainValidator(_as_stations)] = None
+    stations: Annotated[int | tuple[float, ...] | None, PlainValidator(_as_stations), Unit("m")] = None
     every: Count = 1
     format: Literal["csv", "hdf5"] = "csv"
     fields: Annotated[tuple[str, ...], PlainValidator(lambda value: as_names(value, _FIELDS, "a format"))] = ("xdmf",)

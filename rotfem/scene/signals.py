@@ -10,9 +10,10 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import Field, PlainValidator, ValidationInfo, model_validator
 
-from rotfem.scene.files import as_time_table
-from rotfem.scene.table import SceneModel, problem
-from rotfem.scene.values import Array, Matrix, Number, Positive, as_padded_vector3, such
+from rotfem.scene.files import as_table
+from rotfem.scene.table import SceneModel, Unit, problem
+from rotfem.scene.values import Array, Matrix, Number, Positive, as_increasing_rows, as_padded_vector3, such
+from rotfem.units import is_quantity
 
 
 def arguments(function: Callable[..., Any]) -> int:
@@ -32,12 +33,14 @@ def function_of(what: str, count: int = 1) -> PlainValidator:
 
 def time_table(column: str) -> PlainValidator:
     """Return the validator of a table [[t, column], …], rows or the path of a CSV file."""
-    return PlainValidator(lambda value, info: as_time_table(value, info, (2,), f"a table [[t, {column}], …]"))
+    return PlainValidator(
+        lambda value, info: as_table(value, info, (2,), f"a table [[t, {column}], …]", as_increasing_rows)
+    )
 
 
 def _as_rows4(value: Any, info: ValidationInfo) -> Matrix:
     """Return rows (t, a1, a2, a3), the last column zero where it is not given; raise on anything else."""
-    rows = as_time_table(value, info, (3, 4), "a table [[t, a1, a2, a3], …] (a3 may be left out)")
+    rows = as_table(value, info, (3, 4), "a table [[t, a1, a2, a3], …] (a3 may be left out)", as_increasing_rows)
     return tuple((*row, 0.0)[:4] for row in rows)
 
 
@@ -55,9 +58,9 @@ class Harmonic(SceneModel):
     """
 
     amplitude: Any = Field(description="given")
-    frequency: Positive | None = None
+    frequency: Annotated[Positive, Unit("rad/s")] | None = None
     per_rev: Positive | None = None
-    phase: Number = 0.0
+    phase: Annotated[Number, Unit("rad")] = 0.0
 
     @model_validator(mode="after")
     def _check_one(self) -> Self:
@@ -101,7 +104,8 @@ class Given(SceneModel):
         if callable(data):
             return {"function": data}
         rows = isinstance(data, list | tuple) and bool(data) and isinstance(data[0], list | tuple)
-        return {"table" if rows or isinstance(data, str) else "value": data}
+        path = isinstance(data, str) and not is_quantity(data)
+        return {"table" if rows or path else "value": data}
 
     @model_validator(mode="after")
     def _check_one(self) -> Self:
@@ -124,8 +128,8 @@ class Signal(Given):
 
     WAYS: ClassVar[tuple[str, ...]] = ("value", "table", "function")
 
-    value: Annotated[tuple[float, ...], PlainValidator(as_padded_vector3)] | None = None
-    table: Annotated[Matrix, PlainValidator(_as_rows4)] | None = None
+    value: Annotated[tuple[float, ...], PlainValidator(as_padded_vector3), Unit("m/s**2")] | None = None
+    table: Annotated[Matrix, PlainValidator(_as_rows4), Unit("m/s**2", ("s",))] | None = None
     function: TimeFunction | None = None
 
     @property

@@ -8,29 +8,28 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
-from pydantic import ValidationInfo
-from pydantic_core import PydanticCustomError
+from pydantic import GetCoreSchemaHandler, PlainValidator, ValidationInfo
+from pydantic_core import CoreSchema, core_schema
 
-from rotfem.scene.blades.deck import Asked, keys_of
-from rotfem.scene.files import ROW_BYTES, Reader, as_table, existing_file, read_header, read_rows, read_text
+from rotfem.scene.files import Reader, as_table, read_header, read_rows, table_text
 from rotfem.scene.signals import arguments
 from rotfem.scene.table import did_you_mean, problem, problems_at
 from rotfem.scene.values import (
+    Bounds,
     Matrix,
+    Profile,
     as_increasing_rows,
     as_number,
     as_rows,
     as_symmetric_matrix,
     as_vector,
-    limits_in,
 )
 
 #: A table, or a function in its place.
@@ -140,14 +139,18 @@ def as_point_or_table(value: Any) -> Point | PointTable:
 
 
 def as_matrix_or_table(value: Any, *, definite: bool) -> Matrix | MatrixTable:
-    """Return a symmetric 6×6 matrix, or a table of them from rows [x, matrix]; raise on anything else."""
+    """Return a symmetric 6×6 matrix, or a table of them from rows; raise on anything else.
+
+    A row is [x, matrix], or has x and the 36 entries row by row, or the 21 of the upper triangle.
+    """
 
     def entry(matrix: Any) -> Matrix:
         return as_symmetric_matrix(matrix, 6, definite=definite)
 
     first = value[0] if isinstance(value, list | tuple) and value else None
-    if isinstance(first, list | tuple) and len(first) == 2:
-        return _as_table(value, entry, "a table [[x, matrix], …]")
+    if isinstance(first, list | tuple) and len(first) in (2, *FLAT):
+        rows = [[row[0], _matrix(as_vector(row[1:], (21, 36)))] if len(first) in FLAT else row for row in value]
+        return _as_table(rows, entry, "a table [[x, matrix], …]")
     return entry(value)
 
 
@@ -175,54 +178,11 @@ def _as_table(value: Sequence[Any], entry: Callable[[Any], Any], shape: str) -> 
 
 # --- in files ---------------------------------------------------------------------------------------------------------
 
+#: Numbers of columns of rows that have a matrix in them: x and its entries.
+FLAT = (22, 37)
+
 #: Keys of a section that hold matrices, and points.
 MATRICES, POINTS = ("stiffness", "mass"), ("mass_center", "shear_center", "tension_center")
-
-#: Keys of a section that are texts, or numbers that cannot vary.
-NO_TABLES = ("shape", "from", "format", "body", "precone")
-
-Rows: TypeAlias = list[list[Any]]
-
-
-def with_tables(data: Any, info: ValidationInfo, keys: Sequence[str] | None) -> Any:
-    """Return the table [structure] with the rows of files in the place of their paths.
-
-    Raise if a file is not there or not such a table, naming line and column, or a key is given twice.
-    """
-    if not isinstance(data, Mapping):
-        return data
-    out = {key: _table_at(key, key, value, info) if key in (keys or ()) else value for key, value in data.items()}
-    section = out.get("section")
-    if not isinstance(section, Mapping):
-        return out
-    out["section"] = section = _section_tables(section, info)
-    if keys is None and (given := [key for key in ("from", "format") if key in section]):
-        raise problem(f"section.{given[0]}", section[given[0]], "is only of a spatial_beam")
-    if "from" in section:
-        with _problems_of("section.from"):
-            path = existing_file(section["from"], info)
-        without = {key: value for key, value in out.items() if key != "section"}
-        with _problems_of("section.from", of_file=True):
-            return keys_of(path, Asked(without, section, (info.context or {}).get("hints", [])))
-    if "format" in section:
-        raise problem("section.format", section["format"], "has no meaning without section.from")
-    return out
-
-
-def _section_tables(section: Mapping[str, Any], info: ValidationInfo) -> dict[str, Any]:
-    out = {
-        key: value if key in NO_TABLES else _table_at(f"section.{key}", key, value, info)
-        for key, value in section.items()
-        if key != "file"
-    }
-    if "file" not in section:
-        return out
-    with _problems_of("section.file"):
-        columns = _columns(section["file"], info)
-    for key in columns:
-        if key in out:
-            raise problem(f"section.{key}", None, "given twice; section.file has a column of it too")
-    return columns | out
 
 
 def is_path(value: Any) -> bool:
@@ -230,44 +190,30 @@ def is_path(value: Any) -> bool:
     return isinstance(value, Path) or (isinstance(value, str) and re.search(r"\.[A-Za-z]\w*$", value) is not None)
 
 
-@contextmanager
-def _problems_of(key: str, of_file: bool = False) -> Iterator[None]:
-    """Let problems belong to a key; of a file only those that name none themselves."""
-    try:
-        yield
-    except PydanticCustomError as error:
-        context: dict[str, Any] = error.context or {"value": None}
-        named = context.get("key") if of_file else None
-        raise problem(named or key, context["value"], error.message()) from None
+@dataclass(frozen=True)
+class FromFile:
+    """As an annotation of a type: the path of a file may stand in the place of rows.
+
+    Attributes:
+        columns: numbers of columns that are allowed.
+        shape: how such rows are written, for messages.
+    """
+
+    columns: tuple[int, ...]
+    shape: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.with_info_before_validator_function(self, handler(source))
+
+    def __call__(self, value: Any, info: ValidationInfo) -> Any:
+        """Return the rows of the file that a value names; else the value."""
+        return as_table(value, info, self.columns, self.shape, as_rows) if is_path(value) else value
 
 
-def _table_at(path: str, key: str, value: Any, info: ValidationInfo) -> Any:
-    """Return the rows of the file that a value names, x and a number, a point or a matrix; else the value itself."""
-    if not is_path(value):
-        return value
-    with _problems_of(path):
-        return _rows(key, value, info)
-
-
-def _rows(key: str, value: Any, info: ValidationInfo) -> Rows:
-    path, text = _text(value, info)
-    rows = read_rows(text, path)
-    widths = {"x, value": 2}
-    if key in POINTS or key == "line":
-        widths = {"x, y, z": 3}
-    elif key in MATRICES:
-        widths = {"x and 36 entries row by row": 37, "x and 21 entries of the upper triangle row by row": 22}
-    line, first = next(iter(rows.items()))
-    if len(first) not in widths.values():
-        raise problem("", str(path), f"line {line} has {len(first)} columns; must be {', or '.join(widths)}")
-    return [[row[0], _matrix(row[1:])] if key in MATRICES else list(row) for row in rows.values()]
-
-
-def _text(value: Any, info: ValidationInfo) -> tuple[Path, str]:
-    path, limits = existing_file(value, info), limits_in(info)
-    text = read_text(path, 4 * ROW_BYTES * limits.rows)  # a row may have a 6×6 matrix in it
-    limits.check("rows", text.count("\n"), value=str(path))
-    return path, text
+OF_FILE = FromFile((2,), "a table [[x, value], …]")
+PositiveProfile = Annotated[Profile, PlainValidator(Bounds(gt=0.0).profile), OF_FILE]
+NonNegativeProfile = Annotated[Profile, PlainValidator(Bounds(ge=0.0).profile), OF_FILE]
+AnyProfile = Annotated[Profile, PlainValidator(Bounds().profile), OF_FILE]
 
 
 def _matrix(entries: Sequence[float]) -> list[list[float]]:
@@ -281,9 +227,9 @@ def _matrix(entries: Sequence[float]) -> list[list[float]]:
     return [list(map(float, row)) for row in M]
 
 
-def _columns(value: Any, info: ValidationInfo) -> dict[str, Any]:
+def file_columns(value: Any, info: ValidationInfo) -> dict[str, Any]:
     """Return the properties of a section from a file whose header names its columns."""
-    path, text = _text(value, info)
+    path, text = table_text(value, info)
     names = read_header(text)
     if not names or names[0] != "x":
         first = f' "{names[0]}"' if names else ""

@@ -12,7 +12,7 @@ from pydantic import ConfigDict, PlainValidator
 
 from rotfem.errors import SceneError, show
 from rotfem.registry import Registry, damping_models, register, structures
-from rotfem.scene.table import SceneModel, did_you_mean, problem, problems_at
+from rotfem.scene.table import SceneModel, Unit, did_you_mean, problem, problems_at
 from rotfem.scene.values import Bounds, NonNegative, as_vector, such
 
 
@@ -118,9 +118,9 @@ class Damping(SceneModel):
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, NonNegative]
 
-    kelvin_voigt: NonNegative = 0.0
-    rayleigh: Annotated[tuple[float, float], Rayleigh] = (0.0, 0.0)
-    modal: Annotated[Ratios, PlainValidator(_as_modal)] = 0.0
+    kelvin_voigt: Annotated[NonNegative, Unit("s")] = 0.0
+    rayleigh: Annotated[tuple[float, float], Rayleigh, Unit(("1/s", "s"))] = (0.0, 0.0)
+    modal: Annotated[Ratios, PlainValidator(_as_modal), Unit("dimensionless")] = 0.0
 
     @classmethod
     def keys(cls) -> list[str]:
@@ -180,8 +180,6 @@ def apart(places: Collection[float], length: float) -> tuple[float, ...]:
 
 class StructureTable(SceneModel):
     """The [structure] table."""
-
-    part: ClassVar[str] = "structure"
 
     @property
     def is_planar(self) -> bool:

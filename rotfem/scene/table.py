@@ -7,17 +7,16 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
-from functools import reduce
 from inspect import Parameter, Signature
-from typing import TYPE_CHECKING, Any, ClassVar, get_type_hints
+from typing import TYPE_CHECKING, Any, get_args, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError, model_validator
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from rotfem.errors import Problem, SceneError, show
 from rotfem.registry import Registry
-from rotfem.scene.units import UNITS, in_si
 from rotfem.short import short
+from rotfem.units import is_quantity, quantity
 
 if TYPE_CHECKING:
     from pydantic._internal._model_construction import ModelMetaclass
@@ -45,10 +44,12 @@ def problem(key: str, value: Any, allowed: str) -> PydanticCustomError:
 
 @contextmanager
 def problems_at(key: str, value: Any, before: str = "") -> Iterator[None]:
-    """Let a problem raised inside name a key and its value, with some words before what it says."""
+    """Let a problem raised inside that names no key name one and its value, with some words before what it says."""
     try:
         yield
     except PydanticCustomError as error:
+        if (error.context or {}).get("key"):
+            raise
         raise problem(key, value, f"{before}{error.message()}") from None
 
 
@@ -79,6 +80,63 @@ def as_names(value: Any, names: Sequence[str], kind: str, others: str = "") -> t
     return tuple(value)
 
 
+# --- units ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The unit of a key, as an annotation of its type: texts such as "12.1 rpm" become numbers before it is validated.
+
+    Attributes:
+        unit: of all numbers, or one for each component of a vector or column of rows, the last one of all further ones.
+            "" stands for that of SI.
+        over: units of the columns of rows that are before these.
+    """
+
+    unit: str | tuple[str, ...]
+    over: tuple[str, ...] = ()
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.read, handler(source))
+
+    def read(self, value: Any) -> Any:
+        """Return a value with numbers in the place of texts with units; raise if one of these is not of the kind."""
+        if isinstance(value, Mapping):
+            return {key: self.read(entry) for key, entry in value.items()}
+        if not _has_text(value) or (isinstance(value, str) and not is_quantity(value)):
+            return value  # a text that is no number with a unit stays, for who wants a number
+        units = (self.unit,) if isinstance(self.unit, str) else self.unit
+        return _in_units(value, units, self.over)
+
+
+def along(unit: str) -> Unit:
+    """Return the unit of what varies over the span: tables have x (m) in their first column."""
+    return Unit(unit, ("m",))
+
+
+def has_unit(kind: Any) -> bool:
+    """Return whether a type says a unit."""
+    return isinstance(kind, Unit) or any(map(has_unit, get_args(kind)))
+
+
+def _has_text(value: Any) -> bool:
+    return any(map(_has_text, value)) if isinstance(value, list | tuple) else isinstance(value, str)
+
+
+def _in_units(value: Any, units: tuple[str, ...], over: tuple[str, ...]) -> Any:
+    """Return a number, a vector or rows."""
+    if isinstance(value, list | tuple):
+        if any(isinstance(entry, list | tuple) for entry in value):
+            return [_in_units(row, (*over, *units), ()) for row in value]
+        return [_in_units(entry, units[min(i, len(units) - 1) :], ()) for i, entry in enumerate(value)]
+    if not isinstance(value, str):
+        return value
+    try:
+        return quantity(value, units[0])
+    except ValueError as error:
+        raise problem("", value, str(error)) from None
+
+
 # --- tables -----------------------------------------------------------------------------------------------------------
 
 
@@ -91,9 +149,6 @@ class InputErrors(ModelMetaclass):
         Raises:
             SceneError: it is not valid; the name of the class stands for that of the file.
         """
-        if (part := cls.part) and kwargs:  # type: ignore[attr-defined]
-            tables = reduce(lambda below, name: {name: below}, reversed(part.split(".")), kwargs)
-            kwargs = reduce(lambda tables, name: tables[name], part.split("."), in_si(tables, cls.__name__))
         try:
             return super().__call__(*args, **kwargs)
         except ValidationError as error:
@@ -102,10 +157,9 @@ class InputErrors(ModelMetaclass):
     @property
     def __signature__(cls) -> Signature:
         """Signature of the class: the keys of the table, with the types that a script may give."""
-        part: str = cls.part  # type: ignore[attr-defined]
-        parameters, kinds = [], get_type_hints(cls)
+        parameters, kinds, whole = [], get_type_hints(cls), get_type_hints(cls, include_extras=True)
         for name, field in cls.model_fields.items():
-            kind = kinds[name] | str if f"{part}.{name}" in UNITS else kinds[name]
+            kind = kinds[name] | str if has_unit(whole[name]) else kinds[name]
             default = Parameter.empty if field.is_required() else field.get_default(call_default_factory=True)
             parameters.append(Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=kind))
         return Signature(parameters)
@@ -119,9 +173,6 @@ class SceneModel(BaseModel, metaclass=InputErrors):
     """A table of the scene: immutable, and unknown or missing keys are errors that say what is allowed."""
 
     model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
-
-    #: Its dotted name in a scene, where a script makes it by itself: what its keys' units are found by.
-    part: ClassVar[str] = ""
 
     def __repr__(self) -> str:
         given = {name: getattr(self, name) for name in type(self).model_fields if name in self.model_fields_set}

@@ -10,7 +10,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -135,12 +135,6 @@ def such(read: Callable[[Any], Any], holds: Callable[[Any], Any], allowed: str) 
     return PlainValidator(validated)
 
 
-def are_numbers(table: Array) -> bool:
-    """Return whether all numbers are 0 or of a size that is allowed."""
-    size = np.abs(table)
-    return bool(np.all((size == 0.0) | ((size >= SMALLEST) & (size <= LARGEST))))
-
-
 def as_vector(value: Any, sizes: Sequence[int]) -> tuple[float, ...]:
     """Return a vector as a tuple of floats; raise if it has not one of the allowed sizes."""
     shape = f"must be a list of {' or '.join(map(str, sizes))} numbers"
@@ -191,13 +185,9 @@ def _quick_rows(value: Sequence[Sequence[Any]]) -> Matrix | None:
         table = np.array(value, dtype=np.float64)
     except OverflowError:
         return None
-    return rows_of(table) if are_numbers(table) else None
-
-
-def rows_of(table: Array) -> Matrix:
-    """Return the rows of an array (n, columns)."""
-    rows: Any = table.tolist()
-    return tuple(map(tuple, rows))
+    size, rows = np.abs(table), cast(list[list[float]], table.tolist())
+    good = np.all((size == 0.0) | ((size >= SMALLEST) & (size <= LARGEST)))
+    return tuple(tuple(row) for row in rows) if good else None
 
 
 def as_increasing_rows(
@@ -286,9 +276,6 @@ NonNegative = Annotated[float, PlainValidator(Bounds(ge=0.0).number)]
 PoissonRatio = Annotated[float, PlainValidator(Bounds(gt=-1.0, lt=0.5).number)]
 ShearCorrection = Annotated[float, PlainValidator(Bounds(gt=0.0, le=1.0).number)]
 Count = Annotated[int, PlainValidator(Bounds(ge=1).integer)]
-PositiveProfile = Annotated[Profile, PlainValidator(Bounds(gt=0.0).profile)]
-NonNegativeProfile = Annotated[Profile, PlainValidator(Bounds(ge=0.0).profile)]
-AnyProfile = Annotated[Profile, PlainValidator(Bounds().profile)]
 Vector = Annotated[Vector3, PlainValidator(as_vector3)]
 PaddedVector = Annotated[Vector3, PlainValidator(as_padded_vector3)]
 

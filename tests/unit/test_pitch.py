@@ -90,7 +90,7 @@ def test_units() -> None:
         (lambda t, x: 0.1, {}, "structure.root.pitch.function"),
         ({"value": 0.1, "rate": lambda t: 0.0}, {}, "structure.root.pitch.rate"),
         ({"function": lambda t: 0.1, "rate": 0.0}, {}, "structure.root.pitch.rate"),
-        ([[0, "3 m"], [1, 0]], {}, "structure.root.pitch"),
+        ([[0, "3 m"], [1, 0]], {}, "structure.root.pitch.table"),
         ([[0, 0.1], [1, 0.2]], {"root": {"flap_stiffness": 0.0}}, "structure.root.lag_stiffness"),
         ([[0, 0.1], [1, 0.2]], {"motion": {"type": "torque", "hub_inertia": 1.0}}, "structure.root.pitch"),
     ],

@@ -335,7 +335,7 @@ def test_profile_in_a_file_of_its_own(tmp_path: Path) -> None:
         (BLADE_CSV.replace(", -0.5", ""), {"file": "blade.csv"}, "line 4 has 9 columns; must be 10"),
         (BLADE_CSV.replace("\n2,", "\n1,"), {"file": "blade.csv"}, "it ends at 1"),
         ("0, 3\n2, 1", {"file": "blade.csv"}, "its first row must name the columns"),
-        (BLADE_CSV, {"EA": "blade.csv"}, r"section\.EA.*line 3 has 10 columns; must be x, value"),
+        (BLADE_CSV, {"EA": "blade.csv"}, r"section\.EA.*must be a table \[\[x, value\], …\]; line 3 has 10 entries"),
         (BLADE_CSV, {"stiffness": "blade.csv"}, r"section\.stiffness.*must be x and 36 entries"),
         (BLADE_CSV, {"file": "none.csv"}, r"section\.file.*file not found"),
         (BLADE_CSV, {"file": 1}, r"section\.file.*must be the path of a file"),

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, get_type_hints
 
 import pytest
 
 from rotfem import Scene, SceneError
 from rotfem.commands.campbell import parse_speeds
 from rotfem.results.columns import ShownUnits
-from rotfem.scene import beams, loads, motion, plates, section, settings
-from rotfem.scene.units import DEPENDING, UNITS, in_si
+from rotfem.scene import beams, loads, motion, plates, root, section, settings, signals, structure
+from rotfem.scene.table import has_unit
 from rotfem.units import quantity
 
 BEAM: dict[str, Any] = {
@@ -95,38 +95,48 @@ def test_wrong_unit_names_its_key(key, value, message):
 
 
 def test_region_and_type_decide():
-    """The unit of a plate's regions is that of the table above, that of a table of motion follows its type."""
-    tables = {"structure": {"type": "plate", "thickness": {"root": "3 mm"}}, "loads": {"distributed": [0, 0, "2 kPa"]}}
-    found = in_si(tables, "scene")
-    assert found["structure"]["thickness"] == {"root": pytest.approx(3e-3)}
-    assert found["loads"]["distributed"][2] == pytest.approx(2e3)
+    """The unit of a plate's regions is that of all of them, those of loads and of a table follow their types."""
+    plate = {"type": "plate", "length": "1 m", "width": 1, "thickness": [[0, "3 mm"], ["100 cm", 0.001]]}
+    plate |= {"E": "70 GPa", "nu": 0.3, "rho": 2700}
+    tables = {"structure": plate, "motion": BEAM["motion"], "loads": {"distributed": [0, 0, "2 kPa"]}}
+    found = Scene.from_dict(tables)
+    assert found.structure.thickness == ((0.0, 3e-3), (1.0, 1e-3))
+    assert found.loads.distributed.value == (0.0, 0.0, 2e3)
+    assert plates.Modulus.__metadata__[-1].read({"root": "3 Pa"}) == {"root": 3.0}
+    with pytest.raises(SceneError, match="'kPa' is no unit of the kind of N/m"):
+        Scene.from_dict(BEAM | {"loads": {"distributed": [0, "2 kPa"]}})
     table = {"motion": {"type": "table", "table": [[0, 0], ["1 s", "60 rpm"]]}}
-    assert in_si(table, "scene")["motion"]["table"][1] == pytest.approx([1.0, 2 * math.pi])
+    assert Scene.from_dict(BEAM | table).motion.table[1] == pytest.approx([1.0, 2 * math.pi])
 
 
 #: Numbers without a unit, and matrices whose entries differ in theirs.
-PURE = {"nu", "nu12", "shear_correction", "stiffness", "mass", "axis", "speed", "rate", "angle", "tolerance"}
-TABLES = {
-    "structure": (beams.PlanarBeamStructure, beams.SpatialBeamStructure, plates.PlateStructure),
-    "structure.section": (section.PlanarSection, section.SpatialSection),
-    "motion": (motion.ConstantMotion, motion.SpinUpMotion, motion.TableMotion, motion.TorqueMotion),
-    "initial": (settings.Initial,),
-    "loads": (loads.Loads,),
-    "time": (settings.Time,),
+PURE = {"nu", "nu12", "shear_correction", "stiffness", "mass", "axis", "speed", "rate", "angle", "tolerance"} | {
+    "amplitude",
+    "per_rev",
+    "time",
 }
+TABLES = (
+    *(beams.PlanarBeamStructure, beams.SpatialBeamStructure, plates.PlateStructure, beams.PointMass, structure.Damping),
+    *(
+        section.PlanarSection,
+        section.SpatialSection,
+        root.SpatialRoot,
+        root.Support,
+        root.PitchAngle,
+        root.HarmonicAngle,
+    ),
+    *(motion.ConstantMotion, motion.SpinUpMotion, motion.TableMotion, motion.TorqueMotion, signals.Signal),
+    *(settings.Initial, settings.Time, loads.PointLoad, loads.Loads),
+)
 
 
 @pytest.mark.parametrize("table", TABLES)
 def test_every_number_has_its_unit(table):
     """What a new key holds is looked for here: numbers, vectors and tables have a unit or are known to have none."""
-    for model in TABLES[table]:
-        for name, field in model.model_fields.items():
-            kind = str(field.annotation)
-            if not any(word in kind for word in ("float", "Signal", "Load", "tuple")) or "Callable" in kind:
-                continue
-            key = f"{table}.{name}"
-            below = any(other.startswith(f"{key}.") for other in UNITS)
-            assert key in UNITS or key in DEPENDING or below or name in PURE, key
+    for name, kind in get_type_hints(table, include_extras=True).items():
+        words = str(table.model_fields[name].annotation) if name in table.model_fields else ""
+        if any(word in words for word in ("float", "tuple")) and not any(w in words for w in ("Callable", "rotfem")):
+            assert has_unit(kind) or name in PURE, name
 
 
 def test_speeds_of_a_range_in_rpm():

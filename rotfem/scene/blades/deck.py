@@ -15,7 +15,7 @@ from rotfem.errors import show, shown
 from rotfem.registry import Registry
 from rotfem.registry import blade_formats as registered
 from rotfem.scene.files import LARGEST, SHOWN_CELL, Unreadable, read_bytes
-from rotfem.scene.table import as_name, problem
+from rotfem.scene.table import Unit, as_name, problem, problems_at
 from rotfem.scene.values import DIGITS, Array
 
 
@@ -52,9 +52,9 @@ class Deck:
         try:
             content = read_bytes(path, LARGEST)
         except Unreadable as error:
-            raise problem("", shown(path), f"cannot be read: {error}") from None
+            raise problem("section.from", shown(path), f"cannot be read: {error}") from None
         if b"\0" in content:
-            raise problem("", shown(path), "cannot be read: it is no text")
+            raise problem("section.from", shown(path), "cannot be read: it is no text")
         try:
             text = content.decode("utf-8-sig")
         except UnicodeDecodeError:
@@ -65,7 +65,7 @@ class Deck:
     def fail(self, reason: str, line: int | None = None, column: int | None = None) -> NoReturn:
         """Refuse the file: what is wrong and what is allowed, with line and column of the value, from 1."""
         where = "" if line is None else f"line {line}: " if column is None else f"line {line}, column {column}: "
-        raise problem("", shown(self.path), f"{where}{reason}")
+        raise problem("section.from", shown(self.path), f"{where}{reason}")
 
     def refuse(self, name: str, reason: str) -> NoReturn:
         """Refuse the value of the line `value  name …`."""
@@ -192,7 +192,8 @@ class Asked:
 
     def length(self, deck: Deck, why: str) -> float:
         """Return structure.length (m), which the file does not have; refuse a scene without."""
-        length = self.structure.get("length")
+        with problems_at("length", None):
+            length = Unit("m").read(self.structure.get("length"))
         if not isinstance(length, int | float) or isinstance(length, bool) or not length > 0.0:
             raise problem("length", length, f"must be given, greater than 0 (m), with {deck.path.name}: {why}")
         return float(length)
@@ -246,7 +247,10 @@ def keys_of(path: Path, asked: Asked) -> dict[str, Any]:
     """
     deck = Deck(path)
     kind = format_of(deck, asked.section.get("format"))
-    with np.errstate(all="ignore"):  # what overflows is refused by the section, with its key
+    with (
+        problems_at("section.from", shown(path)),
+        np.errstate(all="ignore"),
+    ):  # what overflows is refused by the section, with its key
         read = kind.read(deck, asked)
     own = {key: value for key, value in asked.section.items() if key not in ("from", "format", "set", "body")}
     for where, given, there in (("section.", own, read["section"]), ("", asked.structure, read)):
