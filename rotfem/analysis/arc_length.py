@@ -27,17 +27,11 @@ from rotfem.numerics.newton import Newton
 
 Array = npt.NDArray[np.float64]
 
-#: First, longest and shortest step, in units of s and of the root mean square of q in its scales.
-FIRST, LONGEST, SHORTEST = 0.05, 0.25, 1e-6
-
-#: Least cosine of the angle that the tangent may turn by in a step.
-STRAIGHT = 0.9
+#: Shortest step, in units of s and of the root mean square of q in its scales.
+SHORTEST = 1e-6
 
 #: Steps before the path is given up, and iterations of a step.
 MOST_STEPS, ITERATIONS = 500, 8
-
-#: Accuracy of the place of a limit point, as a part of the step that it is in.
-LOCATED = 1e-5
 
 
 @dataclass
@@ -98,7 +92,7 @@ class Tracer:
             past_limits: whether to go on where the load has a maximum.
         """
         q = self.growth.begin(self.system)
-        path, point, length = LoadPath(q), self._point(q, 0.0, None), FIRST
+        path, point, length = LoadPath(q), self._point(q, 0.0, None), 0.05
         for _ in range(MOST_STEPS):
             try:
                 new, used = self._step(point, length)
@@ -110,7 +104,7 @@ class Tracer:
                 continue
             turned = new.t_s * point.t_s < 0.0
             crossed = new.negative != point.negative and not turned
-            if length > SHORTEST and (crossed or self._dot(new, point) < STRAIGHT):
+            if length > SHORTEST and (crossed or self._dot(new, point) < 0.9):
                 length = max(length / 4, SHORTEST)
                 continue
             if turned:
@@ -126,7 +120,7 @@ class Tracer:
             if new.s < 0.0:
                 path.why = "the load would have to be reversed"
                 break
-            point, length = self._counted(new), min(length * min(2.0, 4.0 / used), LONGEST)
+            point, length = self._counted(new), min(length * min(2.0, 4.0 / used), 0.25)
             path.q, path.share = point.q, point.s
         else:
             path.why = f"{MOST_STEPS} steps were not enough"
@@ -212,7 +206,7 @@ class Tracer:
         def slope(distance: float) -> float:
             return slopes[distance] if distance in slopes else self._step(point, distance)[0].t_s
 
-        return self._step(point, float(brentq(slope, 0.0, length, xtol=LOCATED * length)))[0].s
+        return self._step(point, float(brentq(slope, 0.0, length, xtol=1e-5 * length)))[0].s
 
     def _end(self, before: Point, after: Point) -> Array:
         """Return q at the full load, between two points of the path."""

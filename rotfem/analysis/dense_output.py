@@ -119,22 +119,21 @@ def monomials(x: Array, number: int, k: int) -> Array:
     return np.asarray(x[:, None] ** np.maximum(powers - k, 0) * falling)
 
 
-#: Corrections with the factor at rest, how fast they must shrink, and what may be left, relative to the acceleration.
-MOST, RATE, LEFT = 8, 0.1, 1e-13
-
-
 def end_acceleration(system: Any, state: State) -> Array:
-    """Return q̈ of F(q, q̇, q̈) = 0 at a state, a local dof array; the time is set, the state is written on return."""
+    """Return q̈ of F(q, q̇, q̈) = 0 at a state, a local dof array; the time is set, the state is written on return.
+
+    Eight corrections are made with the factor at rest, if each is a tenth of the last, until 1e-13 would be left.
+    """
     a = state.a.copy()
-    before, at_rest, left = np.inf, True, MOST
+    before, at_rest, left = np.inf, True, 8
     while True:
         system.set_state(state.q, state.v, a)
         change = system.acceleration(at_rest)
         a += change
         size, left = system.increment_size(change), left - 1
-        if not at_rest or (before < np.inf and size * size <= LEFT * before * system.increment_size(a)):
+        if not at_rest or (before < np.inf and size * size <= 1e-13 * before * system.increment_size(a)):
             break
-        at_rest = left > 0 and size <= RATE * before
+        at_rest = left > 0 and size <= 0.1 * before
         before = size
     system.set_state(state.q, state.v, a)
     return a

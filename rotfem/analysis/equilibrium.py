@@ -34,9 +34,6 @@ from rotfem.numerics.newton import Newton
 
 Array = npt.NDArray[np.float64]
 
-#: Distance, in the scales of the unknowns, at which two equilibria are one.
-SAME_STATE = 1e-6
-
 
 def steady_state(
     system: Any,
@@ -129,7 +126,7 @@ def _grown(system: Any, growth: Growth, newton: Newton, past_limits: bool, notes
                 return found.q  # nothing bends it, as a shaft that spins about its axis: one state at all speeds
     path = _path(system, growth, newton, past_limits, notes)
     if path.share == 1.0:
-        if found is not None and system.size(system.structure.total(path.q) - total) > SAME_STATE:
+        if found is not None and system.size(system.structure.total(path.q) - total) > 1e-6:
             notes.append("Newton met another equilibrium first; this is the one that the growing load leads to")
         return counted(system, growth, 1.0, path.q, newton)
     if past_limits:

@@ -19,10 +19,6 @@ from rotfem.numerics.projection import summed, with_ghosts
 
 Array = npt.NDArray[np.float64]
 
-#: Part of the kinetic energy of a mode from which what is in phase, or a quarter of a period behind, is a pattern that
-#: is prescribed. What is less follows the others, as the stretch that the Coriolis force makes of bending.
-PRESCRIBED = 1e-2
-
 
 @dataclass(frozen=True, kw_only=True)
 class FirstMotion:
@@ -69,7 +65,8 @@ class FirstMotion:
         """Return q and its three rates in the mode x, local dof arrays (4, n), and its patterns.
 
         The tip moves by one in the direction in which it moves most; then the rates are Re(λᵏ a x e^{iφ}), and the
-        patterns are M Re x and M Im x, owned unknowns (k, m), those that have some of the kinetic energy.
+        patterns are M Re x and M Im x, owned unknowns (k, m), those that have 1 % of the kinetic energy. What is less
+        follows the others, as the stretch that the Coriolis force makes of bending.
 
         Raises:
             InputError: there is no such mode, or it does not move the tip.
@@ -92,7 +89,7 @@ class FirstMotion:
         signal = np.array([(value**k * factor * whole / largest).real for k in range(4)])
         shape, mass = (x / largest, analysis.mass_times(spinning)[:, number - 1] / largest)
         energies = summed(system.comm, np.array([shape.real @ mass.real, shape.imag @ mass.imag]))
-        return signal, np.array([mass.real, mass.imag])[energies > PRESCRIBED * energies.sum()]
+        return signal, np.array([mass.real, mass.imag])[energies > 1e-2 * energies.sum()]
 
 
 def in_mode(system: Any, state: Array, signal: Array, patterns: Array, newton: Newton) -> tuple[Array, Array]:

@@ -37,18 +37,6 @@ Array = npt.NDArray[Any]
 #: Points about a peak, in half its width at 1/√2 of its height.
 ABOUT_PEAK = np.array([-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0])
 
-#: Damping ratio below which a mode has none, and the distance from its frequency at which its peak is then sampled.
-UNDAMPED = 1e-8
-BESIDE = 1e-3
-
-#: Part of the inertia that brakes the motion in a matrix near by, where the damping of low rank is none of what is
-#: factorised: that of the structure alone would be singular at its resonances. Corrections, relative to the solution,
-#: that end the refinement, and that are good enough after so many rounds.
-BRAKED, DONE, GOOD, ROUNDS = 1e-6, 1e-12, 1e-8, 40
-
-#: Frequencies, as parts of the lowest one of a free hub's vibrating modes, at which its rigid turn is reported.
-BELOW = np.array([0.2, 0.4, 0.6])
-
 
 class Output(NamedTuple):
     """What is read of a motion x e^{st}.
@@ -98,19 +86,23 @@ class FrequencyResponse:
         return np.concatenate([output.read(x, s) for output in self._outputs])
 
     def _solved(self, omega: float) -> Array:
-        """Return q̂ of the owned unknowns."""
+        """Return q̂ of the owned unknowns.
+
+        Where damping of low rank is none of what is factorised, a part of the inertia brakes the motion in that matrix:
+        it would be singular at resonances. Iterative refinement takes that off.
+        """
         if not self._solver.updates:
             self._solver.factor((1.0, 1j * omega, -(omega**2)))
             return np.asarray(self._solver.solve(self.force))
-        self._solver.factor((1.0, 1j * omega, -(1 - 1j * BRAKED) * omega**2))
+        self._solver.factor((1.0, 1j * omega, -(1 - 1e-6j) * omega**2))
         x, left = np.zeros_like(self.force), self.force
-        for _ in range(ROUNDS):  # iterative refinement
+        for _ in range(40):
             step = self._solver.solve(left)
             x, sizes = x + step, self._summed(np.array([np.vdot(step, step), np.vdot(x + step, x + step)])).real
             left = self.force - self._times(omega, x)
-            if sizes[0] <= DONE**2 * sizes[1]:
+            if sizes[0] <= 1e-24 * sizes[1]:
                 break
-        if not sizes[0] <= GOOD**2 * sizes[1]:
+        if not sizes[0] <= 1e-16 * sizes[1]:
             raise ComputationError("the matrix is singular: its solution was not found")
         return np.asarray(x)
 
@@ -153,7 +145,7 @@ class FrequencyResponse:
             return lambda omega: static
         values = self.spinning.pairs.values
         vibrating = values[values.imag > 0.0]
-        known = BELOW * float(np.min(np.abs(vibrating if len(vibrating) else values)))
+        known = np.array([0.2, 0.4, 0.6]) * float(np.min(np.abs(vibrating if len(vibrating) else values)))
         powers = np.array([[1.0, 1 / (1j * w), 1 / (1j * w) ** 2] for w in known])
         parts = np.linalg.solve(powers, np.array([self.direct(w) - at(w) for w in known]))
         return lambda omega: np.asarray(np.array([1.0, 1 / (1j * omega), 1 / (1j * omega) ** 2]) @ parts)
@@ -165,9 +157,9 @@ class FrequencyResponse:
             omega, width = abs(lam.imag), abs(lam.real)
             if not low <= omega <= high or omega == 0.0:
                 continue
-            if width <= UNDAMPED * abs(lam):
+            if width <= 1e-8 * abs(lam):
                 undamped.append(j)
-                width = BESIDE * omega
+                width = 1e-3 * omega
                 found.append(omega + width * ABOUT_PEAK[ABOUT_PEAK != 0.0])
             else:
                 found.append(omega + width * ABOUT_PEAK)

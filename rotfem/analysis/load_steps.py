@@ -20,20 +20,8 @@ from rotfem.structures.reference_rotation import BeyondReach
 
 Array = npt.NDArray[np.float64]
 
-#: Newton iterations after which the stresses of the last correction pay the compilation of a tangent.
-SOON = 4
-
 #: A continuation that must cut its steps below this share of the whole has met a limit point.
 SMALLEST_SHARE = 1e-3
-
-#: Turn of a root (rad) by springs that are as soft as lets it begin to swing when they let go.
-LET_GO = 0.1
-
-#: Stretch (deformed over undeformed length) from which the stretch is why a load cannot be raised farther.
-STRETCHED = 2.0
-
-#: Part of their range from which rotations are counted afresh where the next step of the load leads out of it.
-NEAR = 0.3
 
 
 def less(system: System) -> str:
@@ -145,7 +133,7 @@ def raised(system: System, growth: Growth, newton: Newton) -> Raised:
             wandered = newton.wandered
             new = counted(system, growth, target, new, newton)
         except BeyondReach as error:
-            failure, afresh = error.what, reached(system, q) > NEAR
+            failure, afresh = error.what, reached(system, q) > 0.3
         except ComputationError as error:
             failure, afresh = error.what, False
         else:
@@ -162,7 +150,7 @@ def raised(system: System, growth: Growth, newton: Newton) -> Raised:
             system.count_rotations_from(reference)
             system.set_state(q)
             stretch = system.model.stretches()[1]
-            if stretch >= STRETCHED:
+            if stretch >= 2.0:
                 failure = f"it is stretched to {stretch:.3g} times its length there, and ever farther by more load"
             raise ComputationError(
                 f"no steady state at {growth.omega:g} rad/s: the last equilibrium was at {growth.where(done)}; "
@@ -209,7 +197,7 @@ def on_hinges(system: System, omega: float, newton: Newton) -> Growth:
         turn = float(
             system.comm.allreduce(np.max(np.abs(start.q[system.structure.hinged_unknowns()]), initial=0.0), MPI.MAX)
         )
-        soft = min(1.0, turn / LET_GO) * stiff
+        soft = min(1.0, turn / 0.1) * stiff  # which lets the root swing by 0.1 rad when they let go
         start = raised(system, Growth(omega, (1.0, 1.0), (load, load), between(soft, 0.0), start), newton)
     except ComputationError:
         return Growth(omega)
@@ -266,7 +254,7 @@ def balance(
 
 
 def limited(
-    system: System, x: Array, correction: Callable[[Array | None], Array], soon: int = SOON
+    system: System, x: Array, correction: Callable[[Array | None], Array], soon: int = 4
 ) -> Callable[[], float]:
     """Return an iteration of Newton's method, which corrects x by no more than REACH and returns the size.
 
@@ -274,7 +262,7 @@ def limited(
         system: equations of motion; the state is set before each correction and after it.
         x: the unknowns, a local dof array, with further ones behind; overwritten.
         correction: q from which the last one has led here (see `System.tangent`), or None ↦ change of x.
-        soon: iterations after which that q is given.
+        soon: iterations after which that q is given, as it pays the compilation of a tangent then.
     """
     n = len(system.q.x.array)
     before, followed = x[:n].copy(), 0

@@ -153,9 +153,6 @@ class March:
 #: Safety factor, and smallest change of a step.
 SAFETY, SHRINK = 0.9, 0.2
 
-#: Local errors are estimates: the tolerance is divided by this.
-MARGIN = 7.0
-
 #: The longest step, and the cells of the time grid, as parts of the end.
 LONGEST, CELL = 0.05, 5e-4
 
@@ -269,7 +266,8 @@ class AdaptiveSteps:
         self.largest = max(self.largest, self.measure.displacement(new))
         if local is None:  # a fallback has taken it
             return new, 1.0
-        return new, MARGIN * self.measure(local, leg.length) / max(self.tolerance * self.largest, self.least)
+        # local errors are estimates, so that the tolerance is divided by 7
+        return new, 7.0 * self.measure(local, leg.length) / max(self.tolerance * self.largest, self.least)
 
     def _next(self, t: float, wanted: float) -> Leg:
         """Return a leg from t (s) that is about as long as wanted and passes no landing."""
@@ -370,9 +368,6 @@ class ErrorMeasure:
         return x
 
 
-#: Halvings after which a change that is still there is a jump: all digits of the arguments; part that is left of it.
-HALVINGS, LEFT = 52, 0.5
-
 #: Switches in so many steps that are a sliding mode. Steps that have passed a switch grow for tens of steps before
 #: there is another one to be found; in a sliding mode one in two or three has one.
 SWITCHES, STEPS = 50, 200
@@ -428,14 +423,14 @@ class Switches:
         change = abs(there - M)
         if change == 0.0:
             return False
-        for _ in range(HALVINGS):
+        for _ in range(52):  # all digits of the arguments
             middle = 0.5 * (old + new)
             value = self._at(middle)
             if abs(value - M) >= abs(there - value):
                 new, there = middle, value
             else:
                 old, M = middle, value
-            if abs(there - M) < LEFT * change:
+            if abs(there - M) < 0.5 * change:
                 return False
         return True
 

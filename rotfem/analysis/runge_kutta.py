@@ -107,12 +107,8 @@ _FIRST = [int(np.argmin(np.abs(_EIGENVALUES.imag))), int(np.argmax(_EIGENVALUES.
 REAL, ABOVE = float(_EIGENVALUES[_FIRST[0]].real), complex(_EIGENVALUES[_FIRST[1]])
 COLUMNS, ROWS = _VECTORS[:, _FIRST], np.linalg.inv(_VECTORS)[_FIRST]
 
-#: Iterations before a solution is given up, and from which on the next step gets new matrices.
-MOST, LONG = 10, 5
-
-#: How often matrices are made anew in a step, about where the iterations have come; not if that is farther than this
-#: from their start, in the units of the unknowns.
-FRESH, REACH = 3, 0.5
+#: Iterations before a solution is given up.
+MOST = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +184,10 @@ class RadauIIA(Scheme):
         return Stage(t, q, v, state.a, REAL / h, (REAL / h) ** 2)
 
     def solved(self, state: State, h: float, end: float, equations: Equations) -> list[Stage]:
-        """Return the stages, solved together: with the matrices at hand, or with new ones about where that has led."""
+        """Return the stages, solved together: with the matrices at hand, or with new ones about where that has led.
+
+        Matrices are made anew three times, about the start where the iterations have led half a length away.
+        """
         stages = Together([self.stage(i, state, h, end, ()) for i in range(self.stages)], h)
         if state.memory is not None:
             change = weights(h / state.memory.h) @ np.array(state.memory.accelerations) - state.a
@@ -199,10 +198,10 @@ class RadauIIA(Scheme):
         if (known := equations.linearised(None)) is not None and iterate(stages, h, equations, known, False) is None:
             return stages
         size: float | None = np.inf
-        for fresh in range(1, FRESH + 1):
-            if not equations.system.increment_size(np.abs(stages.arrays[0] - stages.start[0]).max(axis=0)) < REACH:
+        for last in (False, False, True):
+            if not equations.system.increment_size(np.abs(stages.arrays[0] - stages.start[0]).max(axis=0)) < 0.5:
                 stages.go_back()
-            size = iterate(stages, h, equations, equations.linearised(stages[1]), fresh == FRESH)
+            size = iterate(stages, h, equations, equations.linearised(stages[1]), last)
             if size is None:
                 return stages
         raise ComputationError(f"simplified Newton stays at increments of {size:.1e} (scaled)", time=stages[-1].t)
@@ -244,7 +243,7 @@ def iterate(stages: Together, h: float, equations: Equations, linearised: Any, l
         size = float(equations.system.increment_size(np.abs(dq).max(axis=0)))
         rate = size / previous if previous > 0.0 else 0.0
         if k > 1 and (size <= enough or (rate < 1.0 and rate / (1 - rate) * size <= enough)):
-            linearised.serves = k < LONG
+            linearised.serves = k < 5  # else the next step gets new matrices
             return None
         if not np.isfinite(size) or (k > 2 and (rate >= 1.0 or size * rate ** (MOST - k) > enough)):
             break

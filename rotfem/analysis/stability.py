@@ -37,9 +37,6 @@ from rotfem.numerics.projection import summed, times
 
 Array = npt.NDArray[np.float64]
 
-#: Number of eigenvalues computed where none can be counted, and at most where they can.
-FIRST, MOST = 8, 64
-
 
 @dataclass(frozen=True)
 class Stability:
@@ -153,7 +150,7 @@ def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Sta
         negative: number of negative eigenvalues of a symmetric K; None where it says nothing.
         target: shift, away from the zero eigenvalue of a free hub (1/s).
     """
-    count = FIRST if negative is None else max(FIRST, 2 * negative + 2)
+    count = 8 if negative is None else max(8, 2 * negative + 2)
     held = negative is not None and not symmetric(pencil.C)  # by gyroscopic forces, which are all that can
     if negative and surely_negative(pencil.K) == 0:
         return Stability(negative, complete=False, lost=True)
@@ -178,7 +175,7 @@ def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Sta
             return Stability(None, growth, frequency, lost=lost)
         if _counted(pencil, pairs, held) >= negative:
             return Stability(negative, growth, frequency, lost=lost)
-        if count >= MOST or count >= pencil.K.getSize()[0]:
+        if count >= 64 or count >= pencil.K.getSize()[0]:
             # A negative eigenvalue that makes nothing grow, and that nothing holds, is one of round-off.
             return Stability(negative, growth, frequency, complete=False, lost=lost or not held)
         count *= 2
@@ -249,11 +246,9 @@ def constant_stability(system: Any, newton: Newton) -> Stability | None:
 
 # --- the speed at which a linear theory loses its stiffness -----------------------------------------------------------
 
-#: Part of the largest stiffening by spin, over speed squared, below which a softening is none.
-FAR = 1e-6
 
-#: Restarts in which eigenvalues are found that stand apart, and those that are made at most.
-SOON, LATE = 20, 2000
+#: Restarts in which eigenvalues are found that stand apart.
+SOON = 20
 
 
 def critical_speed(system: Any) -> float | None:
@@ -281,19 +276,19 @@ def critical_speed(system: Any) -> float | None:
     if nu is None:
         if _far(K_2, K_1):
             return None
-        nu = _largest(K_2, K_1, LATE)
+        nu = _largest(K_2, K_1, 2000)
     if nu is None:
         raise ComputationError("the eigenproblem of the critical speed did not converge")
     return float(1 / np.sqrt(nu)) if nu > 0 else None
 
 
 def _far(A: Any, B: Any) -> bool:
-    """Return whether no eigenvalue of A x = nu B x is above FAR times the largest in size, a negative one."""
+    """Return whether no eigenvalue of A x = nu B x is above 1e-6 times the largest in size, a negative one."""
     stiffens = _largest(A, B, SOON, SLEPc.EPS.Which.LARGEST_MAGNITUDE)
     if stiffens is None or stiffens >= 0.0:
         return False
     there = B.copy()
-    there.axpy(1.0 / (FAR * stiffens), A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+    there.axpy(1e6 / stiffens, A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
     return negative_eigenvalues(there) == 0
 
 

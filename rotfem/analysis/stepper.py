@@ -77,13 +77,6 @@ def keep_rotations_small(system: Any, scheme: Scheme, state: State, h: float) ->
     return True
 
 
-#: Part of the kinetic and strain energy by which a root that Newton strayed to may exceed the energy there was.
-MORE_ENERGY = 0.03
-
-#: Energy above that of the start, relative to what is exchanged, from which steps that add to it are made in parts.
-GAIN = 0.003
-
-
 @contextmanager
 def seen(system: Any, view: View) -> Iterator[None]:
     """Let a system see what is prescribed as a view shows it."""
@@ -272,7 +265,8 @@ class Stepper:
         """Return whether a step that was hard to solve raises an energy that is above what there can be.
 
         Nothing gives the motion energy. A scheme that does not resolve it may, a little in each step, which Newton's
-        method does not notice until the motion is lost; shorter steps give less, and take some back.
+        method does not notice until the motion is lost; shorter steps give less, and take some back. Above what there
+        can be is 0.3 % of what is exchanged.
         """
         s = self.system
         if not self._hard or self._balanced or s.linear or not s.model.closed:
@@ -292,7 +286,7 @@ class Stepper:
         low_t, high_t = min(low_t, now["kinetic"]), max(high_t, now["kinetic"])
         low_w, high_w = min(low_w, now["strain"]), max(high_w, now["strain"])
         self._exchange = reference, low_t, high_t, low_w, high_w
-        too_much = now["jacobi"] - reference > GAIN * max(high_t - low_t, high_w - low_w)
+        too_much = now["jacobi"] - reference > 0.003 * max(high_t - low_t, high_w - low_w)
         return bool(too_much and now["jacobi"] > (first or energies(state))["jacobi"])
 
     def warnings(self) -> list[str]:
@@ -495,7 +489,7 @@ def check_root(system: Any, stage: Stage, state: State) -> None:
     system.set_state(state.q, state.v, state.a)
     old = system.energies()
     grown, there = new["jacobi"] - old["jacobi"], max(e["kinetic"] + e["strain"] for e in (old, new))
-    if grown > MORE_ENERGY * there:
+    if grown > 0.03 * there:
         what = f"Newton met a state with {grown:.2g} J more than there were, of {there:.2g} J"
         raise ComputationError(what, time=stage.t)
 

@@ -32,7 +32,7 @@ class Missed(ComputationError):
 
 
 def first_setting(scene: Scene, modes: int = 0) -> Setting:
-    """Return the setting that a scene is first computed with.
+    """Return the setting that a scene is first computed with: on beams 30 nodes, or four for every mode.
 
     Args:
         scene: with an accuracy.

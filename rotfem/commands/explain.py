@@ -34,9 +34,8 @@ from rotfem.scene import Scene, as_scene
 NEEDED = {"negligible": "not needed", "noticeable": "needed where {:.1%} matters", "large": "needed"}
 ENOUGH = {"negligible": "good enough", "noticeable": "good to {:.1%}", "large": "not good enough"}
 
-#: The same of steps, and how many times as many there are in a check.
+#: The same of steps.
 FINE = {"negligible": "fine enough", "noticeable": "off by {:.1%}", "large": "too coarse: off by {:.1%}"}
-FINER = 4
 
 #: What the notes of a check are marked with.
 FULL = " of the full model"
@@ -195,7 +194,7 @@ def finer(scene: Scene, name: str) -> Scene:
     """Return a scene with shorter steps and rows where they were, or on a finer mesh; of a file, of a higher degree."""
     time = scene.time
     if name == "time.step" and time is not None and time.step is not None:
-        return scene.replace({"time.step": time.step / FINER, "time.output_every": time.output_every * FINER})
+        return scene.replace({"time.step": time.step / 4, "time.output_every": time.output_every * 4})
     if scene.structure.mesh_file is not None:
         return scene.replace({"mesh.degree": scene.mesh.degree + 1})
     elements = scene.mesh.elements

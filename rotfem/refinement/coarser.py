@@ -23,9 +23,6 @@ from rotfem.refinement.estimate import error_of
 
 Array = npt.NDArray[np.float64]
 
-#: Order of linear elements, and counted on of all others at least.
-LEAST = 2
-
 
 @dataclass(frozen=True)
 class OtherMesh:
@@ -73,7 +70,7 @@ def on_other_mesh(problem: Problem, system: Any, moving: bool = True, finer: boo
         except InputError:
             continue
         if other.V.dofmap.index_map.size_global != nodes:
-            return OtherMesh(other, ratio, max(LEAST, system.V.element.basix_element.degree))
+            return OtherMesh(other, ratio, max(2, system.V.element.basix_element.degree))
     return None
 
 
@@ -96,9 +93,6 @@ def _meshes(problem: Problem, cells: int) -> Iterator[tuple[Any, float]]:
 
 
 # --- shapes carried from one mesh to another -------------------------------------------------------------------------
-
-#: Distance from a cell, relative to the size of the mesh, at which a point still lies in it.
-CLOSE = 1e-8
 
 
 def carrier(of: Any, to: Any) -> Callable[[Array], Array] | None:
@@ -130,7 +124,7 @@ def interpolation(V: Any, points: Array) -> Any:
     None where a point is not in the mesh, as at curved edges that another mesh has cut.
     """
     mesh, element = V.mesh, V.element.basix_element
-    padding = CLOSE * float(np.ptp(mesh.geometry.x, axis=0).max())
+    padding = 1e-8 * float(np.ptp(mesh.geometry.x, axis=0).max())
     tree = geometry.bb_tree(mesh, mesh.topology.dim, padding=padding)
     cells = geometry.compute_colliding_cells(mesh, geometry.compute_collisions_points(tree, points), points)
     if np.any(np.diff(cells.offsets) == 0):

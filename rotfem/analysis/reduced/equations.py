@@ -37,9 +37,6 @@ Forces = Callable[[Array], Array]
 #: Relative distance from a breakpoint at which a signal has the value that it has on that side of it.
 ASIDE = 4 * RESOLVED
 
-#: Effects of which the angular momentum of a structure on a free hub is that of the equations.
-OF_MOMENTUM = ("coriolis", "centrifugal", "euler")
-
 
 class Excitation:
     """Motion of the frame, gravity and loads over a stretch of time, and the factors of the pieces they make.
@@ -211,7 +208,7 @@ class FreeHubEquations(HeldEquations):
         self.model, self.excitation, self.within, self.constant = model, excitation, excitation.within, False
         self.bordered, self.hub, self._coupled = bordered, bordered.hub, float(bordered.row.coupled)
         effects = model.system.model.effects
-        for name in OF_MOMENTUM:
+        for name in ("coriolis", "centrifugal", "euler"):
             if name not in effects:
                 why = f'lacks "{name}", which the reduced model of a free hub needs; leave model.reduced out'
                 raise InputError("model.effects", list(effects), why)

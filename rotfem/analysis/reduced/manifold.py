@@ -35,10 +35,6 @@ from rotfem.numerics.projection import summed, times
 
 Array = npt.NDArray[np.float64]
 
-#: Amplitude of a shape, relative to the largest, from which its products are taken, and most shapes. The error by those
-#: that are not is of the square of the first.
-AMPLITUDE, MOST = 2e-3, 6
-
 
 class Manifold:
     """The second-order displacements of the motion of a reduced model, and their forces.
@@ -48,7 +44,8 @@ class Manifold:
         q: coordinates of a motion of it, (n, m).
 
     Attributes:
-        shapes: coordinates of the shapes whose pairs are taken, (m, r).
+        shapes: coordinates of the shapes whose pairs are taken, (m, r): six at most, with amplitudes of 2e-3 of the
+            largest. The error by those that are not is of the square of that.
         pairs: numbers (i, j) of these, i ≤ j, (p, 2).
         Theta: second-order displacements of a product of coordinates, local dof arrays (n, p).
     """
@@ -56,8 +53,8 @@ class Manifold:
     def __init__(self, model: ReducedModel, q: Array):
         self.model = model
         _, sizes, turns = np.linalg.svd(q, full_matrices=False)
-        keep = sizes > AMPLITUDE * sizes[:1].max(initial=0.0)
-        self.shapes: Array = turns[keep][:MOST].T
+        keep = sizes > 2e-3 * sizes[:1].max(initial=0.0)
+        self.shapes: Array = turns[keep][:6].T
         pairs = list(combinations_with_replacement(range(self.shapes.shape[1]), 2))
         self.pairs = np.array(pairs, dtype=int).reshape(-1, 2)
         self.Theta = self._displacements()

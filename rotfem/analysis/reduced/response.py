@@ -24,14 +24,8 @@ from rotfem.analysis.reduced.solution import Solution, States, cut
 
 Array = npt.NDArray[np.float64]
 
-#: Shapes that a round adds to the basis, most columns, and instants at which the residual is taken.
-ADDED, MOST, INSTANTS = 6, 60, 24
-
 #: Part of an accuracy below which the amplitude of a shape is of no account.
 NEGLIGIBLE = 0.01
-
-#: How often the steps, 64 at first, are halved at most.
-HALVINGS = 10
 
 #: Accuracy that is asked for if none is.
 ACCURACY = 1e-5
@@ -104,6 +98,8 @@ def reduced_response(
 ) -> Response:
     """Return the history of a linear theory by a reduced model, from rest in the turning frame.
 
+    Each round adds six shapes to the basis, up to 60 columns; 64 steps are halved ten times at most.
+
     Args:
         system: equations of a linear theory, bordered if its hub is free.
         times: of the rows, the first the start, s.
@@ -133,14 +129,14 @@ def reduced_response(
         tips = states[0] @ model.tips().T
         if before is not None:
             basis_error = difference(tips, before)
-        if basis_error <= accuracy or model.size >= MOST:
+        if basis_error <= accuracy or model.size >= 60:
             break
         before = tips
         least = (NEGLIGIBLE * accuracy) ** 2 * float(np.einsum("ni,ni->n", states[0], states[0]).max(initial=0.0))
-        if model.grow(growth.lacking(equations, solution, states), ADDED, least) == 0:
+        if model.grow(growth.lacking(equations, solution, states), 6, least) == 0:
             basis_error = NEGLIGIBLE * accuracy if model.size else 0.0
             break
-    for _ in range(HALVINGS if model.size else 0):
+    for _ in range(10 if model.size else 0):
         longest /= 2
         solution, states = solved(equations)
         tips, before = states[0] @ model.tips().T, tips
@@ -198,9 +194,9 @@ class Growth:
         return FreeHubEquations(self.model, self.excitation, self.system)
 
     def lacking(self, equations: HeldEquations, solution: Solution, states: States) -> Array:
-        """Return the static solutions K⁻¹ r at instants of the history, local dof arrays (n, k)."""
+        """Return the static solutions K⁻¹ r at 24 instants of the history, local dof arrays (n, k)."""
         strength = np.linalg.norm(states[2], axis=1)
-        parts = np.array_split(np.arange(len(strength)), min(INSTANTS, len(strength)))
+        parts = np.array_split(np.arange(len(strength)), min(24, len(strength)))
         chosen = np.array([part[np.argmax(strength[part])] for part in parts])
         turn = equations.turn(after(self.times[chosen]), solution)
         factors = self.excitation.factors(after(self.times[chosen]), turn)
