@@ -65,7 +65,7 @@ def main(figure: Path | None = None) -> float:
 
 def dropped(scene: rotfem.Scene, repeat: int) -> dict[str, dict[str, float]]:
     """Return effect ↦ error of the tip without it (relative), median CPU time (s), integrals; "nothing" comes first."""
-    effects = scene.effective_effects()
+    effects = rotfem.Problem.of(scene).effective_effects()
     times: dict[str, list[float]] = {name: [] for name in ("nothing", *effects)}
     results = {}
     for _ in range(repeat + 1):
@@ -93,7 +93,7 @@ def tip(history: Mapping[str, np.ndarray]) -> np.ndarray:
 
 def frequency_error(scene: rotfem.Scene, effect: str) -> float:
     """Return by how much (%) the lowest frequency is off without an effect."""
-    effects = [e for e in scene.effective_effects() if e != effect]
+    effects = [e for e in rotfem.Problem.of(scene).effective_effects() if e != effect]
     with_it, without = (
         rotfem.modes(s).rows[0]["frequency"] for s in (scene, scene.replace({"model.effects": effects}))
     )

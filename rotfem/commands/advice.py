@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rotfem.commands.problem import motion_of
 from rotfem.listeners import Hint
 from rotfem.registry import theories
 from rotfem.scene.scene import Scene
@@ -81,7 +82,7 @@ def advise(
     if hint is None:
         return []
     end = None if scene.time is None else scene.time.end
-    speed = scene.motion.top_speed(end) if speed is None else abs(speed)
+    speed = motion_of(scene).top_speed(end) if speed is None else abs(speed)
     out = [*scene.hints, *also, *_nodes(scene)]
     if command == "run":
         out += _step(scene, speed)

@@ -211,7 +211,7 @@ def motion_of(scene: Scene) -> Motion:
     base = m.base_acceleration
     more = {
         "base_acceleration": no_acceleration if base is None else _base_acceleration(base),
-        "is_accelerated": m.is_accelerated,
+        "is_accelerated": base is not None and not base.is_zero,
         "base_knots": None if base is None else base.knots,
     }
     if m.type not in _MOTIONS or m.type == "callable":

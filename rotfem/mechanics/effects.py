@@ -88,17 +88,6 @@ class DampingModel:
     what: str = ""
 
 
-def effects() -> tuple[Effect, ...]:
-    """Return all effects in the order they are listed."""
-    return tuple(Effect.registry)
-
-
-def present_effects(problem: Any) -> tuple[str, ...]:
-    """Return the effects that a scene or problem has data for."""
-    rotates = problem.frame == "rotating"
-    return tuple(e.name for e in effects() if e.present(problem) and (rotates or not e.of_rotation))
-
-
 def _work(name: str) -> str:
     return f"rotfem.mechanics.work:{name}"
 
@@ -114,7 +103,7 @@ def supports_of(problem: Any) -> Any:
 
 
 def pitches(problem: Any) -> bool:
-    """Return whether the frame of a scene or problem turns with a pitch over time too."""
+    """Return whether the frame of a problem turns with a pitch over time too."""
     return getattr(problem.structure, "pitches", False) or getattr(problem.motion, "pitch", None) is not None
 
 

@@ -209,6 +209,13 @@ class Motion:
         """Return the motion of a frame that pitches over time too."""
         return replace(self, pitch=pitch, constant=False)
 
+    def top_speed(self, end: float | None) -> float:
+        """Return the largest |Omega| (rad/s) at knots until a time (s), or ever; 0 of a function and of a free hub."""
+        if not self.smooth or self.hub is not None:
+            return 0.0
+        last = max((0.0, *self.knots)) if end is None else end
+        return max(abs(float(self.speed(t))) for t in (0.0, last, *(t for t in self.knots if t < last)))
+
     def final_speed(self, end: float) -> float:
         """Return the speed (rad/s) at the end of a history (s), or when the motion has settled if that is later."""
         return self.speed(max(end, self.settled))

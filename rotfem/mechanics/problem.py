@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any, ClassVar, Self
 
 from rotfem.errors import InputError
-from rotfem.mechanics.effects import INERTIA, INTERNAL, LOADS, Effect, Work, present_effects
+from rotfem.mechanics.effects import INERTIA, INTERNAL, LOADS, Effect, Work
 from rotfem.mechanics.loads import Loads
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.theories import Theory
@@ -103,8 +103,9 @@ class Problem:
 
     def effective_effects(self) -> tuple[str, ...]:
         """Return the names of the effects that are in the equations: wanted, and with data."""
-        present = present_effects(self)
-        return present if self.effects is None else tuple(name for name in present if name in self.effects)
+        there = (e for e in Effect.registry if self.frame == "rotating" or not e.of_rotation)
+        names = (e.name for e in there if e.present(self))
+        return tuple(name for name in names if self.effects is None or name in self.effects)
 
     def spinning(self) -> Self:
         """Return the problem of a structure that spins at a speed to be given, as in a sweep over speeds."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -39,35 +38,9 @@ class Motion(SceneModel):
     is_steady: ClassVar[bool] = False
     #: Whether the hub is free, its angle an unknown.
     is_free: ClassVar[bool] = False
-    #: Whether the speeds it takes are known beforehand.
-    is_known: ClassVar[bool] = False
 
     axis: Axis = (0.0, 0.0, 1.0)
     base_acceleration: Signal | None = None
-
-    @property
-    def is_spinning(self) -> bool:
-        """Whether the speed is not identically zero (as far as can be known beforehand)."""
-        return not self.is_known or self.top_speed(None) != 0.0
-
-    @property
-    def changes_speed(self) -> bool:
-        """Whether the spin rate changes (as far as can be known beforehand)."""
-        return self.is_spinning and not self.is_steady
-
-    @property
-    def is_accelerated(self) -> bool:
-        """Whether the origin has an acceleration."""
-        return self.base_acceleration is not None and not self.base_acceleration.is_zero
-
-    @property
-    def is_coupled(self) -> bool:
-        """Whether the structure moves a free hub."""
-        return False
-
-    def top_speed(self, end: float | None) -> float:
-        """Return the largest |Ω| (rad/s) that is prescribed until `end` (s), or ever; 0 if it is not known."""
-        return 0.0
 
     @model_validator(mode="before")
     @classmethod
@@ -90,13 +63,8 @@ class ConstantMotion(Motion):
 
     name: ClassVar[str] = "constant"
     is_steady: ClassVar[bool] = True
-    is_known: ClassVar[bool] = True
     type: Literal["constant"]
     speed: Speed = Field(description="a number (rad/s)")
-
-    def top_speed(self, end: float | None) -> float:
-        """Return |Ω| (rad/s)."""
-        return abs(self.speed)
 
 
 class SpinUpMotion(Motion):
@@ -108,15 +76,9 @@ class SpinUpMotion(Motion):
     """
 
     name: ClassVar[str] = "spin_up"
-    is_known: ClassVar[bool] = True
     type: Literal["spin_up"]
     speed: Speed = Field(description="a number (rad/s)")
     duration: Annotated[Positive, Unit("s")] = Field(description="a number greater than 0 (s)")
-
-    def top_speed(self, end: float | None) -> float:
-        """Return the |Ω| (rad/s) that is reached until `end` (s)."""
-        reached = 1.0 if end is None else min(1.0, end / self.duration)
-        return abs(self.speed) * (reached - math.sin(2 * math.pi * reached) / (2 * math.pi))
 
 
 class TableMotion(Motion):
@@ -128,21 +90,11 @@ class TableMotion(Motion):
     """
 
     name: ClassVar[str] = "table"
-    is_known: ClassVar[bool] = True
     type: Literal["table"]
     table: Annotated[Matrix, time_table("speed"), Unit("rad/s", ("s",))] = Field(
         description="a table [[t, speed], …] or the path of a CSV file"
     )
     interpolation: Literal["pchip", "cubic", "linear"] = "pchip"
-
-    @property
-    def changes_speed(self) -> bool:
-        """Whether there are two speeds in the table."""
-        return len({speed for _, speed in self.table}) > 1
-
-    def top_speed(self, end: float | None) -> float:
-        """Return the largest |Ω| (rad/s) of the table."""
-        return max(abs(speed) for _, speed in self.table)
 
 
 class TorqueMotion(Motion):
@@ -169,11 +121,6 @@ class TorqueMotion(Motion):
     coupled: Annotated[bool, Field(strict=True)] = True
     hub_damping: Annotated[NonNegative, Unit("N*m*s")] = 0.0
     speed: Speed = 0.0
-
-    @property
-    def is_coupled(self) -> bool:
-        """Whether the structure moves the hub."""
-        return self.coupled
 
     @model_validator(mode="after")
     def _check_one(self) -> Self:

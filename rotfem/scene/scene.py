@@ -212,17 +212,6 @@ class Scene(SceneModel):
         digest: dict[str, Any] = abridged(self.to_dict(), self._tables)
         return digest
 
-    @property
-    def frame(self) -> str:
-        """Frame to which displacements refer: "rotating" or "inertial"."""
-        return self.model.frame
-
-    def effective_effects(self) -> tuple[str, ...]:
-        """Return the names of the effects that the scene includes, wanted and with data, as they are registered."""
-        rotates, listed = self.frame == "rotating", self.model.effects
-        names = (e.name for e in registry.effects if e.present(self) and (rotates or not e.of_rotation))
-        return tuple(name for name in names if listed == "auto" or name in listed)
-
     def check_run(self) -> None:
         """Check that the scene can be run: a time history needs times, a steady state a constant speed.
 

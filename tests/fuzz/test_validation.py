@@ -57,7 +57,6 @@ def test_tables_of_any_kind(tables: Any) -> None:
         again = Scene.from_dict(scene.to_dict(), directory=FOLDER)
         assert again.to_dict() == scene.to_dict()
         scene.digest()
-        scene.effective_effects()
 
 
 @st.composite

@@ -96,7 +96,7 @@ def test_example_scenes_are_valid_and_survive_a_round_trip(name: str) -> None:
 
 @pytest.mark.parametrize("name", list(EXAMPLES))
 def test_example_scenes_effects(name: str) -> None:
-    assert load_scene(SCENES / f"{name}.toml").effective_effects() == EXAMPLES[name]
+    assert rotfem.Problem.of(SCENES / f"{name}.toml").effective_effects() == EXAMPLES[name]
 
 
 # --- defaults and normal forms --------------------------------------------------------------------------------------
@@ -278,13 +278,14 @@ def test_replace() -> None:
     ],
 )
 def test_effective_effects(changes: dict[str, Any], expected: set[str]) -> None:
-    effects = scene(**changes).effective_effects()
+    effects = rotfem.Problem.of(scene(**changes)).effective_effects()
     assert set(effects) == expected
     assert list(effects) == [name for name in rotfem.registry.effects.names if name in expected]
 
 
 def test_point_masses_are_tip_masses() -> None:
-    assert "tip_mass" in scene("plate", structure__point_masses=[[1.0, 0.5, 2.0]]).effective_effects()
+    plate = scene("plate", structure__point_masses=[[1.0, 0.5, 2.0]])
+    assert "tip_mass" in rotfem.Problem.of(plate).effective_effects()
 
 
 # --- check_run ------------------------------------------------------------------------------------------------------

@@ -21,8 +21,8 @@ from rotfem.analysis.modal import ModalAnalysis
 from rotfem.analysis.sensitivity import sensitivities
 from rotfem.commands.problem import Problem
 from rotfem.equations.system import System
-from rotfem.mechanics.effects import effects
 from rotfem.mechanics.theories import ladder
+from rotfem.registry import effects
 
 pytestmark = pytest.mark.usefixtures("unestimated")
 
@@ -86,7 +86,7 @@ TWISTED: dict[str, Any] = {
 }
 
 #: All effects but the stretch of fibers by twist, which other rods do not have (see test_trapeze.py).
-RIGID_SECTIONS = {"effects": [effect.name for effect in effects() if effect.name != "trapeze"]}
+RIGID_SECTIONS = {"effects": [effect.name for effect in effects if effect.name != "trapeze"]}
 
 #: What makes of it a beam with everything: mass beside the axis, and a tip body. It takes long to compile.
 REST = {

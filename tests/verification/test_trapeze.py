@@ -14,7 +14,7 @@ from scipy.linalg import eigh
 from rotfem import Problem, Scene, explain, modes, run
 from rotfem.analysis.modal import ModalAnalysis
 from rotfem.equations.compiled import compile_system
-from rotfem.mechanics.effects import effects
+from rotfem.registry import effects
 
 Array = npt.NDArray[np.float64]
 
@@ -143,7 +143,7 @@ def test_lag_pushes_torsion_down() -> None:
 
 
 def test_without_the_effect() -> None:
-    bare = [effect.name for effect in effects() if effect.name != "trapeze"]
+    bare = [effect.name for effect in effects if effect.name != "trapeze"]
     assert torsion(scene({"model.effects": bare})) == pytest.approx(twisting_bar(200.0, 3, trapeze=False), rel=1e-7)
 
 

@@ -1,4 +1,4 @@
-"""The settings that a study of cost tries: theories × meshes × steps, around the scene's own. No dolfinx in it."""
+"""The settings that a study of cost tries: theories × meshes × steps, around the scene's own."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from math import inf
 from typing import Any
 
 from rotfem import registry
+from rotfem.commands.problem import motion_of
 from rotfem.errors import SceneError
 from rotfem.mechanics.theories import theories
 from rotfem.refinement.refine import Setting, grown
@@ -113,7 +114,7 @@ def sweep_speeds(scene: Scene) -> list[float]:
     Raises:
         SceneError: the scene does not turn.
     """
-    top = scene.motion.top_speed(None if scene.time is None else scene.time.end)
+    top = motion_of(scene).top_speed(None if scene.time is None else scene.time.end)
     if not top > 0.0:
         raise SceneError(scene.file, "cost --of", "campbell", "the scene has no speed to go up to")
     return [top * i / 8 for i in range(9)]
@@ -140,7 +141,7 @@ def checked(scene: Scene, accuracy: float, repeat: int, output: str | None) -> s
         raise SceneError(scene.file, "cost --repeat", repeat, "must be an integer at least 1")
     if output is None:  # what the scene computes
         steady = scene.motion.is_steady and not scene.modes.model_fields_set
-        at_rest = not (scene.motion.is_spinning or scene.loads.model_fields_set)
+        at_rest = not (motion_of(scene).is_spinning or scene.loads.model_fields_set)
         output = "frequencies" if scene.time is None and (at_rest or not steady) else "tip"
     if output not in OUTPUTS:
         raise SceneError(scene.file, "cost --of", output, f"allowed: {', '.join(OUTPUTS)}")
