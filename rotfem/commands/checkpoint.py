@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
@@ -24,7 +24,7 @@ import numpy as np
 from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability
 from rotfem.analysis.stepper import Stepper
-from rotfem.commands.monitor import Monitor
+from rotfem.commands.monitor import Log, Monitor
 from rotfem.commands.recorder import Recorder
 from rotfem.errors import SceneError
 from rotfem.refinement.companion import Companion, Followed
@@ -82,8 +82,8 @@ def differences(there: Any, here: Any, key: str = "") -> list[str]:
     return [f"{key.removeprefix('scene.')} is {shown[0]} there and {shown[1]} here"]
 
 
-def check_identity(path: Path, tree: Tree, mine: Tree) -> None:
-    """Refuse a checkpoint of another run.
+def check_identity(path: Path, tree: Tree, mine: Tree, end: float) -> None:
+    """Refuse a checkpoint of another run, or one that lies after an end (s).
 
     Raises:
         SceneError: it is of another scene, or of another version of the program; says what differs.
@@ -96,6 +96,8 @@ def check_identity(path: Path, tree: Tree, mine: Tree) -> None:
     if lines:
         more = f", and {len(lines) - 4} more" if len(lines) > 4 else ""
         raise SceneError("command line", "--resume", path, f"is of another run: {'; '.join(lines[:4])}{more}")
+    if end < tree["t"]:
+        raise SceneError("command line", "--resume", path, f"is of t = {tree['t']:g} s, after time.end = {end:g} s")
 
 
 def check_parts(path: Path, tree: Tree) -> None:
@@ -123,16 +125,6 @@ def damaged(path: Path, what: str) -> SceneError:
     """Return the error of a checkpoint whose sum is right and whose content is not."""
     why = f"does not hold what a checkpoint of this run does: {what}; start the run anew, without --resume"
     return SceneError("command line", "--resume", path, why)
-
-
-def check_end(path: Path, tree: Tree, end: float) -> None:
-    """Refuse an end (s) that lies before the checkpoint.
-
-    Raises:
-        SceneError: it does.
-    """
-    if end < tree["t"]:
-        raise SceneError("command line", "--resume", path, f"is of t = {tree['t']:g} s, after time.end = {end:g} s")
 
 
 class Packing:
@@ -178,26 +170,6 @@ class Packing:
         if values.shape[:1] != (self.numbering.count(kind),) or values.dtype.kind not in "biuf":
             raise ValueError(f"{kind} of shape {values.shape}")
         return self.numbering.local(values, kind)
-
-
-@dataclass
-class Log:
-    """What a run counts and has to say.
-
-    Attributes:
-        started: `perf_counter()` then, s.
-        steps: number of the last step.
-        elapsed: time that it had taken before it went on from a checkpoint, s.
-        warnings, advice: texts.
-        resumed: time (s) and number of ranks of every checkpoint that it went on from.
-    """
-
-    started: float = field(default_factory=perf_counter)
-    steps: int = 0
-    elapsed: float = 0.0
-    warnings: list[str] = field(default_factory=list)
-    advice: list[str] = field(default_factory=list)
-    resumed: list[dict[str, Any]] = field(default_factory=list)
 
 
 @dataclass

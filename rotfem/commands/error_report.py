@@ -16,7 +16,7 @@ from rotfem.analysis.schemes import State
 from rotfem.analysis.stability import Stability, stability_of
 from rotfem.analysis.theory_error import RESOLVED, Farthest, TheoryCheck, TheoryError
 from rotfem.commands.first_state import Start
-from rotfem.commands.reduced_history import accuracy_of
+from rotfem.commands.recorder import accuracy_of
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem

@@ -1,4 +1,4 @@
-"""What a run watches in its states: the range of its theory and of a chosen model, finite numbers, and energy.
+"""What a run counts, and what it watches in its states: the range of its theory, finite numbers, and energy.
 
 Energy and momentum that a history has from nowhere show what steps that are too long do before anything else is seen.
 """
@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,26 @@ Array = npt.NDArray[np.float64]
 
 #: Growth of the Jacobi integral, relative to the energy exchanged, that is reported.
 GROWN = 0.02
+
+
+@dataclass
+class Log:
+    """What a run counts and has to say.
+
+    Attributes:
+        started: `perf_counter()` then, s.
+        steps: number of the last step.
+        elapsed: time that it had taken before it went on from a checkpoint, s.
+        warnings, advice: texts.
+        resumed: time (s) and number of ranks of every checkpoint that it went on from.
+    """
+
+    started: float = field(default_factory=perf_counter)
+    steps: int = 0
+    elapsed: float = 0.0
+    warnings: list[str] = field(default_factory=list)
+    advice: list[str] = field(default_factory=list)
+    resumed: list[dict[str, Any]] = field(default_factory=list)
 
 
 class Monitor:

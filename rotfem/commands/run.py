@@ -26,16 +26,15 @@ from rotfem.analysis.theory_error import said_of
 from rotfem.commands import monitor
 from rotfem.commands.accuracy import ROOT_MOMENT, changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.advice import advise
-from rotfem.commands.checkpoint import Log, Memory
+from rotfem.commands.checkpoint import Memory
 from rotfem.commands.error_report import RunErrors, check_rotations, output_of
 from rotfem.commands.first_state import Start, first_state, hints_of_start
 from rotfem.commands.interrupts import together
 from rotfem.commands.loads import frozen_inputs
-from rotfem.commands.monitor import Monitor
+from rotfem.commands.monitor import Log, Monitor
 from rotfem.commands.problem import Problem, scheme_of
 from rotfem.commands.processes import communicator
-from rotfem.commands.recorder import Recorder
-from rotfem.commands.reduced_history import reduced_history
+from rotfem.commands.recorder import Recorder, reduced_history
 from rotfem.commands.result_folder import ResultFolder
 from rotfem.commands.run_store import Interval, RunStore
 from rotfem.commands.summary import summary, timings

@@ -11,7 +11,7 @@ from typing import Any
 from mpi4py import MPI
 
 from rotfem.analysis.schemes import State
-from rotfem.commands.checkpoint import Memory, Tree, check_end, check_identity, check_parts, comparable, identity
+from rotfem.commands.checkpoint import Memory, Tree, check_identity, check_parts, comparable, identity
 from rotfem.commands.interrupts import Interrupts
 from rotfem.commands.result_folder import ResultFolder
 from rotfem.errors import OutputError, SceneError, Stopped
@@ -109,8 +109,7 @@ class RunStore:
         def read(files: ResultSet) -> Tree:
             tree = read_checkpoint(path)
             check_parts(path, tree)
-            check_identity(path, tree, self._identity)
-            check_end(path, tree, end)
+            check_identity(path, tree, self._identity, end)
             return tree
 
         if self.resume:
