@@ -35,8 +35,8 @@ from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
 from ufl.algorithms import expand_derivatives
 
-from rotfem.equations.geometric import geometric_stiffness
 from rotfem.equations.nonlinear import assembled
+from rotfem.equations.pieces import geometric_stiffness
 from rotfem.errors import ComputationError
 from rotfem.mechanics.motion import Motion
 from rotfem.mechanics.theories import Theory, compared, richest, stiffened

@@ -18,8 +18,7 @@ from rotfem.commands.accuracy import ROWS
 from rotfem.commands.fields import fields_writer, stations_writer
 from rotfem.commands.moment import hub_values
 from rotfem.commands.monitor import Log, Monitor, check_finite
-from rotfem.equations.plate_resultants import PlateResultants
-from rotfem.equations.stations import Stations
+from rotfem.equations.stations import PlateResultants, Stations
 from rotfem.errors import ComputationError, InputError
 from rotfem.results.run import RunResult, StationHistory, Table
 from rotfem.scene import Scene

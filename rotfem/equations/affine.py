@@ -1,8 +1,7 @@
 """Linear theories: M a + C(t) v + K(t) q + f(t) = 0 with operators affine in (1, Omega, Omega², dOmega/dt, a_o, loads).
 
-The pieces are assembled once (see `rotfem.equations.pieces`); a new speed costs matrix sums.
-
-The pieces say what they are of (see `rotfem.equations.pieces`), so that a part can be taken by itself, or weighed.
+The pieces are assembled once (see `rotfem.equations.pieces`); a new speed costs matrix sums. They say what they are of,
+so that a part can be taken by itself, or weighed.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ from rotfem.equations.system import System
 from rotfem.errors import InputError
 from rotfem.mechanics.effects import INTERNAL
 from rotfem.mechanics.motion import Motion
-from rotfem.mechanics.theories import Theory, theories
+from rotfem.mechanics.theories import theories
 from rotfem.numerics import compat, forms
-from rotfem.numerics.linear import DirectSolver, Increment, combine, set_diagonal
+from rotfem.numerics.linear import DirectSolver, combine, set_diagonal
 
 Array = npt.NDArray[np.float64]
 
@@ -39,8 +38,7 @@ class AffineSystem(System):
     pieces: list[Piece]
 
     def __init__(self, model: Model, moving: bool = True, parted: bool = False):
-        self.parted = parted
-        super().__init__(model, moving)
+        super().__init__(model, moving, parted)
         if self._by_mode is not None:  # to those who project the pieces it is one like others
             taken_up = -self._by_mode.B @ self._by_mode.along(self.root.carried())  # by the hub, see `hub_damping`
             self.pieces = [*self.pieces, Piece("C", (), self._by_mode, frozenset((EFFECT, "")), taken_up)]
@@ -59,7 +57,6 @@ class AffineSystem(System):
         self._all_constants = list(self._constants.values())
         chosen = {kind: [i for i, p in enumerate(self.pieces) if p.kind == kind] for kind in "MCKf"}
         self._by_kind = {kind: (index, [self.pieces[i].operator for i in index]) for kind, index in chosen.items()}
-        self._increment: Increment | None = None
         self._make_operators()
         self._sums["K"] = self._decomposed.stiffness
         return self._decomposed.assembler.pattern
@@ -98,18 +95,6 @@ class AffineSystem(System):
         """Number of integrals in F, and in the pieces' forms."""
         count = sum(len(form.integrals()) for kind, form in self._decomposed.at_rest.items() if kind != "f")
         return {"F": forms.integral_count(self.model.residual), "J": count}
-
-    def known_form(self, name: str) -> tuple[Any, Any]:
-        """Return a form, UFL and compiled: F at rest, K, C, M at rest, or the geometric stiffness G."""
-        return self._decomposed.known_form("f" if name == "F" else name)
-
-    def tangent_forms(self, kind: str) -> tuple[tuple[str, ...], tuple[float, ...]]:
-        """Return the names of the forms that M, C or K is the sum of at the time set; there are no shifts."""
-        there = (kind,) if kind in self._decomposed.at_rest else ()
-        return (*there, "G") if kind == "K" and self.prestressed else there, ()
-
-    def shift(self, shifts: tuple[float, ...]) -> None:
-        """Take no shifts: the forms have none."""
 
     def leave_out(self, effects: Collection[str]) -> None:
         """Take the pieces of some effects, their bodies or the PRESTRESS out, and put all others back in."""
@@ -246,17 +231,6 @@ class AffineSystem(System):
     # --- the parts of the stiffness ------------------------------------------------------------------------------
 
     @property
-    def prestressing(self) -> Any:
-        """The function that N⁰ of the form G is of: the displacement under the loads, by the material alone."""
-        return self._decomposed.prestressed
-
-    def displaced(self) -> Array:
-        """Return the displacement (local dof array) of the structure at rest under the loads at the time set."""
-        if self._increment is None:
-            self._increment = Increment(self.V)
-        return -self._increment.solve(self.material_solver, self._load)
-
-    @property
     def material(self) -> Any:
         """Stiffness of the strains alone, clamped rows 1."""
         return self._decomposed.material
@@ -265,10 +239,6 @@ class AffineSystem(System):
     def material_solver(self) -> DirectSolver:
         """Solver of the `material`."""
         return self._decomposed.material_solver
-
-    def geometric(self, u: Any, w: Any, base: Any, theory: Theory | None = None) -> Any:
-        """Return ∫ N⁰ D²Γ₁[u, w], a UFL form (see `Pieces.geometric`)."""
-        return self._decomposed.geometric(u, w, base, theory)
 
     def matrices_at_rest(self) -> tuple[Any, Any]:
         """Return (M, K) of the undeformed structure at rest without spin and loads (see `System`)."""
@@ -309,13 +279,11 @@ class AffineSystem(System):
         """Return kinetic and strain energy and the Jacobi integral ½ v·Mv + ½ q·Kq + f·q − T0(0), J."""
         e = super().energies()
         q, v, _ = self._qva
-        half = [self._quadratic(self._operators[k], x) / 2 for k, x in (("M", v), ("K", q))]
-        e["jacobi"] = sum(half) + self._load.dot(q) - self._rest_energy()
-        return e
-
-    def _quadratic(self, A: Any, x: Any) -> float:
-        A.mult(x, self._work)
-        return float(self._work.dot(x))
+        jacobi = self._load.dot(q) - self._rest_energy()
+        for kind, x in (("M", v), ("K", q)):
+            self._operators[kind].mult(x, self._work)
+            jacobi += self._work.dot(x) / 2
+        return e | {"jacobi": float(jacobi)}
 
     def _rest_energy(self) -> float:
         """Return T0 of the undeformed structure at the present speed, J: the constant of the Jacobi integral."""

@@ -25,7 +25,6 @@ from rotfem.equations.solutions import BorderedLinearised
 from rotfem.equations.system import System
 from rotfem.errors import ComputationError
 from rotfem.mechanics import work
-from rotfem.mechanics.motion import Motion
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import added, weighted
 from rotfem.numerics.linear import Increment
@@ -49,28 +48,18 @@ class HubRow:
         moments = self.model.work(self.model.turn)
         moment, self._shifts = added(moments.values()), [system.structure.constant(0.0) for _ in range(3)]
         self._by_spin = BySpin(self.model, moment)
+        *state, dq = system.structure.k.functions
+        by_state = (ufl.derivative(moment, x, dq) for x in state)
         outside = [term for name, term in moments.items() if not self.model.acting[name].momentum]
         wanted = {
             "moment": moment,
             "spin": self._by_spin.ufl,
-            "row": self._row_of(moment) if self.coupled else None,
+            "row": weighted(self._shifts, by_state) if self.coupled else None,
             "outside": added(outside) if outside else None,
         }
         there = {name: form for name, form in wanted.items() if form is not None}
         self._forms = dict(zip(there, forms.together(list(there.values()), once), strict=True))
         self._vector = compat.create_vector(system.V)
-
-    def of_twin(self, system: System) -> HubRow:
-        """Return the same equation of the structure's twin (see `System.twin`)."""
-        other = copy(self)
-        other.system = system
-        return other
-
-    def _row_of(self, moment: Any) -> Any:
-        """Return c_k ∂/∂q + c_v ∂/∂v + c_m ∂/∂a of the moment, a UFL form."""
-        *state, dq = self.system.structure.k.functions
-        parts = (ufl.derivative(moment, x, dq) for x in state)
-        return weighted(self._shifts, parts)
 
     @cached_property
     def _momentum(self) -> Any:
@@ -96,11 +85,6 @@ class HubRow:
     def torque(self, t: float, after: bool = False) -> float:
         """Return M at time t (s) and the state, N·m; after a jump there if so wanted."""
         return self.hub.torque.on(t, self._seen, after)
-
-    def impulse(self, start: float, end: float) -> float:
-        """Return ∫ M dt from start to end (s), N·m·s; of a controller at the state."""
-        torque = self.hub.torque
-        return self.torque(end) * (end - start) if torque.controlled else torque.impulse(start, end)
 
     def _seen(self) -> tuple[float, float, dict[str, float]]:
         """Return psi (rad), psi' (rad/s) and the tip at the state, by the names of its components."""
@@ -191,7 +175,8 @@ class BorderedSystem:
         """Return another system of the same forms (see `System.twin`)."""
         other = copy(self)
         other.inner, other._whole = self.inner.twin(), None
-        other._row = self.inner.compilations, self.row.of_twin(other.inner)
+        other._row = self.inner.compilations, copy(self.row)
+        other._row[1].system = other.inner
         return other
 
     @property
@@ -228,10 +213,6 @@ class BorderedSystem:
         self.angle.values[:] = q[-1], v[-1], a[-1]
         self.inner.set_state(q[:-1], v[:-1], a[:-1])
         self.inner.set_time(self.inner.time)
-
-    def set_time(self, t: float, motion: Motion | None = None, load_factor: float = 1.0) -> None:
-        """Write the frame and load constants of time t (see `System.set_time`)."""
-        self.inner.set_time(t, motion, load_factor)
 
     def driven(self, t: float) -> Array:
         """Return all that is prescribed at time t (s), the torque last (see `System.driven`)."""
@@ -307,25 +288,9 @@ class BorderedSystem:
 
     # --- what is read of a state -------------------------------------------------------------------------------------
 
-    def size(self, x: Array) -> float:
-        """Return the largest entry of the structure's unknowns in units of their scale, over all ranks."""
-        return self.inner.size(x[:-1])
-
-    def product(self, x: Array, y: Array) -> float:
-        """Return the product of the structure's unknowns (see `System.product`)."""
-        return self.inner.product(x[:-1], y[:-1])
-
-    def deflection(self, q: Array, t: float) -> float:
-        """Return the largest of the structure's unknowns in units of their scale, over all ranks."""
-        return self.size(q)
-
     def increment_size(self, dq: Array) -> float:
         """Return the size of a correction by which Newton is judged, the angle's among them."""
-        return max(self.inner.size(dq[:-1]), abs(float(dq[-1])))
-
-    def sizes(self, x: Array) -> Array:
-        """Return the largest entry of each component of the structure's unknowns (see `System.sizes`)."""
-        return self.inner.sizes(x[: len(self.inner.q.x.array)])
+        return max(self.inner.size(dq), abs(float(dq[-1])))
 
     def root_reaction(self) -> dict[str, float]:
         """Return force and moment of the hub on the structure (see `System`), in balance with the hub's equation.

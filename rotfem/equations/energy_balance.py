@@ -35,9 +35,6 @@ from rotfem.numerics import compat, forms
 
 Array = npt.NDArray[np.float64]
 
-#: Part of the energy a step moves by which it may make up for what the steps before have left.
-MADE_UP = 1e-3
-
 
 class EnergyBalance(Solutions):
     """The equations of a nonlinear system over a step; what it does not say itself is that of the system."""
@@ -194,7 +191,7 @@ class EnergyBalance(Solutions):
         H_1 = self._H(self._end.x.array, 2 * v - self._v_0)
         self.system.set_state(q, v, a)
         moved = size / (self._t_1 - self._t_0) ** 2
-        due = np.clip(self._due, -MADE_UP * moved, MADE_UP * moved)
+        due = np.clip(self._due, -1e-3 * moved, 1e-3 * moved)  # what may be made up of what steps before have left
         enough = moved > 1e-10 * max(abs(self._H_0), abs(H_1))  # in less the digits of H are lost
         self._factor = (H_1 - self._H_0 - due - work) / size if enough else 0.0
         b[self._owned] += self._factor * self._inertia.array

@@ -26,14 +26,16 @@ from rotfem.numerics.eigenproblem import Pencil
 from rotfem.numerics.low_rank import LowRank
 from rotfem.numerics.projection import summed, times
 
-#: Relative distance of frequencies that are one, so that any turn of their shapes is one.
-EQUAL = 1e-6
+Array = npt.NDArray[np.float64]
 
-#: Part of a span's energy that makes a direction of it.
-NEW = 1e-6
+#: The effect that it is part of.
+EFFECT = "damping"
 
-#: Frequency, relative to the median of so many first ones, below which a motion is one that nothing holds.
-VIBRATING, FIRST = 1e-3, 6
+#: Key of a scene for messages.
+KEY = "structure.damping.modal"
+
+#: How many modes a single ratio is for.
+FIRST = 10
 
 
 @dataclass(frozen=True)
@@ -67,28 +69,25 @@ def modes_at_rest(system: Any, count: int) -> ModesAtRest:
     count = min(count, massed(M))
     pairs = Pencil(M, M.duplicate(), K).solve(min(count + MORE, massed(M)))
     found = np.abs(pairs.values)
-    vibrates = found > VIBRATING * np.median(found[:FIRST])
+    vibrates = found > 1e-3 * np.median(found[:FIRST])  # a slower motion is one that nothing holds
     omegas, columns = [], []
-    for group in _equal(found[vibrates]):
+    omega = found[vibrates]
+    # Of frequencies that are one any turn of the shapes is one.
+    for group in np.split(np.arange(len(omega)), 1 + np.flatnonzero(np.diff(omega) > 1e-6 * omega[1:])):
         X = _real_span(system.comm, M, pairs.right[:, vibrates][:, group])
         energies = family_products(system, X, times(M, X))
         distinguished = sum(i * energy for i, energy in enumerate(energies.values()))
         columns.append(X @ np.linalg.eigh(_symmetric(np.asarray(distinguished)))[1])
-        omegas += [float(np.mean(found[vibrates][group]))] * X.shape[1]
+        omegas += [float(np.mean(omega[group]))] * X.shape[1]
     X = np.hstack(columns)[:, :count]
     return ModesAtRest(np.array(omegas[:count]), X, times(M, X))
-
-
-def _equal(omega: Array) -> list[Array]:
-    """Return the numbers of frequencies, increasing, in groups of those that are one."""
-    return np.split(np.arange(len(omega)), 1 + np.flatnonzero(np.diff(omega) > EQUAL * omega[1:]))
 
 
 def _real_span(comm: MPI.Comm, M: Any, X: Array) -> Array:
     """Return real columns V, V·M V = 1, that span complex ones, eigenvectors of one frequency."""
     parts = np.hstack([X.real, X.imag]) / np.sqrt(_energies(comm, M, X.real) + _energies(comm, M, X.imag)).max()
     sizes, turns = np.linalg.eigh(_symmetric(summed(comm, parts.T @ times(M, parts))))
-    keep = sizes > NEW * sizes[-1]
+    keep = sizes > 1e-6 * sizes[-1]
     V = np.asarray(parts @ (turns[:, keep] / np.sqrt(sizes[keep])))
     return np.asarray(V / np.sqrt(_energies(comm, M, V)))
 
@@ -123,18 +122,6 @@ def family_products(system: Any, X: Array, MX: Array) -> dict[str, Array]:
 
 def _symmetric(A: Array) -> Array:
     return 0.5 * (A + A.T)
-
-
-Array = npt.NDArray[np.float64]
-
-#: The effect that it is part of.
-EFFECT = "damping"
-
-#: Key of a scene for messages.
-KEY = "structure.damping.modal"
-
-#: How many modes a single ratio is for.
-FIRST = 10
 
 
 class ByMode(LowRank):

@@ -63,10 +63,6 @@ class HubAngle:
         self.values[:] = 0.0, self.hub.speed, 0.0
 
 
-#: Name of the switch of the bodies that are always there.
-STRUCTURE = "structure"
-
-
 class Model:
     """The terms of a problem, each the virtual work of an effect.
 
@@ -155,7 +151,7 @@ class Model:
     def _mechanics(self) -> Mechanics:
         s, theory = self.structure, self.theory
         bodies = [
-            replace(b, density=self._switched(b.effect or STRUCTURE, bool(b.effect), b.density))
+            replace(b, density=self._switched(b.effect or "structure", bool(b.effect), b.density))
             for b in s.bodies(self.effects)
         ]
         strains = self.strains(theory.measures(s.type), first_order=theory.linear)

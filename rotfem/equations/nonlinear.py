@@ -15,7 +15,7 @@ from ufl.algorithms.analysis import extract_constants
 
 from rotfem.equations.clamp import ClampWork
 from rotfem.equations.energy_balance import EnergyBalance
-from rotfem.equations.model import Both, Model
+from rotfem.equations.model import Both
 from rotfem.equations.system import System
 from rotfem.mechanics.work import Mechanics
 from rotfem.numerics import compat, forms
@@ -115,18 +115,13 @@ class NonlinearSystem(System):
             is most of the work, and that of another theory, too.
     """
 
-    def __init__(self, model: Model, moving: bool = True, parted: bool = False):
-        self.parted = parted
-        super().__init__(model, moving)
-
     def _compile(self) -> Any:
         self._shift_values = [1.0, 0.0, 1.0]
         self._shifts = [self.structure.constant(c) for c in self._shift_values]
         self._spin: Any = None
         if self.moving:
-            self._residuals = self.model.by_strains() if self.parted else [self._residual_form]
-            self._tangents = [self._tangent_of(F) for F in self._residuals] if self.parted else [self._tangent_form]
-            libraries = [list(part) for part in zip(self._residuals, self._tangents, strict=True)]
+            residuals = self.model.by_strains() if self.parted else [self._residual_form]
+            libraries = [[F, self._tangent_of(F) if self.parted else self._tangent_form] for F in residuals]
             if self.model.hub is not None and self._by_spin.ufl is not None:
                 libraries[-1].append(self._by_spin.ufl)
             compiled = [forms.together(library, once=self.parted and self.structure.planar) for library in libraries]
@@ -174,32 +169,14 @@ class NonlinearSystem(System):
     def _at_rest(self) -> dict[str, Any]:
         return self.model.at_rest(self._residual_form)
 
-    @cached_property
-    def _derived(self) -> Both:
-        return self.model.derived_forms("at rest", self._made)
-
     def _made(self) -> Both:
         derived = {name: form for name, form in self._at_rest.items() if not form.empty()}
         return derived, {name: forms.form(form, once=True) for name, form in derived.items()}
 
     @cached_property
     def _parts(self) -> dict[str, Any]:
-        """F, and K, C and M, at v = a = 0, compiled; None where one vanishes."""
-        return {name: self._derived[1].get(name) for name in "fKCM"}
-
-    def known_form(self, name: str) -> tuple[Any, Any]:
-        """Return a form, UFL and compiled: parts of F, and of J of a moving system or else K, C, M."""
-        if self.moving:
-            kind, i = name[0], int(name[1:])
-            return (self._residuals[i], self._F[i]) if kind == "F" else (self._tangents[i], self._J[i])
-        name = "f" if name == "F" else name
-        return self._derived[0][name], self._parts[name]
-
-    def tangent_forms(self, kind: str) -> tuple[tuple[str, ...], tuple[float, ...]]:
-        """Return the names of the forms that M, C or K is the sum of, and the shifts to be set before."""
-        if self.moving:
-            return tuple(f"J{i}" for i in range(len(self._J))), tuple(float(kind == name) for name in "KCM")
-        return () if self._parts[kind] is None else (kind,), tuple(self._shift_values)
+        """F, and K, C and M, at v = a = 0, compiled, but for those that vanish."""
+        return self.model.derived_forms("at rest", self._made)[1]
 
     @property
     def integrals(self) -> dict[str, int]:
@@ -251,9 +228,10 @@ class NonlinearSystem(System):
 
     def whole(self, kind: str) -> Any:
         """Return K, C or M at the state with the rows of the clamp, a new matrix; None where it vanishes."""
-        names, shifts = self.tangent_forms(kind)
-        self.shift(shifts)
-        return self.whole_of([self.known_form(name)[1] for name in names])
+        if self.moving:
+            self.shift(tuple(float(kind == name) for name in "KCM"))
+            return self.whole_of(self._J)
+        return self.whole_of([self._parts[kind]] if kind in self._parts else [])
 
     def whole_of(self, parts: list[Any]) -> Any:
         """Return compiled bilinear forms added up, a new matrix with the rows of the clamp; None of none."""
@@ -316,7 +294,7 @@ class NonlinearSystem(System):
         wanted = [name for name, c in zip("KCM", shifts, strict=True) if c != 0.0]
         assert shifts == tuple(float(name in wanted) for name in "KCM")
         assert len(wanted) == 1
-        if self._parts[wanted[0]] is not None:
+        if wanted[0] in self._parts:
             fem_petsc.assemble_matrix(A, self._parts[wanted[0]], self.bcs, 0.0)
         A.assemble()
         d = A.getDiagonal()

@@ -21,13 +21,13 @@ import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from dolfinx.fem import petsc as fem_petsc
+from ufl.algorithms import expand_derivatives
 from ufl.algorithms.analysis import extract_constants
 
 from rotfem.equations.clamp import AtClamp
-from rotfem.equations.geometric import geometric_stiffness
 from rotfem.equations.model import Model
 from rotfem.mechanics.effects import INTERNAL
-from rotfem.mechanics.theories import Theory
+from rotfem.mechanics.theories import Theory, richest
 from rotfem.numerics import compat, forms
 from rotfem.numerics.forms import SAME, Assembler
 from rotfem.numerics.linear import SMALL, DirectSolver, combine, restrained, set_diagonal
@@ -35,10 +35,45 @@ from rotfem.numerics.projection import with_ghosts
 from rotfem.structures.root_reaction import RootReaction
 
 
-def geometric_pieces(pieces: Pieces) -> list[tuple[Piece, Any, frozenset[str]]]:
+def geometric_stiffness(model: Model, state: tuple[Any, Any], u: Any, w: Any, theory: Theory) -> Any:
+    """Return ∫ σ⁰·D²Γ[u, w] at rest, a UFL form: of N⁰ alone, or of all stress resultants (`Model.prestresses`).
+
+    It is 0 where no active component makes such forces.
+
+    Args:
+        model: whose strains have the forces σ⁰.
+        state: the function q of its displacements (m, rad), and what σ⁰ is of in its place.
+        u: a displacement, or an argument of the form.
+        w: another.
+        theory: with the second-order strains Γ that σ⁰ works on.
+    """
+    q, base = state
+    s = model.structure
+    out: Any = 0
+    second = model.strains(theory.prestress_measures(s.type))
+    for first, higher in zip(model.mechanics.strains, second, strict=True):
+        if model.prestresses(first):
+            force = first.force(ufl.replace(first.value, {q: base}))
+            curvature = ufl.derivative(ufl.derivative(higher.value, q, u), q, w)
+            out += ufl.inner(force, forms.without(curvature, q)) * higher.measure
+    return 0 if isinstance(out, int) or expand_derivatives(out).empty() else out
+
+
+def second_order_work(model: Model, displacements: tuple[Any, Any], test: Any) -> Any:
+    """Return ∫ N(δq)·D²Γ[a, b] at rest, a UFL form, with all exact strains Γ and the forces N of a linear theory."""
+    s, out = model.structure, 0
+    q, exact = s.k.functions[0], {strain.name: strain.value for strain in model.strains(richest().measures(s.type))}
+    for strain in model.mechanics.strains:
+        force = strain.force(ufl.replace(strain.value, {q: test}))
+        at_rest = forms.first_branches(exact[strain.name])  # at rest the other branches of its rotations divide by zero
+        second = ufl.derivative(ufl.derivative(at_rest, q, displacements[0]), q, displacements[1])
+        out += ufl.inner(force, forms.without(second, q)) * strain.measure
+    return out
+
+
+def geometric_pieces(pieces: Pieces, form: Any, compiled: Any) -> list[tuple[Piece, Any, frozenset[str]]]:
     """Return (load piece, its geometric stiffness, which is not zero, the effect that adds it or none) of all."""
     switches = pieces.model.switches
-    form, compiled = pieces.known_form("G")
     there = set(form.constants())
     adding = [name for name, switch in switches.items() if switch in there]
     loads, displaced = _stressing(pieces, compiled), list[tuple[Any, list[Array]]]()
@@ -195,7 +230,6 @@ class Pieces:
         symbols = self.structure.section | self.structure.scalars | model.switches
         purpose = " ".join(("geometric", model.theory.name, str(model.problem.prestress), *model.effects, *symbols))
         known, compiled = model.derived_forms(purpose, self._made_geometric, (self.prestressed, *symbols.values()))
-        self._geometric = known.get("G", 0)
         self._forms |= compiled
         self.assembler = Assembler(self._forms["K"], self.bcs)
         large = self.assembler.pattern.getSize()[0] > SMALL
@@ -210,7 +244,7 @@ class Pieces:
         if self.not_polynomial:
             model.check_smooth()
         if compiled:
-            self._prestress()
+            self._prestress(known["G"], compiled["G"])
         if large:  # a factor and a matrix, which are hardly needed again
             self.__dict__.pop("material_solver", None)
             self.assembler.release()
@@ -223,7 +257,9 @@ class Pieces:
 
     def _made_geometric(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return the geometric stiffness likewise, if there is one."""
-        form = self.geometric(ufl.TestFunction(self.V), ufl.TrialFunction(self.V), self.prestressed)
+        u, w, theory, form = ufl.TestFunction(self.V), ufl.TrialFunction(self.V), self.model.theory, 0
+        if theory.prestress:
+            form = geometric_stiffness(self.model, (self.q, self.prestressed), u, w, theory)
         return ({}, {}) if isinstance(form, int) else ({"G": form}, {"G": forms.form(form, once=True)})
 
     def _narrow(self) -> None:
@@ -406,21 +442,12 @@ class Pieces:
         """The displacement of the linear structure that carries N⁰."""
         return fem.Function(self.V)
 
-    def geometric(self, u: Any, w: Any, base: Any, theory: Theory | None = None) -> Any:
-        """Return ∫ N⁰ D²Γ₁[u, w] with N⁰ of the displacement `base`, a UFL form; 0 where there is no such force."""
-        theory = theory or self.model.theory
-        return geometric_stiffness(self.model, (self.q, base), u, w, theory) if theory.prestress else 0
-
-    def known_form(self, name: str) -> tuple[Any, Any]:
-        """Return f, K, C, M at rest, or G, as UFL and as compiled form."""
-        return self._geometric if name == "G" else self.at_rest[name], self._forms[name]
-
-    def _prestress(self) -> None:
+    def _prestress(self, form: Any, compiled: Any) -> None:
         """Add the geometric stiffness of the stresses that each load piece causes in the linear structure."""
         started = perf_counter()
         if not self._apart and self.stiffness.getSize()[0] > SMALL:
             combine(self.stiffness, [self.material], np.ones(1))
             self.analysed = DirectSolver(self.stiffness, symmetric=True)
-        for load, K, added in geometric_pieces(self):
+        for load, K, added in geometric_pieces(self, form, compiled):
             self._keep("K", load.key, K, load.of | {PRESTRESS} | added)
         self.assembled += perf_counter() - started

@@ -36,10 +36,6 @@ from rotfem.structures.turning_clamp import TurningClamp
 Array = npt.NDArray[np.float64]
 
 
-#: Unknowns from which a factor is kept over steps, by the dimension of the mesh: a plate's matrix is dear to factorise.
-KEPT_FROM = {1: 5000, 2: 300}
-
-
 def forget(owner: Any) -> None:
     """Make an object compute all its cached properties anew when they are next asked for."""
     for name in list(vars(owner)):
@@ -54,6 +50,7 @@ class System(Solutions, ABC):
         model: the terms.
         moving: whether velocities and accelerations will be set, as in a history. A system that is not moving has
             forms of its own at v = a = 0, which compile in a fraction of the time.
+        parted: see `rotfem.equations.compiled`.
 
     Attributes:
         q, v, a: dolfinx functions that hold the state the forms are evaluated at.
@@ -69,7 +66,6 @@ class System(Solutions, ABC):
         assembled: time spent on assembly while compiling, s.
         plain: whether tangents do without what is known of the way to a state (see `PointStresses`), which takes a form
             of its own.
-        parted: whether other theories of the problem share forms with it (see `NonlinearSystem`).
         analysed: a solver with a symmetric matrix of the pattern, of which others can use the ordering; None at first.
         left_out: effects that are switched off.
         compilations: how often the forms were made; once, or twice where rotations have become very large.
@@ -80,15 +76,14 @@ class System(Solutions, ABC):
     solved_at_once = False
     settled = False
     plain = False
-    parted = False
     left_out: frozenset[str] = frozenset()
     hub: Any = None
     analysed: DirectSolver | None = None
     signals: tuple[TimeSignal, ...] = ()
     view: View
 
-    def __init__(self, model: Model, moving: bool = True):
-        self.view = View()
+    def __init__(self, model: Model, moving: bool = True, parted: bool = False):
+        self.view, self.parted = View(), parted
         self.model, self.structure, self.motion, self.moving = model, model.structure, model.motion, moving
         self.comm = model.comm
         self.q, self.v, self.a, _ = self.structure.k.functions
@@ -110,8 +105,8 @@ class System(Solutions, ABC):
         self._damped = True
         self.A = self._compile()
         self._by_mode = damping_by_mode(self)
-        #: Whether a factor is kept for the steps that follow, where factorising is dear.
-        self.keeps_factor = self.A.getSize()[0] > KEPT_FROM[self.structure.mesh.topology.dim]
+        #: Whether a factor is kept for the steps that follow, where factorising is dear: soon of a plate's matrix.
+        self.keeps_factor = self.A.getSize()[0] > (5000 if self.structure.mesh.topology.dim == 1 else 300)
 
     def twin(self) -> Self:
         """Return another system of the same forms, functions and constants, with matrices and a factor of its own.
@@ -323,8 +318,8 @@ class System(Solutions, ABC):
         """
 
     def size(self, x: Array) -> float:
-        """Return the largest entry of a local dof array in units of `scale`, over all ranks."""
-        here = float((np.abs(x) / self.scale).max()) if x.size else 0.0
+        """Return the largest entry of a local dof array in units of `scale`, over all ranks; a hub's angle apart."""
+        here = float((np.abs(x[: len(self.scale)]) / self.scale).max()) if x.size else 0.0
         return here if self.comm.size == 1 else self.comm.allreduce(here, op=MPI.MAX)
 
     def product(self, x: Array, y: Array) -> float:
@@ -333,21 +328,14 @@ class System(Solutions, ABC):
         here = float((x[owned] / self.scale[owned]) @ (y[owned] / self.scale[owned]))
         return here if self.comm.size == 1 else self.comm.allreduce(here)
 
-    def deflection(self, q: Array, t: float) -> float:
-        """Return the largest unknown relative to the turning frame in units of `scale`, over all ranks."""
-        if self.clamp is None:
-            return self.size(q)
-        x = self.V.tabulate_dof_coordinates()[:, 0]
-        return self.size(self.clamp.relative(q.reshape(len(x), -1), x, t).ravel())
-
     def increment_size(self, dq: Array) -> float:
         """Return the size of a correction by which Newton is judged."""
         return self.size(dq)
 
     def sizes(self, x: Array) -> Array:
         """Return the largest entry of each component in units of `scale`, over all ranks, shape (components,)."""
-        here = (np.abs(x) / self.scale).reshape(-1, self.V.dofmap.index_map_bs).max(axis=0, initial=0.0)
-        here = self.structure.whole_values(here)
+        here = np.abs(x[: len(self.scale)]) / self.scale
+        here = self.structure.whole_values(here.reshape(-1, self.V.dofmap.index_map_bs).max(axis=0, initial=0.0))
         if self.comm.size > 1:
             self.comm.Allreduce(MPI.IN_PLACE, here, op=MPI.MAX)
         return np.asarray(here)

@@ -69,22 +69,15 @@ def quadratic(m: Array, c: Array, k: Array, target: float) -> tuple[Array, Array
     return target + unit / nu[order], x, y
 
 
-def shape_frequencies(X: Array, MX: Array, KX: Array) -> Array:
-    """Return ω = √|x^H K x / x^H M x| of columns, the frequency of their shape without damping (Rayleigh quotient)."""
-    mass, stiffness = (np.abs(np.sum(X.conj() * Y, axis=0)) for Y in (MX, KX))
-    return np.asarray(np.sqrt(stiffness / mass))
-
-
-def are_fast(values: Array, omega: Array) -> npt.NDArray[np.bool_]:
-    """Return which eigenvalues are the fast ones of overdamped modes, by the frequencies of their shapes."""
-    return np.asarray((values.imag == 0.0) & (values.real < 0.0) & (np.abs(values) >= omega))
-
-
 def place(values: Array, X: Array, MX: Array, KX: Array) -> Array:
-    """Return what to sort eigenvalues by: ω of their shape, of the fast one of two real ones that of the slow one."""
-    omega = shape_frequencies(X, MX, KX)
-    gone = are_fast(values, omega)
-    slow, fast = np.flatnonzero((values.imag == 0.0) & (values.real < 0.0) & ~gone), np.flatnonzero(gone)
+    """Return what to sort eigenvalues by: ω of their shape, of the fast one of two real ones that of the slow one.
+
+    ω = √|x^H K x / x^H M x|, the frequency of the shape without damping (Rayleigh quotient).
+    """
+    mass, stiffness = (np.abs(np.sum(X.conj() * Y, axis=0)) for Y in (MX, KX))
+    omega = np.asarray(np.sqrt(stiffness / mass))
+    real = (values.imag == 0.0) & (values.real < 0.0)
+    slow, fast = (np.flatnonzero(real & part) for part in (np.abs(values) < omega, ~(np.abs(values) < omega)))
     if len(slow) and len(fast):
         sizes = np.sqrt(np.abs(np.sum(X.conj() * MX, axis=0)))
         alike = np.abs(X[:, fast].conj().T @ MX[:, slow]) / np.outer(sizes[fast], sizes[slow])
@@ -130,14 +123,13 @@ class RitzPairs:
         matrices: M, C, K.
         start: first directions, columns of owned unknowns.
         target: where K + σ C + σ² M is factorised, 0, or away from the zero eigenvalue of a free hub.
-        fast: whether the fast eigenvalues of overdamped modes are wanted.
 
     Attributes:
         values, right, left, errors: λ, vectors of owned unknowns, and the larger backward error of both.
     """
 
-    def __init__(self, matrices: Matrices, start: Array, target: float, fast: bool = True):
-        self.matrices, self.target, self.fast = matrices, target, fast
+    def __init__(self, matrices: Matrices, start: Array, target: float):
+        self.matrices, self.target = matrices, target
         self.comm: MPI.Comm = matrices[2].comm.tompi4py()
         self.norms = np.array([A.norm(PETSc.NormType.INFINITY) for A in self.matrices])
         self._solver = self._solver_at(target)
@@ -173,8 +165,6 @@ class RitzPairs:
         turn_equal(values, (x, y), (m, c, k))
         # The square of a larger eigenvalue, times anything, may be no number any more.
         upper = (values.imag >= 0.0) & (np.abs(np.sum(x.conj() * (m @ x), axis=0)) > 0.0) & (np.abs(values) < 1e140)
-        if not self.fast:
-            upper &= ~are_fast(values, shape_frequencies(x, m @ x, k @ x))
         if not np.any(upper):
             raise ComputationError("damping is so far out of proportion that no mode is left")
         values, x, y = values[upper], x[:, upper], y[:, upper]
@@ -230,9 +220,7 @@ class RitzPairs:
         return self.add(np.array(new).T) if new else 0
 
 
-def damped_pairs(
-    matrices: Matrices, undamped: Array, count: int, target: float, fast: bool = True
-) -> tuple[Array, Array, Array, Array]:
+def damped_pairs(matrices: Matrices, undamped: Array, count: int, target: float) -> tuple[Array, Array, Array, Array]:
     """Return (λ, x, y, backward errors) of the shapes that vibrate slowest without damping.
 
     Args:
@@ -240,10 +228,9 @@ def damped_pairs(
         undamped: vectors of the pencil without damping, columns of owned unknowns.
         count: number of pairs.
         target: see `RitzPairs`.
-        fast: see `RitzPairs`.
     """
     start = np.hstack([undamped.real, undamped.imag])
-    ritz = RitzPairs(matrices, start, target, fast)
+    ritz = RitzPairs(matrices, start, target)
     for number in range(12):
         ritz.solve(count)
         done = float(np.max(ritz.errors)) <= DONE or ritz.V.shape[1] > 400

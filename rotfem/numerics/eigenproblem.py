@@ -254,8 +254,8 @@ class Pencil(Sendable):
         #: Scale of the unknowns, powers of two (None: that of the diagonal), and whether a factor needs pivots.
         self.unknowns: Any = None
         self.pivots = False
-        #: Whether fast eigenvalues of overdamped modes are returned too, and whether inaccurate pairs are refused.
-        self._fast = self._judged = True
+        #: Whether inaccurate pairs are refused.
+        self._judged = True
         #: Time of factorisations, s.
         self.factored = 0.0
         self.spectrum_error: float | None = None
@@ -318,22 +318,6 @@ class Pencil(Sendable):
         except ComputationError:  # K is singular or nearly so (a critical speed, a rigid-body mode): aim beside zero
             return self._solve(count, 0.1 * self._smallest)
 
-    def lasting(self, count: int, target: float = 0.0) -> Array:
-        """Return λ of the first modes, of an overdamped one the slow eigenvalue alone: the fast one is gone at once.
-
-        Args:
-            count: number of modes (fewer are returned if there are no more).
-            target: see `solve`.
-
-        Raises:
-            ComputationError: see `solve`.
-        """
-        self._fast = False
-        try:
-            return self.solve(count, target).values[:count]
-        finally:
-            self._fast = True
-
     def _solve(self, count: int, target: float) -> Eigenpairs:
         if sparse_part(self.C) is not self.C:  # SLEPc's solver takes sparse matrices alone
             return self._damped(count, target)
@@ -381,7 +365,7 @@ class Pencil(Sendable):
         with balanced(self.M, self.C, self.K, self.unit) as d:
             matrices, more = (self.M, self.C, self.K), min(2 * count, count + MORE)
             start = shapes / d[:, None]
-            values, right, left, errors = damped_pairs(matrices, start, more, target / self.unit, self._fast)
+            values, right, left, errors = damped_pairs(matrices, start, more, target / self.unit)
         vectors = d[:, None] * right, d[:, None] * left
         return self._checked(self.unit * values, vectors, errors, ZERO * self.unit if target > 0.0 else 0.0)
 

@@ -26,9 +26,8 @@ import ufl
 from dolfinx import fem
 
 from rotfem.analysis.reduced.model import ReducedModel
-from rotfem.equations.geometric import second_order_work
 from rotfem.equations.nonlinear import assembled
-from rotfem.equations.pieces import PRESTRESS, Piece
+from rotfem.equations.pieces import PRESTRESS, Piece, second_order_work
 from rotfem.mechanics.effects import INTERNAL, Effect
 from rotfem.numerics import forms
 from rotfem.numerics.projection import summed, times
