@@ -33,9 +33,6 @@ NODES = (0.0, -(GOLDEN**2), GOLDEN**2, -GOLDEN, GOLDEN, -1.0, 1.0)
 #: Length of a cell of time (s) where no time grid says it.
 CELL = 0.1
 
-#: Relative round-off of a value.
-EPS = float(np.finfo(float).eps)
-
 
 @lru_cache(maxsize=64)
 def weights(order: int, place: float) -> tuple[tuple[float, ...], tuple[float, ...], float, float]:
@@ -120,4 +117,5 @@ class Derivative:
         D = sum(w * x for w, x in zip(outer, changes, strict=True)) / scale
         coarse = sum(w * x for w, x in zip(inner, changes[:5], strict=True)) / scale
         shift = abs(t) * size / h  # of the value, by the round-off of t
-        return D, rho * abs(D - coarse) + EPS * (abs(base) + size + shift) * total / scale, size
+        rounded = float(np.finfo(float).eps) * (abs(base) + size + shift) * total / scale
+        return D, rho * abs(D - coarse) + rounded, size

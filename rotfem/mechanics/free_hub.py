@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,9 +13,6 @@ import numpy.typing as npt
 
 from rotfem.short import short_fields
 from rotfem.units import si
-
-#: Relative difference of two times that rounding can make.
-ROUNDING = 1e-14
 
 Array = npt.NDArray[np.float64]
 Rows = tuple[tuple[float, ...], ...]
@@ -41,11 +39,11 @@ class Torque:
 
     @cached_property
     def _pulses(self) -> Rows:
-        """Pulses; times that differ by a rounding only are one and the same."""
+        """Pulses; times that differ by a rounding only, 1e-14 of themselves, are one and the same."""
         last = -np.inf
         same: dict[float, float] = {}
         for t in sorted({t for start, end, _ in self.pulses for t in (start, end)}):
-            last = last if t - last <= ROUNDING * abs(t) else t
+            last = last if t - last <= 1e-14 * abs(t) else t
             same[t] = last
         return tuple((same[start], same[end], torque) for start, end, torque in self.pulses)
 
@@ -134,14 +132,7 @@ class ControlledTorque(Torque):
 
     def on_rigid(self, t: Array, psi: float, speed: float) -> Array:
         """Return M at times (n,) with a structure that does not move in the frame, shape (n,)."""
-        return np.array([self.controller(float(s), psi, speed, Nowhere()) for s in t])
-
-
-class Nowhere(dict[str, float]):
-    """The tip of a structure that does not move: all its components are zero."""
-
-    def __missing__(self, name: str) -> float:
-        return 0.0
+        return np.array([self.controller(float(s), psi, speed, defaultdict(float)) for s in t])
 
 
 @dataclass(frozen=True)

@@ -193,7 +193,8 @@ class Motion:
         w, dw, a_o = self.speed(t) * self.axis, self.rate(t) * self.axis, self.base_acceleration(t)
         if self.pitch is None:
             return {"w": w, "dw": dw, "a_o": a_o}
-        return self.pitch.frame(t, w, dw, a_o)
+        turn = self.pitch.turned(t), self.pitch.rate(t), self.pitch.acceleration(t)
+        return self.pitch.moved(turn, w, dw, a_o)
 
     def rotation(self, t: float) -> Array:
         """Return Q(t), shape (3, 3): inertial components = Q(t) · frame components."""

@@ -105,10 +105,6 @@ class Pitch:
         """Return R(t), shape (3, 3): components in the hub's frame = R · components in the pitched frame."""
         return turn_about(self.axis, self.turned(t))
 
-    def frame(self, t: float, w: Array, dw: Array, a_o: Array) -> dict[str, Array]:
-        """Return the motion of the pitched frame at time t (s), see `moved`."""
-        return self.moved((self.turned(t), self.rate(t), self.acceleration(t)), w, dw, a_o)
-
     def moved(self, turn: tuple[Any, Any, Any], w: Array, dw: Array, a_o: Array) -> dict[str, Array]:
         """Return the motion of the pitched frame: w, dw, a_o and v_o, the velocity of its origin, its components.
 

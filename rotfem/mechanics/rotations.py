@@ -8,7 +8,7 @@ With s = |θ|², A = sin|θ|/|θ|, B = (1 − cos|θ|)/s and C = (|θ| − sin|�
 
 K(θ') is one-to-one up to |θ| = 2π, where A = B = 0 takes away every change of θ across θ.
 
-Λ = exp(θ). The two angles of a plate are those of `rotfem.mechanics.mindlin`, t = R_2(−alpha_1) R_1(alpha_2) a_3. A
+Λ = exp(θ). The two angles of a plate are those of `rotfem.mechanics.strains`, t = R_2(−alpha_1) R_1(alpha_2) a_3. A
 rotation has many vectors and a director many pairs of angles: the way back takes those nearest to a guess.
 """
 
@@ -175,7 +175,7 @@ def _factors(s: Array) -> tuple[Array, Array, Array, Array, Array]:
 
 
 def triads(alpha: Array) -> Array:
-    """Return (t_1, t_2, t) of angles (…, 2) in rad as columns, shape (…, 3, 3): `rotfem.mechanics.mindlin.triad`."""
+    """Return (t_1, t_2, t) of angles (…, 2) in rad as columns, shape (…, 3, 3): `rotfem.mechanics.strains.triad`."""
     c1, s1, c2, s2 = np.cos(alpha[..., 0]), np.sin(alpha[..., 0]), np.cos(alpha[..., 1]), np.sin(alpha[..., 1])
     rows = [[c1, -s1 * s2, -s1 * c2], [np.zeros_like(c1), c2, -s2], [s1, c1 * s2, c1 * c2]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

@@ -12,15 +12,6 @@ from rotfem.errors import InputError
 #: Environment variable with the memory that may be used, in GB, where it is not what the machine has.
 VARIABLE = "ROTFEM_MEMORY"
 
-#: Bytes per unknown, component and dimension of the mesh: a linear history of a plate took 13.6 kB per unknown. Modes
-#: of 10⁵ to 10⁶ unknowns took 11 kB, and planar beams of 4·10⁴ elements less than this (degrees 1 and 3: 3 kB).
-BYTES = 1400
-
-#: Times as much on several processes together: modes of plates on two took 29 kB per unknown.
-SHARED = 2.2
-
-_GROUP = Path("/sys/fs/cgroup/memory.max")
-
 
 def check_memory(key: str, value: object, nodes: float, components: int, dimension: int, comm: MPI.Comm) -> None:
     """Refuse a mesh whose matrices cannot be held.
@@ -39,7 +30,10 @@ def check_memory(key: str, value: object, nodes: float, components: int, dimensi
     unknowns = float(nodes) * components
     if unknowns < 1e5:  # nothing is asked of the system for what fits anywhere
         return
-    needed = BYTES * (SHARED if comm.size > 1 else 1.0) * components * dimension * unknowns
+    # Bytes per unknown, component and dimension of the mesh: a linear history of a plate took 13.6 kB per unknown,
+    # modes of 10⁵ to 10⁶ unknowns 11 kB, and planar beams of 4·10⁴ elements less than this (degrees 1 and 3: 3 kB).
+    # Modes of plates on two processes together took 29 kB per unknown.
+    needed = 1400 * (2.2 if comm.size > 1 else 1.0) * components * dimension * unknowns
     there = comm.allreduce(memory(), MPI.MIN) * len(set(comm.allgather(MPI.Get_processor_name())))
     if needed > there:
         raise InputError(
@@ -64,6 +58,6 @@ def memory() -> float:
             raise InputError(VARIABLE, given, "must be a number of GB") from None
     machine = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     try:
-        return min(machine, float(_GROUP.read_text()))
+        return min(machine, float(Path("/sys/fs/cgroup/memory.max").read_text()))
     except (OSError, ValueError):  # no such group, or one without a bound
         return machine

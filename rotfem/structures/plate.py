@@ -22,8 +22,8 @@ from scipy.spatial import Delaunay
 from rotfem.errors import InputError
 from rotfem.mechanics.bodies import AppliedLoad, Body, Kinematics, Strain
 from rotfem.mechanics.loads import AnyLoad
-from rotfem.mechanics.mindlin import PlateGradients, director, triad
 from rotfem.mechanics.problem import Problem
+from rotfem.mechanics.strains import PlateGradients, director, triad
 from rotfem.numerics import forms
 from rotfem.structures.memory import check_memory
 from rotfem.structures.meshes.plate_mesh import PlateGrid, plate_grid
@@ -51,14 +51,6 @@ def plate_points(plate: Structure) -> Points:
     raise InputError(f"loads.at.{applied.index(missing)}.x", list(missing), why)
 
 
-def pressure(plate: Structure, load: AnyLoad) -> list[AppliedLoad]:
-    """Return the pressure p on the surface: p a_3 if dead, p r,1 × r,2 per undeformed area if follower."""
-    r = PlateGradients(plate.k.q).dr
-    p, dead = plate.amplitude("pressure", load, 1)[0], load.kind == "dead"
-    normal = ufl.as_vector((0, 0, 1)) if dead else ufl.cross(r[:, 0], r[:, 1])
-    return [AppliedLoad("pressure", p * normal, plate.position(plate.k.q), plate.dx, dead)]
-
-
 @dataclass(frozen=True, kw_only=True)
 class EdgeMoment(AppliedLoad):
     """A moment per length on the directors of an edge (N, frame components): it works on t×δt.
@@ -76,66 +68,6 @@ class EdgeMoment(AppliedLoad):
     def rigid_turn(self, e: Any) -> Any:
         """Return the turn in a unit rigid turn about e, without its part along t."""
         return e - ufl.dot(e, self.director) * self.director
-
-
-class TipEdge:
-    """The edge "tip" of a plate, along which the loads of the tip are spread.
-
-    Args:
-        plate: the discretised plate; its `tip` is the measure of the edge.
-    """
-
-    def __init__(self, plate: Structure):
-        self._plate = plate
-
-    def spread(self, load: Any) -> Any:
-        """Return a load over the length of the edge."""
-        scalars = self._plate.scalars
-        if "tip_length" not in scalars:
-            self._plate.scalar("tip_length", self._length())
-        return load / scalars["tip_length"]
-
-    def moment(self, m: Any, dead: bool, director: Any) -> list[AppliedLoad]:
-        """Return what a moment is on the edge: one on its directors, and a couple of forces in the plane.
-
-        A director has no rotation about itself: the third component of the moment is the couple, e_3×(X − X_c) in
-        direction and growing with the distance from the middle X_c of the edge.
-
-        Args:
-            m: components of the moment, N·m.
-            dead: whether its direction does not depend on q.
-            director: the unit director t(q).
-        """
-        plate, q = self._plate, self._plate.k.q
-        tilting, alpha = ufl.as_vector((m[0], m[1], 0)), PlateGradients(q).alpha
-        density = self.spread(tilting if dead else plate.turned(q, tilting))
-        if plate.turns is not None and plate.turns.before is not None:
-            alpha = alpha + PlateGradients(plate.turns.before).alpha
-        about = ufl.as_vector((alpha[1], -alpha[0], 0))
-        couple = m[2] * self._couple()
-        force = couple if dead else plate.turned(q, couple)
-        return [
-            EdgeMoment("tip_moment", density, about, plate.tip, dead, director=director),
-            AppliedLoad("tip_moment", force, plate.position(q), plate.tip, dead),
-        ]
-
-    def _couple(self) -> Any:
-        """Return the forces along the edge (per length, in the plane) that make a couple of one."""
-        plate, x = self._plate, ufl.SpatialCoordinate(self._plate.mesh)
-        length = self._length()
-        middle = [self._integral(x[i]) / length for i in range(2)]
-        arm = ufl.as_vector([x[i] - plate.scalar(f"tip_middle_{i + 1}", middle[i]) for i in range(2)])
-        inertia = plate.scalar("tip_inertia", self._integral(ufl.dot(arm, arm)))
-        return ufl.as_vector((-arm[1], arm[0], 0)) / inertia
-
-    def _length(self) -> float:
-        """Return the length of the edge, m."""
-        return self._integral(self._plate.constant(1.0))
-
-    def _integral(self, density: Any) -> float:
-        """Return the integral of a density over the edge."""
-        here = float(fem.assemble_scalar(forms.form(density * self._plate.tip)))
-        return float(self._plate.comm.allreduce(here))
 
 
 def constants(data: Any) -> dict[str, float]:
@@ -178,9 +110,6 @@ def shear_moduli(p: Mapping[str, Any]) -> Any:
 
 #: Part of the energy that reduced integration does not see and is put back; all of it would stiffen the plate.
 SEEN = 0.1
-
-#: Nodes closer than this part of the plate's size share a coordinate when they are put in order.
-SAME_PLACE = 1e-7
 
 
 def _voigt(tensor: Any) -> Any:
@@ -371,11 +300,34 @@ class Plate(Structure):
         if name.startswith("tip") and not self._has_tip:
             why = 'needs a physical curve "tip" in the mesh, which it works on'
             raise InputError(f"loads.{name}", None, why)
-        return pressure(self, load) if name == "pressure" else super().applied(name, load)
+        if name != "pressure":
+            return super().applied(name, load)
+        # p a_3 if dead, p r,1 × r,2 per undeformed area if follower
+        r, p, dead = PlateGradients(self.k.q).dr, self.amplitude("pressure", load, 1)[0], load.kind == "dead"
+        normal = ufl.as_vector((0, 0, 1)) if dead else ufl.cross(r[:, 0], r[:, 1])
+        return [AppliedLoad("pressure", p * normal, self.position(self.k.q), self.dx, dead)]
 
     def moment(self, name: str, m: Any, measure: Any, dead: bool) -> list[AppliedLoad]:
-        """Return the work of the moment of the tip."""
-        return TipEdge(self).moment(m, dead, self.director(self.k.q))
+        """Return what a moment of the tip is on its edge: one on its directors, and a couple of forces in the plane.
+
+        A director has no rotation about itself: the third component of the moment is the couple, e_3×(X − X_c) in
+        direction and growing with the distance from the middle X_c of the edge.
+        """
+        q, alpha, x = self.k.q, PlateGradients(self.k.q).alpha, ufl.SpatialCoordinate(self.mesh)
+        tilting = ufl.as_vector((m[0], m[1], 0))
+        density = self.spread(name, tilting if dead else self.turned(q, tilting))
+        if self.turns is not None and self.turns.before is not None:
+            alpha = alpha + PlateGradients(self.turns.before).alpha
+        about, director = ufl.as_vector((alpha[1], -alpha[0], 0)), self.director(q)
+        length = self._along_tip(self.constant(1.0))
+        middle = [self._along_tip(x[i]) / length for i in range(2)]
+        arm = ufl.as_vector([x[i] - self.scalar(f"tip_middle_{i + 1}", middle[i]) for i in range(2)])
+        inertia = self.scalar("tip_inertia", self._along_tip(ufl.dot(arm, arm)))
+        couple = m[2] * (ufl.as_vector((-arm[1], arm[0], 0)) / inertia)  # per length
+        return [
+            EdgeMoment(name, density, about, measure, dead, director=director),
+            AppliedLoad(name, couple if dead else self.turned(q, couple), self.position(q), measure, dead),
+        ]
 
     def place(self, point: Array) -> tuple[float, float]:
         """Return (x, y) of a point (3,) of the mesh, m."""
@@ -387,7 +339,16 @@ class Plate(Structure):
 
     def spread(self, name: str, load: Any) -> Any:
         """Return a load of the tip over the length of its edge."""
-        return TipEdge(self).spread(load) if name == "tip_force" else load
+        if not name.startswith("tip"):
+            return load
+        if "tip_length" not in self.scalars:
+            self.scalar("tip_length", self._along_tip(self.constant(1.0)))
+        return load / self.scalars["tip_length"]
+
+    def _along_tip(self, density: Any) -> float:
+        """Return the integral of a density over the edge "tip"."""
+        here = float(fem.assemble_scalar(forms.form(density * self.tip)))
+        return float(self.comm.allreduce(here))
 
     # --- values -----------------------------------------------------------------------------------------------------
 
@@ -418,7 +379,7 @@ class Plate(Structure):
         """Return (x, order): all nodes, and the permutation that sorts them by x, then y."""
         owned = self.V.dofmap.index_map.size_local
         x = np.concatenate(self.comm.allgather(self.V.tabulate_dof_coordinates()[:owned]))
-        cell = SAME_PLACE * self.length
+        cell = 1e-7 * self.length  # closer nodes share a coordinate
         return x, np.lexsort((np.round(x[:, 1] / cell), np.round(x[:, 0] / cell)))
 
     def mode_name(self, family: str, coordinates: dict[str, Array], values: Array) -> tuple[str, str]:

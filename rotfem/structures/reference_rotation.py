@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from inspect import signature
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +24,6 @@ from mpi4py import MPI
 
 from rotfem.errors import ComputationError
 from rotfem.mechanics import rotations as turned
-from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.theories import richest
 
 Array = npt.NDArray[np.float64]
@@ -49,17 +48,6 @@ class ReferenceRotation:
     total: Array
     rotation: Array
     curvature: Array
-
-
-class Discretised(Protocol):
-    """What of a structure its rotations are made of: its problem, its mesh and the space of its unknowns."""
-
-    problem: Problem
-    comm: MPI.Comm
-    type: ClassVar[str]
-    mesh: Any
-    V: Any
-    size: int
 
 
 class Turns:
@@ -88,7 +76,7 @@ class Turns:
     #: Rotations, rates, second rates ↦ rates and second rates of rotations counted from the present shape.
     _rates: Callable[[Array, Array, Array], tuple[Array, Array]]
 
-    def __init__(self, structure: Discretised):
+    def __init__(self, structure: Any):
         self._structure = structure
         self.reference: ReferenceRotation | None = None
         self.rotation: Any = None
@@ -96,7 +84,7 @@ class Turns:
         self.before: Any = None
 
     @classmethod
-    def of(cls, structure: Discretised) -> Self | None:
+    def of(cls, structure: Any) -> Self | None:
         """Return the rotations of a structure; None in a theory whose strains do not allow a reference."""
         return cls(structure) if structure.problem.theory.exact else None
 
@@ -145,7 +133,11 @@ class Turns:
             return False
         first = self.rotation is None
         if first:
-            self._make_functions()
+            mesh, degree = self._structure.mesh, self._space.element.basix_element.degree
+            vectors = fem.functionspace(mesh, element("DG", mesh.basix_cell(), degree, shape=(3,)))
+            self.rotation = fem.Function(self._space, name="reference")
+            self.curvature = fem.Function(vectors, name="datum_curvature")
+            self.before = fem.Function(self._structure.V, name="before")
         self.reference = reference
         shape = reference or self._undeformed
         _write(self.rotation, shape.rotation)
@@ -204,13 +196,6 @@ class Turns:
         everywhere = np.broadcast_to(np.eye(3), (cells, points, 3, 3))
         return ReferenceRotation(np.broadcast_to(np.eye(3), (n, 3, 3)), total, everywhere, np.zeros((cells, points, 3)))
 
-    def _make_functions(self) -> None:
-        mesh, degree = self._structure.mesh, self._space.element.basix_element.degree
-        vectors = fem.functionspace(mesh, element("DG", mesh.basix_cell(), degree, shape=(3,)))
-        self.rotation = fem.Function(self._space, name="reference")
-        self.curvature = fem.Function(vectors, name="datum_curvature")
-        self.before = fem.Function(self._structure.V, name="before")
-
 
 def _write(function: Any, values: Array) -> None:
     """Write values (cells, points, …) into a function of polynomials with these points."""
@@ -252,7 +237,7 @@ class DirectorTurns(Turns):
     _rates = staticmethod(turned.tilts)
 
     @classmethod
-    def of(cls, structure: Discretised) -> Self | None:
+    def of(cls, structure: Any) -> Self | None:
         """Return the rotations of a plate; None in a theory whose strains are not those of a director t too."""
         theory = structure.problem.theory
         takes_director = len(signature(theory.measures(structure.type)).parameters) > 1

@@ -22,9 +22,6 @@ from scipy.sparse.csgraph import connected_components
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
-#: Part of the mean area below which a cell counts as having none; part of the size by which nodes may leave the plane.
-NO_AREA, FLAT = 1e-10, 1e-9
-
 
 class BadMesh(Exception):
     """Why a mesh is not one of a plate."""
@@ -60,7 +57,7 @@ class Cells:
         turn = _cross(after, before)  # twice the area of the corner's triangle
         area = np.abs(turn.sum(axis=1)) / (4 if n == 4 else 6)
         mean = float(np.mean(area))
-        bad = np.flatnonzero(area <= NO_AREA * mean) if mean > 0 else np.arange(len(area))
+        bad = np.flatnonzero(area <= 1e-10 * mean) if mean > 0 else np.arange(len(area))
         if len(bad):
             raise BadMesh(f"cell {int(self.numbers[bad[0]])} at {at(x[bad[0]])} has no area")
         folded = np.flatnonzero(np.min(turn * np.sign(turn.sum(axis=1))[:, None], axis=1) <= 0.0)
@@ -164,9 +161,6 @@ def at(x: Array) -> str:
     return f"({where[0]:.4g}, {where[1]:.4g}) m"
 
 
-#: Signals that libraries catch to print where they were.
-_CAUGHT = (signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGALRM, signal.SIGTERM)
-
 #: What the process says at the end of its work.
 DONE = b"\0done"
 
@@ -205,8 +199,8 @@ def mishap(work: Callable[[], object], seconds: float, memory: float) -> str | N
 
 def _behave(seconds: float, memory: float) -> None:
     """Leave this process no way to disturb another one, or to go on for ever."""
-    for number in _CAUGHT:
-        signal.signal(number, signal.SIG_DFL)
+    for name in ("SEGV", "ABRT", "BUS", "FPE", "ILL", "ALRM", "TERM"):  # which libraries catch to print where they were
+        signal.signal(signal.Signals[f"SIG{name}"], signal.SIG_DFL)
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):
         os.dup2(nowhere, stream)
@@ -231,9 +225,6 @@ HEAD = re.compile(
 
 #: Largest number of a node.
 MOST = 10**8
-
-#: Coordinates that a node may have at most, m.
-LARGEST = 1e100
 
 #: What gmsh may need to read a file: seconds, one more for so many bytes of it, and bytes of memory.
 SECONDS, BYTES_PER_SECOND, MEMORY = 20.0, 5e5, 1e9
@@ -411,10 +402,10 @@ def _edges(gmsh: Any, name: str, tag: int, kind: int, rows: Integers) -> Integer
 
 def _check_flat(x: Array) -> None:
     """Refuse nodes outside the plane x_3 = 0."""
-    if not np.all(np.abs(x) < LARGEST):  # so that areas are numbers
+    if not np.all(np.abs(x) < 1e100):  # so that areas are numbers
         raise BadMesh("has nodes whose coordinates are not finite, or of no size")
     away = np.max(np.abs(x[:, 2]))
-    if away > FLAT * np.max(np.ptp(x, axis=0)):
+    if away > 1e-9 * np.max(np.ptp(x, axis=0)):
         raise BadMesh(f"it leaves the plane x₃ = 0 (by {away:.3g} m); a plate lies in it")
 
 
