@@ -184,7 +184,7 @@ def diagram(
         *([off.warning()] if off and off.warning() else []),
     ]
     summary = {
-        **modal_summary("campbell", analysis, scene, started),
+        **modal_summary("campbell", analysis, scene, started, off),
         "branches": [
             {
                 "branch": b + 1,
@@ -205,7 +205,6 @@ def diagram(
         "ambiguous": sweep.ambiguous,
         "speeds": len(values),
         "speeds_solved": sweep.solves,
-        **({} if off is None else {"theory_error": off.summary()}),
         **({"error": error_of_modes(rows, off).summary()} if scene.output.error else {}),
         "checks": self_checks(analysis, sweep.nodes[-1].spinning),
         **analysis.report(),

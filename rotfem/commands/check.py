@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from scipy.spatial.transform import Rotation
 
+from rotfem.commands.fields import BETWEEN, columns_of
 from rotfem.commands.problem import Problem
 from rotfem.commands.processes import communicator
 from rotfem.commands.summary import summary
@@ -20,8 +20,8 @@ from rotfem.errors import input_of
 from rotfem.mechanics.effects import Effect
 from rotfem.mechanics.theories import Theory
 from rotfem.results import CheckResult
+from rotfem.results.result import Array
 from rotfem.scene import Scene, as_scene
-from rotfem.scene.values import Array, evaluate
 
 
 def check(scene: Scene | str | Path | Mapping[str, Any], *, comm: MPI.Comm = MPI.COMM_WORLD) -> CheckResult:
@@ -69,84 +69,6 @@ def check(scene: Scene | str | Path | Mapping[str, Any], *, comm: MPI.Comm = MPI
         }
         coordinates, _ = model.structure.nodes(model.structure.k.functions[0].x.array)
         return CheckResult(found, columns, coordinates, model.structure.surface())
-
-
-# --- along the span ---------------------------------------------------------------------------------------------------
-
-#: Places from one row of the tables to the next.
-BETWEEN = 4
-
-
-def central_properties(stiffness: Array, mass: Array) -> dict[str, Array]:
-    """Return the section properties about the section's own centres of matrices (n, 6, 6) about the reference line.
-
-    They are `EA` (N), `EI2`, `EI3` (N·m²) about the tension centre; `GA2`, `GA3` (N), `GJ` (N·m²) about the shear one;
-    `mass_per_length` (kg/m), `rotary_inertia2`, `rotary_inertia3` (kg·m) about the mass centre; `tension_center_y`,
-    `tension_center_z` (m) and those of the others. Couplings that no centre takes away are left out.
-    """
-    K, M = stiffness, mass
-    EA, m = K[:, 0, 0], M[:, 0, 0]
-    across = K[:, 1:3, 1:3]
-    arm = np.linalg.solve(across, K[:, 1:3, 3, None])[..., 0]  # (−z, y) of the shear centre
-    y, z = M[:, 2, 3] / m, M[:, 0, 4] / m
-    return {
-        "mass_per_length": m,
-        "EA": EA,
-        "GA2": K[:, 1, 1],
-        "GA3": K[:, 2, 2],
-        "GJ": K[:, 3, 3] - np.einsum("ni,ni->n", arm, K[:, 1:3, 3]),
-        "EI2": K[:, 4, 4] - K[:, 0, 4] ** 2 / EA,
-        "EI3": K[:, 5, 5] - K[:, 0, 5] ** 2 / EA,
-        "rotary_inertia2": M[:, 4, 4] - m * z**2,
-        "rotary_inertia3": M[:, 5, 5] - m * y**2,
-        "mass_center_y": y,
-        "mass_center_z": z,
-        "tension_center_y": -K[:, 0, 5] / EA,
-        "tension_center_z": K[:, 0, 4] / EA,
-        "shear_center_y": arm[:, 1],
-        "shear_center_z": -arm[:, 0],
-    }
-
-
-def axes_along(beam: Any, x: Array) -> tuple[Array, Array]:
-    """Return (r, T) in the frame: position of the axis (m), (n, 3), and the section axes as columns, (n, 3, 3)."""
-    coned = Rotation.from_euler("Y", -beam.precone)
-    line = beam.reference_line
-    if line is not None:
-        position, (chi, zeta) = line.at(x)[0], line.angles(x)
-    else:
-        chi = zeta = np.zeros(len(x))
-        position = x[:, None] * np.eye(3)[0]
-    turned = Rotation.from_euler("ZYX", np.column_stack([chi, -zeta, evaluate(beam.pretwist, x)]))
-    return np.array(beam.root_position) + coned.apply(position), (coned * turned).as_matrix()
-
-
-def columns_of(structure: Any, at: Array | None = None) -> dict[str, Array]:
-    """Return columns over `x` (m) of a beam, at places (m) or the rows of its tables; none of another structure.
-
-    Of a spatial beam `axis_1` … `axis_3` say where its axis runs in the frame (m), `t1_1` … `t3_3` are components of
-    the section axes there, `pretwist` is their angle (rad), and the rest is `central_properties`; of a planar beam they
-    are its section.
-    """
-    section = getattr(structure, "section", None)
-    if section is None:
-        return {}
-    if at is None:  # the rows, and places between them
-        ends = np.array([0.0, *structure.knots, structure.length])
-        steps = np.linspace(0.0, 1.0, BETWEEN, endpoint=False)
-        at = np.append((ends[:-1, None] + np.diff(ends)[:, None] * steps).ravel(), structure.length)
-    x = at
-    if structure.is_planar:
-        return {"x": x, **section.at(x)}
-    r, T = axes_along(structure, x)
-    matrices = section.at(x)
-    return {
-        "x": x,
-        **{f"axis_{i + 1}": r[:, i] for i in range(3)},
-        **{f"t{j + 1}_{i + 1}": T[:, i, j] for j in range(3) for i in range(3)},
-        "pretwist": evaluate(structure.pretwist, x),
-        **central_properties(matrices["stiffness"], matrices["mass"]),
-    }
 
 
 def doubts(columns: Mapping[str, Array]) -> list[str]:

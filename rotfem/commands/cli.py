@@ -3,28 +3,16 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from rotfem.commands.console import Session, missing
-from rotfem.commands.job import (
-    Debug,
-    Job,
-    Json,
-    NoPlots,
-    Quiet,
-    SceneFile,
-    app,
-    as_path,
-    command,
-    folder_option,
-    listed,
-    speeds_of,
-)
-from rotfem.errors import input_of
+from rotfem.commands.job import Debug, Job, Json, NoPlots, Quiet, SceneFile, app, as_path, command, folder_option
+from rotfem.errors import SceneError, input_of
+from rotfem.units import split_unit
 
 if TYPE_CHECKING:
     from rotfem.commands.result_folder import Writer
@@ -335,6 +323,30 @@ def compare(
         if tolerance is not None and not result.summary["worst"] <= tolerance:
             session.say([f"farther apart than {tolerance:g}"])
             raise SystemExit(1)  # as diff(1) has it
+
+
+def listed(option: str, text: str | None, kind: Callable[[str], Any]) -> list[Any] | None:
+    """Return the values of an option such as "2,3"; None where it is not given."""
+    if text is None:
+        return None
+    try:
+        return [kind(part.strip()) for part in text.split(",")]
+    except ValueError:
+        what = "integers" if kind is int else "numbers"
+        raise SceneError("command line", option, text, f"must be {what} separated by commas") from None
+
+
+def speeds_of(option: str, text: str, number: int) -> list[float]:
+    """Return so many speeds (rad/s) of an option such as "6.9:12.1rpm"."""
+    try:
+        numbers, unit = split_unit(text)
+        speeds = [float(part) * unit for part in numbers.split(":")]
+        if len(speeds) == number:
+            return speeds
+    except ValueError:
+        pass
+    allowed = {1: "a speed, rad/s or as 12.1rpm", 2: "two speeds low:high, rad/s or as 6.9:12.1rpm"}[number]
+    raise SceneError("command line", option, text, f"must be {allowed}")
 
 
 def main() -> None:

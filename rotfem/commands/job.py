@@ -15,7 +15,7 @@ import typer
 from rotfem.commands.console import Session, missing
 from rotfem.commands.interrupts import held_back
 from rotfem.errors import ComputationError, InputError, SceneError, Stopped
-from rotfem.units import seconds_of, split_unit
+from rotfem.units import seconds_of
 from rotfem.version import __version__
 
 if TYPE_CHECKING:
@@ -209,35 +209,8 @@ def command(
     return decorate
 
 
-# --- values of options --------------------------------------------------------------------------------------------
-
-
 def folder_name(scene: str) -> str:
     """Return the name of the folder of a scene's results: the scene's own, if that is the name of one."""
     if scene in ("", ".", ".."):
         raise SceneError("command line", "-o", None, f'must be given for a scene of the name "{scene}"')
     return scene
-
-
-def listed(option: str, text: str | None, kind: Callable[[str], Any]) -> list[Any] | None:
-    """Return the values of an option such as "2,3"; None where it is not given."""
-    if text is None:
-        return None
-    try:
-        return [kind(part.strip()) for part in text.split(",")]
-    except ValueError:
-        what = "integers" if kind is int else "numbers"
-        raise SceneError("command line", option, text, f"must be {what} separated by commas") from None
-
-
-def speeds_of(option: str, text: str, number: int) -> list[float]:
-    """Return so many speeds (rad/s) of an option such as "6.9:12.1rpm"."""
-    try:
-        numbers, unit = split_unit(text)
-        speeds = [float(part) * unit for part in numbers.split(":")]
-        if len(speeds) == number:
-            return speeds
-    except ValueError:
-        pass
-    allowed = {1: "a speed, rad/s or as 12.1rpm", 2: "two speeds low:high, rad/s or as 6.9:12.1rpm"}[number]
-    raise SceneError("command line", option, text, f"must be {allowed}")

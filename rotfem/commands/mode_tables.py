@@ -3,46 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from rotfem.analysis.modal import ModalAnalysis, Spinning, stability
+from rotfem.commands.fields import modes_writer, surface_of
 from rotfem.refinement.frequencies import FrequencyErrors
+from rotfem.results import ModesResult
 from rotfem.structures.mode_names import Wave, distinct, engineers_name
 
 Array = npt.NDArray[Any]
 
 
-@dataclass(frozen=True)
-class ModeTables:
-    """Rows and warnings of the modes at one speed.
-
-    Attributes:
-        spinning: equilibrium and the eigenpairs kept.
-        rows: one dictionary a mode (see `rotfem.ModesResult`), that of a rigid body first.
-        shapes: title ↦ columns along the structure (see `scaled_shape`).
-        scaled: eigenvectors of the owned unknowns, (n, modes), divided by `scales`.
-        warnings: of the model, and of instabilities.
-    """
-
-    spinning: Spinning
-    rows: list[dict[str, Any]]
-    shapes: dict[str, dict[str, Array]]
-    scaled: Array
-    warnings: list[str]
-
-
-def mode_tables(analysis: ModalAnalysis, speed: float, count: int, *, keep: bool = True) -> ModeTables:
-    """Return the first modes at a speed.
+def mode_tables(
+    analysis: ModalAnalysis, speed: float, count: int, *, keep: bool = True, formats: tuple[str, ...] = ()
+) -> ModesResult:
+    """Return the first modes at a speed, with warnings of the model and of instabilities.
 
     Args:
         analysis: compiled problem.
         speed: rad/s.
         count: number of modes, that of a rigid body among them.
         keep: whether the matrices must outlast another solution.
+        formats: of the files for ParaView that are wanted.
 
     Raises:
         ComputationError: no equilibrium, or eigenpairs that fail the check of their backward error.
@@ -63,7 +48,17 @@ def mode_tables(analysis: ModalAnalysis, speed: float, count: int, *, keep: bool
         first: dict[str, Any] = dict.fromkeys(rows[0] if rows else (), 0.0)
         named = dict.fromkeys(("label", "name"), "rigid body")
         rows = [{**first, "mode": 1, **named, "stability": "neutral", "share_hub": 1.0}, *rows]
-    return ModeTables(spinning, rows, shapes, scaled, warnings)
+    structure = analysis.structure
+    summary = {
+        **{"command": "modes", "status": "done", "theory": analysis.problem.theory.name, "speed": speed},
+        **{"effects": list(analysis.model.effects), "modes": rows, "shapes": {"length": structure.length}},
+        "warnings": warnings,
+    }
+    out = ModesResult(summary, rows, shapes, triangles=structure.surface(), analysis=analysis, spinning=spinning)
+    if shapes:
+        out.surface = surface_of(structure, next(iter(shapes.values())))
+        out.fields = modes_writer(analysis, out, scaled, formats)
+    return out
 
 
 def mode_rows(

@@ -21,7 +21,6 @@ from rotfem.analysis.theory_error import TheoryCheck, TheoryError
 from rotfem.commands.accuracy import changes_of, first_setting, refuse, to_accuracy, within_tolerance
 from rotfem.commands.advice import advise
 from rotfem.commands.error_report import error_of_modes
-from rotfem.commands.fields import modes_writer, surface_of
 from rotfem.commands.loads import frozen_inputs
 from rotfem.commands.mode_tables import mode_tables
 from rotfem.commands.monitor import check_rows
@@ -116,7 +115,7 @@ def _modes(scene: Scene, problem: ProblemData, comm: MPI.Comm, sensitivities: bo
     analysis = analysis_of(scene, problem, comm)
     speed = problem.motion.final_speed(scene.time.end if scene.time is not None else 0.0)
     hints = hints_of(analysis, scene, "modes", hint, speed)
-    found = mode_tables(analysis, speed, scene.modes.count, keep=False)
+    found = mode_tables(analysis, speed, scene.modes.count, keep=False, formats=scene.output.fields)
     check_rows(found.rows)
     spinning = found.spinning
     stability, off = stability_of_pencil(spinning.pencil, spinning.clamped), theory_error(analysis, spinning)
@@ -126,34 +125,21 @@ def _modes(scene: Scene, problem: ProblemData, comm: MPI.Comm, sensitivities: bo
     if stability.stable is None or stability.held_by_spin or stability.growth > max(known, 0.0):
         warnings.append(stability.warning())
     warnings += [off.warning()] if off and off.warning() else []
-    result = {
-        **modal_summary("modes", analysis, scene, started),
+    found.summary = {
+        **modal_summary("modes", analysis, scene, started, off),
         "speed": speed,
         "stability": stability.summary(),
-        **({} if off is None else {"theory_error": off.summary()}),
         **({"error": error_of_modes(found.rows, off).summary()} if scene.output.error else {}),
-        "modes": found.rows,
-        "shapes": {"length": analysis.structure.length},
+        **{name: found.summary[name] for name in ("modes", "shapes")},
         "checks": self_checks(analysis, spinning),
         "warnings": warnings,
         "advice": hints,
     }
-    done = ModesResult(
-        result,
-        found.rows,
-        found.shapes,
-        triangles=analysis.structure.surface(),
-        analysis=analysis,
-        spinning=spinning,
-    )
-    if done.shapes:
-        done.surface = surface_of(analysis.structure, next(iter(done.shapes.values())))
-        done.fields = modes_writer(analysis, done, found.scaled, scene.output.fields)
     if sensitivities:
         from rotfem.analysis.sensitivity import sensitivities as derivatives
 
-        done.sensitivities = derivatives(analysis, spinning)
-    return done
+        found.sensitivities = derivatives(analysis, spinning)
+    return found
 
 
 def check_animated(scene: Scene, mode: int) -> None:

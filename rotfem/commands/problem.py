@@ -164,14 +164,7 @@ class Problem(ProblemData):
         problem = self.spinning() if speed != 0.0 else self
         analysis = ModalAnalysis(problem, about, comm=comm)
         analysis.check_count(count)
-        found = mode_tables(analysis, speed, count)
-        summary = {"command": "modes", "status": "done", "theory": self.theory.name, "speed": speed}
-        summary |= {"effects": list(analysis.model.effects), "modes": found.rows, "warnings": found.warnings}
-        summary["shapes"] = {"length": analysis.structure.length}
-        surface = analysis.structure.surface()
-        result = ModesResult(summary, found.rows, found.shapes, triangles=surface)
-        result.analysis, result.spinning = analysis, found.spinning
-        return result
+        return mode_tables(analysis, speed, count)
 
     def _speed(self, speed: float | str | None) -> float:
         return self.motion.final_speed(0.0) if speed is None else si(speed, "rad/s", "speed")

@@ -229,7 +229,7 @@ def result_of(
         if value is not None
     ]
     summary = {
-        **modal_summary("response", analysis, scene, started),
+        **modal_summary("response", analysis, scene, started, theory),
         "speed": spinning.speed,
         "stability": stability.summary(),
         "outputs": outputs,
@@ -240,7 +240,6 @@ def result_of(
         },
         "difference": {"median": usual, "largest": float(np.max(off)), "worst": float(np.max(worst))},
         "modes": modes[: scene.modes.count],
-        **({} if theory is None else {"theory_error": theory.summary()}),
         "warnings": list(dict.fromkeys(warnings)),
         "advice": [],
     }

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import rotfem
-from rotfem.commands.check import axes_along
+from rotfem.commands.fields import axes_along
 from tests import blade_decks as decks
 from tests import blade_main_decks as mains
 from tests.blade_main_decks import PRIMARY
