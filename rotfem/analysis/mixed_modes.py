@@ -142,14 +142,15 @@ class Resultants:
             W.scale(-1.0)
             rows.append(R)
             blocks.append(W)
-        zero = [_empty(W) for W in blocks]
-        grid = _bordered(_empty(M), rows, blocks)
+        zero, apart = [_empty(W) for W in blocks], [None for W in blocks]
+        factors = _bordered(_empty(M), rows, blocks)
+        of_mass, of_damping = (_bordered(A, apart, zero) for A in (M, C))
         stressed = None
         has_stress = system.prestressed if system.linear else bool(np.any(self._state.x.array))
         if self._stressed is not None and system.comm.allreduce(has_stress, op=MPI.LOR):
             stressed = fem_petsc.assemble_matrix(self._stressed, system.bcs, 0.0)
             stressed.assemble()
-        return Saddle(_diagonal(M, zero), _diagonal(C, zero), _bordered(rest, rows, blocks), grid, rest, stressed)
+        return Saddle(of_mass, of_damping, _bordered(rest, rows, blocks), factors, rest, stressed)
 
 
 def _empty(A: Any) -> Any:
@@ -159,24 +160,14 @@ def _empty(A: Any) -> Any:
     return out
 
 
-def _joined(grid: list[list[Any]]) -> Any:
-    out = PETSc.Mat().createNest(grid, comm=grid[0][0].comm)
-    out.assemble()
-    return out.convert("aij")
-
-
-def _diagonal(first: Any, others: list[Any]) -> Any:
-    """Return a block-diagonal matrix."""
-    blocks = [first, *others]
-    return _joined([[A if i == j else None for j in range(len(blocks))] for i, A in enumerate(blocks)])
-
-
 def _bordered(corner: Any, rows: list[Any], blocks: list[Any]) -> Any:
-    """Return [[corner, R₁ᵀ, …], [R₁, W₁], …]."""
-    grid = [[corner, *(R.transpose(PETSc.Mat()) for R in rows)]]
+    """Return [[corner, R₁ᵀ, …], [R₁, W₁], …]; without rows that are None."""
+    grid = [[corner, *(None if R is None else R.transpose(PETSc.Mat()) for R in rows)]]
     for i, (R, W) in enumerate(zip(rows, blocks, strict=True)):
         grid.append([R, *(W if i == j else None for j in range(len(rows)))])
-    return _joined(grid)
+    out = PETSc.Mat().createNest(grid, comm=corner.comm)
+    out.assemble()
+    return out.convert("aij")
 
 
 class KeptDigits:
