@@ -2,7 +2,7 @@
 
 A linear theory without stress stiffness lacks a term of first order, a nonlinear one of moderate rotations terms whose
 effect grows with the time: what either does to an answer is its difference to that of the theory which has them
-(`rotfem.mechanics.theories.compared`), over a history by a companion (see `rotfem.refinement.discretisation`).
+(`rotfem.mechanics.theories.compared`), over a history by a companion (see `rotfem.refinement.companion`).
 
 What a linear theory with stress stiffness lacks is of second order, and estimated at a state. Its strains Γ and those
 Γ_e of the exact theory differ by ΔΓ. In the exact equations

@@ -22,7 +22,7 @@ from rotfem.errors import ComputationError, InputError
 from rotfem.mechanics.problem import Problem
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import on_other_mesh
-from rotfem.refinement.discretisation import HistoryErrors, richer_problem
+from rotfem.refinement.companion import HistoryErrors, richer_problem
 from rotfem.refinement.distance import COLUMNS, OUTPUTS, Output, largest, tip
 from rotfem.refinement.estimate import NOTICED, ErrorEstimate, percent
 from rotfem.refinement.frequencies import phase_drift

@@ -32,7 +32,7 @@ from rotfem.listeners import Hint, silent
 from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.discretisation import richer_problem
+from rotfem.refinement.companion import richer_problem
 from rotfem.refinement.frequencies import FrequencyErrors
 from rotfem.refinement.refine import Clock, Setting
 from rotfem.results import ModesResult

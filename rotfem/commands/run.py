@@ -45,7 +45,7 @@ from rotfem.mechanics.effects import Work
 from rotfem.mechanics.problem import Functional
 from rotfem.mechanics.problem import Problem as ProblemData
 from rotfem.numerics.newton import Newton
-from rotfem.refinement.discretisation import HistoryErrors, richer_problem
+from rotfem.refinement.companion import HistoryErrors, richer_problem
 from rotfem.refinement.distance import OUTPUTS
 from rotfem.refinement.refine import Clock, Setting
 from rotfem.results.run import RunResult, figures

@@ -1,6 +1,6 @@
 """What every effect and every theory changes: answers with one less, or another theory, against the scene's own.
 
-A history is marched once, with the companions that know its error (`rotfem.refinement.discretisation`). Then the own
+A history is marched once, with the companions that know its error (`rotfem.refinement.companion`). Then the own
 model is marched on half the cells in steps as long as that error allows, followed by one companion for every model that
 differs by one effect or by the theory. So the two have mesh, steps and their errors in common, and what is between them
 is the change by the model,
@@ -33,8 +33,7 @@ from rotfem.mechanics.problem import Problem
 from rotfem.mechanics.theories import theories
 from rotfem.numerics.newton import Newton
 from rotfem.refinement.coarser import OtherMesh, on_other_mesh
-from rotfem.refinement.companion import Companion
-from rotfem.refinement.discretisation import CERTAIN, HistoryErrors, Start
+from rotfem.refinement.companion import CERTAIN, Companion, HistoryErrors, Start
 from rotfem.refinement.distance import distance, distance_each, largest, tip
 from rotfem.refinement.estimate import ASYMPTOTIC, error_of
 

@@ -1,6 +1,6 @@
 """Refinement to an accuracy: from a coarse answer on, every contribution to its error by its order.
 
-An answer knows its error as the difference of two computed ones (`rotfem.refinement.discretisation`). With e the
+An answer knows its error as the difference of two computed ones (`rotfem.refinement.companion`). With e the
 contribution of steps or mesh and s what it may be, the next answer has
 
     tolerance' = tolerance · s/e,    n' = n (e/s)^{1/(k + 1)},
