@@ -13,9 +13,10 @@ import numpy.typing as npt
 from rotfem.analysis.equilibrium import steady_state
 from rotfem.analysis.reduced.response import Response, reduced_response
 from rotfem.analysis.schemes import State
-from rotfem.analysis.stability import Stability, stability_of
-from rotfem.analysis.theory_error import RESOLVED, Farthest, TheoryCheck, TheoryError
+from rotfem.analysis.stability import stability_of
+from rotfem.analysis.theory_error import RESOLVED, TheoryCheck, TheoryError
 from rotfem.commands.first_state import Start
+from rotfem.commands.monitor import Monitor
 from rotfem.commands.recorder import accuracy_of
 from rotfem.equations.compiled import compile_system
 from rotfem.errors import ComputationError, InputError
@@ -40,12 +41,10 @@ class RunErrors:
 
     Attributes:
         scene: what was run.
-        problem: its problem.
-        system: that of it.
+        system: of its problem.
         history: columns of its rows.
         wanted: whether errors are to be estimated.
-        farthest: largest state.
-        stability: of the equilibrium; None without one.
+        monitor: what has seen its states.
         shape: the equilibrium, a local dof array; None of a history.
         reduced: a reduced model's history; None of others.
         companions: of a march; None without them.
@@ -54,17 +53,21 @@ class RunErrors:
     """
 
     scene: Scene
-    problem: Problem
     system: Any
     history: Mapping[str, Array]
     wanted: bool
-    farthest: Farthest
-    stability: Stability | None
+    monitor: Monitor
     shape: Array | None
     reduced: Response | None
     companions: HistoryErrors | None
     stepper: Any
     start: Callable[[Any], Start]
+
+    @property
+    def problem(self) -> Problem:
+        """What was computed."""
+        problem: Problem = self.system.model.problem
+        return problem
 
     @property
     def _scale(self) -> float:
@@ -114,7 +117,7 @@ class RunErrors:
         from_rest = self.scene.time is not None and initial.state == "undeformed" and initial.first is None
         richer = richer_problem(self.problem)
         if richer is None:
-            return self._drifting(self.farthest.error(self.system, tips, from_rest))
+            return self._drifting(self.monitor.farthest.error(self.system, tips, from_rest))
         try:
             found = self._apart(richer) if self.wanted else None
         except (ComputationError, InputError):
@@ -125,7 +128,7 @@ class RunErrors:
         if self.shape is not None and self._buckles(system):
             why = "it is above a buckling load that this theory does not have"
             return TheoryError(1.0, why, self.problem.theory.name)
-        base = self.farthest.error(system, tips, from_rest)
+        base = self.monitor.farthest.error(system, tips, from_rest)
         if base is None:
             return None
         sizes = tips[moves]
@@ -210,7 +213,7 @@ class RunErrors:
     def _buckles(self, system: Any) -> bool:
         """Return whether a richer theory has no stable equilibrium where the run's is stable; its state is set."""
         there = stability_of(system, system.held.q.x.array.copy(), self.problem.motion.speed(0.0))
-        return there.stable is False and self.stability is not None and self.stability.stable is True
+        return there.stable is False and self.monitor.stability is not None and self.monitor.stability.stable is True
 
     def warnings(self, error: ErrorEstimate) -> list[str]:
         """Return what is to be known of an error; nothing where it is small, asked for, or reported already."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
 from mpi4py import MPI
@@ -78,6 +78,12 @@ def shared_out(items: Sequence[Item], work: Callable[[Item], Found], comm: MPI.C
     except (ComputationError, InputError) as error:
         problem = error
     parts = comm.allgather((done, problem))
-    if (problem := next((p for _, p in parts if p is not None), None)) is not None:
-        raise problem
+    raise_first(problem for _, problem in parts)
     return [found for part, _ in parts for found in part]
+
+
+def raise_first(problems: Iterable[Exception | None]) -> None:
+    """Raise the first problem that one of the ranks has; nothing where none has one."""
+    for problem in problems:
+        if problem is not None:
+            raise problem

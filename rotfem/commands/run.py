@@ -243,7 +243,7 @@ class Simulation:
                 f"no longer definite, since t = {watched.since:.4g} s"
             )
         errors = RunErrors(
-            *(self.scene, self.problem, self.system, history, self._wants_error, watched.farthest, watched.stability),
+            *(self.scene, self.system, history, self._wants_error, watched),
             *(self.shape, self.reduced, self.companions, self.stepper, self._start),
         )
         theory, lost = errors.theory, said_of(watched.farthest.conditioning() or 0.0)

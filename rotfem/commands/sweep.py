@@ -29,6 +29,7 @@ from mpi4py import MPI
 from rotfem.commands.console import ALONE
 from rotfem.commands.cost.bench import fingerprint
 from rotfem.commands.job import app
+from rotfem.commands.processes import raise_first
 from rotfem.errors import ComputationError, InputError, OutputError
 from rotfem.listeners import Progress
 from rotfem.results.result_set import FolderLock, ResultSet, holder, read_summary
@@ -187,8 +188,7 @@ def sweep(
             work(points, scene, verb, progress)
     except OutputError as error:
         problem = error
-    if (problem := next((p for p in comm.allgather(problem) if p is not None), None)) is not None:
-        raise problem
+    raise_first(comm.allgather(problem))
     swept = {key: list(values) for key, values in keys.items() if len(values) > 1}
     rows = comm.bcast([row_of(point, swept) for point in points] if comm.rank == 0 else None)
     reasons = [row["reason"] for row in rows if row["status"] != "done"]

@@ -31,6 +31,8 @@ def writing(path: Path) -> Iterator[None]:
     """Turn an OSError into an OutputError that names the file or folder that is written."""
     try:
         yield
+    except OutputError:
+        raise
     except OSError as error:
         raise OutputError(path, error.strerror or str(error).partition("\n")[0]) from None
 
@@ -136,17 +138,15 @@ def write_whole(path: Path, *content: bytes, durable: bool = False) -> Path:
                 if durable:
                     file.flush()
                     os.fsync(descriptor)
-            os.chmod(name, 0o666 & ~_umask())
+            os.umask(mask := os.umask(0))
+            os.chmod(name, 0o666 & ~mask)
             os.replace(name, path)
         except BaseException:
             os.unlink(name)
             raise
         if durable:
-            folder = os.open(path.parent, os.O_RDONLY)
-            try:
+            with opened(path.parent, os.O_RDONLY) as folder:
                 os.fsync(folder)
-            finally:
-                os.close(folder)
     return path
 
 
@@ -158,16 +158,17 @@ def overwrite(path: Path, text: str) -> None:
     Raises:
         OSError: it cannot be written.
     """
-    descriptor = os.open(path, os.O_WRONLY | os.O_NOFOLLOW)
-    try:
+    with opened(path, os.O_WRONLY) as descriptor:
         room, content = os.fstat(descriptor).st_size, text.encode()
         if len(content) <= room:
             os.pwrite(descriptor, content.ljust(room), 0)
+
+
+@contextmanager
+def opened(path: Path, flags: int) -> Iterator[int]:
+    """Open a file or folder that is no symbolic link; give its descriptor."""
+    descriptor = os.open(path, flags | os.O_NOFOLLOW, 0o666)
+    try:
+        yield descriptor
     finally:
         os.close(descriptor)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

@@ -30,6 +30,7 @@ from rotfem.results.files import (
     CHECKPOINT_MAGIC,
     PART,
     json_text,
+    opened,
     overwrite,
     prepare_folder,
     read_csv,
@@ -112,17 +113,12 @@ class FolderLock:
 
 def holder(folder: Path) -> str:
     """Return which process holds the lock on a folder, in words; empty where none does. Nothing is changed."""
-    try:
-        descriptor = os.open(folder / NAME, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
-    except OSError:
-        return ""
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        return ""
-    except OSError:  # it is held, or the file system has no locks and whoever wrote the file may be there
-        return _named_in(descriptor)
-    finally:
-        os.close(descriptor)
+    with suppress(OSError), opened(folder / NAME, os.O_RDONLY) as descriptor:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except OSError:  # it is held, or the file system has no locks and whoever wrote the file may be there
+            return _named_in(descriptor)
+    return ""
 
 
 def _named_in(descriptor: int) -> str:

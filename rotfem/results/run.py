@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotfem.results.columns import ShortTable, by_unit, described, largest, named, number
-from rotfem.results.files import csv_text, line, write_text, writing
+from rotfem.results.files import csv_text, line, opened, write_text, writing
 from rotfem.results.result import Array, Result, Variables, dataset, frame, nodes_of
 from rotfem.short import short_fields
 
@@ -288,12 +288,9 @@ class LiveTable:
         if not data:
             return True
         try:
-            descriptor = os.open(self.path, os.O_WRONLY | os.O_NOFOLLOW)
-            try:
+            with opened(self.path, os.O_WRONLY) as descriptor:
                 whole = data[: os.pwrite(descriptor, data, self._size)].rfind(b"\n") + 1
                 os.ftruncate(descriptor, self._size + whole)  # no line is left torn
-            finally:
-                os.close(descriptor)
         except OSError:
             return False
         self._size, self.rows = self._size + whole, self.rows + data.count(b"\n", 0, whole)

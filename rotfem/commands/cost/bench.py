@@ -30,6 +30,7 @@ from rotfem.commands.run_store import RunStore
 from rotfem.errors import ComputationError, InputError, OutputError, input_of
 from rotfem.refinement.distance import COLUMNS
 from rotfem.refinement.refine import Clock, Setting, TooDear, cpu_time
+from rotfem.results.files import opened, writing
 from rotfem.scene import Scene
 from rotfem.version import __version__
 
@@ -242,16 +243,14 @@ class Record:
         self.found: dict[str, Measurement] = {}
         if path is None:
             return
-        try:
+        with writing(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
             if text and not text.startswith('{"study": '):
-                raise FileExistsError(0, "it is there already, and no record of measurements")
+                raise OutputError(path, "it is there already, and no record of measurements")
             if fresh:
                 path.unlink(missing_ok=True)
                 text = ""
-        except OSError as error:
-            raise OutputError(path, error.strerror or str(error)) from None
         if text and not text.endswith("\n"):  # a start that died in the middle of a line
             self._append("\n")
         for line in text.splitlines():
@@ -276,15 +275,9 @@ class Record:
     def _append(self, text: str) -> None:
         if self.path is None:
             return
-        try:
-            descriptor = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW, 0o666)
-            try:
-                os.write(descriptor, text.encode())
-                os.fsync(descriptor)
-            finally:
-                os.close(descriptor)
-        except OSError as error:
-            raise OutputError(self.path, error.strerror or str(error)) from None
+        with writing(self.path), opened(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT) as descriptor:
+            os.write(descriptor, text.encode())
+            os.fsync(descriptor)
 
 
 # --- memory ----------------------------------------------------------------------------------------------------------
