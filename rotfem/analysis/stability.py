@@ -173,7 +173,10 @@ def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Sta
             frequency = float(fastest.imag) if fastest.imag > SAME * abs(fastest) else 0.0
         if negative is None:
             return Stability(None, growth, frequency, lost=lost)
-        if _counted(pencil, pairs, held) >= negative:
+        growing, swinging = _counted(pencil, pairs, held)
+        if swinging >= negative:  # they leave none to what grows
+            return Stability(negative)
+        if growing + swinging >= negative:
             return Stability(negative, growth, frequency, lost=lost)
         if count >= 64 or count >= pencil.K.getSize()[0]:
             # A negative eigenvalue that makes nothing grow, and that nothing holds, is one of round-off.
@@ -181,8 +184,8 @@ def by_motions(pencil: Pencil, negative: int | None, target: float = 0.0) -> Sta
         count *= 2
 
 
-def _counted(pencil: Pencil, pairs: Eigenpairs, held: bool) -> int:
-    """Return for how many negative eigenvalues of K eigenpairs have been found that come of them.
+def _counted(pencil: Pencil, pairs: Eigenpairs, held: bool) -> tuple[int, int]:
+    """Return (k_r + 2 k_c, 2 k_i): for how many negative eigenvalues of K eigenpairs have been found that come of them.
 
     Args:
         pencil: M, C, K.
@@ -192,11 +195,11 @@ def _counted(pencil: Pencil, pairs: Eigenpairs, held: bool) -> int:
     values = pairs.values
     real = values.imag <= SAME * np.abs(values)
     grows = values.real > GROWTH * np.abs(values)
-    found = int(np.sum(grows & real)) + 2 * int(np.sum(grows & ~real))
+    growing = int(np.sum(grows & real)) + 2 * int(np.sum(grows & ~real))
     if not (held and pencil.conservative):
-        return found
+        return growing, 0
     swings = ~real & (np.abs(values.real) <= GROWTH * np.abs(values))
-    return found + 2 * int(np.sum(_energies(pencil, pairs)[swings] < 0.0))
+    return growing, 2 * int(np.sum(_energies(pencil, pairs)[swings] < 0.0))
 
 
 def _energies(pencil: Pencil, pairs: Eigenpairs) -> Array:

@@ -51,7 +51,7 @@ def quadratic(m: Array, c: Array, k: Array, target: float) -> tuple[Array, Array
     do not spoil them; with K on the right they would set the size of the error for all.
 
     Raises:
-        ComputationError: the stiffness matrix is singular.
+        ComputationError: the stiffness, or with a target its sum with damping, is singular.
     """
     n = len(k)
     unit = np.sqrt(max(float(np.trace(k)) / max(float(np.trace(m)), TINY), TINY))
@@ -63,7 +63,8 @@ def quadratic(m: Array, c: Array, k: Array, target: float) -> tuple[Array, Array
         order = order[np.abs(nu[order]) > 0.0]
         x, y = right[n:, order], np.linalg.solve(shifted[0].conj().T, left[:n, order])
     except np.linalg.LinAlgError:  # of a matrix or of its transpose: round-off may tell them apart
-        raise ComputationError("the stiffness matrix is singular", advice="a slightly different speed") from None
+        what = "the stiffness matrix is singular" if target == 0.0 else "the matrices are singular to round-off"
+        raise ComputationError(what, advice="a slightly different speed") from None
     # A vector that is too small for numbers stays zero: it has no mass, and is none.
     x, y = (vectors / np.maximum(np.linalg.norm(vectors, axis=0), TINY) for vectors in (x, y))
     return target + unit / nu[order], x, y

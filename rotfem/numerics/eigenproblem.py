@@ -96,7 +96,8 @@ class RoundOff:
         residual = values**2 * MX + values * CX + KX
         with np.errstate(divide="ignore", invalid="ignore"):
             step = -summed(p.comm, np.sum(left.conj() * residual, axis=0)) / n
-            values = np.where(np.abs(step) < 1e-4 * np.abs(values), values + step, values)  # larger: no eigenvectors
+            near = np.abs(step) < 1e-4 * np.abs(values)  # farther: no eigenvectors
+            values = np.where(near, values + step, values)
             residual = values**2 * MX + values * CX + KX
             inertia = np.abs(values) ** 2 * np.abs(MX) + np.abs(values) * np.abs(CX)
             size = np.abs(n * values)
@@ -104,8 +105,8 @@ class RoundOff:
             rounded = (
                 self.stiffness(left, right) + summed(p.comm, np.sum(np.abs(left) * ROUNDED * inertia, axis=0))
             ) / size
-            # Of the residual's part at most ten times its square is left, of isolated modes.
-            first_order = rounded + solved * np.minimum(1.0, 10.0 * solved / isolation(values))
+            # Of the residual's part, where it is taken off, at most ten times its square is left of isolated modes.
+            first_order = rounded + solved * np.where(near, np.minimum(1.0, 10.0 * solved / isolation(values)), 1.0)
         return values, relative(np.where(np.isfinite(first_order), first_order, np.inf))
 
 
@@ -341,8 +342,8 @@ class Pencil(Sendable):
         else:
             M, C, K = (transposed(A) for A in (self.M, self.C, self.K))
             left = matched(values, *self._right(M, C, K, count, target)[:2])
-        # Of ± pairs of real eigenvalues of a conservative pencil, the growing one determines both.
-        telling = (values.real >= 0.0) | (not self.conservative)
+        # Of ± pairs of real eigenvalues of a conservative pencil, the growing one determines both; zeros have any sign.
+        telling = (values.real >= 0.0) | (not self.conservative) | (np.abs(values) <= small)
         upper = (values.imag > 0.0) | ((values.imag == 0.0) & telling)
         pairs = self._checked(values[upper], (right[:, upper], left[:, upper]), errors[upper], small)
         return pairs.select(np.argsort(np.abs(pairs.values), kind="stable"))
